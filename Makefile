@@ -1,0 +1,52 @@
+# `make` lists the targets. Every target that needs the environment creates it first.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SWEEP := $(BIN)/sweep
+STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
+
+.DEFAULT_GOAL := help
+.PHONY: help setup test lint types imports check smoke bench clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+
+help:  ## list the targets
+	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
+	@echo "studies: $(STUDIES)"
+
+$(VENV)/ready: pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit("linksweep needs Python 3.11 or later") if sys.version_info < (3, 11) else None'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	@touch $@
+
+setup: $(VENV)/ready  ## create the environment in .venv
+
+test: $(VENV)/ready  ## run the tests
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/ready  ## ruff
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/ready  ## mypy --strict
+	$(BIN)/mypy
+
+imports: $(VENV)/ready  ## studies -> sweep -> kernels, never back
+	$(BIN)/lint-imports
+
+check: lint types imports test  ## what CI runs first
+
+smoke: $(STUDIES:%=smoke-%)  ## every study's tiny version
+
+study-%: $(VENV)/ready  ## run or resume one study, into results/<study>
+	$(SWEEP) run studies/$* --out results/$*/designs
+	$(SWEEP) report results/$*/designs --out results/$*
+
+smoke-%: $(VENV)/ready  ## the tiny version of one study, into results/smoke/<study>
+	$(SWEEP) run studies/$* --smoke --force --out results/smoke/$*/designs
+	$(SWEEP) report results/smoke/$*/designs --out results/smoke/$*
+
+bench: $(VENV)/ready  ## ns per sample against numpy and C, one run
+	$(BIN)/python -m tests.bench.kernels
+
+clean:  ## remove results and the environment
+	rm -rf results $(VENV)

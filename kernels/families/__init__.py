@@ -1,0 +1,1 @@
+"""One mechanism family per file; families never import each other."""

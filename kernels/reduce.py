@@ -1,0 +1,35 @@
+"""Maximum and minimum that LLVM can vectorise.
+
+``if v > m: m = v`` stays a scalar loop, even under fast-math, because LLVM must keep the order of comparisons with nan.
+``llvm.maxnum`` with the flags nnan and nsz on this one instruction is a plain ``vmaxpd``.  The flags promise that no
+operand is nan: the sweep loops clamp what goes under the square root, so none is, and they report the clamp through a
+status.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+_FLAGS = ("nnan", "nsz")
+
+
+def _float_intrinsic(name: str) -> Any:
+    @intrinsic
+    def function(typingctx: Any, a: Any, b: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            double = ir.DoubleType()
+            two_doubles = ir.FunctionType(double, [double, double])
+            llvm_function = builder.module.declare_intrinsic(name, [double], two_doubles)
+            return builder.call(llvm_function, args, fastmath=_FLAGS)
+
+        return types.float64(types.float64, types.float64), codegen
+
+    return function
+
+
+largest = _float_intrinsic("llvm.maxnum")
+smallest = _float_intrinsic("llvm.minnum")

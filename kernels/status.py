@@ -1,0 +1,33 @@
+"""What a status says.  Every kernel returns one; a nan never stands without a status that explains it.
+
+The numbers are part of the public contract: they are stored in every dataset.  Of several causes the one that made
+the result unusable first is reported.
+"""
+
+from __future__ import annotations
+
+OK = 0
+NOT_ASSEMBLED = 1
+DEAD_POINT = 2
+NOT_ROTATABLE = 3
+UNDECIDABLE = 4
+LIMIT_EXCEEDED = 5
+NOT_CONVERGED = 6
+INVALID_INPUT = 7
+SINGULAR = 8
+NOT_OSCILLATING = 9
+JAMMED = 10
+
+MEANING: dict[int, str] = {
+    OK: "ok",
+    NOT_ASSEMBLED: "the links do not reach at this pose (discriminant below zero)",
+    DEAD_POINT: "dead point: the discriminant is zero within float64, derivatives are unbounded",
+    NOT_ROTATABLE: "the crank does not turn fully (margin below zero)",
+    UNDECIDABLE: "whether the crank turns fully cannot be decided in float64 (margin zero within rounding)",
+    LIMIT_EXCEEDED: "a limit of the study is exceeded",
+    NOT_CONVERGED: "an iteration did not reach its tolerance",
+    INVALID_INPUT: "a parameter is not finite, a length is not positive, or their scale leaves float64",
+    SINGULAR: "the position is not defined (a joint lies on the axis it turns about)",
+    NOT_OSCILLATING: "the follower turns fully: it has no limit positions",
+    JAMMED: "friction blocks the motion, or its iteration does not contract",
+}

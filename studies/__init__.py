@@ -1,0 +1,1 @@
+"""Questions stated as data: one folder per study."""

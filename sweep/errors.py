@@ -1,0 +1,43 @@
+"""What linksweep raises on purpose: every message names the quantity, its value, what is allowed and the place."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+
+
+class LinksweepError(Exception):
+    """Base of all errors raised on purpose; ``exit_code`` is what the command line ends with."""
+
+    exit_code = 2
+
+
+class InputError(LinksweepError, ValueError):
+    """A table, a name or a number handed to the API is wrong.
+
+    Parameters
+    ----------
+    name : the quantity, as the user wrote it
+    value : what was found
+    allowed : what may stand there
+    place : where it stands (column and row, file and key)
+    """
+
+    def __init__(self, name: str, value: object, allowed: str, place: str) -> None:
+        self.name, self.value, self.allowed, self.place = name, value, allowed, place
+        super().__init__(f"{place}: {name} = {value!r}; allowed: {allowed}")
+
+
+class StudyError(LinksweepError, ValueError):
+    """A study file has faults; all of them are reported at once, each with its place."""
+
+    def __init__(self, path: str, faults: Sequence[str]) -> None:
+        self.path, self.faults = path, list(faults)
+        noun = "fault" if len(self.faults) == 1 else "faults"
+        super().__init__("\n".join([f"{path}: {len(self.faults)} {noun}", *(f"  {f}" for f in self.faults)]))
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string."""
+    matches = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    return f", did you mean '{matches[0]}'?" if matches else ""

@@ -1,0 +1,110 @@
+"""How a mechanism family presents itself to the sweep: its parameters, its outputs, its kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+Columns: TypeAlias = dict[str, NDArray[np.generic]]
+Unit = Literal["length", "angle", "ratio", "sign", "count", "none"]
+
+
+class Angles(NamedTuple):
+    """Input angles with their cosines and sines; each (n, m), or (1, m) when shared by all designs."""
+
+    phi: Array
+    cos: Array
+    sin: Array
+
+    @classmethod
+    def of(cls, phi: Array) -> Angles:
+        """Tabulate a plain array of angles of shape (n, m) or (1, m)."""
+        return cls(phi, np.cos(phi), np.sin(phi))
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One column of the design matrix."""
+
+    name: str
+    unit: Unit
+    text: str
+    positive: bool = False
+    default: float | None = None
+    choices: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Output:
+    """One quantity that can be wanted: unit in SI words ("rad", "length", "1"), definition, equation of its page."""
+
+    name: str
+    unit: str
+    text: str
+    equation: str = ""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How extrema over the turn are found: on a dense grid of ``samples``, or refined to relative error ``target``."""
+
+    samples: int | None = None
+    target: float | None = None
+
+
+PoseFunction: TypeAlias = Callable[[Array, Angles, frozenset[str]], Columns]
+StepFunction: TypeAlias = Callable[[Array, frozenset[str], Accuracy], Columns]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A family's own route to some design outputs: exact, or faster than the general reductions over sampled poses.
+
+    ``run(designs, wanted, accuracy)`` returns the wanted ones of ``provides`` and ``status``, each of shape (n,).
+    ``condition`` says for which accuracy it applies (a dense kernel does not serve ``accuracy=``).
+    """
+
+    name: str
+    provides: tuple[Output, ...]
+    run: StepFunction
+    ns_per_design: float
+    applies: Callable[[Accuracy], bool] = field(default=lambda accuracy: True)
+
+
+@dataclass(frozen=True)
+class Family:
+    """A mechanism family, or a chain of them, which looks the same from outside.
+
+    ``poses(designs, angles, wanted)`` takes the (n, P) matrix with the columns of ``parameters`` and returns the wanted
+    pose outputs and ``status``, each of shape (n, m).  ``position`` names the follower's coordinate, "psi" or "s"; its
+    derivatives with respect to phi are ``d<position>``, ``d2<position>``, ``d3<position>``.
+    """
+
+    name: str
+    title: str
+    parameters: tuple[Parameter, ...]
+    position: str
+    pose_outputs: tuple[Output, ...]
+    poses: PoseFunction
+    steps: tuple[Step, ...] = ()
+    derivative_of: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Column names of the design matrix in order."""
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def pose_names(self) -> tuple[str, ...]:
+        """Names of the pose outputs."""
+        return tuple(o.name for o in self.pose_outputs)
+
+
+def optional_outputs(names: tuple[str, ...], wanted: frozenset[str], shape: tuple[int, ...]) -> list[Array | None]:
+    """An empty array for each wanted name and None for the others, in the order of a kernel's out arguments."""
+    return [np.empty(shape) if name in wanted else None for name in names]

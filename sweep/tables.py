@@ -1,0 +1,92 @@
+"""From a user's table to a checked design matrix: every fault names column, row and the nearest right name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from sweep.errors import InputError, nearest
+from sweep.families.base import Array, Family, Parameter
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    Table: TypeAlias = pd.DataFrame | Mapping[str, Any]
+
+
+def design_matrix(family: Family, table: Table, extra: Sequence[str] = ()) -> tuple[Array, dict[str, Array]]:
+    """Check a table and lay its parameters out as the (n, P) matrix the kernels take.
+
+    Parameters
+    ----------
+    family : whose parameters are expected
+    table : DataFrame or mapping of equally long columns (scalars are repeated); missing columns take the default
+    extra : further columns that may stand in the table (``phi``); returned separately if present
+
+    Raises
+    ------
+    InputError
+        for a missing or misspelt column, a value that is no number, a nan or infinity, a length that is not positive.
+    """
+    known = [*family.parameter_names, *extra]
+    names = [str(name) for name in table]
+    for name in names:
+        missing = [k for k in known if k not in names]
+        if name not in known and nearest(name, missing):
+            raise InputError("column", name, f"the columns {', '.join(known)}{nearest(name, missing)}", "table")
+    rows = _row_count(table, [n for n in names if n in known])
+    matrix = np.empty((rows, len(family.parameters)))
+    for k, parameter in enumerate(family.parameters):
+        matrix[:, k] = _parameter_column(family, parameter, table, names, rows)
+    extras = {name: np.broadcast_to(_numbers(table[name], name), rows) for name in extra if name in names}
+    for name, values in extras.items():
+        _refuse(~np.isfinite(values), values, name, "a finite number")
+    return matrix, extras
+
+
+def _parameter_column(family: Family, p: Parameter, table: Table, names: list[str], rows: int) -> Array:
+    if p.name not in names:
+        if p.default is not None:
+            return np.full(rows, p.default)
+        guess = nearest(p.name, [n for n in names if n not in family.parameter_names])
+        present = ", ".join(names) or "none"
+        raise InputError("column", p.name, f"a column of that name; found {present}{guess}", f"table of {family.name}")
+    values = np.broadcast_to(_numbers(table[p.name], p.name), rows)
+    _refuse(~np.isfinite(values), values, p.name, "a finite number")
+    if p.positive:
+        _refuse(values <= 0.0, values, p.name, f"a positive {p.unit}")
+    if p.choices is not None:
+        allowed = " or ".join(f"{choice:+g}" for choice in p.choices)
+        _refuse(~np.isin(values, p.choices), values, p.name, allowed)
+    return values
+
+
+def _row_count(table: Table, names: list[str]) -> int:
+    lengths = {name: np.size(np.asarray(table[name])) for name in names if np.ndim(np.asarray(table[name])) > 0}
+    if not lengths:
+        return 1
+    first, rows = next(iter(lengths.items()))
+    for name, length in lengths.items():
+        if length != rows:
+            raise InputError(name, f"{length} rows", f"as many rows as column {first}, {rows}", f"column {name}")
+    return rows
+
+
+def _numbers(values: object, name: str) -> Array:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        for row, value in enumerate(np.atleast_1d(np.asarray(values, dtype=object))):
+            try:
+                float(value)
+            except (TypeError, ValueError):
+                raise InputError(name, value, "a number", f"column {name}, row {row}") from None
+        raise
+
+
+def _refuse(bad: np.ndarray[Any, np.dtype[np.bool_]], values: Array, name: str, allowed: str) -> None:
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InputError(name, float(values[row]), allowed, f"column {name}, row {row}")
