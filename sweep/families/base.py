@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = dict[str, NDArray[np.generic]]
@@ -82,7 +82,8 @@ class Family:
 
     ``poses(designs, angles, wanted)`` takes the (n, P) matrix with the columns of ``parameters`` and returns the wanted
     pose outputs and ``status``, each of shape (n, m).  ``position`` names the follower's coordinate, "psi" or "s"; its
-    derivatives with respect to phi are ``d<position>``, ``d2<position>``, ``d3<position>``.
+    derivatives with respect to phi are ``d<position>``, ``d2<position>``, ``d3<position>``.  A family whose poses need
+    no more than cos(phi) and sin(phi) says ``uses_phi=False``; in a chain that saves an arctangent per pose.
     """
 
     name: str
@@ -93,6 +94,7 @@ class Family:
     poses: PoseFunction
     steps: tuple[Step, ...] = ()
     derivative_of: Mapping[str, str] = field(default_factory=dict)
+    uses_phi: bool = True
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -105,6 +107,11 @@ class Family:
         return tuple(o.name for o in self.pose_outputs)
 
 
-def optional_outputs(names: tuple[str, ...], wanted: frozenset[str], shape: tuple[int, ...]) -> list[Array | None]:
-    """An empty array for each wanted name and None for the others, in the order of a kernel's out arguments."""
-    return [np.empty(shape) if name in wanted else None for name in names]
+def optional_outputs(
+    names: tuple[str, ...], wanted: frozenset[str], shape: tuple[int, ...], dtype: DTypeLike = np.float64
+) -> list[Array | None]:
+    """An empty array for each wanted name and None for the others, in the order of a kernel's out arguments.
+
+    ``dtype`` is complex128 where the designs or angles are (exact gradients by the complex step).
+    """
+    return [np.empty(shape, dtype) if name in wanted else None for name in names]
