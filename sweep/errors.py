@@ -37,6 +37,32 @@ class StudyError(LinksweepError, ValueError):
         super().__init__("\n".join([f"{path}: {len(self.faults)} {noun}", *(f"  {f}" for f in self.faults)]))
 
 
+class StoreError(LinksweepError):
+    """The dataset cannot be read or written: disk full, no permission, a damaged file."""
+
+    exit_code = 74
+
+
+class LockedError(LinksweepError):
+    """Another run is writing to the same folder."""
+
+    exit_code = 75
+
+
+class WorkerDied(LinksweepError):
+    """A worker process was killed (out of memory, a crash); finished chunks are kept."""
+
+    exit_code = 70
+
+
+class Interrupted(LinksweepError):
+    """A signal stopped the run; finished chunks are kept and the next run continues with the missing ones."""
+
+    def __init__(self, signal_number: int, message: str) -> None:
+        super().__init__(message)
+        self.exit_code = 128 + signal_number
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string."""
     matches = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
