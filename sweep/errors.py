@@ -37,6 +37,12 @@ class StudyError(LinksweepError, ValueError):
         super().__init__("\n".join([f"{path}: {len(self.faults)} {noun}", *(f"  {f}" for f in self.faults)]))
 
 
+class BudgetError(LinksweepError):
+    """A study would cost more time or disk than its budget allows; it can be forced."""
+
+    exit_code = 3
+
+
 class StoreError(LinksweepError):
     """The dataset cannot be read or written: disk full, no permission, a damaged file."""
 
@@ -65,5 +71,8 @@ class Interrupted(LinksweepError):
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string."""
-    matches = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    choices = list(known)
+    # Case first: among e1, f1, g1 the letters of E1 say nothing.
+    matches = [k for k in choices if k.casefold() == word.casefold()]
+    matches = matches or difflib.get_close_matches(word, choices, n=1, cutoff=0.5)
     return f", did you mean '{matches[0]}'?" if matches else ""
