@@ -58,3 +58,26 @@ def _magnitude_typed(x: Any) -> Any:
     if isinstance(x, types.Complex):
         return _magnitude_complex
     return _magnitude_real
+
+
+def hypotenuse(x: Any, y: Any) -> Any:
+    """Length of the vector (x, y); for complex arguments continued to first order in their imaginary parts."""
+    if isinstance(x, complex) or isinstance(y, complex):
+        return _hypotenuse_complex(x, y)
+    return _hypotenuse_real(x, y)
+
+
+def _hypotenuse_real(x: Any, y: Any) -> Any:
+    return math.hypot(x, y)
+
+
+def _hypotenuse_complex(x: Any, y: Any) -> Any:
+    length = math.hypot(x.real, y.real)
+    return complex(length, (x.real * x.imag + y.real * y.imag) / length)
+
+
+@overload(hypotenuse)
+def _hypotenuse_typed(x: Any, y: Any) -> Any:
+    if isinstance(x, types.Complex) or isinstance(y, types.Complex):
+        return _hypotenuse_complex
+    return _hypotenuse_real

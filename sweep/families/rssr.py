@@ -27,6 +27,12 @@ POSE_OUTPUTS = (
     Output("cos_psi", "1", "cosine of the rocker angle", "(2*)"),
     Output("discriminant", "length^4", "A1^2 + A2^2 - A3^2; the links reach where it is not negative", "(2)"),
     Output("pressure_angle", "rad", "between the coupler force and the velocity of its joint on the rocker", "(13)"),
+    Output("x_b", "length", "crank pin, along the common perpendicular of the axes", "section 1"),
+    Output("y_b", "length", "crank pin, across it and the rocker axis", "section 1"),
+    Output("z_b", "length", "crank pin, along the rocker axis", "section 1"),
+    Output("x_c", "length", "rocker ball, along the common perpendicular of the axes", "section 1"),
+    Output("y_c", "length", "rocker ball, across it and the rocker axis", "section 1"),
+    Output("z_c", "length", "rocker ball, along the rocker axis", "section 1"),
 )
 
 _POSE_NAMES = tuple(o.name for o in POSE_OUTPUTS)
@@ -36,7 +42,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     shape = (designs.shape[0], angles.cos.shape[1])
     status = np.empty(shape, np.uint8)
-    outputs = optional_outputs(_POSE_NAMES, wanted, shape)
+    outputs = optional_outputs(_POSE_NAMES, wanted, shape, np.result_type(designs, angles.cos))
     rssr.poses(designs, angles.cos, angles.sin, status, *outputs)
     columns: Columns = {name: out for name, out in zip(_POSE_NAMES, outputs, strict=True) if out is not None}
     return columns | {"status": status}
@@ -50,4 +56,5 @@ FAMILY = Family(
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
+    uses_phi=False,
 )

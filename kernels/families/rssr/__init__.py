@@ -1,0 +1,9 @@
+"""Spatial crank-rocker with two revolute and two ball joints (RSSR); planar four-bar for alpha = 0, f = g.
+
+``closure`` reduces a design to its constants, ``motion`` evaluates poses, ``dense`` sweeps a grid of crank angles,
+``margin`` decides rotatability, ``limits`` finds the limit positions and ``maxima`` the true maxima over the turn.
+"""
+
+from kernels.families.rssr.closure import Design as Design
+from kernels.families.rssr.dense import dense_maxima as dense_maxima
+from kernels.families.rssr.motion import poses as poses

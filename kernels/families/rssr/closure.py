@@ -1,0 +1,96 @@
+"""One design of the spatial crank-rocker brought to its smallest set of numbers, and how well they are known.
+
+Polukhin 1971, chapter II, in the corrected and stable forms of docs/rssr.md; the equation numbers are of that page.
+Everything is computed in units of the crank length, mirrored to the assembly mode +1 (psi, f -> -psi, -f together with
+cos(alpha) -> -cos(alpha) in the axial product turns mode -1 into +1 and changes no bit of any magnitude).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels._jit import inline
+
+Array: TypeAlias = NDArray[np.float64]
+Numbers: TypeAlias = NDArray[Any]  # float64, or complex128 for exact gradients by the complex step
+Status: TypeAlias = NDArray[np.uint8]
+EPS = 2.0**-53
+
+
+class Design(NamedTuple):
+    """Columns of the design matrix: lengths in one unit, alpha in radians, branch +1 or -1."""
+
+    a: float
+    b: float
+    c: float
+    e: float
+    f: float
+    g: float
+    alpha: float
+    branch: float
+
+
+class Reduced(NamedTuple):
+    """Per-design numbers of the closure ``X C - Y S + W = 0`` in units of the crank, mirrored to branch +1."""
+
+    e: float  # X = e - cos phi
+    y0: float  # Y = y0 + ca sin phi
+    ca: float
+    k0: float  # W = k0 + k1 sin phi - k2 cos phi
+    k1: float
+    k2: float
+    w_size: float  # sum of the magnitudes whose rounding errors make up W
+    coupler: float  # b/a
+    rocker: float  # c/a
+    z0: float  # z_B - z_C = z0 - sa sin phi
+    sa: float
+    branch: float
+    valid: bool
+
+
+@inline
+def axial_square(f: Any, g: Any, alpha: Any) -> tuple[Any, Any]:
+    """f^2 + g^2 - 2 f g cos(alpha) and the magnitude of its terms, without cancellation near alpha = 0, pi; (K*)."""
+    if math.cos(alpha.real) >= 0.0:
+        h = np.sin(0.5 * alpha)
+        near, far = (f - g) * (f - g), 4.0 * f * g * h * h
+        return near + far, near.real + abs(far.real)
+    h = np.cos(0.5 * alpha)
+    near, far = (f + g) * (f + g), 4.0 * f * g * h * h
+    return near - far, near.real + abs(far.real)
+
+
+@inline
+def reduce_design(designs: Numbers, i: int) -> Reduced:
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    _, exponent = math.frexp(designs[i, 2].real)
+    unit = math.ldexp(1.0, -exponent)
+    a, b, c = designs[i, 0] * unit, designs[i, 1] * unit, designs[i, 2] * unit
+    e, f, g = designs[i, 3] * unit, designs[i, 4] * unit, designs[i, 5] * unit
+    alpha, branch = designs[i, 6], designs[i, 7].real
+    sa, ca = np.sin(alpha), np.cos(alpha)
+    q, q_size = axial_square(f, g, alpha)
+    square = (c - b) * (c + b) + (a * a + e * e) + q
+    per_a, per_c = 1.0 / a, 1.0 / c
+    k0, k1, k2 = 0.5 * square * per_c * per_a, g * sa * per_c, e * per_c
+    terms = abs(((c - b) * (c + b)).real) + (a * a).real + (e * e).real + q_size
+    size = 0.5 * terms * per_c.real * per_a.real + abs(k1.real) + abs(k2.real)
+    valid = a.real > 0.0 and b.real > 0.0 and c.real > 0.0 and size < 1e140
+    valid = valid and abs(alpha.real) < 1e5 and branch * branch == 1.0
+    valid = valid and a.real > 1e-140 and per_a.real < 1e140
+    return Reduced(
+        e * per_a, branch * (f * sa * per_a), branch * ca, k0, k1, k2, size,
+        b * per_a, c * per_a, (f * ca - g) * per_a, sa, branch, valid,
+    )  # fmt: skip
+
+
+@inline
+def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
+    """Rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (sheet 1.2)."""
+    mx, my, mw = abs(r.e.real) + 1.0, abs(r.y0.real) + 1.0, r.w_size
+    t = 8.0 * EPS
+    return t * (abs(x.real) * mx + abs(y.real) * my + abs(w.real) * mw) + t * t * (mx * mx + my * my + mw * mw)
