@@ -9,7 +9,7 @@ from importlib import import_module
 from sweep.errors import InputError, nearest
 from sweep.families.base import Family
 
-NAMES = ("rssr",)
+NAMES = ("rssr", "rssp", "guide")
 
 
 def family(name: str | Sequence[str]) -> Family:

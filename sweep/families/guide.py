@@ -1,0 +1,70 @@
+"""Registry entry of the planar four-bar with a guided coupler point."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.families import guide
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, optional_outputs
+
+PARAMETERS = (
+    Parameter("a", "length", "crank", positive=True),
+    Parameter("b", "length", "coupler", positive=True),
+    Parameter("c", "length", "rocker", positive=True),
+    Parameter("e", "length", "frame, from crank pivot to rocker pivot along x"),
+    Parameter("xi", "length", "coupler point along the coupler, from the crank pin"),
+    Parameter("eta", "length", "coupler point across the coupler, 90 deg counter-clockwise"),
+    Parameter("lam", "angle", "direction of the guiding line, from x"),
+    Parameter("h", "length", "offset of the guiding line from the crank pivot, to its left"),
+    Parameter("branch", "sign", "assembly mode: sign of dF/dpsi", default=1.0, choices=(-1.0, 1.0)),
+)
+
+VALUE_OUTPUTS = (
+    Output("s", "length", "coupler point along the line, from the foot of the crank pivot", "(4)"),
+    Output("ds", "length", "velocity analogue ds/dphi", "(5)"),
+    Output("d2s", "length", "acceleration analogue", "(5)"),
+    Output("d3s", "length", "jerk analogue", "(5)"),
+    Output("dev", "length", "deviation of the coupler point from the line, to its left", "(4)"),
+    Output("ddev", "length", "first derivative of the deviation with respect to phi", "(5)"),
+    Output("d2dev", "length", "second derivative of the deviation", "(5)"),
+    Output("discriminant", "length^4", "A1^2 + A2^2 - A3^2; the links reach where it is not negative", "(2)"),
+    Output("pressure_angle", "rad", "between the coupler force and the velocity of the rocker pin", "(3)"),
+)
+
+JOINT_OUTPUTS = (
+    Output("x_b", "length", "crank pin, along the frame", "(6)"),
+    Output("y_b", "length", "crank pin, across the frame", "(6)"),
+    Output("x_c", "length", "rocker pin, along the frame", "(6)"),
+    Output("y_c", "length", "rocker pin, across the frame", "(6)"),
+    Output("x_m", "length", "coupler point, along the frame", "(6)"),
+    Output("y_m", "length", "coupler point, across the frame", "(6)"),
+)
+
+_VALUES = tuple(o.name for o in VALUE_OUTPUTS)
+_JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    shape = (designs.shape[0], angles.cos.shape[1])
+    dtype = np.result_type(designs, angles.cos)
+    status = np.empty(shape, np.uint8)
+    values = optional_outputs(_VALUES, wanted, shape, dtype)
+    joints = None if wanted.isdisjoint(_JOINTS) else np.empty((len(_JOINTS), *shape), dtype)
+    guide.poses(designs, angles.cos, angles.sin, status, *values, joints)
+    columns: Columns = {name: out for name, out in zip(_VALUES, values, strict=True) if out is not None}
+    if joints is not None:
+        columns |= {name: out for name, out in zip(_JOINTS, joints, strict=True) if name in wanted}
+    return columns | {"status": status}
+
+
+FAMILY = Family(
+    name="guide",
+    title="planar four-bar with a guided coupler point",
+    parameters=PARAMETERS,
+    position="s",
+    pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
+    poses=poses,
+    derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s", "dev": "ddev", "ddev": "d2dev"},
+    uses_phi=False,
+)
