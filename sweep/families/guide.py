@@ -51,7 +51,8 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     status = np.empty(shape, np.uint8)
     values = optional_outputs(_VALUES, wanted, shape, dtype)
     joints = None if wanted.isdisjoint(_JOINTS) else np.empty((len(_JOINTS), *shape), dtype)
-    guide.poses(designs, angles.cos, angles.sin, status, *values, joints)
+    outputs = [*values, joints]
+    guide.poses(designs, angles.cos, angles.sin, status, *outputs)
     columns: Columns = {name: out for name, out in zip(_VALUES, values, strict=True) if out is not None}
     if joints is not None:
         columns |= {name: out for name, out in zip(_JOINTS, joints, strict=True) if name in wanted}

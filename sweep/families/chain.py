@@ -1,0 +1,233 @@
+"""Several families in series as one `Family`: numbered parameters, composed derivatives, every stage's own outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from kernels.chain import chain_rule, input_angle
+from kernels.status import OK
+from sweep.errors import InputError
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+
+BLOCK = 8192  # poses per block: its ten or so arrays of 64 KB stay in the second-level cache
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One mechanism of a chain: its number from 1, and where its parameters stand in the chain's design matrix."""
+
+    number: int
+    family: Family
+    columns: slice
+    kappa: int | None = None  # columns of the coupling to the stage before; none for stage 1
+    offset: int | None = None
+
+    def designs(self, designs: Array) -> Array:
+        """The design matrix of this stage alone."""
+        return np.ascontiguousarray(designs[:, self.columns])
+
+
+@dataclass(frozen=True)
+class Chain(Family):
+    """A family made of stages; the output angle of each drives the crank of the next."""
+
+    stages: tuple[Stage, ...] = ()
+
+
+@dataclass
+class _Plan:
+    """What one call computes: per stage its own outputs, and how many derivatives are composed."""
+
+    order: int = 0
+    needed: list[set[str]] = field(default_factory=list)
+    composed: list[list[str]] = field(default_factory=list)  # of the last stage: derivatives 1..k of one output
+    source: dict[str, tuple[int, str]] = field(default_factory=dict)  # wanted name -> stage index, its own name
+
+
+def chain(families: tuple[Family, ...]) -> Chain:
+    """The chain of these families, each driven by the one before it.
+
+    Parameters and the stages' own outputs carry the stage number; the outputs of the last stage also stand without a
+    number, their derivatives being those with respect to phi of stage 1.
+
+    Raises
+    ------
+    InputError
+        if a stage other than the last has no output angle: a slider cannot drive a crank.
+    """
+    place = f"chain {[f.name for f in families]}"
+    for number, family in enumerate(families[:-1], start=1):
+        if family.position != "psi":
+            allowed = f"a family with an output angle psi; {family.name} has {family.position}, which drives no crank"
+            raise InputError(f"stage {number}", family.name, allowed, place)
+    stages, parameters = _numbered(families)
+    last = families[-1]
+    outputs = [_with_respect_to_chain(o, last) for o in last.pose_outputs]
+    for stage in stages:
+        outputs += [
+            replace(o, name=f"{o.name}{stage.number}", text=f"stage {stage.number}: {o.text}")
+            for o in stage.family.pose_outputs
+            if stage.number == 1 or o.name not in stage.family.derivative_of.values()
+        ]
+    own = {f"{name}1": f"{derivative}1" for name, derivative in families[0].derivative_of.items()}
+    return Chain(
+        name="+".join(f.name for f in families),
+        title=" driving ".join(f.title for f in families),
+        parameters=parameters,
+        position=last.position,
+        pose_outputs=tuple(outputs),
+        poses=partial(_poses, stages),
+        derivative_of=dict(last.derivative_of) | own,
+        uses_phi=families[0].uses_phi,
+        stages=stages,
+    )
+
+
+def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Parameter, ...]]:
+    stages: list[Stage] = []
+    parameters: list[Parameter] = []
+    for number, family in enumerate(families, start=1):
+        start = len(parameters)
+        parameters += [
+            replace(p, name=f"{p.name}{number}", text=f"stage {number}: {p.text}") for p in family.parameters
+        ]
+        stage = Stage(number, family, slice(start, len(parameters)))
+        if number > 1:
+            stage = replace(stage, kappa=len(parameters), offset=len(parameters) + 1)
+            sense = f"sense of the coupling: phi of stage {number} = kappa{number} * psi of stage {number - 1} + offset"
+            angle = f"angle between the crank of stage {number} and the rocker of stage {number - 1}"
+            parameters += [
+                Parameter(f"kappa{number}", "sign", sense, default=1.0, choices=(-1.0, 1.0)),
+                Parameter(f"offset{number}", "angle", angle, default=0.0),
+            ]
+        stages.append(stage)
+    return tuple(stages), tuple(parameters)
+
+
+def _with_respect_to_chain(output: Output, last: Family) -> Output:
+    if output.name not in last.derivative_of.values():
+        return output
+    return replace(output, text=f"{output.text}, with respect to phi of stage 1")
+
+
+def _derivatives(family: Family, name: str) -> list[str]:
+    """The derivatives 1..k up to ``name`` of the output it derives from; empty if it is no derivative."""
+    lower = {derivative: of for of, derivative in family.derivative_of.items()}
+    names: list[str] = []
+    while name in lower:
+        names.insert(0, name)
+        name = lower[name]
+    return names
+
+
+def _plan(stages: tuple[Stage, ...], wanted: frozenset[str]) -> _Plan:
+    last = stages[-1].family
+    plan = _Plan(needed=[set() for _ in stages])
+    chains: dict[str, list[str]] = {}
+    for name in wanted:
+        if name in last.pose_names:
+            plan.source[name] = len(stages) - 1, name
+            derivatives = _derivatives(last, name)
+            if derivatives:
+                chains[derivatives[0]] = max(chains.get(derivatives[0], []), derivatives, key=len)
+        else:
+            stage = next(s for s in stages if name.endswith(str(s.number)) and _own(name, s) in s.family.pose_names)
+            plan.source[name] = stage.number - 1, _own(name, stage)
+    plan.composed = list(chains.values())
+    plan.order = max((len(names) for names in plan.composed), default=0)
+    for index, own in plan.source.values():
+        plan.needed[index].add(own)
+    for names in plan.composed:
+        plan.needed[-1].update(names)
+    deepest = max((index for index, _ in plan.source.values()), default=len(stages) - 1)
+    del plan.needed[deepest + 1 :]
+    for k, stage in enumerate(stages[:deepest]):
+        outputs = stage.family.pose_names
+        angle = {"sin_psi", "cos_psi"} if {"sin_psi", "cos_psi"} <= set(outputs) else {"psi"}
+        if stages[k + 1].family.uses_phi:
+            angle.add("psi")
+        plan.needed[k] |= angle | set(_psi_derivatives(stage.family, plan.order))
+    return plan
+
+
+def _own(name: str, stage: Stage) -> str:
+    return name.removesuffix(str(stage.number))
+
+
+def _psi_derivatives(family: Family, order: int) -> list[str]:
+    names = [family.position]
+    while len(names) <= order:
+        names.append(family.derivative_of[names[-1]])
+    return names[1:]
+
+
+def _poses(stages: tuple[Stage, ...], designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status, computed in blocks so that the intermediate arrays stay in the cache."""
+    plan = _plan(stages, wanted)
+    shape = (designs.shape[0], angles.cos.shape[1])
+    if shape[0] * shape[1] <= BLOCK:
+        return _block(stages, plan, designs, angles)
+    dtype = np.result_type(designs, angles.cos)
+    columns: Columns = {name: np.empty(shape, dtype) for name in plan.source}
+    columns["status"] = np.empty(shape, np.uint8)
+    for rows, poses in _blocks(shape):
+        of_angles = rows if angles.cos.shape[0] > 1 else slice(None)
+        part = Angles(*(np.ascontiguousarray(x[of_angles, poses]) for x in angles))
+        for name, values in _block(stages, plan, designs[rows], part).items():
+            columns[name][rows, poses] = values
+    return columns
+
+
+def _blocks(shape: tuple[int, int]) -> Iterator[tuple[slice, slice]]:
+    rows, poses = max(1, BLOCK // shape[1]), min(shape[1], BLOCK)
+    for i in range(0, shape[0], rows):
+        for j in range(0, shape[1], poses):
+            yield slice(i, i + rows), slice(j, j + poses)
+
+
+def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angles) -> Columns:
+    """All stages of one block, the derivatives carried along by the chain rule."""
+    results: list[dict[str, Any]] = []
+    inner: list[Any] = []  # derivatives of the angle that drives the present stage
+    status = np.zeros((designs.shape[0], angles.cos.shape[1]), np.uint8)
+    for k, needed in enumerate(plan.needed):
+        stage = stages[k]
+        is_last = k == len(stages) - 1
+        if k > 0:
+            kappa = np.ascontiguousarray(designs[:, stage.kappa])
+            angles = _drive(results[-1], kappa, np.ascontiguousarray(designs[:, stage.offset]))
+        result: dict[str, Any] = stage.family.poses(stage.designs(designs), angles, frozenset(needed))
+        np.copyto(status, result["status"], where=status == OK)
+        results.append(result)
+        if plan.order == 0:
+            continue
+        composed = plan.composed if is_last else [_psi_derivatives(stage.family, plan.order)]
+        if k > 0:
+            for names in composed:
+                outer: list[Any] = [result[name] for name in names]
+                padding: list[Any] = [None] * (3 - len(names))
+                chain_rule(kappa, *inner[: len(names)], *padding, *outer, *padding)
+        if not is_last:
+            inner = [result[name] for name in composed[0]]
+    columns: Columns = {name: results[index][own] for name, (index, own) in plan.source.items()}
+    return columns | {"status": status}
+
+
+def _drive(result: dict[str, Any], kappa: Array, offset: Array) -> Angles:
+    """The input angles of the stage driven by ``result``."""
+    shape = result["status"].shape
+    # a family that says it works from cos and sin alone gets no angle at all
+    phi: Array = np.broadcast_to(np.float64(np.nan), shape)
+    if "psi" in result:
+        phi = kappa[:, None] * result["psi"] + offset[:, None]
+    if "cos_psi" not in result:
+        return Angles.of(phi)
+    cos = np.empty(shape, np.result_type(result["cos_psi"], offset))
+    sin = np.empty_like(cos)
+    input_angle(kappa, offset, result["cos_psi"], result["sin_psi"], cos, sin)
+    return Angles(phi, cos, sin)
