@@ -1,0 +1,168 @@
+"""One chunk of a sweep: a run of consecutive designs taken through the cascade of limits, cheapest first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as codes
+from sweep.errors import InputError
+from sweep.families.base import Array, Columns
+from sweep.summaries import design_outputs, routes
+from sweep.tables import design_matrix
+
+if TYPE_CHECKING:
+    from sweep.study import Limit, Study
+
+# Designs computed together: the tables of a block stay in the second-level cache, and a stop is noticed after a block.
+BLOCK = 4096
+
+# A clockwise and an anticlockwise follower of the same amplitude meet the same requirement.
+MAGNITUDES = ("swing", "stroke")
+
+
+class Dropped(Exception):
+    """The chunk was given up half way because the run was asked to stop."""
+
+
+@dataclass(frozen=True)
+class ChunkResult:
+    """Rows of a chunk, and how many of its designs ended with which status (dropped rows included)."""
+
+    columns: Columns
+    counts_by_status: dict[int, int]
+
+
+@dataclass(frozen=True)
+class Cascade:
+    """Outputs and status of some designs, each (n,), and how many designs each route was run on."""
+
+    outputs: dict[str, Array]
+    status: NDArray[np.uint8]
+    reached: tuple[int, ...]
+
+
+def output_columns(study: Study) -> tuple[str, ...]:
+    """Names of the result columns: what the study wants, each followed by its error estimate if a target is set."""
+    if study.accuracy.target is None:
+        return study.want
+    return tuple(name for wanted in study.want for name in (wanted, f"err_{wanted}"))
+
+
+def parameter_matrix(study: Study, start: int, stop: int) -> Array:
+    """Checked (n, P) design matrix of the designs start, ..., stop - 1 of the study's space."""
+    matrix, _ = design_matrix(study.family, study.space.columns(start, stop))
+    return matrix
+
+
+def cascade(study: Study, designs: Array) -> Cascade:
+    """Compute the wanted outputs route by route; only designs that meet all limits known so far go on.
+
+    Parameters
+    ----------
+    study : whose family, wanted outputs, limits and accuracy apply
+    designs : (n, P) design matrix [mm, rad]
+
+    Returns
+    -------
+    Cascade
+        outputs (n,), nan where not computed; status 0 for designs that meet every limit, LIMIT_EXCEEDED for those that
+        miss one, otherwise the status of the kernel that could not answer.
+    """
+    n = len(designs)
+    outputs = {name: np.full(n, np.nan) for name in output_columns(study)}
+    status = np.zeros(n, np.uint8)
+    alive = np.arange(n)
+    reached = []
+    for route in routes(study.family, study.want, study.accuracy):
+        reached.append(alive.size)
+        if alive.size == 0:
+            continue
+        found = design_outputs(study.family, designs[alive], route.outputs, study.accuracy, study.window)
+        for name in outputs.keys() & found.keys():
+            outputs[name][alive] = found[name]
+        fate = found["status"].astype(np.uint8)
+        for limit in study.limits:
+            if limit.output in found:
+                fate[(fate == codes.OK) & ~meets(limit, found[limit.output])] = codes.LIMIT_EXCEEDED
+        status[alive] = fate
+        alive = alive[fate == codes.OK]
+    return Cascade(outputs, status, tuple(reached))
+
+
+def warm(study: Study) -> None:
+    """Compile or load every kernel the study needs, on a few designs spread over its space."""
+    count = study.space.count
+    starts = sorted({k * (count - 1) // 7 for k in range(8)})
+    designs = np.concatenate([parameter_matrix(study, start, start + 1) for start in starts])
+    for route in routes(study.family, study.want, study.accuracy):
+        design_outputs(study.family, designs, route.outputs, study.accuracy, study.window)
+
+
+def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:
+    """Whether each value keeps the limit; nan does not.  Swing and stroke are compared by magnitude."""
+    x = np.asarray(values, dtype=np.float64)
+    if limit.output.rstrip("0123456789") in MAGNITUDES:
+        x = np.abs(x)
+    good = np.isfinite(x)
+    if limit.minimum is not None:
+        good &= x >= limit.minimum
+    if limit.maximum is not None:
+        good &= x <= limit.maximum
+    return good
+
+
+def compute_chunk(study: Study, start: int, stop: int, should_stop: Callable[[], bool] = lambda: False) -> ChunkResult:
+    """Rows of the designs start, ..., stop - 1: index, parameters, wanted outputs, status.
+
+    The work goes block by block, so memory is one block and the rows that are kept.
+
+    Parameters
+    ----------
+    study : the question
+    start, stop : range of design indices in the study's space
+    should_stop : asked before every block
+
+    Returns
+    -------
+    ChunkResult
+        columns ``design`` int64, parameters float64 [mm, rad], outputs in the study's dtype, ``status`` uint8; with
+        ``keep = "feasible"`` only the rows with status 0, all designs are counted either way.
+
+    Raises
+    ------
+    InputError
+        if the range is not inside the space, or a design of the space has a bad value.
+    Dropped
+        if ``should_stop`` answered true.
+    """
+    if not 0 <= start <= stop <= study.space.count:
+        raise InputError("designs", f"{start}:{stop}", f"a range inside 0:{study.space.count}", f"study {study.name}")
+    dtype = np.dtype(study.output.dtype)
+    counts = np.zeros(256, np.int64)
+    blocks: list[Columns] = []
+    for low in range(start, stop, BLOCK):
+        if should_stop():
+            raise Dropped
+        blocks.append(_block(study, low, min(low + BLOCK, stop), dtype, counts))
+    if not blocks:
+        blocks.append(_block(study, start, stop, dtype, counts))
+    columns = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+    return ChunkResult(columns, {code: int(counts[code]) for code in np.flatnonzero(counts).tolist()})
+
+
+def _block(study: Study, start: int, stop: int, dtype: np.dtype[np.floating], counts: NDArray[np.int64]) -> Columns:
+    matrix = parameter_matrix(study, start, stop)
+    result = cascade(study, matrix)
+    counts += np.bincount(result.status, minlength=counts.size)
+    rows = np.arange(len(matrix))
+    if study.output.keep == "feasible":
+        rows = np.flatnonzero(result.status == codes.OK)
+    columns: Columns = {"design": start + rows.astype(np.int64)}
+    columns |= {name: matrix[rows, k] for k, name in enumerate(study.family.parameter_names)}
+    columns |= {name: values[rows].astype(dtype) for name, values in result.outputs.items()}
+    return columns | {"status": result.status[rows]}

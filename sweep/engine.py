@@ -1,0 +1,254 @@
+"""``run``: a study's design space over the cores, chunk by chunk, into a dataset folder; resumable at any moment."""
+
+from __future__ import annotations
+
+import os
+import platform
+import socket
+import subprocess
+import time
+import uuid
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from sweep import store
+from sweep.errors import InputError, Interrupted, LinksweepError, WorkerDied, nearest
+from sweep.families.base import Accuracy
+from sweep.signals import Stop, stop_on_signal
+
+if TYPE_CHECKING:
+    from sweep.plan import Plan
+    from sweep.study import Study
+    from sweep.worker import Done
+
+BACKENDS = ("threading", "loky")
+LIBRARIES = ("linksweep", "numpy", "numba", "llvmlite", "scipy", "pandas", "pyarrow", "joblib")
+
+
+def run(
+    study: str | Path | Study,
+    out: str | Path | None = None,
+    jobs: int = 2,
+    backend: Literal["threading", "loky"] = "threading",
+    *,
+    smoke: bool = False,
+    force: bool = False,
+    accuracy: float | None = None,
+    progress: bool = False,
+) -> Path:
+    """Compute a study's designs into a folder, continuing where an earlier run stopped; then its optimum if it asks.
+
+    The bytes of the chunks do not depend on jobs, backend, or interruptions.
+
+    Parameters
+    ----------
+    study : study file, its folder, or a loaded study
+    out : dataset folder; default ``results/<name>/designs`` (``results/smoke/<name>/designs``)
+    jobs : workers
+    backend : "threading" (the kernels release the lock) or "loky" (processes)
+    smoke : take the study's tiny version
+    force : run even over the budget, and set data of another study or code in the folder aside into ``_old/``
+    accuracy : relative accuracy of the extrema in place of the study's own
+    progress : bar on a terminal, lines in a log
+
+    Returns
+    -------
+    Path
+        the folder: ``pandas.read_parquet(folder)`` reads it.
+
+    Raises
+    ------
+    StudyError, InputError
+        for a bad study or argument, or a folder with data of another study (exit code 2)
+    BudgetError
+        if the estimate exceeds the study's budget (3)
+    WorkerDied, StoreError, LockedError, Interrupted
+        worker killed (70), disk full or forbidden (74), folder in use (75), signal (130, 143); finished chunks stay.
+    """
+    if backend not in BACKENDS:
+        raise InputError("backend", backend, f"{' or '.join(BACKENDS)}{nearest(str(backend), BACKENDS)}", "run")
+    if isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1:
+        raise InputError("jobs", jobs, "a whole number from 1", "run")
+    model = _model(study, smoke, accuracy)
+    _check_budget(model, jobs, force)
+    folder = Path(out) if out is not None else Path("results", *(["smoke"] if smoke else []), model.name, "designs")
+    with store.locked(folder), stop_on_signal() as stop:
+        head = {"run": uuid.uuid4().hex[:12]}
+        begin = time.monotonic()
+        store.append_run(folder, head | {"event": "start"} | _circumstances(jobs, backend))
+        try:
+            computed = _sweep(model, folder, jobs, backend, force, stop, progress)
+        except LinksweepError as error:
+            if error.exit_code != 74:  # the log stands on the disk that has just refused
+                store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
+            raise
+        store.append_run(folder, head | _end(begin, "complete", f"{computed} chunks computed"))
+    return folder
+
+
+def _model(study: str | Path | Study, smoke: bool, accuracy: float | None) -> Study:
+    from sweep.study import load_study
+
+    model = load_study(study, smoke=smoke) if isinstance(study, (str, Path)) else study
+    if accuracy is None:
+        return model
+    if not 0.0 < accuracy < 1.0:
+        raise InputError("accuracy", accuracy, "a relative accuracy between 0 and 1", "run")
+    data = model.data | {"accuracy": {"target": accuracy}}
+    return replace(model, accuracy=Accuracy(target=accuracy), data=data)
+
+
+def _check_budget(study: Study, jobs: int, force: bool) -> None:
+    from sweep.study.estimate import check_budget, estimate
+
+    if not force:
+        check_budget(study, estimate(study, jobs))
+
+
+def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, stop: Stop, progress: bool) -> int:
+    """Compute the missing chunks, note the totals, optimise; returns the number of chunks computed."""
+    from sweep.progress import Progress
+
+    store.remove_temporary(folder)
+    plan = _open_plan(study, folder, force)
+    finished = store.finished_chunks(folder, plan)
+    missing = [index for index in range(plan.chunks) if index not in finished]
+    done = plan.designs - sum(len(range(*plan.bounds(index))) for index in missing)
+    failure: Exception | None = None
+    with Progress(study.name, plan.designs, done, progress) as shown:
+        for result in _results(study, plan, folder, missing, jobs, backend, stop):
+            if result.error is not None:
+                failure = failure or result.error
+                stop.event.set()
+            shown.advance(result.designs)
+    if failure is not None:
+        raise failure
+    _raise_if_signalled(stop, folder)
+    note = _plan_note(study, folder, plan) | {"counts": store.total_counts(folder), "complete": True}
+    store.write_plan(folder, note)
+    if study.optimise is not None:
+        _optimise(study, folder, note)
+    return len(missing)
+
+
+def _open_plan(study: Study, folder: Path, force: bool) -> Plan:
+    """The plan in the folder if it is this study's, otherwise a new one; foreign data only go with ``force``."""
+    from sweep.plan import make_plan
+
+    noted = store.read_plan(folder)
+    if noted is not None:
+        plan = make_plan(study, noted["chunk_size"])
+        if plan.identity == noted["identity"]:
+            # What the chunks say of the study stays as the first run said it, whatever units it is now written in.
+            plan = replace(plan, name=noted["name"], chunk_data=noted["chunk_data"])
+            if force:
+                _set_foreign_aside(folder, plan, ())
+            return plan
+        if not force:
+            known = ", ".join(f"{key} {noted.get(key)}" for key in ("name", "study", "code", "identity"))
+            raise store.foreign(folder, known, plan)
+    plan = make_plan(study)
+    if force:
+        _set_foreign_aside(folder, plan, (store.PLAN, store.OPTIMUM, store.CURVES))
+    store.finished_chunks(folder, plan)  # refuses foreign chunks before the plan is written
+    store.write_plan(folder, _plan_note(study, folder, plan))
+    return plan
+
+
+def _set_foreign_aside(folder: Path, plan: Plan, others: tuple[str, ...]) -> None:
+    old = [part.path for part in store.parts(folder) if part.identity != plan.identity]
+    old += [folder / name for name in others if (folder / name).is_file()]
+    if old:
+        store.set_aside(folder, old, f"{store.OLD}/{time.strftime('%Y%m%d-%H%M%S')}")
+
+
+def _plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
+    """Content of ``_plan.json``, with what an earlier run noted of the optimum."""
+    noted = store.read_plan(folder) or {}
+    return plan.as_dict() | {
+        "data": study.data,
+        "optimise": study.optimise is not None,
+        "optimised": noted.get("optimised"),
+        "counts": noted.get("counts"),
+        "complete": False,
+    }
+
+
+def _results(
+    study: Study, plan: Plan, folder: Path, missing: list[int], jobs: int, backend: str, stop: Stop
+) -> Iterator[Done]:
+    """Finished chunks in the order they become ready."""
+    from sweep.chunk import warm
+    from sweep.worker import work
+
+    if missing:
+        warm(study)  # one process compiles, the others load the machine code
+    todo = (index for index in missing if not stop)
+    if jobs == 1 or len(missing) < 2:
+        for index in todo:
+            yield work(study, plan, folder, index, os.getpid(), stop.event)
+        return
+
+    from joblib import Parallel, delayed
+    from joblib.externals.loky.process_executor import BrokenProcessPool
+
+    shared = stop.event if backend == "threading" else None
+    parallel = Parallel(
+        n_jobs=jobs, backend=backend, return_as="generator_unordered", batch_size=1, pre_dispatch=f"{jobs} + 1"
+    )
+    try:
+        yield from parallel(delayed(work)(study, plan, folder, index, os.getpid(), shared) for index in todo)
+    except BrokenProcessPool as error:
+        _raise_if_signalled(stop, folder)
+        text = f"{folder}: a worker process died ({error}); finished chunks are kept, run again to continue"
+        raise WorkerDied(text) from error
+
+
+def _raise_if_signalled(stop: Stop, folder: Path) -> None:
+    if stop.signal_number is not None:
+        text = f"{folder}: stopped by signal {stop.signal_number}; finished chunks are kept, run again to continue"
+        raise Interrupted(stop.signal_number, text)
+
+
+def _optimise(study: Study, folder: Path, note: dict[str, Any]) -> None:
+    """Run the optimiser unless its result for these very sources is there already."""
+    from sweep.optimise import optimise_study
+    from sweep.plan import optimiser_hash
+
+    key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
+    if note.get("optimised") == key and (folder / store.OPTIMUM).is_file() and (folder / store.CURVES).is_file():
+        return
+    optimise_study(study, folder)
+    store.write_plan(folder, note | {"optimised": key})
+
+
+def _circumstances(jobs: int, backend: str) -> dict[str, Any]:
+    """What may differ between runs that give the same bytes."""
+    return {
+        "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+        "host": socket.gethostname(),
+        "pid": os.getpid(),
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "python": platform.python_version(),
+        "versions": {name: version(name) for name in LIBRARIES},
+        "commit": _commit(),
+        "jobs": jobs,
+        "backend": backend,
+    }
+
+
+def _end(begin: float, outcome: str, text: str) -> dict[str, Any]:
+    return {"event": "end", "outcome": outcome, "seconds": round(time.monotonic() - begin, 3), "text": text}
+
+
+def _commit() -> str | None:
+    """Commit of the sources, None where they are not a git work tree or there is no git."""
+    command = ["git", "-C", str(Path(__file__).resolve().parent), "rev-parse", "HEAD"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10)
+    except (FileNotFoundError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() or None if done.returncode == 0 else None

@@ -1,0 +1,186 @@
+"""How a sweep is cut into chunks, what its columns are, and the identity that every chunk carries."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sweep.chunk import BLOCK, cascade, output_columns, parameter_matrix
+from sweep.families.base import Family
+from sweep.summaries import output, routes
+
+if TYPE_CHECKING:
+    from sweep.study import Study
+
+FORMAT = 1
+
+# A chunk should take a few seconds on one core (by the routes' own cost figures, so every machine cuts alike) and hold at
+# most this much before it is encoded; and there should be enough chunks to keep the workers even to the end.
+CHUNK_SECONDS = 2.0
+CHUNK_BYTES = 64 * 2**20
+CHUNKS_AT_LEAST = 16
+SECONDS_AT_LEAST = 0.1
+
+PILOT_RUNS, PILOT_LENGTH = 32, 32
+
+PARAMETER_UNITS = {"length": "mm", "angle": "rad", "ratio": "1", "sign": "1", "count": "1", "none": "1"}
+
+# Parts of the package that decide no value in a chunk; everything else does.
+NOT_VALUES = ("optimise", "report", "cli", "templates", "__init__.py", "__main__.py", "engine.py", "progress.py")
+NOT_VALUES += ("signals.py", "poses.py", "compare.py")
+
+
+# Sections of the study file that decide no value in a chunk.
+NOT_IN_CHUNKS = ("study", "optimise", "reference", "budget")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a chunk: its numpy type, unit and definition (both stored as Parquet field metadata)."""
+
+    name: str
+    dtype: str
+    unit: str
+    text: str
+    role: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The cut of a sweep and all that makes its chunks what they are; equal plans give equal bytes."""
+
+    name: str
+    study: str
+    code: str
+    designs: int
+    chunk_size: int
+    columns: tuple[Column, ...]
+    repetitive: tuple[str, ...]
+    chunk_data: dict[str, Any]
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return -(-self.designs // self.chunk_size)
+
+    @property
+    def identity(self) -> str:
+        """Short hash of study, code, cut and columns; part of every chunk's file name."""
+        columns = [[c.name, c.dtype, c.unit] for c in self.columns]
+        text = json.dumps([FORMAT, self.study, self.code, self.designs, self.chunk_size, columns, self.repetitive])
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+    def bounds(self, index: int) -> tuple[int, int]:
+        """First design of a chunk and the one after its last."""
+        start = index * self.chunk_size
+        return start, min(start + self.chunk_size, self.designs)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What ``_plan.json`` says of the chunks."""
+        return {"format": FORMAT, "identity": self.identity, "chunks": self.chunks} | asdict(self)
+
+
+def make_plan(study: Study, chunk_size: int | None = None) -> Plan:
+    """The plan of a study; a pilot of about a thousand designs tells how many get through the cascade.
+
+    Parameters
+    ----------
+    study : the question
+    chunk_size : designs per chunk if it is known already (a run that is resumed)
+    """
+    return Plan(
+        name=study.name,
+        study=designs_fingerprint(study),
+        code=code_hash(),
+        designs=study.space.count,
+        chunk_size=choose_chunk_size(study) if chunk_size is None else chunk_size,
+        columns=describe_columns(study),
+        repetitive=tuple(study.space.fixed if study.space.kind == "sobol" else study.space.names),
+        chunk_data={key: value for key, value in study.data.items() if key not in NOT_IN_CHUNKS},
+    )
+
+
+def designs_fingerprint(study: Study) -> str:
+    """The study's fingerprint without what concerns only the optimum, so that a change there keeps the designs."""
+    output = replace(study.output, curves="none")
+    return replace(study, optimise=None, reference=None, output=output).fingerprint
+
+
+def choose_chunk_size(study: Study) -> int:
+    """Designs per chunk: a multiple of the block length from the routes' cost, the memory and the number of designs.
+
+    Neither the number of workers nor the clock of the machine enters.
+    """
+    seconds = max(seconds_per_design(study), 1e-10)
+    by_time = CHUNK_SECONDS / seconds
+    by_memory = CHUNK_BYTES / row_bytes(study)
+    by_count = max(study.space.count / CHUNKS_AT_LEAST, SECONDS_AT_LEAST / seconds)
+    return BLOCK * max(1, math.floor(min(by_time, by_memory, by_count) / BLOCK))
+
+
+def seconds_per_design(study: Study) -> float:
+    """Estimated cost of one design on one core [s]: each route counts as often as the pilot's designs reached it."""
+    count = study.space.count
+    length = min(PILOT_LENGTH, count)
+    golden = (math.sqrt(5.0) - 1.0) / 2.0
+    starts = sorted({int((k * golden) % 1.0 * (count - length + 1)) for k in range(PILOT_RUNS)})
+    designs = np.concatenate([parameter_matrix(study, start, start + length) for start in starts])
+    reached = cascade(study, designs).reached
+    costs = [route.ns_per_design for route in routes(study.family, study.want, study.accuracy)]
+    return 1e-9 * sum(n * cost for n, cost in zip(reached, costs, strict=True)) / len(designs)
+
+
+def row_bytes(study: Study) -> int:
+    """Bytes of one row before it is encoded."""
+    return sum(np.dtype(column.dtype).itemsize for column in describe_columns(study))
+
+
+def describe_columns(study: Study) -> tuple[Column, ...]:
+    """The columns of a chunk in order: design, parameters, outputs, status."""
+    columns = [Column("design", "int64", "1", "index of the design in the study's design space", "index")]
+    columns += [
+        Column(p.name, "float64", PARAMETER_UNITS[p.unit], p.text, "parameter") for p in study.family.parameters
+    ]
+    columns += [_output_column(study.family, name, study.output.dtype) for name in output_columns(study)]
+    columns.append(Column("status", "uint8", "1", "0 = ok, others say why a value is missing", "status"))
+    return tuple(columns)
+
+
+def _output_column(family: Family, name: str, dtype: str) -> Column:
+    definition = output(family, name.removeprefix("err_"))
+    text = f"absolute error estimate of {definition.name}" if name.startswith("err_") else definition.text
+    return Column(name, dtype, definition.unit.replace("length", "mm"), text, "output")
+
+
+@lru_cache
+def code_hash() -> str:
+    """Hash of the sources and libraries that determine the values in a chunk."""
+    import scipy
+
+    from kernels._jit import source_hash
+
+    root = Path(__file__).resolve().parent
+    paths = [path for path in sorted(root.rglob("*.py")) if path.relative_to(root).parts[0] not in NOT_VALUES]
+    return _hash_sources(root, paths, f"{source_hash()} {np.__version__} {scipy.__version__}")
+
+
+@lru_cache
+def optimiser_hash() -> str:
+    """Hash of the sources that determine the optimum, beyond those of the chunks."""
+    root = Path(__file__).resolve().parent
+    return _hash_sources(root, sorted((root / "optimise").rglob("*.py")), code_hash())
+
+
+def _hash_sources(root: Path, paths: list[Path], first: str) -> str:
+    digest = hashlib.sha256(first.encode())
+    for path in paths:
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

@@ -1,0 +1,62 @@
+"""How far a sweep is: a bar with the remaining time on a terminal, a plain line now and then in a log."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import TextIO
+
+from tqdm import tqdm
+
+LINE_SECONDS = 10.0
+
+
+class Progress:
+    """Counts designs; used as a context.
+
+    Parameters
+    ----------
+    label : what is swept
+    total : designs in all
+    done : designs finished by earlier runs
+    show : False for a silent one (the library's way unless asked)
+    """
+
+    def __init__(self, label: str, total: int, done: int, show: bool, stream: TextIO | None = None) -> None:
+        self.label, self.total, self.done, self.show = label, total, done, show
+        self.stream = sys.stderr if stream is None else stream
+        self.begin = self.said = time.monotonic()
+        self.first = done
+        self.bar: tqdm[None] | None = None
+        if show and self.stream.isatty():
+            self.bar = tqdm(desc=label, total=total, initial=done, unit=" designs", unit_scale=True, file=self.stream)
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.bar is not None:
+            self.bar.close()
+        elif self.show:
+            self._line()
+
+    def advance(self, designs: int) -> None:
+        """So many more designs are finished."""
+        self.done += designs
+        if self.bar is not None:
+            self.bar.update(designs)
+        elif self.show and time.monotonic() - self.said > LINE_SECONDS:
+            self._line()
+
+    def _line(self) -> None:
+        self.said = time.monotonic()
+        seconds = self.said - self.begin
+        text = f"{self.label}: {self.done} of {self.total} designs ({self.done / max(self.total, 1):.0%})"
+        text += f", {seconds:.0f} s"
+        if self.first < self.done < self.total:
+            text += f", {seconds * (self.total - self.done) / (self.done - self.first):.0f} s left"
+        self.stream.write(text + "\n")
+        self.stream.flush()
