@@ -1,0 +1,240 @@
+"""B1, B2: sliding and rolling bearings of the rocker shaft under the coupler force, and the angles they permit.
+
+Dynamics sheet, section 4 (Polukhin 1971, (15)-(17) as corrected).  Only the direction of the coupler force enters: its
+in-plane part P has the tangential and radial shares cos(theta1), sin(theta1), and ``axial`` = sin(theta1) tan(theta2)
+is the axial force in units of P.  That product stays finite where theta2 does not (no radial force).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+
+Array = NDArray[np.float64]
+Status = NDArray[np.uint8]
+
+SCAN = 128
+BISECTIONS = 60
+
+
+class Sliding(NamedTuple):
+    """Columns of the sliding-bearing matrix [length, -]; r_t is the mean thrust radius of the collar."""
+
+    c: float  # radius of the ball joint on the rocker
+    z1: float  # supports along the rocker axis, rocker plane at zero
+    z2: float
+    d: float  # journal diameter
+    l1: float  # journal lengths
+    l2: float
+    d0: float  # collar diameter
+    kj: float  # journal factor: 1 point contact, 4/pi run-in, pi/2 new
+    rt: float
+    mu: float
+
+
+class Rolling(NamedTuple):
+    """Columns of the rolling-bearing matrix; ``axial_on`` 1 or 2 is the support that takes the axial force."""
+
+    c: float
+    z1: float
+    z2: float
+    rotation_factor: float  # V
+    radial_factor: float  # X
+    axial_factor: float  # Y
+    e_limit: float
+    exponent: float  # 3 for balls, 10/3 for rollers
+    capacity: float  # C_dyn
+    shock_factor: float  # K_b
+    axial_on: float
+
+
+class Criteria(NamedTuple):
+    """Arms, coupler force, support forces, mean pressures for one direction of the coupler force."""
+
+    pi1: float
+    pi2: float
+    arm: float
+    force: float
+    r1: float
+    r2: float
+    axial: float
+    p1: float
+    p2: float
+    p3: float
+
+
+@inline
+def _sliding(data: Array, i: int) -> Sliding:
+    return Sliding(
+        data[i, 0], data[i, 1], data[i, 2], data[i, 3], data[i, 4], data[i, 5], data[i, 6], data[i, 7], data[i, 8],
+        data[i, 9],
+    )  # fmt: skip
+
+
+@inline
+def support_arms(c: float, z1: float, z2: float, cos1: float, sin1: float, axial: float) -> tuple[float, float]:
+    """Pi_1, Pi_2: support force times the distance of the supports, per unit of P; the axial force turns about c."""
+    return math.hypot(z2 * cos1, z2 * sin1 + c * axial), math.hypot(z1 * cos1, z1 * sin1 + c * axial)
+
+
+@inline
+def sliding_criteria(s: Sliding, moment: float, cos1: float, sin1: float, axial: float) -> Criteria:
+    """Equations (15)-(17): support forces and mean pressures while the rocker overcomes ``moment``; arm <= 0 locks."""
+    pi1, pi2 = support_arms(s.c, s.z1, s.z2, cos1, sin1, axial)
+    span = abs(s.z2 - s.z1)
+    arm = s.c * cos1 - s.mu * (0.5 * s.kj * s.d * (pi1 + pi2) / span + s.rt * abs(axial))
+    force = moment / arm
+    r1, r2, x = force * pi1 / span, force * pi2 / span, force * axial
+    p3 = 4.0 * abs(x) / (math.pi * (s.d0 - s.d) * (s.d0 + s.d))
+    return Criteria(pi1, pi2, arm, force, r1, r2, x, r1 / (s.d * s.l1), r2 / (s.d * s.l2), p3)
+
+
+@kernel
+def sliding_bearings(
+    cos_theta1: Array,
+    sin_theta1: Array,
+    axial: Array,
+    moment: Array,
+    bearings: Array,
+    status: Status,
+    support1: Array | None,
+    support2: Array | None,
+    thrust: Array | None,
+    pressure1: Array | None,
+    pressure2: Array | None,
+    pressure3: Array | None,
+) -> None:
+    """Support forces and mean pressures of two journals and a collar, massless estimate.
+
+    Parameters
+    ----------
+    cos_theta1, sin_theta1, axial : (n, m) direction of the coupler force, see the module
+    moment : (n,) resisting torque M_c on the rocker
+    bearings : (n, 10) columns of :class:`Sliding`
+    status : (n, m), in and out; JAMMED where friction leaves no driving arm
+    support1, support2, thrust : (n, m) or None; radial forces and axial force
+    pressure1, pressure2, pressure3 : (n, m) or None; mean pressures of the journals and the collar
+    """
+    for i in range(cos_theta1.shape[0]):
+        data = _sliding(bearings, i)
+        for j in range(cos_theta1.shape[1]):
+            r = sliding_criteria(data, moment[i], cos_theta1[i, j], sin_theta1[i, j], axial[i, j])
+            if status[i, j] == st.OK and not r.arm > 0.0:
+                status[i, j] = st.JAMMED
+            good = 1.0 if status[i, j] == st.OK else math.nan
+            if support1 is not None:
+                support1[i, j] = good * r.r1
+            if support2 is not None:
+                support2[i, j] = good * r.r2
+            if thrust is not None:
+                thrust[i, j] = good * r.axial
+            if pressure1 is not None:
+                pressure1[i, j] = good * r.p1
+            if pressure2 is not None:
+                pressure2[i, j] = good * r.p2
+            if pressure3 is not None:
+                pressure3[i, j] = good * r.p3
+
+
+@inline
+def _utilisation(s: Sliding, moment: float, theta1: float, tan2: float, limits: Array, i: int) -> float:
+    sin1 = math.sin(theta1)
+    r = sliding_criteria(s, moment, math.cos(theta1), sin1, sin1 * tan2)
+    if not r.arm > 0.0:
+        return math.inf
+    worst: float = max(r.p1 / limits[i, 0], max(r.p2 / limits[i, 1], r.p3 / limits[i, 2]))
+    return worst
+
+
+@kernel
+def permissible_theta1(
+    theta2: Array, moment: Array, bearings: Array, limits: Array, theta1: Array, status: Status
+) -> None:
+    """Largest radial pressure angle the bearings permit at a given axial angle: first crossing of max p/p_adm = 1.
+
+    Parameters
+    ----------
+    theta2 : (n,) axial pressure angle [rad];  moment : (n,);  bearings : (n, 10)
+    limits : (n, 3) permissible mean pressures of journal 1, journal 2, collar
+    theta1 : (n,) out [rad]; 0 with LIMIT_EXCEEDED where even theta1 = 0 is too much
+    status : (n,) out
+    """
+    for i in range(theta2.size):
+        data = _sliding(bearings, i)
+        tan2 = math.tan(theta2[i])
+        status[i] = st.OK
+        if _utilisation(data, moment[i], 0.0, tan2, limits, i) > 1.0:
+            theta1[i], status[i] = 0.0, st.LIMIT_EXCEEDED
+            continue
+        low, high = 0.0, 0.5 * math.pi
+        for k in range(1, SCAN + 1):
+            high = 0.5 * math.pi * k / SCAN
+            if _utilisation(data, moment[i], high, tan2, limits, i) > 1.0:
+                break
+            low = high
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            if _utilisation(data, moment[i], middle, tan2, limits, i) > 1.0:
+                high = middle
+            else:
+                low = middle
+        theta1[i] = low
+
+
+@kernel
+def rolling_bearings(
+    cos_theta1: Array,
+    sin_theta1: Array,
+    axial: Array,
+    moment: Array,
+    bearings: Array,
+    status: Status,
+    equivalent1: Array | None,
+    equivalent2: Array | None,
+    life1: Array | None,
+    life2: Array | None,
+) -> None:
+    """Equivalent loads and L10 lives [10^6 turns] of two rolling bearings, frictionless support forces.
+
+    Parameters
+    ----------
+    cos_theta1, sin_theta1, axial : (n, m) direction of the coupler force, see the module
+    moment : (n,) resisting torque on the rocker
+    bearings : (n, 11) columns of :class:`Rolling`
+    status : (n, m), in and out; JAMMED at cos(theta1) <= 0
+    equivalent1, equivalent2, life1, life2 : (n, m) or None
+    """
+    for i in range(cos_theta1.shape[0]):
+        c, z1, z2 = bearings[i, 0], bearings[i, 1], bearings[i, 2]
+        for j in range(cos_theta1.shape[1]):
+            cos1 = cos_theta1[i, j]
+            pi1, pi2 = support_arms(c, z1, z2, cos1, sin_theta1[i, j], axial[i, j])
+            if status[i, j] == st.OK and not cos1 > 0.0:
+                status[i, j] = st.JAMMED
+            good = 1.0 if status[i, j] == st.OK else math.nan
+            force = moment[i] / (c * cos1)
+            thrust = abs(force * axial[i, j])
+            span = abs(z2 - z1)
+            first = _equivalent(bearings, i, abs(force) * pi1 / span, thrust if bearings[i, 10] == 1.0 else 0.0)
+            second = _equivalent(bearings, i, abs(force) * pi2 / span, thrust if bearings[i, 10] == 2.0 else 0.0)
+            if equivalent1 is not None:
+                equivalent1[i, j] = good * first
+            if equivalent2 is not None:
+                equivalent2[i, j] = good * second
+            if life1 is not None:
+                life1[i, j] = good * (bearings[i, 8] / first) ** bearings[i, 7]
+            if life2 is not None:
+                life2[i, j] = good * (bearings[i, 8] / second) ** bearings[i, 7]
+
+
+@inline
+def _equivalent(bearings: Array, i: int, radial: float, thrust: float) -> float:
+    v, x, y, e_limit, shock = bearings[i, 3], bearings[i, 4], bearings[i, 5], bearings[i, 6], bearings[i, 9]
+    load: float = v * radial if thrust <= e_limit * v * radial else x * v * radial + y * thrust
+    return float(shock * load)

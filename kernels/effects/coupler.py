@@ -1,0 +1,128 @@
+"""C0: orientation of the coupler, its rates, and the motion of a point on it.
+
+A ball joint with a finger is a universal joint: its first axis ``w`` is fixed in the neighbouring link, its second axis
+``n`` in the coupler, normal to w and to the coupler (spatial-linkages sheet, section 4; Polukhin 1971, 2.6).
+
+* finger on the driven joint C: w = rho (the line D-C), n = branch (w x s)/|w x s|; degenerates only at a dead point,
+  |w x s| >= cos(pressure angle);
+* finger on the driving joint B: w = u (crank axis), n = (w x s)/|w x s|; degenerates where the coupler is parallel to
+  the crank axis, whatever the pressure angle.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.joints import Joints, read
+from kernels.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
+
+Array = NDArray[np.float64]
+Status = NDArray[np.uint8]
+
+DRIVEN, DRIVING = 0, 1
+
+# Below this sine of the angle between coupler and finger axis the finger couple, ~ 1/sine^3, has no digit left.
+LEAST_SINE = 1e-7
+
+
+class Coupler(NamedTuple):
+    """Orientation (s, n x s, n) and its rates per unit crank speed: multiply omega by speed, eps by speed squared."""
+
+    w: Vector
+    n: Vector
+    across: Vector  # n x s
+    omega: Vector
+    eps: Vector
+    v_b: Vector
+    a_b: Vector
+    sine: float  # |w x s|
+
+
+@inline
+def orientation(j: Joints, construction: int) -> Coupler:
+    """Orientation and rates of the coupler for one pose (sheet 4.1, 4.2, primes with respect to the crank angle)."""
+    v_b, a_b = scale(j.a, j.tau_b), scale(-j.a, j.rho_b)
+    v_c = scale(j.c * j.dpsi, j.tau)
+    a_c = mix(j.c * j.d2psi, j.tau, -j.c * j.dpsi * j.dpsi, j.rho)
+    per_b = 1.0 / j.b
+    ds, d2s = scale(per_b, sub(v_c, v_b)), scale(per_b, sub(a_c, a_b))
+    if construction == DRIVEN:
+        w = j.rho
+        dw = scale(j.dpsi, j.tau)
+        d2w = mix(j.d2psi, j.tau, -j.dpsi * j.dpsi, j.rho)
+        sign = j.branch
+    else:
+        w, dw, d2w, sign = j.u, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0
+    m = scale(sign, cross(w, j.s))
+    dm = scale(sign, add(cross(dw, j.s), cross(w, ds)))
+    d2m = scale(sign, add(add(cross(d2w, j.s), scale(2.0, cross(dw, ds))), cross(w, d2s)))
+    sine = norm(m)
+    per = 1.0 / sine
+    n = scale(per, m)
+    across = cross(n, j.s)
+    d_sine = dot(dm, n)
+    dn = scale(per, mix(1.0, dm, -d_sine, n))
+    spin = -per * dot(dm, across)
+    omega = add(cross(j.s, ds), scale(spin, j.s))
+    d_spin = -(per * dot(mix(1.0, d2m, -2.0 * d_sine, dn), across) + dot(dn, cross(omega, across)))
+    eps = add(add(cross(j.s, d2s), scale(d_spin, j.s)), scale(spin, ds))
+    return Coupler(w, n, across, omega, eps, v_b, a_b, sine)
+
+
+@kernel
+def coupler_point(
+    poses: Array,
+    designs: Array,
+    point: Array,
+    construction: int,
+    status: Status,
+    position: Array | None,
+    velocity: Array | None,
+    acceleration: Array | None,
+    orientation_n: Array | None,
+    omega: Array | None,
+    eps: Array | None,
+) -> None:
+    """Motion of a point of the coupler and the coupler's orientation and rates.
+
+    Parameters
+    ----------
+    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.joints`
+    point : (n, 3), coordinates along (s, n x s, n) from B [length]
+    construction : DRIVEN or DRIVING, which ball joint carries the finger
+    status : (n, m), in and out; poses that are not OK give nan, SINGULAR where the finger axis meets the coupler
+    position, velocity, acceleration : (n, m, 3) or None, with respect to the crank angle [length]
+    orientation_n, omega, eps : (n, m, 3) or None; unit vector n, angular velocity and acceleration per unit crank speed
+    """
+    for i in range(poses.shape[0]):
+        p = (point[i, 0], point[i, 1], point[i, 2])
+        for j in range(poses.shape[1]):
+            joints = read(poses[i, j], designs[i])
+            body = orientation(joints, construction)
+            if status[i, j] == st.OK and not body.sine > LEAST_SINE:
+                status[i, j] = st.SINGULAR
+            good = 1.0 if status[i, j] == st.OK else math.nan
+            arm = add(mix(p[0], joints.s, p[1], body.across), scale(p[2], body.n))
+            if position is not None:
+                _store(position, i, j, good, add(joints.B, arm))
+            if velocity is not None:
+                _store(velocity, i, j, good, add(body.v_b, cross(body.omega, arm)))
+            if acceleration is not None:
+                _store(acceleration, i, j, good, add(body.a_b, spun(body.omega, body.eps, arm)))
+            if orientation_n is not None:
+                _store(orientation_n, i, j, good, body.n)
+            if omega is not None:
+                _store(omega, i, j, good, body.omega)
+            if eps is not None:
+                _store(eps, i, j, good, body.eps)
+
+
+@inline
+def _store(out: Array, i: int, j: int, good: float, a: Vector) -> None:
+    out[i, j, 0], out[i, j, 1], out[i, j, 2] = good * a[0], good * a[1], good * a[2]

@@ -1,0 +1,73 @@
+"""What an effect knows of a linkage: joint positions, directions and the follower's motion, never the family.
+
+A crank turns about ``u`` at A and carries the ball joint B; a coupler runs from B to the ball joint C, which turns
+about ``k`` at D.  A family fills one record per pose and one per design; :func:`read` puts them together for one pose.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels._jit import inline
+from kernels.vectors import Vector
+
+Array = NDArray[np.float64]
+
+PER_POSE = 24
+PER_DESIGN = 16
+
+
+class Joints(NamedTuple):
+    """One pose; primes are derivatives with respect to the crank angle."""
+
+    B: Vector  # crank pin
+    C: Vector  # driven ball joint
+    s: Vector  # unit vector from B to C
+    rho_b: Vector  # crank triad (rho_b, tau_b, u)
+    tau_b: Vector
+    rho: Vector  # follower triad (rho, tau, k)
+    tau: Vector
+    t_tau: float  # s . tau, signed by the branch: |t_tau| is the cosine of the pressure angle
+    dpsi: float
+    u: Vector  # crank axis
+    k: Vector  # follower axis
+    A: Vector
+    D: Vector
+    a: float
+    b: float
+    c: float
+    branch: float
+    d2psi: float
+
+
+@inline
+def _vector(record: Array, first: int) -> Vector:
+    return record[first], record[first + 1], record[first + 2]
+
+
+@inline
+def read(poses: Array, designs: Array) -> Joints:
+    """Joints of one pose from its record ``poses`` (PER_POSE,) and its design's record ``designs`` (PER_DESIGN,)."""
+    return Joints(
+        _vector(poses, 0),
+        _vector(poses, 3),
+        _vector(poses, 6),
+        _vector(poses, 9),
+        _vector(poses, 12),
+        _vector(poses, 15),
+        _vector(poses, 18),
+        poses[21],
+        poses[22],
+        _vector(designs, 0),
+        _vector(designs, 3),
+        _vector(designs, 6),
+        _vector(designs, 9),
+        designs[12],
+        designs[13],
+        designs[14],
+        designs[15],
+        poses[23],
+    )
