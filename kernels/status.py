@@ -17,6 +17,7 @@ INVALID_INPUT = 7
 SINGULAR = 8
 NOT_OSCILLATING = 9
 JAMMED = 10
+NO_DWELL = 11
 
 MEANING: dict[int, str] = {
     OK: "ok",
@@ -30,4 +31,5 @@ MEANING: dict[int, str] = {
     SINGULAR: "the position is not defined (a joint lies on the axis it turns about)",
     NOT_OSCILLATING: "the follower turns fully: it has no limit positions",
     JAMMED: "friction blocks the motion, or its iteration does not contract",
+    NO_DWELL: "the output does not make one turn per turn of the input: no dwell is defined",
 }

@@ -9,7 +9,7 @@ from importlib import import_module
 from sweep.errors import InputError, nearest
 from sweep.families.base import Family
 
-NAMES = ("rssr", "rssp", "guide")
+NAMES = ("rssr", "rssp", "guide", "geared_dwell")
 
 
 def family(name: str | Sequence[str]) -> Family:

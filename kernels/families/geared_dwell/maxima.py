@@ -1,0 +1,145 @@
+"""True maxima of the geared dwell drive's transfer functions over the turn, from all their stationary points."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.families.geared_dwell.closure import Array, Reduced, Status, reduce_design
+from kernels.polynomial import roots_up_to, value_and_slope
+
+
+@inline
+def stretch(
+    r: Reduced, k: float, a: float, number: int, s2: Array, q: Array, d: Array, lean: Array
+) -> tuple[float, float]:
+    """Quadratics of a stretch of the half turn in its own variable tau >= 0; its length and |dtau/dcos(phi)|.
+
+    ``s2`` is sin^2(phi), ``q`` and ``d`` are Q and D, and psi' = 1 - lean/D.  The turn is cut at phi = pi/2 with
+    tau = t (number 0) and tau = 1 + cos(phi) (number 1).  Where the pin passes nearest to the axis at cos(phi) = 1/k,
+    near a = -k, number 0 is replaced by two stretches in tau = 1 - k cos(phi) (number 2) and its negative (number 3).
+    """
+    h = r.front if number != 1 else r.back
+    if number < 2:
+        s2[0], s2[1], s2[2] = 0.0, 2.0, -1.0
+        q[0], q[1], q[2] = h.q0, h.q1, r.ak4
+        d[0], d[1], d[2] = h.e * h.e, h.d1, -r.ak4
+        lean[0], lean[1] = h.total * h.e, -2.0 * h.total
+        return 1.0, 1.0
+    g, per_k, total = (1.0 if number == 2 else -1.0), 1.0 / k, h.total
+    s2[0], s2[1], s2[2] = (1.0 - per_k) * (1.0 + per_k), 2.0 * g * per_k * per_k, -per_k * per_k
+    q[0], q[1], q[2] = (
+        total * (3.0 * total - 4.0 * k + 4.0 * per_k),
+        g * (8.0 - 4.0 * a * (a - k) - 8.0 * total * per_k),
+        4.0 * a * per_k,
+    )
+    d[0], d[1], d[2] = total * total, 4.0 * g * total * per_k, -4.0 * a * per_k
+    lean[0], lean[1] = total * (2.0 * per_k + (a - k)), -2.0 * g * total * per_k
+    return (1.0 if number == 2 else k - 1.0), k
+
+
+@inline
+def angle_at(k: float, number: int, tau: float) -> float:
+    """The carrier angle in [0, pi] at a place of a stretch."""
+    if number == 1:
+        return math.pi - 2.0 * math.asin(math.sqrt(0.5 * tau))
+    t = tau if number == 0 else ((k - 1.0) + (tau if number == 2 else -tau)) / k
+    return 2.0 * math.asin(math.sqrt(0.5 * min(max(t, 0.0), 2.0)))
+
+
+@inline
+def quadratic(p: Array, x: float) -> float:
+    """p[0] + p[1] x + p[2] x^2."""
+    value: float = p[0] + x * (p[1] + x * p[2])
+    return value
+
+
+@kernel
+def turn_maxima(
+    designs: Array,
+    status: Status,
+    max_abs_dpsi: Array | None,
+    max_abs_d2psi: Array | None,
+    phi_max_abs_d2psi: Array | None,
+    max_abs_d3psi: Array | None,
+) -> None:
+    """Largest |psi'|, |psi''|, |psi'''| over the turn from all stationary points; (7)-(9).
+
+    Parameters
+    ----------
+    designs : (n, 2) columns of :class:`Design`
+    status : (n,) out; OK, SINGULAR (the pin passes through the output axis), NOT_CONVERGED or INVALID_INPUT
+    max_abs_dpsi ... max_abs_d3psi : (n,) out, or None: not computed, not compiled
+    phi_max_abs_d2psi : (n,) out, where |psi''| is largest, in [0, pi]; -phi is as good, psi'' being odd
+
+    Notes
+    -----
+    Every real root of the polynomial in cos(phi) is found (degree 2, 5 and 6), for every number of output turns;
+    nothing is sampled.  Each half turn uses the variable that vanishes where the pin comes nearest to the axis.
+    """
+    s2, q, d, lean = np.empty(3), np.empty(3), np.empty(3), np.empty(2)
+    bend, slope, found, scratch = np.empty(6), np.empty(7), np.empty(6), np.empty((6, 7))
+    for i in range(designs.shape[0]):
+        r = reduce_design(designs, i)
+        k, a, total = designs[i, 0], designs[i, 1], r.front.total
+        code = st.OK
+        if not r.valid:
+            code = st.INVALID_INPUT
+        elif not r.regular:
+            code = st.SINGULAR
+        near = k > 1.0 and 2.0 * abs(total) < abs(r.front.e)
+        m1, m2, m3, phi2 = 0.0, -1.0, 0.0, 0.0
+        for number in range(4 if code == st.OK else 0):
+            if (number == 0 and near) or (number >= 2 and not near):
+                continue
+            end, steep = stretch(r, k, a, number, s2, q, d, lean)
+            if max_abs_dpsi is not None:
+                count = roots_up_to(end, q, 2, scratch, found)
+                for n in range(-2, count):
+                    tau = found[n] if n >= 0 else (0.0 if n == -1 else end)
+                    value = abs(1.0 - (lean[0] + lean[1] * tau) / quadratic(d, tau))
+                    m1 = value if not value <= m1 else m1  # nan, a root that did not settle, stays
+            if max_abs_d2psi is not None or phi_max_abs_d2psi is not None or max_abs_d3psi is not None:
+                # bend = s2'/2 q d + s2 (q' d - 2 q d'): psi'' is stationary where it vanishes, psi''' ~ bend/d^3.
+                bend[:] = 0.0
+                for x in range(3):
+                    for y in range(3):
+                        for z in range(3):
+                            if x + y + z > 0:
+                                factor = 0.5 * x + y - 2.0 * z
+                                bend[x + y + z - 1] += factor * (s2[x] * q[y] * d[z])
+                if max_abs_d2psi is not None or phi_max_abs_d2psi is not None:
+                    count = roots_up_to(end, bend, 5, scratch, found)
+                    for n in range(-1, count):
+                        tau = found[n] if n >= 0 else end
+                        square = quadratic(d, tau)
+                        value = math.sqrt(max(quadratic(s2, tau), 0.0)) / square * (abs(quadratic(q, tau)) / square)
+                        if not value <= m2:
+                            m2, phi2 = value, angle_at(k, number, tau)
+                if max_abs_d3psi is not None:
+                    slope[:] = 0.0
+                    for x in range(6):
+                        for z in range(3):
+                            if x + z > 0:
+                                slope[x + z - 1] += (x - 3.0 * z) * (bend[x] * d[z])
+                    count = roots_up_to(end, slope, 6, scratch, found)
+                    for n in range(-2, count):
+                        tau = found[n] if n >= 0 else (0.0 if n == -1 else end)
+                        square = quadratic(d, tau)
+                        value = abs(value_and_slope(bend, 5, tau)[0]) * steep / square / square / square
+                        m3 = value if not value <= m3 else m3
+        if m1 != m1 or m2 != m2 or m3 != m3:
+            code = st.NOT_CONVERGED
+        status[i] = code
+        scale = 2.0 * abs(total) if code == st.OK else math.nan
+        if max_abs_dpsi is not None:
+            max_abs_dpsi[i] = m1 if code == st.OK else math.nan
+        if max_abs_d2psi is not None:
+            max_abs_d2psi[i] = scale * m2
+        if phi_max_abs_d2psi is not None:
+            phi_max_abs_d2psi[i] = phi2 if code == st.OK else math.nan
+        if max_abs_d3psi is not None:
+            max_abs_d3psi[i] = scale * m3

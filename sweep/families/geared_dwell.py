@@ -1,0 +1,124 @@
+"""Registry entry of the geared dwell drive with a slotted output link."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from kernels.families import geared_dwell
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, optional_outputs
+
+PARAMETERS = (
+    Parameter("k", "ratio", "distance of the pin from the planet centre, in planet radii", positive=True),
+    Parameter("a", "ratio", "offset of the output axis from the carrier axis, in planet radii"),
+)
+
+POSE_OUTPUTS = (
+    Output("psi", "rad", "output angle, continuous over all turns; 0 or pi at phi = 0", "(3)"),
+    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(4)"),
+    Output("d2psi", "1", "acceleration analogue", "(5)"),
+    Output("d3psi", "1", "jerk analogue", "(6)"),
+    Output("sin_psi", "1", "sine of the output angle", "(2)"),
+    Output("cos_psi", "1", "cosine of the output angle", "(2)"),
+    Output("x_b", "1", "pin from the output axis towards phi = 0, in planet radii", "(2)"),
+    Output("y_b", "1", "pin from the output axis across it, in planet radii", "(2)"),
+)
+
+DWELL_OUTPUTS = (
+    Output("turns", "1", "turns of the output per turn of the carrier, 0, 1 or 2", "section 2"),
+    Output("dwell_angle", "rad", "return dwell: carrier angle between first and third passage of mid-dwell", "(10)"),
+    Output("dwell_deviation", "rad", "largest deviation of psi from mid-dwell, half the peak to peak", "(11)"),
+    Output("dwell_band", "rad", "carrier angle during which psi stays within +-dwell_deviation", "(12)"),
+)
+
+MAX_OUTPUTS = (
+    Output("max_abs_dpsi", "1", "largest velocity analogue over the turn", "(7)"),
+    Output("max_abs_d2psi", "1", "largest acceleration analogue over the turn", "(8)"),
+    Output("phi_max_abs_d2psi", "rad", "carrier angle in [0, pi] where it occurs; as well at minus it", "(8)"),
+    Output("max_abs_d3psi", "1", "largest jerk analogue over the turn", "(9)"),
+)
+
+_POSE_NAMES = tuple(o.name for o in POSE_OUTPUTS)
+_SAMPLED_OUTPUTS = tuple(o for o in MAX_OUTPUTS if o.name.startswith("max"))
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its carrier angles, each (n, m)."""
+    shape = (designs.shape[0], angles.cos.shape[1])
+    status = np.empty(shape, np.uint8)
+    outputs = optional_outputs(_POSE_NAMES, wanted, shape, np.result_type(designs, angles.cos))
+    geared_dwell.poses(designs, angles.phi, angles.cos, angles.sin, status, *outputs)
+    columns: Columns = {name: out for name, out in zip(_POSE_NAMES, outputs, strict=True) if out is not None}
+    return columns | {"status": status}
+
+
+def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Dwell measures from their closed forms and a bracketed root; to rounding, whatever the accuracy asked."""
+    status, outputs = _empty(DWELL_OUTPUTS, wanted, len(designs))
+    geared_dwell.dwell_measures(designs, status, *outputs.values())
+    return _columns(outputs, status)
+
+
+def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Maxima over the turn from all stationary points, to rounding."""
+    status, outputs = _empty(MAX_OUTPUTS, wanted, len(designs))
+    geared_dwell.turn_maxima(designs, status, *outputs.values())
+    return _columns(outputs, status)
+
+
+def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Maxima over ``accuracy.samples`` equidistant carrier angles, the first at phi = 0."""
+    assert accuracy.samples is not None
+    status, outputs = _empty(_SAMPLED_OUTPUTS, wanted, len(designs))
+    geared_dwell.dense_maxima(designs, *half_turn(accuracy.samples), status, *outputs.values())
+    return _columns(outputs, status)
+
+
+@lru_cache(maxsize=32)
+def half_turn(samples: int) -> tuple[Array, Array]:
+    """The equidistant grid of one turn, folded: rows 1 -+ cos(phi) and sin(phi) around phi = 0 and around phi = pi.
+
+    phi and -phi have the same magnitudes, so half of the samples stand for all.  The last angle is repeated up to a
+    multiple of 16, which the vectorised loop takes without a remainder; the grid of an odd number misses phi = pi.
+    """
+    quarters = np.arange(samples // 2 + 1) * 4  # phi in units of pi/(2 samples)
+    return _table(quarters[quarters <= samples], samples), _table(2 * samples - quarters[quarters > samples], samples)
+
+
+def _table(quarters: np.ndarray[tuple[int], np.dtype[np.int64]], samples: int) -> Array:
+    angle = quarters * (np.pi / (2 * samples))
+    rows = np.stack([2.0 * np.sin(0.5 * angle) ** 2, np.sin(angle)])
+    missing = -quarters.size % 16 if quarters.size else 0
+    table: Array = np.pad(rows, ((0, 0), (0, missing)), mode="edge" if missing else "constant")
+    table.flags.writeable = False
+    return table
+
+
+def _empty(
+    provided: tuple[Output, ...], wanted: frozenset[str], count: int
+) -> tuple[np.ndarray[tuple[int], np.dtype[np.uint8]], dict[str, Array | None]]:
+    names = tuple(o.name for o in provided)
+    outputs = optional_outputs(names, wanted, (count,))
+    return np.empty(count, np.uint8), dict(zip(names, outputs, strict=True))
+
+
+def _columns(outputs: dict[str, Array | None], status: np.ndarray[tuple[int], np.dtype[np.uint8]]) -> Columns:
+    columns: Columns = {name: out for name, out in outputs.items() if out is not None}
+    return columns | {"status": status}
+
+
+FAMILY = Family(
+    name="geared_dwell",
+    title="geared dwell drive",
+    parameters=PARAMETERS,
+    position="psi",
+    pose_outputs=POSE_OUTPUTS,
+    poses=poses,
+    steps=(
+        Step("dwell", DWELL_OUTPUTS, dwell, 600.0),
+        Step("stationary points", MAX_OUTPUTS, exact_maxima, 1500.0, lambda accuracy: accuracy.target is not None),
+        Step("grid", _SAMPLED_OUTPUTS, sampled_maxima, 200.0, lambda accuracy: accuracy.samples is not None),
+    ),
+    derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
+)
