@@ -1,0 +1,9 @@
+"""The optimiser: smallest objective under limits, by SLSQP on the epigraph form with exact gradients."""
+
+from __future__ import annotations
+
+from sweep.optimise.certificate import Result
+from sweep.optimise.problem import Problem
+from sweep.optimise.solve import minimise
+
+__all__ = ["Problem", "Result", "minimise"]

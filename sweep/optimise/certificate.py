@@ -1,0 +1,118 @@
+"""What is known about a result: multipliers, optimality residual, active limits in words, agreement of the starts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.families.base import Array
+from sweep.optimise.form import Form, Label
+
+ACTIVE = 1e-6  # a row within this of its bound (scaled) may carry a multiplier
+AGREE = 1e-4  # starts whose objective is within this of the best agree
+
+CAVEAT = (
+    "The conditions hold at a local optimum; starts that agree make a better one less likely, they do not exclude it: "
+    "this is no proof of a global optimum."
+)
+
+WORDS = {"minimum": "at its minimum", "maximum": "at its maximum", "equal": "held by its equation"}
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """Least-squares multipliers: ``gradient of t = sum weights * gradient of rows + bounds``.
+
+    ``residual`` is the largest component of what is left, in variables scaled to their bounds and the objective scaled
+    by its value at the start; ``bounds`` holds the multipliers of the lower (+) and upper (-) bounds.
+    """
+
+    weights: Array
+    bounds: Array
+    at_bound: NDArray[np.bool_]
+    residual: float
+
+
+def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array) -> Multipliers:
+    """Multipliers of the active rows and bounds by non-negative least squares (equations are free in sign).
+
+    Parameters
+    ----------
+    form : the program at the design
+    rows : (R,) its rows there
+    jacobian : (R, n) their gradients by the scaled variables
+    fractions : (n,) scaled variables
+    """
+    from scipy.optimize import nnls
+
+    n = len(fractions)
+    active = np.flatnonzero((rows <= ACTIVE) | form.equal)
+    lower, upper = np.flatnonzero(fractions <= 1e-10), np.flatnonzero(fractions >= 1.0 - 1e-10)
+    if not np.isfinite(jacobian[active]).all():
+        return Multipliers(np.zeros(len(rows)), np.zeros(n), np.zeros(n, np.bool_), math.nan)
+    full = np.column_stack([jacobian[active], form.slack[active]]).T
+    equations = full[:, form.equal[active]]
+    edges = np.zeros((n + 1, len(lower) + len(upper)))
+    edges[lower, np.arange(len(lower))] = 1.0
+    edges[upper, len(lower) + np.arange(len(upper))] = -1.0
+    matrix = np.concatenate([full, -equations, edges], axis=1)
+    target = np.concatenate([np.zeros(n), [1.0]])
+    # Columns of very different size would hide the small ones from the active-set choice.
+    size = np.linalg.norm(matrix, axis=0)
+    size[size == 0.0] = 1.0
+    solution = nnls(matrix / size, target)[0] / size if matrix.shape[1] else np.zeros(0)
+    residual = np.abs(matrix @ solution - target).max()
+    weights = np.zeros(len(rows))
+    weights[active] = solution[: len(active)]
+    weights[active[form.equal[active]]] -= solution[len(active) : len(active) + equations.shape[1]]
+    edge = solution[len(active) + equations.shape[1] :]
+    bounds = np.zeros(n)
+    bounds[lower] += edge[: len(lower)]
+    bounds[upper] -= edge[len(lower) :]
+    at_bound = bounds != 0.0
+    complementarity = np.abs(weights * rows)[~form.equal].max(initial=0.0)
+    return Multipliers(weights, bounds, at_bound, float(max(residual, complementarity)))
+
+
+@dataclass(frozen=True)
+class Result:
+    """A start's outcome.
+
+    ``design`` (P,) in the family's units.  ``gap`` is the difference between the maximum the search worked with and the
+    true one found afterwards on a finer grid, relative to the objective.  ``violation`` is the largest scaled
+    violation; ``relaxation`` says by how much every violated limit would have to give way, in the unit of its output.
+    ``multipliers`` are changes of the scaled objective per unit of each active limit, scaled likewise.  ``status`` is OK,
+    LIMIT_EXCEEDED (infeasible) or NOT_CONVERGED, and ``ended`` says how the search ended: "converged", "stalled",
+    "infeasible", "time" or "interrupted".
+    """
+
+    start: int
+    design: Array
+    objective: float
+    gap: float
+    violation: float
+    kkt_residual: float
+    active: tuple[str, ...]
+    multipliers: dict[str, float]
+    relaxation: dict[str, float]
+    values: dict[str, float]
+    status: int
+    ended: str
+    agree: int = 1
+    caveat: str = CAVEAT
+
+
+def in_words(labels: tuple[Label, ...], found: Multipliers, variables: tuple[str, ...]) -> dict[str, float]:
+    """Active limits and bounds with their multipliers, by name; several points of one limit are one."""
+    words: dict[str, float] = {}
+    for label, weight in zip(labels, found.weights, strict=True):
+        if label.side != "objective" and abs(weight) > 1e-9:
+            text = f"{label.name} {WORDS[label.side]}"
+            words[text] = words.get(text, 0.0) + float(weight)
+    for name, weight in zip(variables, found.bounds, strict=True):
+        if abs(weight) > 1e-9:
+            words[f"{name} at its {'lower' if weight > 0 else 'upper'} bound"] = abs(float(weight))
+    return words

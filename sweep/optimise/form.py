@@ -1,0 +1,256 @@
+"""The epigraph program of one design: rows ``c = constant + matrix @ atoms + slack * t``, to be >= 0 or = 0.
+
+Atoms are what the gradients know: the curves at K points, the crank angles of these points, and plain numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.errors import InputError
+from sweep.families.base import Array
+from sweep.optimise.measures import Measure, Series, margins, measure
+from sweep.optimise.points import Curves, Points
+from sweep.optimise.problem import PLACE, Problem
+
+Term = dict[int, float]
+FAR = 1e3  # stands for a row that cannot be computed at a trial design: far outside, but a number
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """One limit in inner values; ``minimum == maximum`` is an equation."""
+
+    measure: Measure
+    minimum: float | None
+    maximum: float | None
+
+    @property
+    def equal(self) -> bool:
+        """Whether this is an equation."""
+        return self.minimum is not None and self.minimum == self.maximum
+
+
+@dataclass(frozen=True)
+class Label:
+    """What a row stands for: an output and its side, "objective", "minimum", "maximum" or "equal"."""
+
+    name: str
+    side: str
+
+
+@dataclass(frozen=True)
+class Form:
+    """Rows of the program and the points whose curves they use."""
+
+    points: Points
+    scalars: tuple[str, ...]
+    matrix: Array
+    constant: Array
+    slack: Array
+    equal: NDArray[np.bool_]
+    labels: tuple[Label, ...]
+    complete: bool
+
+    def rows(self, atoms: Array, t: float) -> Array:
+        """The rows' values; a row that is nan counts as far outside."""
+        return np.nan_to_num(self.constant + self.matrix @ np.nan_to_num(atoms, nan=1e30) + self.slack * t, nan=-FAR)
+
+    def objective(self, atoms: Array) -> float:
+        """Largest of the objective's rows: the smallest t they allow."""
+        own = np.array([label.side == "objective" for label in self.labels], dtype=np.bool_)
+        if not own.any():
+            return math.inf
+        return float(-(self.constant + self.matrix @ atoms)[own].min())
+
+    def violation(self, atoms: Array) -> float:
+        """Largest scaled violation of the limits; infinite where one of them does not exist for this design."""
+        if not self.complete:
+            return math.inf
+        return self.known_violation(atoms)
+
+    def known_violation(self, atoms: Array) -> float:
+        """Largest scaled violation of those limits that exist for this design."""
+        c = self.constant + self.matrix @ atoms
+        own = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
+        if np.isnan(c[own]).any():
+            return math.inf
+        return float(np.maximum(np.where(self.equal, np.abs(c), -c)[own], 0.0).max(initial=0.0))
+
+    def relaxed(self, hard: set[str]) -> Form:
+        """The elastic program: smallest t by which all limits but the ``hard`` ones have to give way."""
+        keep = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
+        soft = np.array([label.name not in hard for label in self.labels], dtype=np.float64)[keep]
+        both = self.equal[keep]
+        matrix, constant = self.matrix[keep], self.constant[keep]
+        labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
+        return replace(
+            self,
+            matrix=np.concatenate([matrix, -matrix[both]]),
+            constant=np.concatenate([constant, -constant[both]]),
+            slack=np.concatenate([soft, soft[both]]),
+            equal=np.zeros(len(labels) + int(both.sum()), dtype=np.bool_),
+            labels=labels + tuple(label for label, twice in zip(labels, both, strict=True) if twice),
+        )
+
+
+class Program:
+    """The objective and the limits of a problem, ready to be laid out as rows for any design."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.objective = measure(problem.family, problem.objective, problem.window)
+        if self.objective.inner == "rotatable":
+            raise InputError("objective", problem.objective, "a quantity that changes steadily", PLACE)
+        turning = Measure("rotatable", "min", margins(problem.family), "rotatable")
+        self.requirements = [Requirement(turning, turning.to_inner(1.0), None)] if turning.series else []
+        for limit in problem.limits:
+            found = measure(problem.family, limit.output, problem.window)
+            if found.inner == "rotatable":
+                if limit.maximum is not None or limit.minimum not in (1, 1.0, True):
+                    raise InputError(limit.output, (limit.minimum, limit.maximum), "at least 1 (it turns)", PLACE)
+                continue  # demanded of every design anyway
+            sides = [None if side is None else found.to_inner(float(side)) for side in (limit.minimum, limit.maximum)]
+            if (
+                found.inner == "pressure"
+                and limit.minimum is None
+                and not 0.0 < float(limit.maximum or 0) < math.pi / 2
+            ):
+                raise InputError(limit.output, limit.maximum, "an angle between 0 and pi/2", PLACE)
+            self.requirements.append(Requirement(found, sides[0], sides[1]))
+        measures = [self.objective, *(r.measure for r in self.requirements)]
+        self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
+        self.scalars = tuple(dict.fromkeys(m.name for m in measures if m.kind == "scalar"))
+        self.places = any(m.kind.startswith("phi") for m in measures)
+
+    def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
+        """Rows for a design; ``points`` are its extrema, ``scale`` divides the objective."""
+        layout = _Layout(curves, points, design, self.scalars)
+        complete = turns
+        for requirement in self.requirements:
+            complete = layout.require(requirement) and complete
+        for term, shift in layout.upper(self.objective):
+            layout.add(term, shift, -1.0 / scale, 0.0, 1.0, False, Label(self.objective.name, "objective"))
+        return layout.form(complete and layout.has_objective)
+
+    def value(self, found: Measure, form: Form, curves: Curves, design: Array, atoms: Array) -> float:
+        """A measure's value in its own unit; nan where it does not exist."""
+        layout = _Layout(curves, form.points, design, self.scalars)
+        inner = [sum(w * atoms[k] for k, w in term.items()) + shift for term, shift in layout.upper(found)]
+        return found.from_inner(float(max(inner))) if inner else math.nan
+
+
+class _Layout:
+    def __init__(self, curves: Curves, points: Points, design: Array, scalars: tuple[str, ...]) -> None:
+        self.curves, self.points, self.scalars = curves, points, scalars
+        names = curves.family.parameter_names
+        self.outward = float(design[names.index("branch")]) if "branch" in names else 1.0
+        self.terms: list[Term] = []
+        self.rest: list[tuple[float, float, bool, Label]] = []
+
+    @property
+    def has_objective(self) -> bool:
+        return any(label.side == "objective" for *_, label in self.rest)
+
+    def add(
+        self, term: Term, shift: float, weight: float, bound: float, slack: float, equal: bool, label: Label
+    ) -> None:
+        self.terms.append({k: weight * w for k, w in term.items()})
+        self.rest.append((weight * shift + bound, slack, equal, label))
+
+    def require(self, r: Requirement) -> bool:
+        """Rows of one limit; false where the design has none of the extrema it is about."""
+        found = True
+        if r.equal and r.minimum is not None:
+            for term, shift in self.lower(r.measure)[:1]:
+                size = self._size(r, r.minimum)
+                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, True, Label(r.measure.name, "equal"))
+            return bool(self.lower(r.measure))
+        if r.minimum is not None:
+            terms, size = self.lower(r.measure), self._size(r, r.minimum)
+            found = found and bool(terms)
+            for term, shift in terms:
+                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, False, Label(r.measure.name, "minimum"))
+        if r.maximum is not None:
+            terms, size = self.upper(r.measure), self._size(r, r.maximum)
+            found = found and bool(terms)
+            for term, shift in terms:
+                self.add(term, shift, -1.0 / size, r.maximum / size, 0.0, False, Label(r.measure.name, "maximum"))
+        return found
+
+    def upper(self, m: Measure) -> list[tuple[Term, float]]:
+        """Sums of atoms that all have to stay below a bound for the inner value to do so."""
+        return self._bounded(m, above=m.sign > 0.0)
+
+    def lower(self, m: Measure) -> list[tuple[Term, float]]:
+        """Sums of atoms that all have to stay above a bound for the inner value to do so."""
+        return self._bounded(m, above=m.sign < 0.0)
+
+    def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        if m.kind == "scalar":
+            return [({2 * len(self.points) + self.scalars.index(m.name): m.sign}, 0.0)]
+        maxima, minima = self._ends(m.series)
+        if m.kind in ("max", "min"):
+            many = above == (m.kind == "max")
+            ends = maxima if m.kind == "max" else minima
+            return [({k: m.sign}, 0.0) for k in (ends if many else ends[:1])]
+        if m.kind in ("max_abs", "phi_max_abs"):
+            value = self.points.value
+            ends = sorted([*maxima, *minima], key=lambda k: -self.points.sense[k] * value[k])
+            if m.kind == "phi_max_abs":
+                return [({len(self.points) + k: 1.0}, self._turns(k)) for k in ends[:1]]
+            size = max((abs(value[k]) for k in ends), default=0.0)
+            ends = [k for k in ends if self.points.sense[k] * value[k] >= 0.5 * size]
+            return [({k: float(self.points.sense[k])}, 0.0) for k in (ends if above else ends[:1])]
+        if not maxima or not minima:
+            return []
+        if m.kind == "range":
+            pairs = [(i, j) for i in maxima[:4] for j in minima[:4]]
+            return [({i: 1.0, j: -1.0}, 0.0) for i, j in (pairs if above else pairs[:1])]
+        ext, fold = (maxima[0], minima[0]) if self.outward > 0.0 else (minima[0], maxima[0])
+        k, other = len(self.points), {"ext": ext, "fold": fold}
+        if m.kind in ("ext", "fold"):
+            return [({other[m.kind]: 1.0}, 0.0)]
+        if m.kind in ("phi_ext", "phi_fold"):
+            end = other[m.kind.removeprefix("phi_")]
+            return [({k + end: 1.0}, self._turns(end))]
+        apart = self.points.phi[fold] - self.points.phi[ext]
+        return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
+
+    def _turns(self, k: int) -> float:
+        return -2.0 * math.pi * math.floor(self.points.phi[k] / (2.0 * math.pi))
+
+    def _ends(self, series: Sequence[Series]) -> tuple[list[int], list[int]]:
+        """Points that are maxima, highest first, and minima, lowest first, of some series."""
+        numbers = [self.curves.series.index(s) for s in series]
+        own = np.isin(self.points.series, numbers)
+        value, sense = self.points.value, self.points.sense
+        maxima = sorted(np.flatnonzero(own & (sense > 0)).tolist(), key=lambda k: -value[k])
+        minima = sorted(np.flatnonzero(own & (sense < 0)).tolist(), key=lambda k: value[k])
+        return maxima, minima
+
+    def _size(self, r: Requirement, bound: float) -> float:
+        """What a violation is measured in: the bound itself, unless it is tiny against the curve; 1 for cos^2."""
+        if any(s.pressure for s in r.measure.series):
+            return 1.0
+        ends = [k for side in self._ends(r.measure.series) for k in side]
+        amplitude = (
+            1.0 if r.measure.kind.startswith("phi") else max((abs(self.points.value[k]) for k in ends), default=0.0)
+        )
+        return max(abs(bound), 1e-3 * amplitude) or 1.0
+
+    def form(self, complete: bool) -> Form:
+        matrix = np.zeros((len(self.terms), 2 * len(self.points) + len(self.scalars)))
+        for row, term in enumerate(self.terms):
+            for k, weight in term.items():
+                matrix[row, k] += weight
+        constant, slack, equal, labels = (list(c) for c in zip(*self.rest, strict=True)) if self.rest else ([],) * 4
+        return Form(
+            self.points, self.scalars, matrix, np.array(constant, np.float64), np.array(slack, np.float64),
+            np.array(equal, np.bool_), tuple(labels), complete,
+        )  # fmt: skip

@@ -1,0 +1,278 @@
+"""Where along the turn the extrema are: found on a grid, refined, and followed while the design changes.
+
+Slopes with respect to the crank angle come from the complex step through the family's own poses, so any pose output can
+be followed, with or without an output that is its derivative.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.families.base import Angles, Array
+from sweep.optimise.measures import Series
+from sweep.optimise.problem import Problem
+
+Index: TypeAlias = NDArray[np.intp]
+
+STEP = 1e-30  # imaginary step: the error is of order STEP^2, there is no difference to cancel
+NEIGHBOUR = 3e-5  # distance of the slopes whose difference is the curvature; it only steers Newton [rad]
+STRIDE = 0.1  # longest single move of a followed point [rad]
+STATIONARY, CROSSING, STATIC = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Points:
+    """K points of a design's curves; every array is (K,).
+
+    ``series`` numbers the curve, ``phi`` is the crank angle, ``sense`` +1 for a maximum and -1 for a minimum; ``how``
+    says what holds the point: stationary, the crossing of the window's edge at the fraction ``level`` of the stroke, or
+    a fixed angle.  ``value`` is the curve there, ``slope`` and ``curvature`` are its derivatives with respect to phi;
+    ``pace`` is the slope of the position.
+    """
+
+    series: Index
+    phi: Array
+    sense: Array
+    how: Index
+    level: Array
+    value: Array
+    slope: Array
+    curvature: Array
+    pace: Array
+
+    def __len__(self) -> int:
+        return len(self.phi)
+
+    def take(self, which: Any) -> Points:
+        """The points selected by an index or a mask."""
+        return Points(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+    def shifted(self, offset: float) -> Points:
+        """The same curves at crank angles ``offset`` further on."""
+        return replace(self, phi=self.phi + offset)
+
+    @classmethod
+    def of(cls, rows: Iterable[tuple[int, float, float, int, float, float]]) -> Points:
+        """Points of (series, phi, sense, how, level, value)."""
+        table = np.array(list(rows), dtype=np.float64).reshape(-1, 6)
+        nothing = np.zeros(len(table))
+        number, phi, sense, how, level, value = table.T
+        return cls(number.astype(np.intp), phi, sense, how.astype(np.intp), level, value, nothing, nothing, nothing)
+
+    @classmethod
+    def joined(cls, first: Points, second: Points) -> Points:
+        """Both sets, the second after the first."""
+        pairs = ((getattr(first, name), getattr(second, name)) for name in first.__dataclass_fields__)
+        return cls(*(np.concatenate(pair) for pair in pairs))
+
+
+class Curves:
+    """The curves a problem needs, of one design or of many at the same crank angles."""
+
+    def __init__(self, problem: Problem, series: tuple[Series, ...]) -> None:
+        self.problem = problem
+        self.family = problem.family
+        position = Series(self.family.position, wrapped=self.family.position == "psi")
+        if any(s.window is not None for s in series) and position not in series:
+            series = (*series, position)
+        self.series = series
+        self.position = series.index(position) if position in series else -1
+        names = {s.output for s in series} | {s.pressure for s in series if s.pressure}
+        self.wanted = frozenset(names)
+        self.calls = 0
+
+    def poses(self, designs: Any, phi: Any, extra: frozenset[str] = frozenset()) -> dict[str, Any]:
+        """Pose outputs at angles phi (m,) shared by all designs (n, P); complex if either is."""
+        self.calls += 1
+        angles = np.asarray(phi)[None, :]
+        if np.iscomplexobj(angles) or np.iscomplexobj(designs):
+            angles, designs = angles.astype(np.complex128), np.asarray(designs).astype(np.complex128)
+        # A trial design may leave the domain of its kernel; the nan it gives is answered by a shorter step.
+        with np.errstate(all="ignore"):
+            return self.family.poses(np.ascontiguousarray(designs), Angles.of(angles), self.wanted | extra)
+
+    def scan(self, design: Array, samples: int) -> tuple[Points, bool]:
+        """All extrema of all curves that can matter, refined, and whether the design has every pose of the turn.
+
+        Only maxima in the upper half of a curve's range and minima in the lower half are kept.  A curve that is not
+        defined over the whole turn has none.
+        """
+        phi = np.arange(samples) * (2.0 * math.pi / samples)
+        columns = self.poses(design[None, :], phi)
+        turns = not columns["status"].any()
+        rows: list[tuple[int, float, float, int, float, float]] = []
+        windowed = [n for n, s in enumerate(self.series) if s.window is not None]
+        for n, s in enumerate(self.series):
+            if n not in windowed:
+                rows += _extrema(n, phi, self.curve(s, columns)[0], s.wrapped)
+        points = self.follow(design, Points.of(rows), stride=2.0 * math.pi / samples)
+        if windowed and turns:
+            edge_rows: list[tuple[int, float, float, int, float, float]] = []
+            for n in windowed:
+                edge_rows += self._inside(n, phi, columns, points)
+            points = self.follow(design, Points.joined(points, Points.of(edge_rows)), stride=2.0 * math.pi / samples)
+        return _without_repetition(points), turns
+
+    def curve(self, series: Series, columns: dict[str, Any]) -> Any:
+        """Values of a series (n, m) out of pose outputs on a set of angles."""
+        x = columns[series.output]
+        if series.pressure:
+            x = x / _discriminant_scale(x, columns[series.pressure])
+        return x
+
+    def stroke(self, points: Points) -> tuple[int, int]:
+        """The points with the smallest and the largest position."""
+        own = np.flatnonzero((points.series == self.position) & (points.how == STATIONARY))
+        low, high = own[points.sense[own] < 0], own[points.sense[own] > 0]
+        if not len(low) or not len(high):
+            return -1, -1
+        return int(low[np.argmin(points.value[low])]), int(high[np.argmax(points.value[high])])
+
+    def follow(self, design: Array, points: Points, stride: float = STRIDE) -> Points:
+        """Move the points to where they belong on this design; values, slopes and curvatures are brought up to date.
+
+        A stationary point climbs (or descends) to its extremum by Newton's method on the slope, at most ``stride`` at a
+        time.  Whatever angle it ends at, the curve's value there bounds the maximum from below.
+        """
+        if not len(points):
+            return points
+        held = points.how == STATIONARY
+        phi = points.phi.copy()
+        for _ in range(20):
+            slope, curvature, pace, place = self._local(design, phi, points)
+            move = np.zeros(len(phi))
+            peak = held & (points.sense * curvature < 0.0)
+            move[peak] = -slope[peak] / curvature[peak]
+            climb = held & ~peak
+            move[climb] = points.sense[climb] * np.sign(slope[climb]) * stride
+            self._approach_edges(points, phi, place, pace, move)
+            move = np.nan_to_num(np.clip(move, -stride, stride), nan=0.0)
+            phi += move
+            if np.abs(move).max() < 1e-7:
+                break
+        slope, curvature, pace, _ = self._local(design, phi, points)
+        moved = replace(points, phi=phi, slope=slope, curvature=curvature, pace=pace)
+        return replace(moved, value=self.values(design[None, :], moved)[0])
+
+    def values(self, designs: Any, points: Points) -> Any:
+        """Curves (n, K) of designs (n, P) at the points' crank angles."""
+        columns = self.poses(designs, self._angles(points))
+        out = np.empty((len(designs), len(points)), dtype=columns[next(iter(self.wanted))].dtype)
+        for n, s in enumerate(self.series):
+            own = points.series == n
+            if not own.any():
+                continue
+            out[:, own] = self.curve(s, columns)[:, : len(points)][:, own]
+            if s.wrapped:
+                # The angle of the same turn as before: a step of the optimiser never moves it by half a turn.
+                turns = np.round((points.value[own] - out[:, own].real) / (2.0 * math.pi))
+                out[:, own] += 2.0 * math.pi * np.nan_to_num(turns)
+        return out
+
+    def positions(self, designs: Any, points: Points) -> Any:
+        """Position of the follower (n, K) at the points' crank angles."""
+        number = np.full(len(points), self.position)
+        return self.values(designs, replace(points, series=number, value=np.zeros(len(points))))
+
+    def _angles(self, points: Points) -> Array:
+        """The points' angles, then a few that tell the scale of a discriminant where the points cannot."""
+        if any(s.pressure for s in self.series):
+            return np.concatenate([points.phi, np.arange(16) * (math.pi / 8.0)])
+        return points.phi
+
+    def _local(self, design: Array, phi: Array, points: Points) -> tuple[Array, Array, Array, Array]:
+        """Slope and curvature of each point's own output, slope and value of the position, all (K,)."""
+        three = np.concatenate([phi - NEIGHBOUR, phi, phi + NEIGHBOUR])
+        columns = self.poses(design[None, :], three + 1j * STEP)
+        k = len(phi)
+        slopes = np.empty((3, k))
+        for n, s in enumerate(self.series):
+            own = points.series == n
+            if own.any():
+                slopes[:, own] = columns[s.output][0].imag.reshape(3, k)[:, own] / STEP
+        curvature = (slopes[2] - slopes[0]) / (2.0 * NEIGHBOUR)
+        if self.position < 0:
+            return slopes[1], curvature, np.zeros(k), np.zeros(k)
+        place = columns[self.series[self.position].output][0, k : 2 * k]
+        return slopes[1], curvature, place.imag / STEP, place.real
+
+    def _approach_edges(self, points: Points, phi: Array, place: Array, pace: Array, move: Array) -> None:
+        edges = points.how == CROSSING
+        low, high = self.stroke(points)
+        if not edges.any() or low < 0:
+            return
+        base, level = place[low], points.level[edges]
+        target = base + level * (place[high] - base)
+        move[edges] = -(place[edges] - target) / pace[edges]
+
+    def _inside(
+        self, n: int, phi: Array, columns: dict[str, Any], points: Points
+    ) -> list[tuple[int, float, float, int, float, float]]:
+        """Extrema inside the window of series n, and both senses at every crossing of the window's edges."""
+        series = self.series[n]
+        low, high = self.stroke(points)
+        if series.window is None or low < 0:
+            return []
+        s = self.curve(self.series[self.position], columns)[0]
+        share = (s - points.value[low]) / (points.value[high] - points.value[low])
+        x = self.curve(series, columns)[0]
+        rows = []
+        for edge in series.window:
+            if edge in (0.0, 1.0):
+                continue
+            side = share - edge
+            for j in np.flatnonzero(np.sign(side) != np.sign(np.roll(side, -1))):
+                part = side[j] / (side[j] - side[(j + 1) % len(side)])
+                start = phi[j] + part * (phi[1] - phi[0])
+                rows += [(n, start, sense, CROSSING, edge, x[j]) for sense in (1.0, -1.0)]
+        inside = (share >= series.window[0] - 1e-12) & (share <= series.window[1] + 1e-12)
+        return rows + _extrema(n, phi, x, False, inside)
+
+
+def _discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
+    """Discriminant over cos^2 of the pressure angle (n, 1): one number for all crank angles.
+
+    Taken at the pose whose pressure angle is nearest to half a radian: well away from the dead points, where the ratio
+    is 0/0, and from a pressure angle of zero, where the angle (not its cosine) has a kink and no derivative.
+    """
+    angle = pressure_angle.real
+    distance = np.where(np.isfinite(angle), np.abs(angle - 0.5), np.inf)
+    best = np.argmin(distance, axis=1)[:, None]
+    cos = np.cos(np.take_along_axis(pressure_angle, best, axis=1))
+    return np.take_along_axis(discriminant, best, axis=1) / (cos * cos)
+
+
+def _extrema(
+    n: int, phi: Array, x: Array, wrapped: bool, inside: NDArray[np.bool_] | None = None
+) -> list[tuple[int, float, float, int, float, float]]:
+    if not np.isfinite(x).all():
+        return []
+    if wrapped:
+        x = np.unwrap(x)
+        if abs(x[0] - x[-1] + math.remainder(x[-1] - x[0], 2.0 * math.pi)) > 1.0:
+            return []  # turns fully: no limit positions
+    counts = np.ones(len(x), dtype=np.bool_) if inside is None else inside
+    if not counts.any():
+        return []
+    top, bottom = float(x[counts].max()), float(x[counts].min())
+    if top - bottom <= 1e-13 * max(abs(top), abs(bottom)):
+        return [(n, float(phi[0]), sense, STATIC, math.nan, float(x[0])) for sense in (1.0, -1.0)]
+    before, after, middle = np.roll(x, 1), np.roll(x, -1), 0.5 * (top + bottom)
+    rows = []
+    for sense in (1.0, -1.0):
+        peak = counts & (sense * x > sense * before) & (sense * x >= sense * after) & (sense * (x - middle) >= 0.0)
+        rows += [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
+    return rows
+
+
+def _without_repetition(points: Points) -> Points:
+    """Two grid maxima that climbed to the same angle are one."""
+    key = np.stack([points.series, points.sense, points.how, np.round(np.mod(points.phi, 2.0 * math.pi), 5)])
+    _, first = np.unique(key, axis=1, return_index=True)
+    return points.take(np.sort(first))
