@@ -8,10 +8,11 @@ import math
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from kernels.status import OK
 from sweep.chunk import BLOCK, cascade, output_columns, parameter_matrix
 from sweep.families.base import Family
 from sweep.summaries import output, routes
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 
-# A chunk should take a few seconds on one core (by the routes' own cost figures, so every machine cuts alike) and hold at
-# most this much before it is encoded; and there should be enough chunks to keep the workers even to the end.
+# A chunk should take a few seconds on one core by the routes' own cost figures, so every machine cuts alike; it should
+# hold at most this much before it is encoded; and there should be enough of them to keep the workers even to the end.
 CHUNK_SECONDS = 2.0
 CHUNK_BYTES = 64 * 2**20
 CHUNKS_AT_LEAST = 16
@@ -38,7 +39,7 @@ NOT_VALUES += ("signals.py", "poses.py", "compare.py")
 
 
 # Sections of the study file that decide no value in a chunk.
-NOT_IN_CHUNKS = ("study", "optimise", "reference", "budget")
+NOT_IN_CHUNKS = ("study", "optimise", "reference", "budget", "report")
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,13 @@ class Column:
     unit: str
     text: str
     role: str
+
+
+class Pilot(NamedTuple):
+    """What a few designs tell of all: cost of one design on one core [s], share of those within every limit."""
+
+    seconds_per_design: float
+    feasible: float
 
 
 @dataclass(frozen=True)
@@ -118,23 +126,28 @@ def choose_chunk_size(study: Study) -> int:
 
     Neither the number of workers nor the clock of the machine enters.
     """
-    seconds = max(seconds_per_design(study), 1e-10)
+    seconds = max(pilot(study).seconds_per_design, 1e-10)
     by_time = CHUNK_SECONDS / seconds
     by_memory = CHUNK_BYTES / row_bytes(study)
     by_count = max(study.space.count / CHUNKS_AT_LEAST, SECONDS_AT_LEAST / seconds)
     return BLOCK * max(1, math.floor(min(by_time, by_memory, by_count) / BLOCK))
 
 
-def seconds_per_design(study: Study) -> float:
-    """Estimated cost of one design on one core [s]: each route counts as often as the pilot's designs reached it."""
+def pilot(study: Study) -> Pilot:
+    """Send about a thousand designs, spread over the space, through the cascade.
+
+    The time counts each route as often as designs reached it, by the routes' own cost figures, so it is the same on
+    every machine.
+    """
     count = study.space.count
     length = min(PILOT_LENGTH, count)
     golden = (math.sqrt(5.0) - 1.0) / 2.0
     starts = sorted({int((k * golden) % 1.0 * (count - length + 1)) for k in range(PILOT_RUNS)})
     designs = np.concatenate([parameter_matrix(study, start, start + length) for start in starts])
-    reached = cascade(study, designs).reached
+    found = cascade(study, designs)
     costs = [route.ns_per_design for route in routes(study.family, study.want, study.accuracy)]
-    return 1e-9 * sum(n * cost for n, cost in zip(reached, costs, strict=True)) / len(designs)
+    nanoseconds = sum(n * cost for n, cost in zip(found.reached, costs, strict=True))
+    return Pilot(1e-9 * nanoseconds / len(designs), float(np.mean(found.status == OK)))
 
 
 def row_bytes(study: Study) -> int:

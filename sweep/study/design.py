@@ -1,0 +1,209 @@
+"""The tables [design] and [reference]: every parameter of the family given once, in its unit, within its range."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sweep.families.base import Family, Parameter
+from sweep.study import units
+from sweep.study.faults import Faults, Key, read_section
+from sweep.study.model import FixedEntry, ListEntry, RangeEntry, SampleTable
+from sweep.study.sobol import DIMENSIONS
+from sweep.study.space import Axis, DesignSpace
+
+MOST_DESIGNS = 10**12
+
+
+@dataclass(frozen=True)
+class _Written:
+    """A parameter as written: its unit and the factor to the internal one."""
+
+    unit: str
+    factor: float
+
+
+def read_space(family: Family, raw: Mapping[str, Any], faults: Faults) -> DesignSpace | None:
+    """The designs of a study, or None if a parameter is faulty (all faults are reported)."""
+    before = len(faults.lines)
+    sample = read_section(SampleTable, raw["sample"], ("design", "sample"), faults) if "sample" in raw else None
+    _check_names(family, raw, ("design",), faults, extra=("sample",))
+    found: dict[str, Axis | float] = {}
+    for name in [name for name in raw if name in family.parameter_names]:
+        parameter = next(p for p in family.parameters if p.name == name)
+        entry = _read_entry(parameter, raw[name], ("design", name), faults, sampled=sample is not None)
+        if entry is not None:
+            found[name] = entry
+    axes = tuple(entry for entry in found.values() if isinstance(entry, Axis))
+    fixed = {p.name: p.default for p in family.parameters if p.default is not None and p.name not in found}
+    fixed |= {name: entry for name, entry in found.items() if not isinstance(entry, Axis)}
+    if sample is None and (count := math.prod(axis.count for axis in axes)) > MOST_DESIGNS:
+        faults.value(("design",), count, f"at most {MOST_DESIGNS:.0e} designs; take fewer values or design.sample")
+    if sample is not None and len(faults.lines) == before and not 1 <= len(axes) <= DIMENSIONS:
+        faults.value(("design", "sample"), f"{len(axes)} swept parameters", f"1 to {DIMENSIONS} with from and to")
+    if len(faults.lines) > before:
+        return None
+    if sample is None:
+        return DesignSpace(family.parameter_names, axes, fixed)
+    return DesignSpace(family.parameter_names, axes, fixed, "sobol", sample.n or 0, sample.seed)
+
+
+def read_reference(family: Family, raw: Mapping[str, Any], faults: Faults) -> dict[str, float]:
+    """The parameters of one design, in the order of the family."""
+    key: Key = ("reference", "design")
+    _check_names(family, raw, key, faults)
+    values = {p.name: p.default for p in family.parameters if p.default is not None}
+    for parameter in family.parameters:
+        if parameter.name in raw:
+            place = (*key, parameter.name)
+            entry = raw[parameter.name]
+            if isinstance(entry, dict) and "value" not in entry:
+                faults.value(place, entry, _one_value(parameter))
+                continue
+            value = _read_entry(parameter, entry, place, faults, sampled=False)
+            if isinstance(value, float):
+                values[parameter.name] = value
+    return {name: values[name] for name in family.parameter_names if name in values}
+
+
+def _check_names(family: Family, raw: Mapping[str, Any], key: Key, faults: Faults, extra: tuple[str, ...] = ()) -> None:
+    for name in raw:
+        if name not in family.parameter_names and name not in extra:
+            # The nearest of those still missing is the better guess.
+            unknown_to = [p for p in family.parameter_names if p not in raw] or list(family.parameter_names)
+            faults.unknown(
+                (*key, name), [*unknown_to, *(e for e in extra if e not in raw)], f"parameter of {family.name}"
+            )
+    for p in family.parameters:
+        if p.name not in raw and p.default is None:
+            faults.missing((*key, p.name), f"{p.text}; {_one_value(p)}")
+
+
+def _read_entry(p: Parameter, raw: object, key: Key, faults: Faults, sampled: bool) -> Axis | float | None:
+    before = len(faults.lines)
+    entry: Axis | float | None
+    if not isinstance(raw, dict):
+        entry = _read_plain(p, raw, key, faults)
+    elif "values" in raw:
+        entry = _read_list(p, raw, key, faults)
+    elif "value" in raw:
+        entry = _read_fixed(p, raw, key, faults)
+    else:
+        entry = _read_range(p, raw, key, faults, sampled)
+    return entry if len(faults.lines) == before else None
+
+
+def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | None:
+    internal = units.internal_unit(p.unit)
+    if isinstance(raw, str) and internal != "1":
+        try:
+            number, unit = units.split(raw, internal)
+            return _checked(p, number, number * units.factor(unit, internal), key, faults)
+        except units.UnitFault as fault:
+            faults.value(key, raw, str(fault))
+            return None
+    number_like = isinstance(raw, (int, float)) and not isinstance(raw, bool)
+    if not number_like or internal != "1":
+        faults.value(key, raw, _forms(p, raw if number_like else None))
+        return None
+    return _read_fixed(p, {"value": raw}, key, faults)
+
+
+def _read_fixed(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -> float | None:
+    entry = read_section(FixedEntry, raw, key, faults)
+    written = _unit(p, entry.unit, raw, key, faults)
+    if entry.value is None or written is None:
+        return None
+    return _checked(p, entry.value, entry.value * written.factor, key, faults)
+
+
+def _read_list(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -> Axis | None:
+    entry = read_section(ListEntry, raw, key, faults)
+    written = _unit(p, entry.unit, raw, key, faults)
+    if entry.values is None:
+        return None
+    seen: set[float] = set()
+    for k, value in enumerate(entry.values):
+        _checked(p, value, value, (*key, "values", k), faults)
+        if value in seen:
+            faults.value((*key, "values", k), value, "every value once")
+        seen.add(value)
+    if written is None:
+        return None
+    return Axis.listed(p.name, entry.values, written.unit, written.factor)
+
+
+def _read_range(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults, sampled: bool) -> Axis | None:
+    if p.choices is not None:
+        faults.value(key, raw, _forms(p))
+        return None
+    before = len(faults.lines)
+    entry = read_section(RangeEntry, raw, key, faults)
+    written = _unit(p, entry.unit, raw, key, faults)
+    low, high = entry.low, entry.high
+    if sampled and "count" in raw:
+        faults.value((*key, "count"), raw["count"], "no count beside design.sample, which draws from the range")
+    if not sampled and "count" not in raw:
+        faults.missing((*key, "count"), "a whole number of values, 1 or greater (or design.sample)")
+    if low is not None:
+        _checked(p, low, low, (*key, "from"), faults)
+        if entry.scale == "log" and low <= 0.0:
+            faults.value((*key, "from"), low, 'a positive number on a scale = "log"')
+    if low is not None and high is not None and not low < high:
+        faults.value((*key, "to"), high, f"a number greater than from = {low:g}")
+    if len(faults.lines) > before or low is None or high is None or written is None:
+        return None
+    if sampled:
+        return Axis.sampled(p.name, (low, high), written.unit, written.factor, entry.scale)
+    return Axis.lattice(p.name, (low, high), entry.count or 1, written.unit, written.factor, entry.scale)
+
+
+def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faults: Faults) -> _Written | None:
+    internal = units.internal_unit(p.unit)
+    if unit is None:
+        if internal == "1":
+            return _Written("1", 1.0)
+        if "unit" not in raw:
+            faults.missing((*key, "unit"), f"{units.example(internal)}, as unit = {_usual(internal)!r}")
+        return None
+    try:
+        return _Written(unit, units.factor(unit, internal))
+    except units.UnitFault as fault:
+        faults.value((*key, "unit"), unit, str(fault))
+        return None
+
+
+def _checked(p: Parameter, written: float, value: float, key: Key, faults: Faults) -> float:
+    if p.positive and not value > 0.0:
+        faults.value(key, written, f"a positive {p.unit} ({p.text})")
+    if p.choices is not None and value not in p.choices:
+        faults.value(key, written, _choices(p))
+    return float(value)
+
+
+def _choices(p: Parameter) -> str:
+    return " or ".join(f"{choice:+g}" for choice in p.choices or ())
+
+
+def _usual(internal: str) -> str:
+    return {"rad": "deg"}.get(internal, internal)
+
+
+def _one_value(p: Parameter) -> str:
+    return "one value, " + _forms(p).removeprefix("a ").removeprefix("an ")
+
+
+def _forms(p: Parameter, number: object = None) -> str:
+    """The right ways to write a fixed value of this parameter."""
+    if p.choices is not None:
+        return f"{_choices(p)}, or {{ values = {[int(c) for c in p.choices]} }}"
+    internal = units.internal_unit(p.unit)
+    if internal == "1":
+        return "a number"
+    shown = 40.0 if number is None else number
+    usual = _usual(internal)
+    return f'a {p.unit} with its unit, as "{shown} {usual}" or {{ value = {shown}, unit = "{usual}" }}'.replace(
+        "a angle", "an angle"
+    )

@@ -1,0 +1,105 @@
+"""What a study will cost before it starts, and the refusal of one that costs too much."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sweep.errors import BudgetError
+from sweep.study.study import Study
+
+# With no survivor in the pilot, this share is assumed.
+LEAST_KEPT = 1e-3
+# Measured: the parameter values of a design take 100 ns, writing its row 120 ns; a result of eight bytes packs to some
+# six, a lattice's parameters, design number and status together to two bytes a row, a sampled parameter to seven.
+SPACE_SECONDS = 100e-9
+WRITE_SECONDS_PER_ROW = 120e-9
+PACKED = 0.75
+DISK_BYTES_PER_ROW = 2.0
+SAMPLED_VALUE_BYTES = 7.0
+
+# Python, numpy, pandas, pyarrow and the compiled kernels.
+BASE_MEMORY_BYTES = 350e6
+# A chunk is alive as designs, as outputs and as the table being encoded.
+COPIES_OF_A_CHUNK = 3
+# Threads share memory bandwidth and the interpreter: two were measured at 1.95 times the speed of one.
+THREAD_EFFICIENCY = 0.97
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Cost of a run; ``kept`` is the share of designs expected to become rows."""
+
+    designs: int
+    chunks: int
+    chunk_size: int
+    jobs: int
+    kept: float
+    memory_bytes: float
+    disk_bytes: float
+    seconds: float
+    optimise_seconds: float | None
+
+
+def estimate(study: Study, jobs: int) -> Estimate:
+    """Estimate a run from the routes' cost figures and a pilot of about a thousand designs spread over the space.
+
+    Parameters
+    ----------
+    study : the question
+    jobs : workers it will run on
+
+    Returns
+    -------
+    Estimate
+        ``seconds`` of the sweep alone, without the first compilation of the kernels; ``optimise_seconds`` is the time
+        the optimiser may take, None without optimiser or budget.  If the pilot keeps no design, one in a thousand
+        is assumed.
+    """
+    from sweep.plan import choose_chunk_size, describe_columns, pilot, row_bytes
+
+    found = pilot(study)
+    chunk_size = choose_chunk_size(study)
+    designs = study.space.count
+    kept = 1.0 if study.output.keep == "all" else max(found.feasible, LEAST_KEPT)
+    results = sum(
+        8 if column.dtype == "float64" else 4 for column in describe_columns(study) if column.role == "output"
+    )
+    sampled = len(study.space.axes) * SAMPLED_VALUE_BYTES if study.space.kind == "sobol" else 0.0
+    work = designs * (found.seconds_per_design + SPACE_SECONDS + kept * WRITE_SECONDS_PER_ROW)
+    return Estimate(
+        designs=designs,
+        chunks=-(-designs // chunk_size),
+        chunk_size=chunk_size,
+        jobs=jobs,
+        kept=kept,
+        memory_bytes=BASE_MEMORY_BYTES + jobs * COPIES_OF_A_CHUNK * min(chunk_size, designs) * row_bytes(study),
+        disk_bytes=designs * kept * (DISK_BYTES_PER_ROW + sampled + PACKED * results),
+        seconds=work / (1.0 if jobs == 1 else jobs * THREAD_EFFICIENCY),
+        optimise_seconds=None if study.optimise is None else study.optimise.time_budget,
+    )
+
+
+def check_budget(study: Study, cost: Estimate) -> None:
+    """Refuse a study whose estimate is over its budget ([budget] in the file: 20 GB and 1 h unless it says otherwise).
+
+    Raises
+    ------
+    BudgetError
+        names what is over, by how much, and the way out.
+    """
+    over = []
+    if cost.seconds > study.budget.seconds:
+        over.append(f"time about {_time(cost.seconds)}; allowed: {_time(study.budget.seconds)} (budget.time)")
+    if cost.disk_bytes > study.budget.disk_bytes:
+        allowed = study.budget.disk_bytes
+        over.append(f"disk about {cost.disk_bytes / 1e9:.3g} GB; allowed: {allowed / 1e9:.3g} GB (budget.disk)")
+    if over:
+        way_out = "take fewer values, raise the budget in the study file, or force it"
+        size = f"{cost.designs} designs on {cost.jobs} workers"
+        raise BudgetError(f"{study.path}: over the budget with {size}: {'; '.join(over)}; {way_out}")
+
+
+def _time(seconds: float) -> str:
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"

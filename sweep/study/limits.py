@@ -1,0 +1,72 @@
+"""[limits] and the names of design outputs: each must be an output of the family, its bounds in the output's unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from sweep.errors import InputError
+from sweep.families.base import Family, Output
+from sweep.study import units
+from sweep.study.faults import Faults, Key, read_section
+from sweep.study.model import LimitEntry
+from sweep.study.study import Limit
+
+_YES_OR_NO = re.compile(r"rotatable\d*")
+
+
+def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Output | None:
+    """The design output of that name, or a fault that gives the nearest."""
+    from sweep.summaries import output
+
+    try:
+        return output(family, name)
+    except InputError as error:
+        faults.value(key, name, error.allowed)
+        return None
+
+
+def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple[Limit, ...]:
+    """The limits in the order of the file, in internal units."""
+    found = []
+    for name, entry in raw.items():
+        key: Key = ("limits", name)
+        output = read_output_name(family, name, key, faults)
+        if output is None:
+            continue
+        if _YES_OR_NO.fullmatch(name):
+            if entry is not True:
+                faults.value(key, entry, "true")
+            found.append(Limit(name, minimum=1.0))
+        elif isinstance(entry, dict):
+            found += _read_bounds(output, entry, key, faults)
+        else:
+            faults.value(key, entry, _form(output))
+    return tuple(found)
+
+
+def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Faults) -> list[Limit]:
+    entry = read_section(LimitEntry, raw, key, faults)
+    if "min" not in raw and "max" not in raw:
+        faults.missing((*key, "max"), f"min, max or both, as {_form(output)}")
+    if entry.min is not None and entry.max is not None and entry.min > entry.max:
+        faults.value((*key, "max"), entry.max, f"a number not below min = {entry.min:g}")
+    internal = units.internal_unit(output.unit)
+    if entry.unit is None and internal != "1":
+        if "unit" not in raw:
+            faults.missing((*key, "unit"), units.example(internal))
+        return []
+    try:
+        factor = units.factor(entry.unit or "1", internal)
+    except units.UnitFault as fault:
+        faults.value((*key, "unit"), entry.unit, str(fault))
+        return []
+    bounds = [None if bound is None else bound * factor for bound in (entry.min, entry.max)]
+    return [Limit(output.name, *bounds)]
+
+
+def _form(output: Output) -> str:
+    internal = units.internal_unit(output.unit)
+    unit = {"1": "", "rad": ', unit = "deg"'}.get(internal, f', unit = "{internal}"')
+    return f"{{ min = ..., max = ...{unit} }}"

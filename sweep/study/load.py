@@ -1,0 +1,271 @@
+"""``load_study``: from TOML to a checked :class:`Study`, or every fault of the file at once."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from sweep.errors import InputError, StudyError, nearest
+from sweep.families import NAMES
+from sweep.families import family as find_family
+from sweep.families.base import Accuracy, Family
+from sweep.study import units
+from sweep.study.design import read_reference, read_space
+from sweep.study.faults import Faults, Key, S, read_section
+from sweep.study.limits import read_limits, read_output_name
+from sweep.study.model import (
+    REQUIRED_TABLES,
+    TABLES,
+    AccuracySection,
+    BudgetSection,
+    MechanismSection,
+    ObjectiveSection,
+    OptimiseSection,
+    OutputSection,
+    ReferenceSection,
+    ReportSection,
+    SceneSection,
+    StudySection,
+)
+from sweep.study.study import Budget, Objective, OptimiseSettings, OutputSettings, Study
+
+DEFAULT_TARGET = 1e-8
+
+
+def load_study(path: str | Path, smoke: bool = False) -> Study:
+    """Read and check a study file.
+
+    Parameters
+    ----------
+    path : a study.toml, or the folder that holds one
+    smoke : lay smoke.toml, which lies beside it and holds only the keys that differ, over it
+
+    Raises
+    ------
+    StudyError
+        lists every fault with file, key, value and what is allowed.
+    """
+    file = Path(path)
+    file = file / "study.toml" if file.is_dir() else file
+    files = {file.name: _read_toml(file)}
+    if smoke:
+        beside = file.with_name("smoke.toml")
+        files[beside.name] = _read_toml(beside)
+        return _build(merged(files[file.name], files[beside.name]), file, files)
+    return _build(files[file.name], file, files)
+
+
+def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
+    """The study of ``Study.data`` (as a dataset's _plan.json keeps it); ``path`` is what messages name.
+
+    Raises
+    ------
+    StudyError
+        as :func:`load_study`.
+    """
+    return _build(data, Path(path), {Path(path).name: data})
+
+
+def with_accuracy(study: Study, target: float) -> Study:
+    """The same study with its extrema refined to another relative error.
+
+    Raises
+    ------
+    StudyError
+        if the target is not between 1e-15 and 1.
+    """
+    return study_from_data(study.data | {"accuracy": {"target": target}}, study.path)
+
+
+def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Lay one file's tables over another's, key by key.
+
+    [accuracy] and whatever stands as value or values of a parameter replace what they cover: half of one and half of
+    the other would be neither.
+    """
+    result = copy.deepcopy(dict(base))
+    for name, new in over.items():
+        old = result.get(name)
+        if not isinstance(old, dict) or not isinstance(new, dict) or (*key, name) == ("accuracy",):
+            result[name] = copy.deepcopy(new)
+        elif {"value", "values"}.isdisjoint({*old, *new}):
+            result[name] = merged(old, new, (*key, name))
+        else:
+            result[name] = copy.deepcopy(new)
+    return result
+
+
+def _read_toml(file: Path) -> dict[str, Any]:
+    try:
+        text = file.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise StudyError(str(file), [f"{file.name}: cannot be read: {error.strerror}"]) from None
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise StudyError(str(file), [f"{file.name}: line {line} is no UTF-8 text"]) from None
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        line, column = text.count("\n") + 1, len(text) - text.rfind("\n")
+        message = str(error).replace("at end of document", f"at line {line}, column {column}, the end of the file")
+        raise StudyError(str(file), [f"{file.name}: {message}"]) from None
+
+
+def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str, Any]]) -> Study:
+    faults = Faults(files)
+    for name in data:
+        if name not in TABLES:
+            faults.unknown((name,), [t for t in TABLES if t not in data], "table")
+    for name in REQUIRED_TABLES:
+        if name not in data:
+            faults.missing((name,), f"a table [{name}]")
+
+    about = _section(StudySection, "study", data, faults)
+    scene = _section(SceneSection, "scene", data, faults)
+    search = _section(OptimiseSection, "optimise", data, faults)
+    output = _section(OutputSection, "output", data, faults)
+    budget = _section(BudgetSection, "budget", data, faults)
+    report = _section(ReportSection, "report", data, faults)
+    goal = _section(ObjectiveSection, "objective", data, faults).minimise
+    accuracy = _accuracy(_section(AccuracySection, "accuracy", data, faults), faults)
+    design = _free_table("design", data, faults)
+    bounds = _free_table("limits", data, faults)
+    reference_design = _section(ReferenceSection, "reference", data, faults).design
+    families = _families(_section(MechanismSection, "mechanism", data, faults), data, faults)
+
+    speed = _quantity(scene.speed, "rad/s", ("scene", "speed"), faults)
+    window = _window(scene, faults)
+    time_budget = _quantity(search.time_budget, "s", ("optimise", "time_budget"), faults)
+    disk_bytes = _quantity(budget.disk, "B", ("budget", "disk"), faults)
+    seconds = _quantity(budget.time, "s", ("budget", "time"), faults)
+    if "optimise" in data and "objective" not in data:
+        faults.missing(("objective",), "a table [objective] with minimise = a design output, as [optimise] is given")
+    if not scene.want and not bounds and goal is None:
+        faults.missing(("scene", "want"), "design outputs to compute, here or in [limits] or [objective]")
+
+    family = _family(families, data, faults)
+    if family is None:
+        raise StudyError(str(path), faults.lines)
+    for k, name in enumerate(scene.want):
+        read_output_name(family, name, ("scene", "want", k), faults)
+    limits = read_limits(family, bounds or {}, faults)
+    if goal is not None:
+        read_output_name(family, goal, ("objective", "minimise"), faults)
+    space = None if design is None else read_space(family, design, faults)
+    reference = None if reference_design is None else read_reference(family, reference_design, faults)
+    _check_curves(report, [name for name in design or () if name in family.parameter_names], faults)
+    if faults.lines or space is None or disk_bytes is None or seconds is None:
+        raise StudyError(str(path), faults.lines)
+
+    defaults = {"accuracy": _without_none(accuracy.__dict__), "output": output.model_dump()}
+    return Study(
+        name=about.name or "",
+        title=about.title,
+        question=about.question,
+        path=path,
+        families=families,
+        speed=speed,
+        want=tuple(dict.fromkeys([*scene.want, *(limit.output for limit in limits), *([goal] if goal else [])])),
+        space=space,
+        limits=limits,
+        objective=Objective(goal) if goal else None,
+        accuracy=accuracy,
+        window=window,
+        optimise=OptimiseSettings(search.starts, search.seed, time_budget) if "optimise" in data else None,
+        reference=reference,
+        output=OutputSettings(output.keep, output.dtype, output.curves),
+        budget=Budget(disk_bytes, seconds),
+        data=copy.deepcopy(dict(data)) | defaults,
+    )
+
+
+def _section(model: type[S], name: str, data: Mapping[str, Any], faults: Faults) -> S:
+    return read_section(model, data[name], (name,), faults) if name in data else model()
+
+
+def _free_table(name: str, data: Mapping[str, Any], faults: Faults) -> dict[str, Any] | None:
+    raw = data.get(name)
+    if raw is None or isinstance(raw, dict):
+        return raw
+    faults.value((name,), raw, f"a table [{name}]")
+    return None
+
+
+def _quantity(text: str | None, internal: str, key: Key, faults: Faults) -> float | None:
+    """A text such as "7000 rpm" in the internal unit; it must be positive."""
+    if text is None:
+        return None
+    try:
+        number, unit = units.split(text, internal)
+        value = number * units.factor(unit, internal)
+    except units.UnitFault as fault:
+        faults.value(key, text, str(fault))
+        return None
+    if not value > 0.0:
+        faults.value(key, text, f"a positive number; {units.example(internal)}")
+    return value
+
+
+def _window(scene: SceneSection, faults: Faults) -> tuple[float, float] | None:
+    if scene.window is None:
+        return None
+    low, high = scene.window.low, scene.window.high
+    if low is None or high is None:
+        faults.missing(("scene", "window", "from" if low is None else "to"), "a fraction of the stroke, 0 to 1")
+        return None
+    if not low < high:
+        faults.value(("scene", "window", "to"), high, f"a fraction greater than from = {low:g}")
+    return low, high
+
+
+def _accuracy(section: AccuracySection, faults: Faults) -> Accuracy:
+    if section.target is not None and section.samples is not None:
+        faults.value(("accuracy", "samples"), section.samples, "either target or samples, not both")
+    if section.samples is not None:
+        return Accuracy(samples=section.samples)
+    return Accuracy(target=DEFAULT_TARGET if section.target is None else section.target)
+
+
+def _without_none(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if value is not None}
+
+
+def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults) -> tuple[str, ...]:
+    raw = data.get("mechanism")
+    if isinstance(raw, dict) and "family" in raw and "chain" in raw:
+        faults.value(("mechanism", "chain"), raw["chain"], "either family or chain, not both")
+    if isinstance(raw, dict) and "family" not in raw and "chain" not in raw:
+        faults.missing(("mechanism", "family"), f"one of {', '.join(NAMES)}; or chain, a list of them")
+    if section.family is not None:
+        return (section.family,)
+    return tuple(section.chain or ())
+
+
+def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> Family | None:
+    """The mechanism, or None with a fault for each unknown name, or for a chain that cannot be."""
+    single = "family" in data.get("mechanism", {}) if names else False
+    unknown = [k for k, name in enumerate(names) if name not in NAMES]
+    for k in unknown:
+        key: Key = ("mechanism", "family") if single else ("mechanism", "chain", k)
+        faults.value(key, names[k], f"one of {', '.join(NAMES)}{nearest(names[k], NAMES)}")
+    if unknown or not names:
+        return None
+    try:
+        return find_family(names)
+    except InputError as error:
+        faults.value(("mechanism", "chain"), list(names), error.allowed)
+        return None
+
+
+def _check_curves(report: ReportSection, parameters: list[str], faults: Faults) -> None:
+    for k, curve in enumerate(report.curves):
+        for name in curve.required:
+            if getattr(curve, name) is None:
+                faults.missing(("report", "curves", k, name), str(type(curve).model_fields[name].description))
+        for key, axis in (("x", curve.x), ("y", curve.y)):
+            if axis is not None and axis not in parameters:
+                allowed = f"one of {', '.join(parameters)}{nearest(axis, parameters)}"
+                faults.value(("report", "curves", k, key), axis, allowed)

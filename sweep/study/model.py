@@ -1,0 +1,180 @@
+"""The shape of a study file, table by table; what each key may hold is its ``description``, which messages quote."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e100, le=1e100)]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Section(BaseModel):
+    """A table of the file.  ``required`` keys are optional to pydantic, so that the others are read all the same."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, populate_by_name=False)
+    required: ClassVar[tuple[str, ...]] = ()
+
+
+class StudySection(Section):
+    """[study]"""
+
+    required = ("name",)
+    name: str | None = Field(
+        None, pattern="^[a-z0-9][a-z0-9-]*$", max_length=64, description="a plain word of a-z, 0-9 and '-'"
+    )
+    title: str = Field("", description="a text")
+    question: str = Field("", description="a text")
+
+
+class MechanismSection(Section):
+    """[mechanism]"""
+
+    family: str | None = Field(None, description="the name of a family")
+    chain: Annotated[list[str], Field(min_length=1)] | None = Field(None, description="a list of names of families")
+
+
+class WindowTable(Section):
+    """scene.window"""
+
+    required = ("from", "to")
+    low: Fraction | None = Field(None, alias="from", description="a fraction of the stroke, 0 to 1")
+    high: Fraction | None = Field(None, alias="to", description="a fraction of the stroke, 0 to 1")
+
+
+class SceneSection(Section):
+    """[scene]"""
+
+    speed: str | None = Field(None, description='a speed of rotation as a text, as "7000 rpm"')
+    want: list[str] = Field([], description="a list of names of design outputs")
+    window: WindowTable | None = Field(None, description="{ from = 0.0, to = 0.6 }, fractions of the stroke")
+
+
+class SampleTable(Section):
+    """design.sample"""
+
+    required = ("kind", "n")
+    kind: Literal["sobol"] | None = Field(None, description='"sobol"')
+    n: Annotated[int, Field(ge=1, le=2**40)] | None = Field(None, description="a whole number, 1 to 2^40")
+    seed: Seed = Field(0, description="a whole number, 0 or greater")
+
+
+class RangeEntry(Section):
+    """design.x = { from, to, count, unit, scale }"""
+
+    required = ("from", "to")
+    low: Number | None = Field(None, alias="from", description="a finite number, its unit in the key unit")
+    high: Number | None = Field(None, alias="to", description="a finite number, its unit in the key unit")
+    count: Count | None = Field(None, description="a whole number, 1 to 1000000")
+    unit: str | None = Field(None, description='a unit as a text, as "mm"')
+    scale: Literal["linear", "log"] = Field("linear", description='"linear" or "log"')
+
+
+class ListEntry(Section):
+    """design.x = { values, unit }"""
+
+    values: Annotated[list[Number], Field(min_length=1, max_length=1_000_000)] | None = Field(
+        None, description="a list of 1 to 1000000 finite numbers, their unit in the key unit"
+    )
+    unit: str | None = Field(None, description='a unit as a text, as "mm"')
+
+
+class FixedEntry(Section):
+    """design.x = { value, unit }"""
+
+    value: Number | None = Field(None, description="a finite number, its unit in the key unit")
+    unit: str | None = Field(None, description='a unit as a text, as "mm"')
+
+
+class LimitEntry(Section):
+    """limits.x = { min, max, unit }"""
+
+    min: Number | None = Field(None, description="a finite number, its unit in the key unit")
+    max: Number | None = Field(None, description="a finite number, its unit in the key unit")
+    unit: str | None = Field(None, description='a unit as a text, as "deg"')
+
+
+class ObjectiveSection(Section):
+    """[objective]"""
+
+    required = ("minimise",)
+    minimise: str | None = Field(None, description="the name of a design output")
+
+
+class AccuracySection(Section):
+    """[accuracy]"""
+
+    target: Annotated[float, Field(ge=1e-15, lt=1.0)] | None = Field(None, description="a relative error, 1e-15 to 1")
+    samples: Annotated[int, Field(ge=4, le=1_000_000)] | None = Field(
+        None, description="a whole number of crank angles, 4 to 1000000"
+    )
+
+
+class OptimiseSection(Section):
+    """[optimise]"""
+
+    starts: Annotated[int, Field(ge=1, le=100_000)] = Field(20, description="a whole number, 1 to 100000")
+    seed: Seed = Field(0, description="a whole number, 0 or greater")
+    time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
+
+
+class ReferenceSection(Section):
+    """[reference]"""
+
+    required = ("design",)
+    design: dict[str, Any] | None = Field(None, description="a table of the parameters of one design")
+
+
+class OutputSection(Section):
+    """[output]"""
+
+    keep: Literal["feasible", "all"] = Field("feasible", description='"feasible" or "all"')
+    dtype: Literal["float32", "float64"] = Field("float64", description='"float32" or "float64"')
+    curves: Literal["optimum", "none"] = Field("optimum", description='"optimum" or "none"')
+
+
+class BudgetSection(Section):
+    """[budget]"""
+
+    disk: str = Field("20 GB", description='a size as a text, as "20 GB"')
+    time: str = Field("1 h", description='a time as a text, as "1 h"')
+
+
+class CurveTable(Section):
+    """report.curves"""
+
+    required = ("label", "x", "y", "points")
+    label: str | None = Field(None, description="a text")
+    x: str | None = Field(None, description="the name of a swept parameter")
+    y: str | None = Field(None, description="the name of a swept parameter")
+    points: Annotated[list[Annotated[list[Number], Field(min_length=2, max_length=2)]], Field(min_length=2)] | None = (
+        Field(None, description="a list of two or more points [x, y] in the units of the two axes")
+    )
+
+
+class ReportSection(Section):
+    """[report]"""
+
+    curves: list[CurveTable] = Field(
+        [], description='a list of { label = "...", x = "k", y = "a", points = [[1, 1], [9, 9]] }'
+    )
+
+
+TABLES = (
+    "study",
+    "mechanism",
+    "scene",
+    "design",
+    "limits",
+    "objective",
+    "accuracy",
+    "optimise",
+    "reference",
+    "output",
+    "budget",
+    "report",
+)
+REQUIRED_TABLES = ("study", "mechanism", "design")

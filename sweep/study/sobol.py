@@ -1,0 +1,134 @@
+"""Scrambled Sobol points by index: any slice of the sequence, the same bits however it is cut.
+
+scipy.stats.qmc gives the same sequence, but reaches point i only by stepping through all before it, and with more than
+30 bits its ``fast_forward`` fails (1.17); a chunk of a study must be computable alone.  The tests compare the plain
+sequence with scipy's bit for bit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.families.base import Array
+
+BITS = 52
+INDEX_BITS = 40
+_TABLE_BITS = 10
+
+# Primitive polynomial (leading and last coefficient included) and first direction integers of each dimension:
+# S. Joe and F. Y. Kuo, Constructing Sobol sequences with better two-dimensional projections, SIAM J. Sci. Comput. 30
+# (2008), file new-joe-kuo-6.21201, dimensions 1 to 40.
+_JOE_KUO = (
+    (1, (1,)),
+    (3, (1,)),
+    (7, (1, 3)),
+    (11, (1, 3, 1)),
+    (13, (1, 1, 1)),
+    (19, (1, 1, 3, 3)),
+    (25, (1, 3, 5, 13)),
+    (37, (1, 1, 5, 5, 17)),
+    (41, (1, 1, 5, 5, 5)),
+    (47, (1, 1, 7, 11, 19)),
+    (55, (1, 1, 5, 1, 1)),
+    (59, (1, 1, 1, 3, 11)),
+    (61, (1, 3, 5, 5, 31)),
+    (67, (1, 3, 3, 9, 7, 49)),
+    (91, (1, 1, 1, 15, 21, 21)),
+    (97, (1, 3, 1, 13, 27, 49)),
+    (103, (1, 1, 1, 15, 7, 5)),
+    (109, (1, 3, 1, 15, 13, 25)),
+    (115, (1, 1, 5, 5, 19, 61)),
+    (131, (1, 3, 7, 11, 23, 15, 103)),
+    (137, (1, 3, 7, 13, 13, 15, 69)),
+    (143, (1, 1, 3, 13, 7, 35, 63)),
+    (145, (1, 3, 5, 9, 1, 25, 53)),
+    (157, (1, 3, 1, 13, 9, 35, 107)),
+    (167, (1, 3, 1, 5, 27, 61, 31)),
+    (171, (1, 1, 5, 11, 19, 41, 61)),
+    (185, (1, 3, 5, 3, 3, 13, 69)),
+    (191, (1, 1, 7, 13, 1, 19, 1)),
+    (193, (1, 3, 7, 5, 13, 19, 59)),
+    (203, (1, 1, 3, 9, 25, 29, 41)),
+    (211, (1, 3, 5, 13, 23, 1, 55)),
+    (213, (1, 3, 7, 3, 13, 59, 17)),
+    (229, (1, 3, 1, 3, 5, 53, 69)),
+    (239, (1, 1, 5, 5, 23, 33, 13)),
+    (241, (1, 1, 7, 7, 1, 61, 123)),
+    (247, (1, 1, 7, 9, 13, 61, 49)),
+    (253, (1, 3, 3, 5, 3, 55, 33)),
+    (285, (1, 3, 1, 15, 31, 13, 49, 245)),
+    (299, (1, 3, 5, 15, 31, 59, 63, 97)),
+    (301, (1, 3, 1, 11, 11, 11, 77, 249)),
+)
+DIMENSIONS = len(_JOE_KUO)
+
+
+class Sobol:
+    """The sequence of one seed; ``points(start, stop)`` has the shape (dimensions, stop - start) and lies in (0, 1).
+
+    ``seed`` chooses a random lower-triangular mixing of the digits and a random digital shift (Matousek's scrambling):
+    every aligned block of 2^k points keeps its stratification.  None leaves the plain sequence, which starts at 0.
+    """
+
+    def __init__(self, dimensions: int, seed: int | None) -> None:
+        # Raw output of PCG64 is fixed by numpy's promise on bit streams, that of Generator methods is not.
+        source = None if seed is None else np.random.PCG64(seed)
+        self._shift = np.zeros(dimensions, np.uint64)
+        self._centre = 0.0 if seed is None else 0.5
+        tables = []
+        for k in range(dimensions):
+            directions = _direction_numbers(*_JOE_KUO[k])
+            if source is not None:
+                raw = [int(x) for x in source.random_raw(BITS + 1)]
+                directions = [_mix(v, raw) for v in directions]
+                self._shift[k] = raw[BITS] >> (64 - BITS)
+            tables.append(_xor_tables(directions))
+        self._tables = np.array(tables, np.uint64).reshape(dimensions, INDEX_BITS // _TABLE_BITS, 2**_TABLE_BITS)
+
+    def points(self, start: int, stop: int) -> Array:
+        """Points start to stop - 1, one row per dimension."""
+        index = np.arange(start, stop, dtype=np.int64)
+        gray = index ^ (index >> 1)
+        out = np.empty((len(self._shift), index.size))
+        for k, tables in enumerate(self._tables):
+            x = np.full(index.size, self._shift[k])
+            for part, table in enumerate(tables):
+                x ^= table[(gray >> (part * _TABLE_BITS)) & (2**_TABLE_BITS - 1)]
+            out[k] = (x.astype(np.float64) + self._centre) * 2.0**-BITS
+        return out
+
+
+def _direction_numbers(polynomial: int, first: tuple[int, ...]) -> list[int]:
+    """V_1 ... V_INDEX_BITS as integers of BITS digits, by the recurrence of the primitive polynomial."""
+    degree = polynomial.bit_length() - 1
+    if degree == 0:  # the first dimension is the van der Corput sequence
+        return [1 << (BITS - 1 - j) for j in range(INDEX_BITS)]
+    m = list(first)
+    for j in range(degree, INDEX_BITS):
+        new = m[j - degree] ^ (m[j - degree] << degree)
+        for i in range(1, degree):
+            if polynomial >> (degree - i) & 1:
+                new ^= m[j - i] << i
+        m.append(new)
+    return [m[j] << (BITS - 1 - j) for j in range(INDEX_BITS)]
+
+
+def _mix(direction: int, raw: list[int]) -> int:
+    """Each digit plus (mod 2) a random choice of the digits above it."""
+    mixed = 0
+    for digit in range(BITS):
+        place = BITS - 1 - digit
+        above = (raw[digit] >> (64 - BITS)) >> (place + 1) << (place + 1)
+        mixed |= ((direction & (above | 1 << place)).bit_count() & 1) << place
+    return mixed
+
+
+def _xor_tables(directions: list[int]) -> NDArray[np.uint64]:
+    """For every group of index digits the exclusive or of the direction numbers of each combination."""
+    tables = np.zeros((INDEX_BITS // _TABLE_BITS, 2**_TABLE_BITS), np.uint64)
+    for j, direction in enumerate(directions):
+        part, bit = divmod(j, _TABLE_BITS)
+        half = 1 << bit
+        tables[part, half : 2 * half] = tables[part, :half] ^ np.uint64(direction)
+    return tables

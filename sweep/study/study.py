@@ -1,0 +1,124 @@
+"""A checked study: what the engine, the optimiser and the report work from; in mm, rad and s."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+from sweep.families import family as find_family
+from sweep.families.base import Accuracy, Family
+from sweep.study.space import DesignSpace
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Bounds of a design output; equal ones ask for a value.  ``rotatable = true`` is a minimum of 1."""
+
+    output: str
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+@dataclass(frozen=True)
+class Objective:
+    """The design output to be made small."""
+
+    output: str
+
+
+@dataclass(frozen=True)
+class OptimiseSettings:
+    """Number of starts of the local search, seed of their choice, time allowed [s]."""
+
+    starts: int = 20
+    seed: int = 0
+    time_budget: float | None = None
+
+
+@dataclass(frozen=True)
+class OutputSettings:
+    """Which designs become rows, how results are stored, for which designs curves over a turn are written."""
+
+    keep: Literal["feasible", "all"] = "feasible"
+    dtype: Literal["float32", "float64"] = "float64"
+    curves: Literal["optimum", "none"] = "optimum"
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a run may cost before it must be forced."""
+
+    disk_bytes: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Study:
+    """A question about one mechanism, made by :func:`sweep.study.load_study`.
+
+    ``want`` holds every design output that is computed: the wanted ones, then those of the limits, then the objective.
+    ``data`` is the file's content with defaults filled in, ready for JSON; ``study_from_data`` makes the study again.
+    """
+
+    name: str
+    title: str
+    question: str
+    path: Path
+    families: tuple[str, ...]
+    speed: float | None
+    want: tuple[str, ...]
+    space: DesignSpace
+    limits: tuple[Limit, ...]
+    objective: Objective | None
+    accuracy: Accuracy
+    window: tuple[float, float] | None
+    optimise: OptimiseSettings | None
+    reference: dict[str, float] | None
+    output: OutputSettings
+    budget: Budget
+    data: dict[str, Any]
+
+    @property
+    def family(self) -> Family:
+        """The mechanism: a family, or the chain of several."""
+        return find_family(self.families)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hash of all that determines values: not of name, title, question, budget or report.
+
+        The same values written in other units or in another order give the same fingerprint.
+        """
+        content = {
+            "families": self.families,
+            "speed": self.speed,
+            "want": self.want,
+            "space": _space_content(self.space),
+            "limits": sorted((limit.output, limit.minimum, limit.maximum) for limit in self.limits),
+            "objective": self.objective and self.objective.output,
+            "accuracy": asdict(self.accuracy),
+            "window": self.window,
+            "optimise": self.optimise and asdict(self.optimise),
+            "reference": self.reference,
+            "output": asdict(self.output),
+        }
+        return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
+def _space_content(space: DesignSpace) -> Mapping[str, Any]:
+    axes = [
+        (axis.name, axis.low, axis.high, axis.scale, None if axis.values is None else axis.values.tolist())
+        for axis in space.axes
+    ]
+    return {
+        "kind": space.kind,
+        "samples": space.samples,
+        "seed": space.seed,
+        "axes": axes,
+        "fixed": dict(space.fixed),
+    }

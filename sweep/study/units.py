@@ -1,0 +1,139 @@
+"""Units of study files: a number and its unit to mm, rad, rad/s, s or bytes."""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from sweep.errors import nearest
+
+if TYPE_CHECKING:
+    import pint
+
+# The registry is built from these lines alone: pint's own file makes an angle a pure number, so 45 would pass for
+# 45 rad, and it takes 50 times as long to load.
+_DEFINITIONS = (
+    "millimetre = [length] = mm",
+    "micrometre = 1e-3 * millimetre = um",
+    "centimetre = 10 * millimetre = cm",
+    "metre = 1000 * millimetre = m",
+    "inch = 25.4 * millimetre = in",
+    "radian = [angle] = rad",
+    "milliradian = 1e-3 * radian = mrad",
+    f"degree = {math.pi / 180!r} * radian = deg",
+    f"revolution = {2 * math.pi!r} * radian = rev",
+    "second = [time] = s",
+    "millisecond = 1e-3 * second = ms",
+    "minute = 60 * second = min",
+    "hour = 3600 * second = h",
+    "revolution_per_minute = revolution / minute = rpm",
+    "byte = [information] = B",
+    "megabyte = 1e6 * byte = MB",
+    "gigabyte = 1e9 * byte = GB",
+    "percent = 1e-2 = %",
+)
+SYMBOLS = tuple(line.rsplit(" = ", 1)[1] for line in _DEFINITIONS)
+
+# What may stand for an internal unit, as messages say it.
+_EXAMPLES = {
+    "mm": "a length, in mm, um, cm, m or in",
+    "rad": "an angle, in deg, rad, mrad or rev",
+    "rad/s": "a speed of rotation, in rpm, rad/s or deg/s",
+    "s": "a time, in s, ms, min or h",
+    "B": "a size, in B, MB or GB",
+    "1": "a pure number: no unit, or 1 or %",
+}
+
+_NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
+_TERM = re.compile(r"([A-Za-z%]+|1)(?:\^(-?[1-9]))?")
+
+
+class UnitFault(ValueError):
+    """A unit that is unknown or of the wrong kind; the text says what is allowed."""
+
+
+def example(internal: str) -> str:
+    """What may stand where the internal unit is ``internal``, in words."""
+    return _EXAMPLES.get(internal, f"in units such as {internal}")
+
+
+def internal_unit(word: str) -> str:
+    """Internal unit of a parameter's or output's unit word ("length" -> "mm", "length^4" -> "mm^4", "sign" -> "1")."""
+    word = {"angle": "rad"}.get(word, word).replace("length", "mm")
+    names = re.findall(r"[A-Za-z]+", word)
+    return word if names and set(names) <= set(SYMBOLS) else "1"
+
+
+@lru_cache
+def factor(unit: str, internal: str) -> float:
+    """Multiplier from a written unit to the internal one.
+
+    Angles count as a dimension, so 45 deg is no ratio; but an analogue such as d2s may be given per rad or rad^2.
+
+    Raises
+    ------
+    UnitFault
+        if the unit is unknown or measures something else.
+    """
+    ours, theirs = _parse(internal), _parse(unit)
+    if _dimensions(theirs, ours) != _dimensions(ours, ours):
+        raise UnitFault(example(internal))
+    bridge = ours * _parse("rad") ** (_power(theirs, "[angle]") - _power(ours, "[angle]"))
+    return float(_registry().Quantity(1.0, theirs).to(bridge).magnitude)
+
+
+def split(text: str, internal: str) -> tuple[float, str]:
+    """Number and unit of a text such as "7000 rpm".
+
+    Raises
+    ------
+    UnitFault
+        if there is no number, or no unit where one is needed.
+    """
+    match = _NUMBER.fullmatch(text.strip())
+    if match is None or not match[2] or not math.isfinite(float(match[1])):
+        raise UnitFault(f"a number and its unit; {example(internal)}")
+    return float(match[1]), match[2]
+
+
+def _power(unit: pint.Unit, dimension: str) -> int:
+    return _powers(unit).get(dimension, 0)
+
+
+def _powers(unit: pint.Unit) -> dict[str, int]:
+    return {str(name): round(float(str(power))) for name, power in unit.dimensionality.items()}
+
+
+def _dimensions(unit: pint.Unit, wanted: pint.Unit) -> dict[str, int]:
+    """Exponents; an angle below the fraction line does not count unless the wanted unit is made of angles alone."""
+    powers = _powers(unit)
+    free = _power(wanted, "[angle]") <= 0 and powers.get("[angle]", 0) <= 0
+    return {name: power for name, power in powers.items() if not (free and name == "[angle]")}
+
+
+def _parse(text: str) -> pint.Unit:
+    """A product of known symbols with small whole exponents; nothing else reaches pint's parser."""
+    parts = re.split(r"\s*([*/])\s*", text.strip())
+    for part in parts[::2]:
+        match = _TERM.fullmatch(part)
+        if match is None or (match[1] not in SYMBOLS and match[1] != "1"):
+            symbol = part if match is None else match[1]
+            raise UnitFault(f"a unit made of {', '.join(SYMBOLS)}, as mm/rad^2{nearest(symbol, SYMBOLS)}")
+    unit = _registry().Unit("")
+    for operator, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
+        symbol, _, exponent = part.partition("^")
+        term = _registry().Unit("" if symbol == "1" else symbol) ** int(exponent or 1)
+        unit = unit * term if operator == "*" else unit / term
+    return unit
+
+
+@lru_cache
+def _registry() -> pint.UnitRegistry[float]:
+    import pint
+
+    registry: pint.UnitRegistry[float] = pint.UnitRegistry(None)
+    for line in _DEFINITIONS:
+        registry.define(line)
+    return registry
