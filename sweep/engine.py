@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from sweep import store
 from sweep.errors import InputError, Interrupted, LinksweepError, WorkerDied, nearest
-from sweep.families.base import Accuracy
 from sweep.signals import Stop, stop_on_signal
 
 if TYPE_CHECKING:
@@ -62,7 +61,7 @@ def run(
     Raises
     ------
     StudyError, InputError
-        for a bad study or argument, or a folder with data of another study (exit code 2)
+        for a bad study, accuracy or argument, or a folder with data of another study (exit code 2)
     BudgetError
         if the estimate exceeds the study's budget (3)
     WorkerDied, StoreError, LockedError, Interrupted
@@ -90,15 +89,10 @@ def run(
 
 
 def _model(study: str | Path | Study, smoke: bool, accuracy: float | None) -> Study:
-    from sweep.study import load_study
+    from sweep.study.load import load_study, with_accuracy
 
     model = load_study(study, smoke=smoke) if isinstance(study, (str, Path)) else study
-    if accuracy is None:
-        return model
-    if not 0.0 < accuracy < 1.0:
-        raise InputError("accuracy", accuracy, "a relative accuracy between 0 and 1", "run")
-    data = model.data | {"accuracy": {"target": accuracy}}
-    return replace(model, accuracy=Accuracy(target=accuracy), data=data)
+    return model if accuracy is None else with_accuracy(model, accuracy)
 
 
 def _check_budget(study: Study, jobs: int, force: bool) -> None:
@@ -169,6 +163,7 @@ def _plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
     """Content of ``_plan.json``, with what an earlier run noted of the optimum."""
     noted = store.read_plan(folder) or {}
     return plan.as_dict() | {
+        "about": {"name": study.name, "title": study.title, "question": study.question},
         "data": study.data,
         "optimise": study.optimise is not None,
         "optimised": noted.get("optimised"),
@@ -192,8 +187,9 @@ def _results(
             yield work(study, plan, folder, index, os.getpid(), stop.event)
         return
 
+    from concurrent.futures.process import BrokenProcessPool
+
     from joblib import Parallel, delayed
-    from joblib.externals.loky.process_executor import BrokenProcessPool
 
     shared = stop.event if backend == "threading" else None
     parallel = Parallel(

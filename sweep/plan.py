@@ -34,9 +34,9 @@ PILOT_RUNS, PILOT_LENGTH = 32, 32
 PARAMETER_UNITS = {"length": "mm", "angle": "rad", "ratio": "1", "sign": "1", "count": "1", "none": "1"}
 
 # Parts of the package that decide no value in a chunk; everything else does.
-NOT_VALUES = ("optimise", "report", "cli", "templates", "__init__.py", "__main__.py", "engine.py", "progress.py")
-NOT_VALUES += ("signals.py", "poses.py", "compare.py")
-
+NOT_VALUES = frozenset(
+    "optimise report cli templates __init__.py __main__.py engine.py progress.py signals.py poses.py compare.py".split()
+)
 
 # Sections of the study file that decide no value in a chunk.
 NOT_IN_CHUNKS = ("study", "optimise", "reference", "budget", "report")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from types import TracebackType
-from typing import TextIO
+from typing import Never, TextIO
 
 from tqdm import tqdm
 
@@ -28,7 +28,7 @@ class Progress:
         self.stream = sys.stderr if stream is None else stream
         self.begin = self.said = time.monotonic()
         self.first = done
-        self.bar: tqdm[None] | None = None
+        self.bar: tqdm[Never] | None = None
         if show and self.stream.isatty():
             self.bar = tqdm(desc=label, total=total, initial=done, unit=" designs", unit_scale=True, file=self.stream)
 

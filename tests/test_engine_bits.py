@@ -1,0 +1,151 @@
+"""The same bits whoever computes them: any number of workers, threads or processes; rows as asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import sweep.plan
+from kernels import status as codes
+from sweep.chunk import BLOCK, compute_chunk, meets
+from sweep.engine import run
+from sweep.errors import InputError
+from sweep.plan import make_plan
+from sweep.store import is_complete, load, read_plan, read_runs
+from sweep.study import Limit, Study, load_study
+from sweep.summaries import design_outputs
+from sweep.tables import design_matrix
+from tests.engine_study import chunk_bytes, write_study
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep.plan, "CHUNK_SECONDS", 1e-9)
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Study:
+    return load_study(write_study(tmp_path / "study"))
+
+
+def test_chunks_have_same_bytes_with_one_and_two_threads_and_processes(study: Study, tmp_path: Path) -> None:
+    one = run(study, tmp_path / "one", jobs=1)
+    threads = run(study, tmp_path / "threads", jobs=2)
+    processes = run(study, tmp_path / "processes", jobs=2, backend="loky")
+    assert len(chunk_bytes(one)) == -(-study.space.count // BLOCK) > 10
+    assert chunk_bytes(threads) == chunk_bytes(one)
+    assert chunk_bytes(processes) == chunk_bytes(one)
+    assert (threads / "_plan.json").read_bytes() == (one / "_plan.json").read_bytes()
+
+
+def test_rows_equal_a_direct_computation_of_all_designs(study: Study, tmp_path: Path) -> None:
+    """No cascade, no blocks, no chunks: every output of every design at once, the limits by plain numpy."""
+    matrix, _ = design_matrix(study.family, study.space.columns(0, study.space.count))
+    found = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)
+    expected = np.array(found["status"])
+    good = (found["rotatable"] == 1) & (found["max_pressure_angle"] <= np.radians(50.0))
+    expected[(expected == codes.OK) & ~good] = codes.LIMIT_EXCEEDED
+
+    frame = load(run(study, tmp_path / "out"))
+    assert frame["design"].tolist() == list(range(study.space.count))
+    np.testing.assert_array_equal(frame[list(study.family.parameter_names)].to_numpy(), matrix)
+    ok = expected == codes.OK
+    np.testing.assert_array_equal(frame["status"].to_numpy() == codes.OK, ok)
+    np.testing.assert_array_equal(frame["status"], expected)
+    for name in study.want:
+        np.testing.assert_array_equal(frame.loc[ok, name].to_numpy(), np.asarray(found[name], float)[ok], name)
+    assert 0.01 < ok.mean() < 0.9, "the study must have designs on both sides of its limits"
+    assert frame.loc[ok].notna().all().all()
+
+
+def test_failing_designs_have_nan_in_what_was_not_computed(study: Study, tmp_path: Path) -> None:
+    frame = load(run(study, tmp_path / "out"))
+    over = frame[frame["status"] == codes.LIMIT_EXCEEDED]
+    assert len(over) and over["margin" if "margin" in over else "max_pressure_angle"].notna().all()
+    assert over["max_abs_d2psi"].isna().all(), "the cascade computed an output of designs it had already refused"
+    stuck = frame[frame["status"] == codes.NOT_ROTATABLE]
+    assert len(stuck) and (stuck["rotatable"] == 0).all() and stuck["swing"].isna().all()
+
+
+def test_keep_feasible_drops_and_counts_the_others(tmp_path: Path) -> None:
+    every = run(write_study(tmp_path / "all"), tmp_path / "out-all")
+    feasible = run(write_study(tmp_path / "feasible", keep="feasible"), tmp_path / "out-feasible")
+    frame = load(every)
+    pd.testing.assert_frame_equal(load(feasible), frame[frame["status"] == codes.OK].reset_index(drop=True))
+    counts = {int(code): int(n) for code, n in frame["status"].value_counts().items()}
+    names = {getattr(codes, name): number for name, number in (read_plan(feasible) or {})["counts"].items()}
+    assert names == counts == {getattr(codes, k): v for k, v in (read_plan(every) or {})["counts"].items()}
+    assert sum(counts.values()) == len(frame)
+
+
+def test_float32_is_for_results_only(tmp_path: Path) -> None:
+    wide = load(run(write_study(tmp_path / "a"), tmp_path / "wide"))
+    narrow = load(run(write_study(tmp_path / "b", dtype="float32"), tmp_path / "narrow"))
+    pd.testing.assert_frame_equal(narrow[["a", "b", "alpha"]], wide[["a", "b", "alpha"]])
+    np.testing.assert_array_equal(narrow["status"], wide["status"])
+    assert narrow["max_abs_d2psi"].dtype == np.float32
+    np.testing.assert_array_equal(narrow["max_abs_d2psi"], wide["max_abs_d2psi"].astype(np.float32))
+
+
+def test_pandas_reads_the_folder_and_the_run_is_noted(study: Study, tmp_path: Path) -> None:
+    folder = run(study, tmp_path / "out")
+    pd.testing.assert_frame_equal(pd.read_parquet(folder), load(folder))
+    assert is_complete(folder)
+    start, end = read_runs(folder)
+    assert (start["event"], end["outcome"], start["jobs"]) == ("start", "complete", 2)
+    before = chunk_bytes(folder)
+    run(study, folder)
+    assert read_runs(folder)[-1]["text"] == "0 chunks computed"
+    assert chunk_bytes(folder) == before
+
+
+def test_chunk_in_pieces_equals_chunk_at_once(study: Study) -> None:
+    whole = compute_chunk(study, 1000, 12000)
+    pieces = [compute_chunk(study, 1000, 7001), compute_chunk(study, 7001, 7001), compute_chunk(study, 7001, 12000)]
+    for name, column in whole.columns.items():
+        np.testing.assert_array_equal(np.concatenate([piece.columns[name] for piece in pieces]), column, name)
+
+
+def test_chunk_outside_the_space_is_refused(study: Study) -> None:
+    with pytest.raises(InputError, match="designs"):
+        compute_chunk(study, 0, study.space.count + 1)
+
+
+def test_plan_does_not_depend_on_jobs_and_knows_its_bounds(study: Study) -> None:
+    plan = make_plan(study)
+    ranges = [plan.bounds(k) for k in range(plan.chunks)]
+    assert [r[0] for r in ranges[1:]] == [r[1] for r in ranges[:-1]]
+    assert (ranges[0][0], ranges[-1][1]) == (0, study.space.count)
+    assert make_plan(study) == plan
+
+
+def test_chunk_size_follows_cost_and_memory(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep.plan, "CHUNK_SECONDS", 1e9)
+    monkeypatch.setattr(sweep.plan, "CHUNKS_AT_LEAST", 1e-9)
+    size = make_plan(study).chunk_size
+    row = sweep.plan.row_bytes(study)
+    assert sweep.plan.CHUNK_BYTES - BLOCK * row < size * row <= sweep.plan.CHUNK_BYTES
+
+
+@pytest.mark.parametrize("name", ["swing", "stroke", "swing1", "stroke2"])
+def test_limits_on_swing_and_stroke_compare_magnitudes(name: str) -> None:
+    values = np.array([-25.0, 25.0, -23.0, np.nan])
+    assert meets(Limit(name, 24.0, 26.0), values).tolist() == [True, True, False, False]
+
+
+def test_other_limits_compare_signed_values_and_nan_never_meets_one() -> None:
+    values = np.array([-25.0, 25.0, 24.0, np.nan, np.inf])
+    assert meets(Limit("stroke_ratio", 24.0, None), values).tolist() == [False, True, True, False, False]
+    assert meets(Limit("margin", None, 24.0), values).tolist() == [True, False, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"), [("jobs", 0), ("jobs", 1.5), ("jobs", True), ("backend", "threads"), ("backend", "dask")]
+)
+def test_bad_argument_is_named(study: Study, tmp_path: Path, argument: str, value: object) -> None:
+    with pytest.raises(InputError, match=argument):
+        run(study, tmp_path / "out", **{argument: value})  # type: ignore[arg-type]
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,263 @@
+"""What can go wrong while a sweep runs: signals, kills, a full disk, damaged and foreign chunks, a second run."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+import tracemalloc
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import sweep.engine
+import sweep.plan
+from sweep.chunk import ChunkResult, compute_chunk
+from sweep.engine import run
+from sweep.errors import InputError, Interrupted, LockedError, StoreError, WorkerDied
+from sweep.store import BAD, LOCK, OLD, PLAN, is_complete, load, locked, parts, read_runs
+from sweep.study import Study, load_study
+from tests.engine_study import ROOT, chunk_bytes, write_study
+
+PAUSE = 0.05
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep.plan, "CHUNK_SECONDS", 1e-9)
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_study(tmp_path_factory.mktemp("study"))
+
+
+@pytest.fixture(scope="module")
+def whole(path: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """Chunks of an uninterrupted run."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sweep.plan, "CHUNK_SECONDS", 1e-9)
+        return chunk_bytes(run(path, tmp_path_factory.mktemp("whole")))
+
+
+@pytest.fixture
+def study(path: Path) -> Study:
+    return load_study(path)
+
+
+def start(study: Path, out: Path, *, backend: str = "threading", pause: float = PAUSE) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "tests.engine_study", str(study), str(out), "2", backend, str(pause)]
+    return subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+def wait_for_chunks(out: Path, count: int, process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 60.0
+    while len(list(out.glob("part-*"))) < count:
+        assert process.poll() is None, f"ended early with {process.returncode}: {process.communicate()[1]}"
+        assert time.monotonic() < deadline, "no chunk after a minute"
+        time.sleep(0.005)
+
+
+def only_ignored_beside_parts(folder: Path) -> bool:
+    return all(p.name.startswith("_") or p.name.startswith("part-") for p in folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "backend"),
+    [(signal.SIGINT, 130, "threading"), (signal.SIGTERM, 143, "threading"), (signal.SIGINT, 130, "loky")],
+)
+def test_signal_ends_run_with_its_code_and_next_run_ends_with_same_bytes(
+    path: Path, whole: dict[str, bytes], tmp_path: Path, number: int, code: int, backend: str
+) -> None:
+    out = tmp_path / "out"
+    process = start(path, out, backend=backend)
+    wait_for_chunks(out, 2, process)
+    os.killpg(process.pid, number)  # as a terminal does: the whole group
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == code, errors
+    assert "finished chunks are kept" in errors
+    assert 2 <= len(parts(out)) < len(whole)
+    assert read_runs(out)[-1]["outcome"] == "Interrupted"
+    assert not is_complete(out) and only_ignored_beside_parts(out)
+    run(path, out)
+    assert chunk_bytes(out) == whole and is_complete(out)
+
+
+def test_second_signal_stops_at_once(path: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = start(path, out, pause=3.0)
+    deadline = time.monotonic() + 60.0
+    while not list(out.glob("_tmp-*part*")):
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.3)
+    process.send_signal(signal.SIGINT)
+    begin = time.monotonic()
+    process.communicate(timeout=30)
+    assert process.returncode == -signal.SIGINT
+    assert time.monotonic() - begin < 1.5, "waited for the slow disk"
+
+
+def test_kill_at_random_moments_leaves_a_readable_folder_and_same_bytes_in_the_end(
+    path: Path, whole: dict[str, bytes], tmp_path: Path
+) -> None:
+    out, moments, torn = tmp_path / "out", random.Random(7), 0
+    for target in (1, 3, 6):
+        process = start(path, out)
+        wait_for_chunks(out, target, process)
+        time.sleep(moments.uniform(0.0, 2.0 * PAUSE))
+        process.kill()
+        process.communicate(timeout=30)
+        torn += len(list(out.glob("_tmp-*")))
+        assert pd.read_parquet(out).equals(load(out))
+        assert chunk_bytes(out).items() <= whole.items()
+        assert only_ignored_beside_parts(out)
+    assert torn > 0, "no kill fell into a write: the test does not test what it says"
+    run(path, out)
+    assert chunk_bytes(out) == whole and is_complete(out)
+    assert not list(out.glob("_tmp-*"))
+
+
+def test_killed_worker_process_is_reported_and_finished_chunks_are_kept(
+    path: Path, whole: dict[str, bytes], tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    process = start(path, out, backend="loky")
+    wait_for_chunks(out, 1, process)
+    children = subprocess.run(["ps", "-o", "pid=,args=", "--ppid", str(process.pid)], capture_output=True, text=True)
+    workers = [int(line.split()[0]) for line in children.stdout.splitlines() if "popen_loky" in line]
+    os.kill(workers[0], signal.SIGKILL)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == WorkerDied.exit_code == 70, errors
+    assert "finished chunks are kept" in errors
+    run(path, out)
+    assert chunk_bytes(out) == whole
+
+
+@pytest.mark.parametrize("damage", ["cut", "flip", "empty"])
+def test_damaged_chunk_is_set_aside_and_computed_anew(
+    study: Study, whole: dict[str, bytes], tmp_path: Path, damage: str
+) -> None:
+    out = run(study, tmp_path / "out")
+    victim = parts(out)[3].path
+    data = bytearray(victim.read_bytes())
+    data[len(data) // 2] ^= 1
+    bad = {"cut": bytes(data[: len(data) // 2]), "flip": bytes(data), "empty": b""}[damage]
+    victim.write_bytes(bad)
+    assert not is_complete(out)
+    with pytest.raises(StoreError, match=victim.name):
+        load(out)
+    run(study, out)
+    assert chunk_bytes(out) == whole
+    assert (out / BAD / victim.name).read_bytes() == bad
+    assert read_runs(out)[-1]["text"] == "1 chunks computed"
+
+
+def test_lost_or_damaged_plan_is_made_again(study: Study, whole: dict[str, bytes], tmp_path: Path) -> None:
+    out = run(study, tmp_path / "out")
+    plan = (out / PLAN).read_bytes()
+    for text in (None, b"{ torn", b"[]"):
+        (out / PLAN).unlink()
+        if text is not None:
+            (out / PLAN).write_bytes(text)
+        assert not is_complete(out)
+        run(study, out)
+        assert chunk_bytes(out) == whole and (out / PLAN).read_bytes() == plan
+
+
+def test_other_study_in_the_folder_is_refused_and_set_aside_only_by_force(
+    study: Study, whole: dict[str, bytes], tmp_path: Path
+) -> None:
+    out = run(study, tmp_path / "out")
+    other = load_study(write_study(tmp_path / "other", limits='margin = { min = 0.01, unit = "1" }'))
+    with pytest.raises(InputError, match="another folder") as caught:
+        run(other, out)
+    assert caught.value.exit_code == 2
+    assert chunk_bytes(out) == whole
+    run(other, out, force=True)
+    assert is_complete(out) and not chunk_bytes(out).keys() & whole.keys()
+    (old,) = (out / OLD).iterdir()
+    assert chunk_bytes(old) == whole
+
+
+def test_foreign_chunk_without_plan_is_refused(study: Study, whole: dict[str, bytes], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    name = min(whole)
+    (out / name.replace(name.split("-")[2], "0" * 12)).write_bytes(whole[name])
+    with pytest.raises(InputError, match="part-000000-000000000000"):
+        run(study, out)
+    assert not (out / PLAN).exists()
+
+
+def test_change_of_code_is_foreign_too(study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = run(study, tmp_path / "out")
+    monkeypatch.setattr(sweep.plan, "code_hash", lambda: "0123456789abcdef")
+    with pytest.raises(InputError, match="code 0123456789ab"):
+        run(study, out)
+
+
+def test_held_lock_is_refused_with_its_holder(study: Study, whole: dict[str, bytes], tmp_path: Path) -> None:
+    out = run(study, tmp_path / "out")
+    with locked(out), pytest.raises(LockedError, match=f"process {os.getpid()}") as caught:
+        run(study, out)
+    assert caught.value.exit_code == 75
+    assert (out / LOCK).exists()
+    run(study, out)
+    assert chunk_bytes(out) == whole
+
+
+def test_folder_that_cannot_be_made_is_a_store_error(study: Study, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StoreError) as caught:
+        run(study, tmp_path / "file" / "out")
+    assert caught.value.exit_code == 74
+
+
+@pytest.mark.parametrize("backend", ["threading", "loky"])
+def test_full_disk_ends_with_74_and_nothing_half_written(
+    path: Path, whole: dict[str, bytes], tmp_path: Path, backend: str
+) -> None:
+    """The system itself refuses to write more than 20 kB into a file; chunks are larger, plan and log are not."""
+    assert min(len(data) for data in whole.values()) > 20_000
+    out = tmp_path / "out"
+    limited = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000)); "
+    limited += "from tests.engine_study import main; main(*sys.argv[1:])"
+    command = [sys.executable, "-B", "-c", limited, str(path), str(out), "2", backend, "0"]
+    done = subprocess.run(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert done.returncode == 74, done.stderr
+    assert "File too large" in done.stderr and "part-" in done.stderr and "Traceback" not in done.stderr
+    assert not list(out.glob("part-*")) and not list(out.glob("_tmp-*"))
+    run(path, out)
+    assert chunk_bytes(out) == whole
+
+
+def test_bug_in_a_worker_surfaces_with_its_chunk(study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(study: Study, start: int, stop: int, should_stop: object) -> ChunkResult:
+        raise ZeroDivisionError("broken")
+
+    monkeypatch.setattr("sweep.worker.compute_chunk", broken)
+    with pytest.raises(ZeroDivisionError) as caught:
+        run(study, tmp_path / "out")
+    assert "in chunk 0, designs 0:4096" in "".join(caught.value.__notes__)
+
+
+def test_memory_of_a_chunk_is_its_rows_not_its_designs(tmp_path: Path) -> None:
+    study = load_study(write_study(tmp_path, keep="feasible", count=2000, limits='swing = { min = 359, unit = "deg" }'))
+    compute_chunk(study, 0, 8192)
+    peaks = []
+    for designs in (8192, 65536, 524288):
+        tracemalloc.start()
+        assert compute_chunk(study, 0, designs).columns["design"].size == 0
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[2] < 1.2 * peaks[1] < 40 * 2**20, peaks
+
+
+def test_interrupted_knows_its_exit_code() -> None:
+    assert (Interrupted(2, "").exit_code, Interrupted(15, "").exit_code) == (130, 143)
