@@ -69,5 +69,5 @@ def kernel_fused(function: F) -> F:
 
 
 def inline(function: F) -> F:
-    """Compile a scalar helper that is only ever called from kernels; LLVM folds it into the caller."""
-    return cast(F, numba.njit(nogil=True, error_model="numpy")(function))
+    """Compile a scalar helper for kernels; it is always folded into its caller, so that the loop there vectorises."""
+    return cast(F, numba.njit(nogil=True, error_model="numpy", forceinline=True)(function))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels._jit import inline
+from kernels.sincos import sincos
 
 Array: TypeAlias = NDArray[np.float64]
 Numbers: TypeAlias = NDArray[Any]  # float64, or complex128 for exact gradients by the complex step
@@ -53,35 +54,46 @@ class Reduced(NamedTuple):
 
 
 @inline
-def axial_square(f: Any, g: Any, alpha: Any) -> tuple[Any, Any]:
+def axial_square(f: Any, g: Any, alpha: Any, ca: Any) -> tuple[Any, Any]:
     """f^2 + g^2 - 2 f g cos(alpha) and the magnitude of its terms, without cancellation near alpha = 0, pi; (K*)."""
-    if math.cos(alpha.real) >= 0.0:
-        h = np.sin(0.5 * alpha)
-        near, far = (f - g) * (f - g), 4.0 * f * g * h * h
-        return near + far, near.real + abs(far.real)
-    h = np.cos(0.5 * alpha)
-    near, far = (f + g) * (f + g), 4.0 * f * g * h * h
-    return near - far, near.real + abs(far.real)
+    near_zero = ca.real >= 0.0
+    sine, cosine = sincos(0.5 * alpha)
+    h = sine if near_zero else cosine
+    gap = f - g if near_zero else f + g
+    near, far = gap * gap, 4.0 * f * g * h * h
+    return near + (far if near_zero else -far), near.real + abs(far.real)
+
+
+@inline
+def unit_scale(c: float) -> float:
+    """Power of two that brings a rocker of length c to the unit range; 1 where no square can leave float64 anyway."""
+    if 1e-6 < c < 1e6:
+        return 1.0
+    _, exponent = math.frexp(c)
+    return math.ldexp(1.0, -exponent)
 
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
-    _, exponent = math.frexp(designs[i, 2].real)
-    unit = math.ldexp(1.0, -exponent)
+    unit = unit_scale(designs[i, 2].real)
     a, b, c = designs[i, 0] * unit, designs[i, 1] * unit, designs[i, 2] * unit
     e, f, g = designs[i, 3] * unit, designs[i, 4] * unit, designs[i, 5] * unit
-    alpha, branch = designs[i, 6], designs[i, 7].real
-    sa, ca = np.sin(alpha), np.cos(alpha)
-    q, q_size = axial_square(f, g, alpha)
+    return reduce_scaled(a, b, c, e, f, g, designs[i, 6], designs[i, 7].real)
+
+
+@inline
+def reduce_scaled(a: Any, b: Any, c: Any, e: Any, f: Any, g: Any, alpha: Any, branch: float) -> Reduced:
+    """As :func:`reduce_design`, for lengths whose squares stay in float64; without a branch, so that it vectorises."""
+    sa, ca = sincos(alpha)
+    q, q_size = axial_square(f, g, alpha, ca)
     square = (c - b) * (c + b) + (a * a + e * e) + q
     per_a, per_c = 1.0 / a, 1.0 / c
     k0, k1, k2 = 0.5 * square * per_c * per_a, g * sa * per_c, e * per_c
     terms = abs(((c - b) * (c + b)).real) + (a * a).real + (e * e).real + q_size
     size = 0.5 * terms * per_c.real * per_a.real + abs(k1.real) + abs(k2.real)
-    valid = a.real > 0.0 and b.real > 0.0 and c.real > 0.0 and size < 1e140
-    valid = valid and abs(alpha.real) < 1e5 and branch * branch == 1.0
-    valid = valid and a.real > 1e-140 and per_a.real < 1e140
+    valid = (a.real > 1e-140) & (per_a.real < 1e140) & (b.real > 0.0) & (c.real > 0.0) & (size < 1e140)
+    valid = valid & (abs(alpha.real) < 1e5) & (branch * branch == 1.0)
     return Reduced(
         e * per_a, branch * (f * sa * per_a), branch * ca, k0, k1, k2, size,
         b * per_a, c * per_a, (f * ca - g) * per_a, sa, branch, valid,

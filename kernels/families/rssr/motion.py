@@ -40,7 +40,7 @@ def poses(
     Parameters
     ----------
     designs : (n, 8) columns of :class:`Design`; complex128 for gradients by the complex step
-    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; complex128 if the designs are or the angles depend on them
+    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; complex128 where they depend on the designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT
     psi ... z_c : (n, m) out, or None: what is None is neither computed nor compiled; complex128 if an input is
 
@@ -50,7 +50,7 @@ def poses(
     The dead-point band is the rounding error of Delta itself; outside it the sign of Delta is right for the given
     doubles up to the rounding of K.  ``discriminant`` is a length to the fourth power and leaves float64 at scales
     beyond 1e+-77, as inf or 0; the status is decided on Delta in units of the crank.
-    Largest error over the 422 oracle rows, hard ones included: 2.7 x 2^-53 x max(cond, |y|).
+    Largest error over the 422 oracle rows, hard ones included: 2.1 x 2^-53 x max(cond, |y|).
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)

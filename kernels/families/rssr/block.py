@@ -1,0 +1,92 @@
+"""Blocks of designs side by side: reduction and least Delta, vectorised over the designs.
+
+A block is a plain array of ROWS rows of BLOCK numbers; the constant stride lets the compiler see that rows do not
+overlap, so the loops over designs become vector code (8 ns per design for the reduction instead of 30).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kernels._jit import inline
+from kernels.families.rssr.closure import EPS, Array, reduce_scaled, unit_scale
+from kernels.trigpoly import LAST_STEP, approach, lowest_of_16, minimum, shortfall
+
+BLOCK = 128
+# Rows: the fields of Reduced, the polynomial of Delta, its minimum.  During loading they hold the design itself.
+E, Y0, CA, K0, K1, K2, W_SIZE, COUPLER, ROCKER, Z0, SA, BRANCH, VALID = (k * BLOCK for k in range(13))
+C1, S1, C2, S2, COS, SIN, STEP, DELTA, CURVATURE, TOLERANCE, ACROSS = (k * BLOCK for k in range(13, 24))
+ROWS = 24
+
+
+@inline
+def new_block() -> Array:
+    """Memory for one block."""
+    return np.empty(ROWS * BLOCK)
+
+
+@inline
+def load_block(designs: Array, start: int, count: int, at: Array) -> None:
+    """Reduce the designs start ... start + count - 1."""
+    for k in range(count):
+        i = start + k
+        unit = unit_scale(designs[i, 2])
+        at[k + E], at[k + Y0], at[k + CA] = designs[i, 0] * unit, designs[i, 1] * unit, designs[i, 2] * unit
+        at[k + K0], at[k + K1], at[k + K2] = designs[i, 3] * unit, designs[i, 4] * unit, designs[i, 5] * unit
+        at[k + W_SIZE], at[k + COUPLER] = designs[i, 6], designs[i, 7]
+    for k in range(count):
+        r = reduce_scaled(
+            at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE], at[k + COUPLER]
+        )
+        at[k + E], at[k + Y0], at[k + CA] = r.e, r.y0, r.ca
+        at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE] = r.k0, r.k1, r.k2, r.w_size
+        at[k + COUPLER], at[k + ROCKER], at[k + Z0], at[k + SA] = r.coupler, r.rocker, r.z0, r.sa
+        at[k + BRANCH], at[k + VALID] = r.branch, 1.0 if r.valid else 0.0
+        # Delta = const + C1 cos phi + S1 sin phi + C2 cos 2 phi + S2 sin 2 phi
+        at[k + C1] = 2.0 * (r.k0 * r.k2 - r.e)
+        at[k + S1] = 2.0 * (r.y0 * r.ca - r.k0 * r.k1)
+        at[k + C2] = 0.5 * (r.sa * r.sa - (r.k2 - r.k1) * (r.k2 + r.k1))
+        at[k + S2] = r.k1 * r.k2
+
+
+@inline
+def least_delta(count: int, at: Array) -> None:
+    """Smallest Delta of the turn in squared crank units, where it is, and how well it is known.
+
+    The bound of the rounding error is from standard error analysis (docs/rssr.md, section 4.2): the numbers of the
+    closure carry errors of at most 5 (X), 7 (Y) and 18 (W) units of 2^-53 of their terms, the unit length of (cos, sin)
+    included, and near Delta = 0 |W| <= |X| + |Y|.
+    """
+    for k in range(count):
+        at[k + COS], at[k + SIN] = lowest_of_16(at[k + C1], at[k + S1], at[k + C2], at[k + S2])
+    for k in range(count):
+        c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2]
+        u, v, step = approach(c1, s1, c2, s2, at[k + COS], at[k + SIN])
+        at[k + COS], at[k + SIN] = u, v
+        at[k + STEP] = math.inf if shortfall(c1, s1, c2, s2, u, v) > 0.0 else step
+    for k in range(count):
+        if at[k + STEP] > LAST_STEP:
+            m = minimum(at[k + C1], at[k + S1], at[k + C2], at[k + S2])
+            at[k + COS], at[k + SIN] = m.cos, m.sin
+    for k in range(count):
+        u, v, e, y0, ca = at[k + COS], at[k + SIN], at[k + E], at[k + Y0], at[k + CA]
+        k0, k1, k2 = at[k + K0], at[k + K1], at[k + K2]
+        # The expanded coefficients only place the minimum; its value comes from X, Y, W themselves, and its slope there
+        # takes off what the rounding of the coefficients displaced it by.
+        x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
+        slope = x * v + y * ca * u - w * (k1 * u + k2 * v)
+        curvature = -(at[k + C1] * u + at[k + S1] * v) - 4.0 * (
+            at[k + C2] * ((u - v) * (u + v)) + at[k + S2] * (2.0 * u * v)
+        )
+        moved = 2.0 * slope * slope / curvature
+        delta = x * x + y * y - w * w
+        small = (moved >= 0.0) & (moved < 1e-6 * abs(delta))
+        at[k + DELTA] = delta - (moved if small else 0.0)
+        at[k + CURVATURE] = curvature
+        mx, my, mw = abs(e) + 1.0, abs(y0) + abs(ca), at[k + W_SIZE]
+        w_error = 18.0 * EPS * mw
+        at[k + TOLERANCE] = EPS * (14.0 * mx * mx + 18.0 * my * my + 38.0 * (mx + my) * mw) + w_error * w_error
+        z, p = at[k + Z0] - at[k + SA] * v, at[k + ROCKER] - w
+        at[k + ACROSS] = math.sqrt(p * p + z * z)

@@ -1,0 +1,60 @@
+"""Joint records of the spatial crank-rocker for the effects (:mod:`kernels.joints`)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kernels._jit import kernel
+from kernels.families.rssr.closure import Array
+
+
+@kernel
+def joints(
+    designs: Array,
+    cos_phi: Array,
+    sin_phi: Array,
+    cos_psi: Array,
+    sin_psi: Array,
+    dpsi: Array,
+    d2psi: Array,
+    discriminant: Array,
+    per_pose: Array,
+    per_design: Array,
+) -> None:
+    """Fill the records of :mod:`kernels.joints` from the motion.
+
+    Parameters
+    ----------
+    designs : (n, 8);  cos_phi, sin_phi : (n, m) or (1, m)
+    cos_psi, sin_psi, dpsi, d2psi, discriminant : (n, m), outputs of ``poses``
+    per_pose : (n, m, PER_POSE) out;  per_design : (n, PER_DESIGN) out
+
+    Notes
+    -----
+    t_tau comes from the discriminant with the sign of the branch, not from differenced points: near a dead point the
+    difference has no digit left (dynamics sheet, rule 3).
+    """
+    for i in range(designs.shape[0]):
+        a, b, c = designs[i, 0], designs[i, 1], designs[i, 2]
+        e, f, g, branch = designs[i, 3], designs[i, 4], designs[i, 5], designs[i, 7]
+        sa, ca = math.sin(designs[i, 6]), math.cos(designs[i, 6])
+        d = per_design[i]
+        d[0], d[1], d[2], d[3], d[4], d[5] = 0.0, sa, ca, 0.0, 0.0, 1.0
+        d[6], d[7], d[8], d[9], d[10], d[11] = 0.0, f * sa, f * ca, e, 0.0, g
+        d[12], d[13], d[14], d[15] = a, b, c, branch
+        row = i if cos_phi.shape[0] > 1 else 0
+        for j in range(cos_phi.shape[1]):
+            u, v, cp, sp = cos_phi[row, j], sin_phi[row, j], cos_psi[i, j], sin_psi[i, j]
+            r = per_pose[i, j]
+            r[0], r[1], r[2] = a * u, f * sa + a * (ca * v), f * ca - a * (sa * v)
+            r[3], r[4], r[5] = e + c * cp, c * sp, g
+            for k in range(3):
+                r[6 + k] = (r[3 + k] - r[k]) / b
+            r[9], r[10], r[11] = u, ca * v, -sa * v
+            r[12], r[13], r[14] = -v, ca * u, -sa * u
+            r[15], r[16], r[17] = cp, sp, 0.0
+            r[18], r[19], r[20] = -sp, cp, 0.0
+            r[21] = branch * np.sqrt(discriminant[i, j]) / (2.0 * b * c)
+            r[22], r[23] = dpsi[i, j], d2psi[i, j]

@@ -1,0 +1,80 @@
+"""Does the crank turn fully, by what margin, and how large does the pressure angle get: one exact minimum.
+
+Delta(phi) = X^2 + Y^2 - W^2 is a trigonometric polynomial of degree 2 and Delta/b^2 = cos^2(pressure angle), so its
+minimum answers all three (docs/rssr.md, section 4).
+"""
+
+from __future__ import annotations
+
+import math
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.families.rssr.block import (
+    ACROSS,
+    BLOCK,
+    COS,
+    COUPLER,
+    DELTA,
+    SIN,
+    TOLERANCE,
+    VALID,
+    least_delta,
+    load_block,
+    new_block,
+)
+from kernels.families.rssr.closure import Array, Status
+
+
+@inline
+def turning_status(delta: float, tolerance: float, valid: bool) -> int:
+    """Whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT."""
+    code = st.OK if delta > tolerance else st.UNDECIDABLE
+    code = st.NOT_ROTATABLE if delta < -tolerance else code
+    return code if valid and delta == delta else st.INVALID_INPUT
+
+
+@kernel
+def margin(
+    designs: Array,
+    status: Status,
+    margin: Array | None,
+    rotatable: Array | None,
+    max_pressure_angle: Array | None,
+    phi_min: Array | None,
+) -> None:
+    """Rotatability, margin and largest pressure angle of every design, exact.
+
+    Parameters
+    ----------
+    designs : (n, 8) columns of :class:`Design`
+    status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE (the least Delta is zero within rounding) or INVALID_INPUT
+    margin : (n,) out, least Delta/b^2 = least cos^2(pressure angle) over the turn; negative if the crank does not turn
+    rotatable : (n,) out, 1 or 0; nan where undecidable
+    max_pressure_angle : (n,) out [rad]; nan unless rotatable
+    phi_min : (n,) out [rad], crank angle in (-pi, pi] of the least Delta
+
+    Notes
+    -----
+    What is None is neither computed nor compiled.  Outside the error bound of :func:`least_delta` the verdict is that
+    of exact arithmetic on the given doubles.
+    """
+    at = new_block()
+    for start in range(0, designs.shape[0], BLOCK):
+        count = min(BLOCK, designs.shape[0] - start)
+        load_block(designs, start, count, at)
+        least_delta(count, at)
+        for k in range(count):
+            i, delta = start + k, at[k + DELTA]
+            code = turning_status(delta, at[k + TOLERANCE], at[k + VALID] != 0.0)
+            status[i] = code
+            known = code != st.INVALID_INPUT
+            if margin is not None:
+                margin[i] = delta / (at[k + COUPLER] * at[k + COUPLER]) if known else math.nan
+            if rotatable is not None:
+                rotatable[i] = (1.0 if delta > 0.0 else 0.0) if known and code != st.UNDECIDABLE else math.nan
+            if max_pressure_angle is not None:
+                angle = math.atan2(at[k + ACROSS], math.sqrt(delta)) if code == st.OK else math.nan
+                max_pressure_angle[i] = angle
+            if phi_min is not None:
+                phi_min[i] = math.atan2(at[k + SIN], at[k + COS]) if known else math.nan
