@@ -1,0 +1,87 @@
+"""The verbs that need no data: families, cache."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from sweep.families.base import Family
+
+
+def family_names(text: str) -> str | list[str]:
+    """``rssr`` is a family, ``rssr+guide`` or ``rssr,guide`` a chain of two."""
+    names = [name.strip() for name in text.replace("+", ",").split(",")]
+    return names if len(names) > 1 else names[0]
+
+
+@click.command()
+@click.argument("name", required=False)
+def families(name: str | None) -> None:
+    """List the mechanism families, or the parameters and outputs of one (or of a chain: rssr+guide)."""
+    from sweep.families import NAMES, family
+
+    if name is None:
+        echo_columns([(known, family(known).title) for known in NAMES])
+        click.echo("\nchains: any of them in series, such as rssr+guide; `sweep families NAME` shows what one takes")
+        return
+    for line in describe(family(family_names(name))):
+        click.echo(line)
+
+
+def describe(family: Family) -> list[str]:
+    """Parameters, pose outputs and design outputs of a family with their units, one per line."""
+    from sweep.summaries import output, output_names
+
+    lines = [f"{family.name}: {family.title}", "", "parameters (one length unit throughout, angles in rad)"]
+    parameters = []
+    for p in family.parameters:
+        notes = ["positive"] if p.positive else []
+        notes += [" or ".join(f"{choice:+g}" for choice in p.choices)] if p.choices else []
+        notes += [f"default {p.default:g}"] if p.default is not None else []
+        parameters.append((p.name, p.unit, p.text + (f" ({', '.join(notes)})" if notes else "")))
+    lines += aligned(parameters)
+    lines += ["", "pose outputs (sweep eval)"]
+    lines += aligned([(o.name, o.unit, o.text) for o in family.pose_outputs])
+    lines += ["", "design outputs (sweep summarise, and [scene] want of a study)"]
+    lines += aligned([(o.name, o.unit, o.text) for o in (output(family, n) for n in output_names(family))])
+    return lines
+
+
+def aligned(rows: Iterable[Sequence[str]]) -> list[str]:
+    """Rows of words as indented lines with aligned columns."""
+    table = [tuple(row) for row in rows]
+    if not table:
+        return []
+    widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
+    return ["  " + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in table]
+
+
+def echo_columns(rows: Iterable[Sequence[str]]) -> None:
+    """Print rows of words as aligned columns."""
+    for line in aligned(rows):
+        click.echo(line)
+
+
+@click.group()
+def cache() -> None:
+    """The compiled kernels kept on disk."""
+
+
+@cache.command()
+def clear() -> None:
+    """Remove the compiled kernels of every version; they are compiled anew when needed.
+
+    This is the cure when a damaged file in the cache stops a kernel from loading.
+    """
+    from kernels._jit import cache_root
+
+    root = cache_root()
+    if not root.exists():
+        click.echo(f"nothing to remove: {root} does not exist")
+        return
+    shutil.rmtree(root)
+    click.echo(f"removed {root}")

@@ -1,0 +1,67 @@
+"""The verbs that take a study or the dataset it left behind: run, check, report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+STUDY = click.argument("study", type=click.Path(exists=True, path_type=Path))
+
+
+@click.command()
+@STUDY
+@click.option("--out", type=click.Path(path_type=Path), help="Dataset folder; default results/<study>/designs.")
+@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers.")
+@click.option("--backend", type=click.Choice(["threading", "loky"]), default="threading", show_default=True)
+@click.option("--accuracy", type=float, help="Relative error of the extrema, instead of the study's own target.")
+@click.option("--smoke", is_flag=True, help="The tiny version: smoke.toml beside the study.")
+@click.option(
+    "--force", is_flag=True, help="Start although over the budget; set data of another study in the folder aside."
+)
+def run(
+    study: Path,
+    out: Path | None,
+    jobs: int,
+    backend: Literal["threading", "loky"],
+    accuracy: float | None,
+    smoke: bool,
+    force: bool,
+) -> None:
+    """Run or resume a study.
+
+    An interrupted run is resumed by the same command.  Finished chunks are never computed twice, and the result is the
+    same, bit for bit, with any number of workers.
+    """
+    from sweep.engine import run as run_study
+
+    folder = run_study(study, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, progress=True)
+    click.echo(f"dataset: {folder}")
+
+
+@click.command()
+@STUDY
+@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers to plan for.")
+@click.option("--smoke", is_flag=True, help="The tiny version: smoke.toml beside the study.")
+def check(study: Path, jobs: int, smoke: bool) -> None:
+    """Validate a study and print what running it would compute and cost; nothing is written."""
+    from sweep.cli.plan import plan_lines
+    from sweep.study import load_study
+
+    for line in plan_lines(load_study(study, smoke=smoke), jobs):
+        click.echo(line)
+
+
+@click.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default FOLDER/_report.")
+def report(folder: Path, out: Path | None) -> None:
+    """Write report.html, figures and tables about a dataset.
+
+    report.html holds everything in one file and needs no network.  Beside it: figures/, optimum.parquet and
+    curves.parquet (if the study optimises) and survivors.parquet, the designs within all limits.
+    """
+    from sweep.report import write_report
+
+    click.echo(f"report: {write_report(folder, out)}")

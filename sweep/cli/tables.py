@@ -1,0 +1,138 @@
+"""The verbs that take a table of designs: eval and summarise."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sweep.cli.listing import family_names
+from sweep.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FORMATS = (".parquet", ".csv")
+FAMILY = click.argument("family")
+TABLE = click.argument("table", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+WANT = click.option(
+    "--want", multiple=True, required=True, help="Outputs, separated by commas; see `sweep families FAMILY`."
+)
+OUT = click.option(
+    "--out", type=click.Path(dir_okay=False, path_type=Path), help="A .parquet or .csv file; default: CSV to stdout."
+)
+
+
+@click.command("eval")
+@FAMILY
+@TABLE
+@WANT
+@click.option(
+    "--poses", type=click.IntRange(min=1), help="Equally spaced crank angles over one turn, for every design."
+)
+@OUT
+def evaluate_table(family: str, table: Path, want: tuple[str, ...], poses: int | None, out: Path | None) -> None:
+    """Pose outputs of the designs in TABLE (.parquet or .csv), one row per pose.
+
+    TABLE has a column for each parameter of FAMILY, in one length unit, ANGLES IN RAD, and a column phi (then each row
+    is one pose) unless --poses is given (then each row is a design).  FAMILY is a family or a chain such as rssr+guide.
+    A value that is nan has a status that says why.
+    """
+    out = checked_format(out)
+    import numpy as np
+
+    from sweep.poses import evaluate
+
+    phi = None if poses is None else np.arange(poses) * (2.0 * np.pi / poses)
+    designs = read_table(table)
+    if poses is None and "phi" not in designs.columns:
+        raise InputError(
+            "column", "phi", "a column phi [rad], or --poses N for N crank angles over the turn", str(table)
+        )
+    write_table(evaluate(family_names(family), designs, wanted(want), phi), out)
+
+
+@click.command("summarise")
+@FAMILY
+@TABLE
+@WANT
+@click.option("--samples", type=click.IntRange(min=3), help="Extrema on a grid of this many crank angles.")
+@click.option(
+    "--accuracy", type=float, help="Extrema refined to this relative error (default 1e-8), with err_ columns."
+)
+@click.option(
+    "--window", type=(float, float), help="Part of the stroke that max_abs_dev covers, two fractions such as 0 0.6."
+)
+@OUT
+def summarise_table(
+    family: str,
+    table: Path,
+    want: tuple[str, ...],
+    samples: int | None,
+    accuracy: float | None,
+    window: tuple[float, float] | None,
+    out: Path | None,
+) -> None:
+    """Design outputs of the designs in TABLE (.parquet or .csv), one row per design.
+
+    TABLE has a column for each parameter of FAMILY, in one length unit, ANGLES IN RAD.  FAMILY is a family or a chain
+    such as rssr+guide.  A value that is nan has a status that says why.
+    """
+    out = checked_format(out)
+    from sweep.summaries import summarise
+
+    designs = read_table(table)
+    write_table(
+        summarise(family_names(family), designs, wanted(want), samples=samples, accuracy=accuracy, window=window), out
+    )
+
+
+def wanted(texts: tuple[str, ...]) -> list[str]:
+    """Names out of ``--want x,y --want z``, without repetition."""
+    names = [name.strip() for text in texts for name in text.split(",")]
+    return list(dict.fromkeys(name for name in names if name))
+
+
+def checked_format(out: Path | None) -> Path | None:
+    """Refuse an output file that could not be written before anything is computed."""
+    if out is None:
+        return None
+    if out.suffix.lower() not in FORMATS:
+        raise InputError("--out", str(out), f"a file name ending in {' or '.join(FORMATS)}", "command line")
+    if not out.resolve().parent.is_dir():
+        raise InputError("--out", str(out), "a file in a folder that exists", "command line")
+    return out
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """Read designs from Parquet or CSV; a file that is neither is an :class:`InputError`."""
+    import pandas as pd
+
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS:
+        raise InputError("table", path.name, f"a file name ending in {' or '.join(FORMATS)}", str(path))
+    try:
+        if suffix == ".parquet":
+            return pd.read_parquet(path)
+        # The default parser of pandas is off by an ulp for some numbers.
+        return pd.read_csv(path, float_precision="round_trip", skipinitialspace=True)
+    except (ValueError, OSError) as error:  # pandas and pyarrow derive all their complaints about content from these
+        raise InputError("table", path.name, f"readable {suffix[1:]} ({error})", str(path)) from error
+
+
+def write_table(frame: pd.DataFrame, out: Path | None) -> None:
+    """Write a table; a file appears under its name only when it is whole."""
+    if out is None:
+        click.echo(frame.to_csv(index=False), nl=False)
+        return
+    partial = out.with_name(f"_tmp-{os.getpid()}-{out.name}")
+    try:
+        if out.suffix.lower() == ".parquet":
+            frame.to_parquet(partial, index=False)
+        else:
+            frame.to_csv(partial, index=False)
+        partial.replace(out)
+    finally:
+        partial.unlink(missing_ok=True)

@@ -1,0 +1,211 @@
+"""The answer in words: what was reached, against what, which limits bind, what was not reached, what it proves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sweep.chunk import MAGNITUDES, meets
+from sweep.report.quantities import Quantity, number, percent_change, quantity
+
+if TYPE_CHECKING:
+    from sweep.report.dataset import Dataset
+    from sweep.report.scan import Scan
+    from sweep.study import Limit
+
+Row = Mapping[str, Any]
+ACTIVE = 1e-5  # a limit is called active if the optimum is this near to it, relative to its size
+KKT = 1e-6  # residual above which the optimiser's result is not called a local optimum
+NO_PROOF = "This is no proof of a global optimum"
+
+
+@dataclass(frozen=True)
+class LimitState:
+    """One limit and where the result stands; ``state`` is "active", "met", "missed" or "unknown"."""
+
+    shown: Quantity
+    bound: str
+    value: str
+    reference: str
+    slack: str
+    state: str
+
+
+def limit_state(
+    limit: Limit, row: Row | None, reference: Row | None, unit: str, active_names: frozenset[str]
+) -> LimitState:
+    """Whether a design keeps a limit, and with how much room."""
+    shown = quantity(limit.output, unit)
+    value, other = _value(row, limit.output), _value(reference, limit.output)
+    if limit.output.rstrip("0123456789") == "rotatable":
+        words = {1.0: "yes", 0.0: "no"}
+        state = "unknown" if math.isnan(value) else "met" if meets(limit, np.array([value]))[0] else "missed"
+        return LimitState(shown, "must turn fully", words.get(value, "–"), words.get(other, "–"), "", state)
+    size = abs(value) if limit.output.rstrip("0123456789") in MAGNITUDES else value
+    rooms = []
+    if limit.minimum is not None:
+        rooms.append((size - limit.minimum, limit.minimum))
+    if limit.maximum is not None:
+        rooms.append((limit.maximum - size, limit.maximum))
+    room, bound = min(rooms, key=lambda pair: pair[0]) if not math.isnan(size) else (math.nan, math.nan)
+    tolerance = ACTIVE * max(abs(bound), 1e-12)
+    if math.isnan(room):
+        state = "unknown"
+    elif room < -tolerance:
+        state = "missed"
+    elif room <= tolerance or limit.output in active_names:
+        state = "active"
+    else:
+        state = "met"
+    slack = "" if state in ("unknown", "active") else shown.show(abs(room), 3)
+    return LimitState(shown, bound_words(limit, shown), shown.show(value), shown.show(other), slack, state)
+
+
+def bound_words(limit: Limit, shown: Quantity) -> str:
+    """``at most 45°``, ``24.4 to 24.6 mm``."""
+    if limit.minimum is not None and limit.maximum is not None:
+        if limit.minimum == limit.maximum:
+            return f"exactly {shown.show(limit.maximum)}"
+        return f"{number(limit.minimum * shown.factor)} to {shown.show(limit.maximum)}"
+    if limit.maximum is not None:
+        return f"at most {shown.show(limit.maximum)}"
+    return f"at least {shown.show(limit.minimum if limit.minimum is not None else math.nan)}"
+
+
+def limit_states(data: Dataset) -> list[LimitState]:
+    """Every limit of the study at the result of the study."""
+    row = data.result
+    active = frozenset(data.active)
+    return [limit_state(x, row, data.reference, data.units.get(x.output, ""), active) for x in data.study.limits]
+
+
+def answer(data: Dataset, found: Scan) -> list[str]:
+    """Sentences that answer the study's question, the most important first."""
+    total = data.designs
+    if data.result is None:
+        return [f"No design of the {_count(total)} in the sweep meets all limits.", *_sweep_sentences(data, found)]
+    sentences = []
+    who = "The optimum" if data.optimum is not None else "The best design of the sweep"
+    objective = data.study.objective
+    if objective is not None:
+        sentences.append(_headline(data, who, objective.output))
+    second = data.second
+    if second is not None and _is_number(data.result, second):
+        sentences.append(_comparison(data, second))
+    sentences += _limit_sentences(limit_states(data))
+    sentences += _sweep_sentences(data, found)
+    sentences += not_achieved(data, found)
+    sentences.append(_proof(data))
+    return [s for s in sentences if s]
+
+
+def _headline(data: Dataset, who: str, name: str) -> str:
+    shown = quantity(name, data.units.get(name, ""))
+    value = _value(data.result, name)
+    text = f"{who} has {shown.symbol} = {_with_speed(data, shown, value)}, the {shown.words}"
+    if data.reference is None:
+        return text + "."
+    old = _value(data.reference, name)
+    if math.isnan(old):
+        return f"{text}. The reference design has no such value: {data.reference_status}."
+    change = percent_change(value, old)
+    than = "the same as" if change == "the same" else f"{change} than"
+    fast = shown.at_speed(old, data.study.speed)
+    return f"{text}: {than} the reference design, which has {shown.show(old)}{f' or {fast}' if fast else ''}."
+
+
+def _comparison(data: Dataset, name: str) -> str:
+    shown = quantity(name, data.units.get(name, ""))
+    value, old = _value(data.result, name), _value(data.reference, name)
+    text = f"Its {shown.words} is {_with_speed(data, shown, value)}"
+    change = percent_change(value, old)
+    return f"{text}; the reference has {shown.show(old)} ({change})." if change else f"{text}."
+
+
+def _with_speed(data: Dataset, shown: Quantity, value: float) -> str:
+    fast = shown.at_speed(value, data.study.speed)
+    return f"{shown.show(value)} ({fast} at {rpm(data.study.speed)})" if fast else shown.show(value)
+
+
+def rpm(speed: float | None) -> str:
+    """A speed in turns per minute."""
+    return "" if speed is None else f"{number(speed * 30.0 / math.pi, 5)} rpm"
+
+
+def _limit_sentences(states: list[LimitState]) -> list[str]:
+    active = [f"{s.shown.words} ({s.bound})" for s in states if s.state == "active"]
+    slack = [f"{s.shown.words} ({s.value}, {s.bound})" for s in states if s.state == "met"]
+    return [
+        f"Active {'limit' if len(active) == 1 else 'limits'}, which hold the result back: {'; '.join(active)}."
+        if active
+        else "",
+        f"Met with room to spare: {'; '.join(slack)}." if slack else "",
+    ]
+
+
+def not_achieved(data: Dataset, found: Scan) -> list[str]:
+    """What the result does not reach: limits, outputs worse than the reference, an optimiser that did not settle."""
+    missed = [
+        f"{s.shown.words}: {s.value} instead of {s.bound}"
+        for s in limit_states(data)
+        if s.state in ("missed", "unknown")
+    ]
+    criteria = [data.study.objective.output if data.study.objective is not None else None, data.second]
+    worse = [
+        f"{quantity(name, data.units.get(name, '')).words} is larger than the reference's"
+        for name in criteria
+        if name is not None and abs(_value(data.result, name)) > abs(_value(data.reference, name)) * (1.0 + 1e-9)
+    ]
+    faults = missed + worse
+    if data.optimum is not None:
+        residual = _value(data.optimum, "kkt_residual")
+        if not residual <= KKT:
+            faults.append(f"the optimiser did not settle (KKT residual {number(residual, 3)}, {number(KKT)} is wanted)")
+        objective = data.study.objective
+        if objective is not None and found.best_row:
+            best, value = found.best_row[objective.output], _value(data.optimum, objective.output)
+            if not abs(value) <= abs(best) * (1.0 + 1e-6):
+                shown = quantity(objective.output, data.units.get(objective.output, ""))
+                faults.append(f"the optimiser ended above the best design of the sweep, {shown.show(best)}")
+    return [f"Not achieved: {'; '.join(faults)}."] if faults else []
+
+
+def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
+    feasible = found.feasible
+    share = number(100.0 * feasible / max(data.designs, 1), 3)
+    text = f"Of {_count(data.designs)} designs in the sweep {_count(feasible)} ({share} %) meet all limits"
+    objective = data.study.objective
+    if objective is None or data.optimum is None or not found.best_row:
+        return [text + "."]
+    shown = quantity(objective.output, data.units.get(objective.output, ""))
+    best = found.best_row[objective.output]
+    return [f"{text}; the best of them has {shown.symbol} = {shown.show(best)}, from where the optimiser went on."]
+
+
+def _proof(data: Dataset) -> str:
+    if data.optimum is None:
+        return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
+    starts, agree = data.starts, _value(data.optimum, "agree")
+    text = f"{NO_PROOF}: the optimiser started from {starts} designs of the sweep"
+    if math.isfinite(agree):
+        text += f", {number(agree)} of which ended at this value"
+    residual, violation = _value(data.optimum, "kkt_residual"), _value(data.optimum, "violation")
+    return f"{text}. KKT residual {number(residual, 3)}, largest violation of a limit {number(violation, 3)}."
+
+
+def _value(row: Row | None, name: str) -> float:
+    value = None if row is None else row.get(name)
+    return math.nan if value is None else float(value)
+
+
+def _is_number(row: Row, name: str) -> bool:
+    return math.isfinite(_value(row, name))
+
+
+def _count(n: float) -> str:
+    """1 234 567 with thin no-break spaces."""
+    return f"{int(n):,}".replace(",", "\u202f")

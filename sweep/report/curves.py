@@ -1,0 +1,137 @@
+"""The motion over one turn: position, derivatives, deviation and pressure angles, optimum against reference."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.report.figures import LIMIT, OPTIMUM, REFERENCE, WIDTH, crank_axis, new_figure
+from sweep.report.quantities import Quantity, quantity
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from sweep.families.base import Array
+    from sweep.study import Limit
+
+STYLES: dict[str, dict[str, Any]] = {
+    "optimum": {"color": OPTIMUM},
+    "reference": {"color": REFERENCE, "linestyle": (0, (4, 2))},
+}
+SHOWN = re.compile(r"(d[23]?)?(s|psi)|dev|pressure_angle\d*")
+
+
+def shown_curves(columns: list[str]) -> list[str]:
+    """Columns that get a panel; a chain's unnumbered pressure angle repeats that of its last stage."""
+    names = [name for name in columns if SHOWN.fullmatch(name)]
+    if any(re.fullmatch(r"pressure_angle\d+", name) for name in names):
+        names = [name for name in names if name != "pressure_angle"]
+    order = ["s", "psi", "ds", "dpsi", "d2s", "d2psi", "d3s", "d3psi", "dev"]
+    return sorted(names, key=lambda name: (order.index(name) if name in order else len(order), name))
+
+
+def motion_figure(
+    curves: pd.DataFrame,
+    units: dict[str, str],
+    position: str,
+    speed: float | None,
+    limits: tuple[Limit, ...],
+    window: tuple[float, float] | None,
+) -> Figure:
+    """Panels over the crank angle from the lowest position, so that two mechanisms can be laid over each other."""
+    names = shown_curves(list(curves.columns))
+    turns = {role: curves[curves["role"] == role] for role in ("optimum", "reference")}
+    turns = {role: turn for role, turn in turns.items() if len(turn)}
+    figure = new_figure(WIDTH, 2.1 * -(-len(names) // 2) + 0.5)
+    panels = np.atleast_1d(figure.subplots(-(-len(names) // 2), 2, sharex=True)).ravel()
+    for axes, name in zip(panels, names, strict=False):
+        shown = quantity(name, units.get(name, ""))
+        for role, turn in turns.items():
+            angle, values = aligned_turn(turn, name, position)
+            axes.plot(np.degrees(angle), values * shown.factor, label=role, zorder=3, **STYLES[role])
+        _limit_lines(axes, name, shown, limits)
+        axes.set_title(shown.title)
+        if name == "dev" and window is not None:
+            bound = max((x.maximum for x in limits if x.output == "max_abs_dev" and x.maximum is not None), default=0.0)
+            _show_window(axes, turns, position, window, shown.factor, bound * shown.factor)
+        if speed is not None and shown.order:
+            scale = shown.speed_scale * speed**shown.order / shown.factor
+            twin = axes.secondary_yaxis("right", functions=(lambda v, k=scale: v * k, lambda v, k=scale: v / k))
+            twin.set_ylabel(shown.speed_unit)
+        crank_axis(axes, "")
+    for axes in panels[len(names) :]:
+        axes.set_axis_off()
+    for column in range(2):
+        used = [k for k in range(len(names)) if k % 2 == column]
+        if used:
+            panels[used[-1]].set_xlabel("crank angle from the lowest position [°]")
+            panels[used[-1]].tick_params(labelbottom=True)
+    if len(turns) > 1:
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=2)
+    return figure
+
+
+def _show_window(
+    axes: Axes, turns: dict[str, pd.DataFrame], position: str, window: tuple[float, float], factor: float, bound: float
+) -> None:
+    """Shade the part of the turn in which the deviation counts, and scale the axis to what happens there."""
+    sizes = [bound]
+    for role, turn in turns.items():
+        angle, path = aligned_turn(turn, position, position)
+        _, dev = aligned_turn(turn, "dev", position)
+        inside = in_window(path, window)
+        sizes.append(float(np.nanmax(np.abs(dev[inside]))) * factor)
+        axes.fill_between(
+            np.degrees(angle), 0, 1, where=inside, transform=axes.get_xaxis_transform(),
+            color=STYLES[role]["color"], alpha=0.08, linewidth=0, zorder=1,
+        )  # fmt: skip
+    top = 1.25 * max(sizes)
+    if np.isfinite(top) and top > 0.0:
+        axes.set_ylim(-top, top)
+
+
+def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
+    """Poses whose position lies between two fractions of the stroke, counted from its smallest value."""
+    low, high = np.nanmin(path), np.nanmax(path)
+    fraction = (path - low) / (high - low) if high > low else np.zeros_like(path)
+    return (fraction >= window[0]) & (fraction <= window[1])
+
+
+def aligned_turn(curve: pd.DataFrame, name: str, position: str) -> tuple[Array, Array]:
+    """One closed turn that starts where the position is smallest; the position itself counts from there."""
+    phi = curve["phi"].to_numpy(float)
+    values = curve[name].to_numpy(float)
+    path = curve[position].to_numpy(float) if position in curve else values
+    if position == "psi":
+        path = np.unwrap(path)
+    if name == position:
+        values = path
+    turns = abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi and position == "psi"
+    start = 0 if turns or not np.isfinite(path).any() else int(np.nanargmin(path))
+    order = np.r_[start : phi.size, 0:start]
+    angle = np.mod(phi[order] - phi[start], 2.0 * np.pi)
+    values = values[order]
+    if name == position and not turns:
+        values = values - values[0]
+    closing = values[0] + 2.0 * np.pi * np.sign(path[-1] - path[0]) if turns and name == position else values[0]
+    return np.append(angle, 2.0 * np.pi), np.append(values, closing)
+
+
+def _limit_lines(axes: Axes, name: str, shown: Quantity, limits: tuple[Limit, ...]) -> None:
+    """The limits that bound this curve itself, as thin lines."""
+    for limit in limits:
+        for value, outputs in (
+            (limit.maximum, (f"max_abs_{name}", f"max_{name}")),
+            (limit.minimum, (f"min_{name}",)),
+        ):
+            if value is None or limit.output not in outputs:
+                continue
+            both = limit.output.startswith("max_abs_") and not name.startswith("pressure_angle")
+            for sign in (1.0, -1.0) if both else (1.0,):
+                axes.axhline(sign * value * shown.factor, color=LIMIT, linewidth=0.9, linestyle=":", zorder=2)

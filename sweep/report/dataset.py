@@ -1,0 +1,164 @@
+"""A finished dataset folder as the report sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kernels.status import MEANING
+from sweep import store
+from sweep.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.study import Study
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Parts, optimum and curves of one folder, and the study they answer.
+
+    ``units`` and ``definitions`` come from the field metadata of the Parquet files; ``best`` is the best row of the
+    sweep once it has been read, None if no design is feasible.
+    """
+
+    folder: Path
+    plan: dict[str, Any]
+    study: Study
+    parts: tuple[Path, ...]
+    units: dict[str, str]
+    definitions: dict[str, str]
+    optima: pd.DataFrame | None
+    curves: pd.DataFrame | None
+    runs: tuple[dict[str, Any], ...]
+    best: Row | None = None
+
+    @property
+    def counts(self) -> dict[int, int]:
+        """Designs by status, those that were not kept included."""
+        codes = {name: code for code, name in store.STATUS_NAMES.items()}
+        return {codes[name]: count for name, count in self.plan.get("counts", {}).items() if name in codes}
+
+    @property
+    def designs(self) -> int:
+        """Number of designs in the design space."""
+        return self.study.space.count
+
+    @cached_property
+    def optimum(self) -> Row | None:
+        """The optimiser's result."""
+        return self._role("optimum")
+
+    @cached_property
+    def reference(self) -> Row | None:
+        """The design the result is compared with."""
+        return self._role("reference")
+
+    @property
+    def result(self) -> Row | None:
+        """The optimum, or without an optimiser the best design of the sweep."""
+        return self.optimum if self.optimum is not None else self.best
+
+    @property
+    def result_name(self) -> str:
+        """What the result is called."""
+        return "optimum" if self.optimum is not None else "best of the sweep"
+
+    @property
+    def starts(self) -> int:
+        """From how many designs the optimiser started."""
+        if self.optima is None:
+            return 0
+        return int(self.optima["role"].isin(["optimum", "start"]).sum())
+
+    @property
+    def active(self) -> list[str]:
+        """Limits the optimiser calls active."""
+        names = None if self.optimum is None else self.optimum.get("active")
+        if names is None:
+            return []
+        return names.replace(",", " ").split() if isinstance(names, str) else [str(name) for name in names]
+
+    @property
+    def reference_status(self) -> str:
+        """Why the reference has no values."""
+        code = 0 if self.reference is None else int(self.reference.get("status", 0))
+        return MEANING.get(code, f"status {code}")
+
+    @cached_property
+    def second(self) -> str | None:
+        """The criterion set against the objective: the deviation if there is one, else another maximum."""
+        objective = self.study.objective
+        others = [name for name in self.study.want if objective is None or name != objective.output]
+        ranked = [name for name in others if "dev" in name and not name.startswith("phi_")]
+        ranked += [name for name in others if name.startswith("max_abs_")]
+        ranked += [name for name in others if name.startswith("max_")]
+        return ranked[0] if ranked else None
+
+    def _role(self, role: str) -> Row | None:
+        if self.optima is None:
+            return None
+        rows = self.optima[self.optima["role"] == role]
+        return {str(name): value for name, value in rows.iloc[0].items()} if len(rows) else None
+
+
+def read_dataset(folder: Path) -> Dataset:
+    """Read what the report needs, except the rows of the parts.
+
+    Raises
+    ------
+    InputError
+        if the folder is no complete dataset.
+    """
+    import pandas as pd
+
+    plan = store.read_plan(folder)
+    if plan is None:
+        allowed = f"a dataset folder, with a readable {store.PLAN} (sweep run makes one)"
+        raise InputError("folder", str(folder), allowed, "report")
+    if not store.is_complete(folder):
+        raise InputError("folder", str(folder), "a complete dataset; run the study again to resume it", "report")
+    optima, curves = folder / store.OPTIMUM, folder / store.CURVES
+    parts = tuple(part.path for part in store.parts(folder))
+    units, definitions = field_metadata([path for path in (*parts[:1], optima, curves) if path.exists()])
+    return Dataset(
+        folder=folder,
+        plan=plan,
+        study=study_of(plan, folder),
+        parts=parts,
+        units=units,
+        definitions=definitions,
+        optima=pd.read_parquet(optima) if optima.exists() else None,
+        curves=pd.read_parquet(curves) if curves.exists() else None,
+        runs=tuple(store.read_runs(folder)),
+    )
+
+
+def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
+    """The study a dataset answers, from its plan; its title and question stand there under ``about``."""
+    from sweep.study.load import study_from_data
+
+    about = plan.get("about", {"name": plan["name"]})
+    return study_from_data({**plan["data"], "study": about}, folder / store.PLAN)
+
+
+def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str]]:
+    """Units and definitions that stand in the schemas of Parquet files."""
+    import pyarrow.parquet as pq
+
+    units: dict[str, str] = {}
+    definitions: dict[str, str] = {}
+    for file in files:
+        for column in pq.read_schema(file):
+            about = column.metadata or {}
+            if b"unit" in about:
+                units.setdefault(column.name, about[b"unit"].decode())
+            if b"definition" in about:
+                definitions.setdefault(column.name, about[b"definition"].decode())
+    return units, definitions

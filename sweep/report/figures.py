@@ -1,0 +1,62 @@
+"""Figures share one style file, one palette and one way of being saved."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+TEMPLATES = Path(__file__).resolve().parent.parent / "templates"
+OPTIMUM, REFERENCE, LIMIT, QUIET = "#1f5aa6", "#c8551b", "#b3261e", "#8a8f98"
+WIDTH = 9.6  # inches, the full text width of the page
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A figure on disk, and the same bytes as a data URI for the page."""
+
+    path: Path
+    uri: str
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Draw in the style of the house without changing the caller's settings."""
+    import matplotlib as mpl
+    from matplotlib import style
+
+    with mpl.rc_context():
+        style.use(TEMPLATES / "report.mplstyle")
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure that no window system ever sees."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, path: Path) -> Saved:
+    """Write an SVG that depends on nothing but its data: no date, no random identifiers."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    encoded = base64.b64encode(path.read_bytes()).decode("ascii")
+    return Saved(path, f"data:image/svg+xml;base64,{encoded}")
+
+
+def crank_axis(axes: Axes, label: str) -> None:
+    """Crank angles over one turn, ticked in quarters."""
+    axes.set_xlim(0, 360)
+    axes.set_xticks(range(0, 361, 90))
+    axes.set_xlabel(label)

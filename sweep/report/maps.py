@@ -1,0 +1,165 @@
+"""The design space: what the best design of each cell attains, where designs are feasible, and the trade-off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
+from sweep.report.quantities import Quantity
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from sweep.families.base import Array
+    from sweep.report.scan import Cells, Grid, Scan
+
+MARKS: dict[str, dict[str, Any]] = {
+    "optimum": {"marker": "*", "s": 210, "color": "#14181f"},
+    "reference": {"marker": "o", "s": 52, "color": REFERENCE},
+    "best of the sweep": {"marker": "D", "s": 40, "color": "#2f8f5b"},
+}
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """A known line in the plane of two axes, in stored units."""
+
+    label: str
+    x: Array
+    y: Array
+
+
+def map_figure(
+    grid: Grid,
+    x: tuple[Cells, Quantity],
+    y: tuple[Cells, Quantity],
+    designs: float,
+    objective: Quantity | None,
+    marks: dict[str, tuple[float, float]],
+    overlays: Sequence[Overlay],
+) -> Figure:
+    """Best objective per cell, and the share of the cell's designs that is feasible; ``marks`` in stored units."""
+    figure = new_figure(WIDTH, 4.6)
+    panels = figure.subplots(1, 2 if objective is not None else 1, squeeze=False, sharex=True, sharey=True)[0]
+    (x_cells, x_shown), (y_cells, y_shown) = x, y
+    edges = x_cells.edges * x_shown.factor, y_cells.edges * y_shown.factor
+    shares = grid.count / (designs * np.outer(y_cells.weights, x_cells.weights))
+    fields = [(np.where(grid.count > 0, 100.0 * np.minimum(shares, 1.0), np.nan), "Blues", "feasible designs [%]")]
+    if objective is not None:
+        best = np.where(np.isfinite(grid.best), grid.best * objective.factor, np.nan)
+        fields.insert(0, (best, "viridis_r", f"best {objective.label} in the cell"))
+    for axes, (values, colours, label) in zip(panels, fields, strict=True):
+        axes.set_facecolor("#eceef1")
+        axes.grid(False)
+        norm = _norm(values) if colours == "viridis_r" else _share_norm()
+        mesh = axes.pcolormesh(*edges, values, cmap=colours, norm=norm, rasterized=True)
+        figure.colorbar(mesh, ax=axes, label=label, orientation="horizontal", location="top", shrink=0.9, aspect=32)
+        axes.set_xlabel(x_shown.label)
+        limits = axes.get_xlim(), axes.get_ylim()
+        for overlay in overlays:
+            axes.plot(overlay.x * x_shown.factor, overlay.y * y_shown.factor, color=LIMIT, label=overlay.label)
+        _place(axes, marks, x_shown.factor, y_shown.factor)
+        axes.set_xlim(limits[0])
+        axes.set_ylim(limits[1])
+    panels[0].set_ylabel(y_shown.label)
+    handles, labels = panels[0].get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def line_figure(
+    line: Grid, x: tuple[Cells, Quantity], designs: float, objective: Quantity | None, marks: dict[str, float]
+) -> Figure:
+    """As :func:`map_figure`, over the only axis a study sweeps."""
+    cells, shown = x
+    figure = new_figure(WIDTH, 3.6)
+    panels = figure.subplots(1, 2 if objective is not None else 1, squeeze=False)[0]
+    edges = cells.edges * shown.factor
+    if objective is not None:
+        best = np.where(np.isfinite(line.best), line.best * objective.factor, np.nan)
+        panels[0].stairs(best, edges, baseline=None, color=OPTIMUM)
+        panels[0].set_ylabel(f"best {objective.label}")
+        for role, at in marks.items():
+            panels[0].axvline(at * shown.factor, color=MARKS[role]["color"], linestyle="--", label=role)
+        if marks:
+            panels[0].legend()
+    panels[-1].stairs(
+        100.0 * np.minimum(line.count / (designs * cells.weights), 1.0), edges, fill=True, color="#9fbfe3"
+    )
+    panels[-1].set_ylabel("feasible designs [%]")
+    for axes in panels:
+        axes.set_xlabel(shown.label)
+    return figure
+
+
+def trade_off_figure(
+    found: Scan, objective: Quantity, second: Quantity, marks: dict[str, tuple[float, float]], limit: float | None
+) -> Figure:
+    """Feasible designs, objective against a second criterion, with the front that no design beats in both."""
+    figure = new_figure(WIDTH, 4.4)
+    axes = figure.subplots()
+    scatter = found.scatter * (objective.factor, second.factor)
+    front = found.front * (objective.factor, second.factor)
+    axes.scatter(
+        scatter[:, 0],
+        scatter[:, 1],
+        s=3,
+        color=QUIET,
+        alpha=0.35,
+        linewidths=0,
+        rasterized=True,
+        label="feasible designs",
+    )
+    axes.step(*front.T, where="post", color="#2f8f5b", linewidth=1.2, zorder=3)
+    axes.scatter(
+        front[:, 0],
+        front[:, 1],
+        s=14,
+        color="#2f8f5b",
+        zorder=3,
+        label=f"non-dominated designs of the sweep ({len(front)})",
+    )
+    if limit is not None:
+        axes.axhline(
+            limit * second.factor, color=LIMIT, linewidth=0.9, linestyle=":", label=f"limit of {second.symbol}"
+        )
+    _place(axes, marks, objective.factor, second.factor)
+    for axis, k in ((axes.set_xscale, 0), (axes.set_yscale, 1)):
+        positive = scatter[:, k][scatter[:, k] > 0.0]
+        if positive.size == len(scatter) and positive.size and positive.max() > 30.0 * positive.min():
+            axis("log")
+    axes.set_xlabel(f"{objective.words}, {objective.label}")
+    axes.set_ylabel(f"{second.words}, {second.label}")
+    axes.legend(loc="best")
+    return figure
+
+
+def _place(axes: Axes, marks: dict[str, tuple[float, float]], x_factor: float, y_factor: float) -> None:
+    for role, (x, y) in marks.items():
+        if np.isfinite(x) and np.isfinite(y):
+            axes.scatter(x * x_factor, y * y_factor, label=role, zorder=5, edgecolors="white", **MARKS[role])
+
+
+def _norm(values: Array) -> object:
+    """Logarithmic where the values span more than a decade, so that a few bad cells do not hide the good ones."""
+    from matplotlib.colors import LogNorm, Normalize
+
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return Normalize(0.0, 1.0)
+    low, high = float(finite.min()), float(finite.max())
+    if low > 0.0 and high > 10.0 * low:
+        return LogNorm(low, high)
+    return Normalize(low, high if high > low else low + 1.0)
+
+
+def _share_norm() -> object:
+    from matplotlib.colors import Normalize
+
+    return Normalize(0.0, 100.0)

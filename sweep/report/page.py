@@ -1,0 +1,155 @@
+"""The page: gathers figures, tables and sentences and sets them with the template."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sweep.errors import StoreError
+from sweep.report import answer, tables
+from sweep.report.curves import motion_figure
+from sweep.report.dataset import Dataset, read_dataset
+from sweep.report.drawing import mechanism_figure
+from sweep.report.figures import TEMPLATES, Saved, house_style, save
+from sweep.report.files import copy_tables, write_survivors
+from sweep.report.maps import Overlay, line_figure, map_figure, trade_off_figure
+from sweep.report.quantities import Quantity, quantity
+from sweep.report.scan import Cells, Scan, most_telling, scan
+
+if TYPE_CHECKING:
+    from sweep.study import Study
+
+CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
+
+
+def write(folder: Path, out: Path) -> Path:
+    """Write everything the report consists of into ``out`` and return the path of ``report.html``."""
+    data = read_dataset(folder)
+    objective = data.study.objective.output if data.study.objective is not None else None
+    cells = divided_axes(data.study)
+    found = scan(data.parts, cells, objective, data.second if objective is not None else None)
+    data = replace(data, best=found.best_row or None)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with house_style():
+            figures = draw(data, found, cells, objective, out / "figures")
+        copy_tables(folder, out)
+        write_survivors(data.parts, out / "survivors.parquet")
+        target = out / "report.html"
+        partial = out / "_tmp-report.html"
+        partial.write_text(render(data, found, cells, figures), encoding="utf-8")
+        partial.replace(target)
+    except OSError as error:
+        raise StoreError(f"report {out}: cannot be written: {error}") from error
+    return target
+
+
+def divided_axes(study: Study) -> list[Cells]:
+    """The swept axes, divided into cells: finely if a single map shows them all, else coarsely."""
+    swept = [axis for axis in study.space.axes if axis.high > axis.low]
+    most = CELLS_OF_PAIR if len(swept) <= 2 else CELLS_OF_MANY
+    if study.space.kind == "sobol":
+        # A power of two: a Sobol sequence puts equally many points into such cells.
+        sampled = 2 ** min(5, max(2, math.floor(math.log2(max(study.space.count, 4)) / 3.0)))
+        return [
+            Cells.of_range(axis.name, axis.low, axis.high, sampled)
+            if axis.values is None
+            else Cells.of_values(axis.name, axis.values, most)
+            for axis in swept
+        ]
+    return [Cells.of_values(axis.name, axis.values, most) for axis in swept if axis.values is not None]
+
+
+def draw(data: Dataset, found: Scan, cells: list[Cells], objective: str | None, folder: Path) -> dict[str, Saved]:
+    """Every figure the data allow, saved; keys are the names the template knows."""
+    study, figures = data.study, {}
+    shown = None if objective is None else quantity(objective, data.units.get(objective, ""))
+    by_name = {c.name: c for c in cells}
+    marks = {role: row for role, row in marked(data).items() if row is not None}
+    pair = most_telling(found)
+    if pair is not None:
+        x, y = pair
+        at = {role: (float(row[x]), float(row[y])) for role, row in marks.items()}
+        known = overlays(study, by_name[x], by_name[y])
+        grid = found.grids[pair]
+        sides = (by_name[x], axis_quantity(data, x)), (by_name[y], axis_quantity(data, y))
+        figures["map"] = save(map_figure(grid, *sides, data.designs, shown, at, known), folder / "map.svg")
+    elif len(cells) == 1 and found.feasible:
+        name = cells[0].name
+        side = cells[0], axis_quantity(data, name)
+        figure = line_figure(
+            found.lines[name], side, data.designs, shown, {r: float(row[name]) for r, row in marks.items()}
+        )
+        figures["map"] = save(figure, folder / "map.svg")
+    if shown is not None and data.second is not None and len(found.scatter):
+        second = quantity(data.second, data.units.get(data.second, ""))
+        at = {role: (abs(float(row[shown.name])), abs(float(row[second.name]))) for role, row in marks.items()}
+        bound = next((limit.maximum for limit in study.limits if limit.output == second.name), None)
+        figures["trade_off"] = save(trade_off_figure(found, shown, second, at, bound), folder / "trade-off.svg")
+    if data.curves is not None:
+        motion = motion_figure(data.curves, data.units, study.family.position, study.speed, study.limits, study.window)
+        figures["motion"] = save(motion, folder / "motion.svg")
+        mechanism = mechanism_figure(data.curves)
+        if mechanism is not None:
+            figures["mechanism"] = save(mechanism, folder / "mechanism.svg")
+    return figures
+
+
+def marked(data: Dataset) -> dict[str, Any]:
+    """The designs that are marked in the pictures of the design space."""
+    return {data.result_name: data.result, "reference": data.reference}
+
+
+def axis_quantity(data: Dataset, name: str) -> Quantity:
+    """A swept parameter under its own name, in the unit a designer reads."""
+    shown = quantity(name, data.units.get(name, ""))
+    return replace(shown, symbol=name, words=data.definitions.get(name, name))
+
+
+def overlays(study: Study, x: Cells, y: Cells) -> list[Overlay]:
+    """Known lines of equal parameters, ``[report] curves`` of the study, that lie in the plane of the map."""
+    import numpy as np
+
+    low, high = max(x.edges[0], y.edges[0]), min(x.edges[-1], y.edges[-1])
+    along = np.linspace(low, high, 2)
+    curves = study.data.get("report", {}).get("curves", [])
+    return [
+        Overlay(curve["label"], along, along)
+        for curve in curves
+        if {curve["x"], curve["y"]} <= {x.name, y.name} and low < high
+    ]
+
+
+def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Saved]) -> str:
+    """The HTML text."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    pair = most_telling(found)
+    return environment.get_template("report.html").render(
+        style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
+        study=data.study,
+        data=data,
+        title=data.study.title or data.study.name,
+        figures=figures,
+        sentences=answer.answer(data, found),
+        limits=answer.limit_states(data),
+        outputs=tables.output_rows(data),
+        parameters=tables.parameter_rows(data),
+        fates=tables.fates(data, found),
+        errors=tables.error_rows(data, found),
+        provenance=tables.provenance(data),
+        pair=pair or (cells[0].name,) if cells else (),
+        axes=len(cells),
+        speed=answer.rpm(data.study.speed),
+        today=date.today().isoformat(),
+    )

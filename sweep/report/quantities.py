@@ -1,0 +1,153 @@
+"""What a column is called and in which unit a designer reads it: deg, mm, mm/rad^2, m/s^2 at the scene's speed."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+POSITIONS = {"s": "displacement", "psi": "follower angle", "dev": "deviation from the line"}
+DERIVATIVES = ("", "velocity", "acceleration", "jerk")
+SYMBOLS = {"psi": "ψ", "phi": "φ"}
+PRIMES = ("", "′", "″", "‴")
+POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
+REDUCTIONS = {
+    "phi_max_abs_": ("φ at max |{}|", "crank angle of the largest {}"),
+    "max_abs_": ("max |{}|", "largest {}"),
+    "range_": ("range of {}", "range of {}"),
+    "max_": ("max {}", "largest {}"),
+    "min_": ("min {}", "smallest {}"),
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A column of a dataset as it is shown.
+
+    ``symbolic`` says that the symbol is one and not the name again.  ``factor`` turns the stored value (mm, rad) into
+    ``unit``; ``order`` is that of the derivative with respect to the crank angle, ``speed_scale`` the factor to
+    ``speed_unit`` for 1 rad/s, so that a value at the speed omega is ``stored * speed_scale * omega**order``.
+    """
+
+    name: str
+    symbol: str
+    words: str
+    unit: str
+    factor: float
+    symbolic: bool = False
+    order: int = 0
+    speed_unit: str = ""
+    speed_scale: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """Symbol and unit, for an axis."""
+        return f"{self.symbol} [{self.unit}]" if self.unit else self.symbol
+
+    @property
+    def title(self) -> str:
+        """Words, symbol where there is a real one, unit."""
+        name = f"{self.words} {self.symbol}" if self.symbolic else self.words
+        return f"{name} [{self.unit}]" if self.unit else name
+
+    def show(self, stored: float, digits: int = 5) -> str:
+        """Value with its unit."""
+        return with_unit(number(stored * self.factor, digits), self.unit)
+
+    def at_speed(self, stored: float, speed: float | None, digits: int = 4) -> str:
+        """Value at the scene's speed with its unit, or nothing where a speed says nothing."""
+        if speed is None or self.order == 0:
+            return ""
+        return with_unit(number(stored * self.speed_scale * speed**self.order, digits), self.speed_unit)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """``45°`` but ``24.5 mm``; nothing is added to a missing value."""
+    if not unit or text == "–":
+        return text
+    return text + unit if unit == "°" else f"{text}\u00a0{unit}"
+
+
+def quantity(name: str, unit: str) -> Quantity:
+    """How the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
+    unit = unit.replace("length", "mm")
+    if name.startswith("err_"):
+        shown = quantity(name[4:], unit)
+        return Quantity(name, f"error of {shown.symbol}", f"error of the {shown.words}", shown.unit, shown.factor)
+    symbol_form, words_form, base = "{}", "{}", name
+    for prefix, (symbols, words) in REDUCTIONS.items():
+        if name.startswith(prefix):
+            symbol_form, words_form, base = symbols, words, name[len(prefix) :]
+            break
+    order, root, stage = _derivative(base)
+    symbolic = order > 0 or root in ("s", "psi")
+    symbol = SYMBOLS.get(root, root.replace("_", " ")) + PRIMES[order] + stage.translate(SUBSCRIPTS)
+    words = POSITIONS.get(root, root.replace("_", " ")) if order == 0 else DERIVATIVES[order]
+    words += " across the line" if order and root == "dev" else ""
+    words += f" of stage {stage}" if stage else ""
+    symbol, words = symbol_form.format(symbol), words_form.format(words)
+    if name.startswith("phi_") or (order == 0 and unit in ("rad", "angle")):
+        return Quantity(name, symbol, words, "°", math.degrees(1.0), symbolic)
+    if order == 0:
+        return Quantity(name, symbol, words, _pretty_unit(unit), 1.0, symbolic)
+    length = unit.startswith("mm")
+    return Quantity(
+        name,
+        symbol,
+        words,
+        f"{'mm' if length else 'rad'}/rad{POWERS[order]}",
+        1.0,
+        symbolic,
+        order,
+        f"{'m' if length else 'rad'}/s{POWERS[order]}",
+        1e-3 if length else 1.0,
+    )
+
+
+SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+def _derivative(base: str) -> tuple[int, str, str]:
+    """Order, quantity and stage number of ``d2psi1``."""
+    match = re.fullmatch(r"(d[23]?)?(s|psi|dev)(\d*)", base)
+    if match:
+        mark, root, stage = match.groups()
+        return (0 if mark is None else int(mark[1:] or 1)), root, stage
+    root, stage = re.fullmatch(r"(.*?)(\d*)", base, re.DOTALL).groups()  # type: ignore[union-attr]
+    return 0, root, stage
+
+
+def _pretty_unit(unit: str) -> str:
+    if unit in ("1", "", "ratio", "sign", "none", "count"):
+        return ""
+    return re.sub(r"\^(\d)", lambda m: POWERS[int(m[1])], unit)
+
+
+def number(value: float, digits: int = 5) -> str:
+    """A number as it is set in a table: significant digits, no trailing zeros, powers of ten written out."""
+    if not math.isfinite(value):
+        return "–" if math.isnan(value) else "∞"
+    if value == 0.0:
+        return "0"
+    if 1e-4 <= abs(value) < 1e6:
+        decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+        text = f"{value:.{decimals}f}"
+        text = text.rstrip("0").rstrip(".") if "." in text else text
+    else:
+        mantissa, exponent = f"{value:.{max(digits - 3, 0)}e}".split("e")
+        power = str(int(exponent)).replace("-", "−").translate(SUPERSCRIPTS)
+        text = f"{mantissa}·10{power}"
+    return text.replace("-", "−")
+
+
+SUPERSCRIPTS = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+def percent_change(new: float, old: float) -> str:
+    """``14.2 % less`` or ``3.1 % more`` than the old magnitude."""
+    if not (math.isfinite(new) and math.isfinite(old)) or old == 0.0:
+        return ""
+    change = 100.0 * (abs(new) / abs(old) - 1.0)
+    if abs(change) < 0.005:
+        return "the same"
+    return f"{number(abs(change), 3)}\u00a0% {'less' if change < 0.0 else 'more'}"

@@ -1,0 +1,185 @@
+"""One pass over the parts of a dataset with bounded memory: what the map, the trade-off and the counts need."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from sweep.families.base import Array
+
+ROWS_PER_BATCH = 262_144
+SCATTER_POINTS = 40_000
+
+
+@dataclass(frozen=True)
+class Cells:
+    """How one axis of the design space is divided: a cell per value, or per run of values where there are many.
+
+    ``edges`` are the boundaries in stored units; ``weights`` the share of the axis that falls into each cell.
+    """
+
+    name: str
+    edges: Array
+    weights: Array
+
+    @classmethod
+    def of_values(cls, name: str, values: Array, most: int) -> Cells:
+        """Cells of a lattice axis; neighbouring values share a cell where there are more than ``most``."""
+        ordered = np.unique(values)
+        boundaries = np.concatenate(
+            [
+                [1.5 * ordered[0] - 0.5 * ordered[1]],
+                0.5 * (ordered[1:] + ordered[:-1]),
+                [1.5 * ordered[-1] - 0.5 * ordered[-2]],
+            ]
+        )
+        count = min(most, ordered.size)
+        starts = np.arange(count + 1) * ordered.size // count
+        return cls(name, boundaries[starts], np.diff(starts) / ordered.size)
+
+    @classmethod
+    def of_range(cls, name: str, low: float, high: float, count: int) -> Cells:
+        """Equal cells of a sampled axis."""
+        return cls(name, np.linspace(low, high, count + 1), np.full(count, 1.0 / count))
+
+    def index(self, values: Array) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+        """Cell of each value."""
+        return np.clip(np.searchsorted(self.edges, values, side="right") - 1, 0, self.edges.size - 2)
+
+
+@dataclass
+class Grid:
+    """Best objective and number of feasible designs in each cell of two axes, shape (y, x)."""
+
+    best: Array
+    count: Array
+
+
+@dataclass
+class Scan:
+    """What one pass found; ``best_row`` is the feasible design with the smallest objective."""
+
+    rows: int = 0
+    feasible: int = 0
+    best_row: dict[str, float] = field(default_factory=dict)
+    grids: dict[tuple[str, str], Grid] = field(default_factory=dict)
+    lines: dict[str, Grid] = field(default_factory=dict)
+    scatter: Array = field(default_factory=lambda: np.empty((0, 2)))
+    front: Array = field(default_factory=lambda: np.empty((0, 2)))
+    errors: dict[str, tuple[float, float]] = field(default_factory=dict)
+    counts: dict[int, int] = field(default_factory=dict)
+
+
+def scan(parts: Sequence[Path], cells: Sequence[Cells], objective: str | None, second: str | None) -> Scan:
+    """Read every part once.
+
+    Parameters
+    ----------
+    parts : Parquet files of the dataset
+    cells : divided axes; every pair of them gets a grid
+    objective, second : output columns, smaller (in magnitude) is better; None where the study has none
+    """
+    found = Scan()
+    for c in cells:
+        found.lines[c.name] = Grid(np.full(c.weights.size, np.inf), np.zeros(c.weights.size))
+    for x, y in combinations(cells, 2):
+        shape = (y.weights.size, x.weights.size)
+        found.grids[x.name, y.name] = Grid(np.full(shape, np.inf), np.zeros(shape))
+    stride = max(1, _row_count(parts) // SCATTER_POINTS)
+    best, samples = np.inf, []
+    for batch, names in _batches(parts):
+        ok = batch["status"] == 0
+        for code, count in zip(*np.unique(batch["status"], return_counts=True), strict=True):
+            found.counts[int(code)] = found.counts.get(int(code), 0) + int(count)
+        offset = -found.rows % stride
+        found.rows += ok.size
+        if objective is not None:
+            ok &= np.isfinite(batch[objective])
+        found.feasible += int(ok.sum())
+        for name in names:
+            if name.startswith("err_") and ok.any():
+                _note_errors(found, name, np.abs(batch[name][ok]), np.abs(batch[name[4:]][ok]))
+        if not ok.any():
+            continue
+        score = np.abs(batch[objective]) if objective is not None else np.zeros(ok.size)
+        _fill(found, cells, batch, ok, score)
+        row = int(np.argmin(np.where(ok, score, np.inf)))
+        if score[row] < best:
+            best, found.best_row = float(score[row]), {name: float(batch[name][row]) for name in names}
+        if objective is not None and second is not None:
+            other = np.abs(batch[second])
+            both = ok & np.isfinite(other)
+            points = np.column_stack([score, other])
+            found.front = non_dominated(np.vstack([found.front, points[both]]))
+            taken = points[offset::stride]
+            samples.append(taken[both[offset::stride]])
+    if samples:
+        found.scatter = np.vstack(samples)
+    return found
+
+
+def _fill(found: Scan, cells: Sequence[Cells], batch: dict[str, Array], ok: Array, score: Array) -> None:
+    index = {c.name: c.index(batch[c.name][ok]) for c in cells}
+    good = score[ok]
+    for name, line in found.lines.items():
+        np.minimum.at(line.best, index[name], good)
+        line.count += np.bincount(index[name], minlength=line.count.size)
+    for (x, y), grid in found.grids.items():
+        flat = index[y] * grid.best.shape[1] + index[x]
+        np.minimum.at(grid.best.reshape(-1), flat, good)
+        grid.count += np.bincount(flat, minlength=grid.count.size).reshape(grid.count.shape)
+
+
+def _note_errors(found: Scan, name: str, errors: Array, values: Array) -> None:
+    finite = np.isfinite(errors) & np.isfinite(values) & (values > 0.0)
+    if finite.any():
+        relative = float(np.max(errors[finite] / values[finite]))
+        before = found.errors.get(name, (0.0, 0.0))
+        found.errors[name] = (max(before[0], float(errors[finite].max())), max(before[1], relative))
+
+
+def non_dominated(points: Array) -> Array:
+    """The points no other point beats in both coordinates (smaller is better), sorted by the first."""
+    if not len(points):
+        return points
+    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
+    least_before = np.concatenate([[np.inf], np.minimum.accumulate(ordered[:, 1])[:-1]])
+    return ordered[ordered[:, 1] < least_before]
+
+
+def most_telling(found: Scan) -> tuple[str, str] | None:
+    """The pair of axes over whose cells the best attainable objective, or else the feasible share, varies most."""
+    scores: dict[tuple[str, str], tuple[float, float]] = {}
+    for pair, grid in found.grids.items():
+        reached = np.isfinite(grid.best)
+        if not reached.any():
+            continue
+        # A cell without a feasible design tells as much as the worst one that has.
+        filled = np.where(reached, grid.best, grid.best[reached].max())
+        size = float(np.abs(filled).mean())
+        share = grid.count / max(float(grid.count.max()), 1.0)
+        scores[pair] = (float(filled.std()) / size if size > 0.0 else 0.0, float(share.std()))
+    return max(scores, key=lambda pair: scores[pair]) if scores else None
+
+
+def _row_count(parts: Sequence[Path]) -> int:
+    import pyarrow.parquet as pq
+
+    return sum(pq.read_metadata(part).num_rows for part in parts)
+
+
+def _batches(parts: Sequence[Path]) -> Iterator[tuple[dict[str, Array], list[str]]]:
+    import pyarrow.parquet as pq
+
+    for part in parts:
+        with pq.ParquetFile(part) as source:
+            for batch in source.iter_batches(batch_size=ROWS_PER_BATCH):
+                names = list(batch.schema.names)
+                yield (
+                    {name: np.asarray(batch.column(name).to_numpy(zero_copy_only=False), float) for name in names},
+                    names,
+                )

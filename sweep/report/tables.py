@@ -1,0 +1,164 @@
+"""The tables of the report: outputs and parameters side by side, fates of the designs, errors, provenance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from kernels import status as codes
+from sweep.report.quantities import Quantity, number, percent_change, quantity
+
+if TYPE_CHECKING:
+    from sweep.report.dataset import Dataset
+    from sweep.report.scan import Scan
+
+
+@dataclass(frozen=True)
+class OutputRow:
+    """One output of the result against the reference."""
+
+    name: str
+    symbol: str
+    text: str
+    value: str
+    fast: str
+    reference: str
+    reference_fast: str
+    change: str
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One parameter; ``space`` says what was searched, ``edge`` whether the result lies on the edge of it."""
+
+    name: str
+    text: str
+    value: str
+    reference: str
+    space: str
+    edge: str
+
+
+@dataclass(frozen=True)
+class Fate:
+    """How many designs ended with one status."""
+
+    code: int
+    text: str
+    count: int
+    percent: float
+
+
+def output_rows(data: Dataset) -> list[OutputRow]:
+    """Wanted outputs in designer's units, the objective first."""
+    study = data.study
+    objective = [study.objective.output] if study.objective is not None else []
+    rows = []
+    for name in dict.fromkeys([*objective, *study.want]):
+        shown = quantity(name, data.units.get(name, ""))
+        value, other = _number(data.result, name), _number(data.reference, name)
+        flag = name.rstrip("0123456789") == "rotatable"
+        rows.append(
+            OutputRow(
+                name,
+                shown.symbol,
+                data.definitions.get(name, shown.words),
+                _yes(value) if flag else shown.show(value),
+                shown.at_speed(value, study.speed),
+                _yes(other) if flag else shown.show(other),
+                shown.at_speed(other, study.speed),
+                "" if flag or name.startswith("phi_") else change(shown, value, other),
+            )
+        )
+    return rows
+
+
+def change(shown: Quantity, value: float, other: float) -> str:
+    """Against the reference: in percent, for angles in degrees."""
+    if shown.unit != "°":
+        return percent_change(value, other)
+    difference = abs(value) - abs(other)
+    if math.isnan(difference):
+        return ""
+    return f"{shown.show(abs(difference), 3)} {'less' if difference < 0.0 else 'more'}" if difference else "the same"
+
+
+def parameter_rows(data: Dataset) -> list[ParameterRow]:
+    """All parameters of the mechanism with what was searched."""
+    study, rows = data.study, []
+    bounds = study.space.bounds
+    for p in study.family.parameters:
+        shown = quantity(p.name, data.units.get(p.name, {"length": "mm", "angle": "rad"}.get(p.unit, "1")))
+        value, other = _number(data.result, p.name), _number(data.reference, p.name)
+        space, edge = "fixed", ""
+        if p.name in bounds:
+            low, high = bounds[p.name]
+            space = f"{number(low * shown.factor)} to {shown.show(high)}"
+            near = 1e-9 * (high - low)
+            if high > low and not math.isnan(value):
+                edge = "lower edge" if value - low <= near else "upper edge" if high - value <= near else ""
+        rows.append(ParameterRow(p.name, p.text, shown.show(value, 6), shown.show(other, 6), space, edge))
+    return rows
+
+
+def fates(data: Dataset, found: Scan) -> list[Fate]:
+    """Designs per status in the order in which the sweep finds out, the feasible ones last."""
+    counts = data.counts or found.counts
+    total = max(sum(counts.values()), 1)
+    order = [codes.INVALID_INPUT, codes.NOT_ASSEMBLED, codes.NOT_ROTATABLE, codes.UNDECIDABLE]
+    failed = sorted(
+        (c for c in counts if c != codes.OK), key=lambda c: order.index(c) if c in order else len(order) + c
+    )
+    rows = [Fate(c, codes.MEANING.get(c, f"status {c}"), counts[c], 100.0 * counts[c] / total) for c in failed]
+    kept = counts.get(codes.OK, 0)
+    return [*rows, Fate(codes.OK, "within all limits", kept, 100.0 * kept / total)]
+
+
+def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
+    """Per output: symbol, error estimate at the result, largest estimate in the sweep, the same relative."""
+    rows = []
+    for name in data.study.want:
+        error = f"err_{name}"
+        if error not in found.errors and math.isnan(_number(data.result, error)):
+            continue
+        shown = quantity(error, data.units.get(error, data.units.get(name, "")))
+        largest, relative = found.errors.get(error, (math.nan, math.nan))
+        rows.append(
+            (
+                quantity(name, "").symbol,
+                shown.show(_number(data.result, error), 2),
+                shown.show(largest, 2),
+                number(relative, 2),
+            )
+        )
+    return rows
+
+
+def provenance(data: Dataset) -> list[tuple[str, str]]:
+    """What made the dataset: enough to make it again."""
+    rows = [("study", data.study.name), ("fingerprint of the study", data.study.fingerprint)]
+    rows += [(key, str(data.plan[key])) for key in ("code", "identity", "designs", "chunks") if key in data.plan]
+    accuracy = data.study.accuracy
+    if accuracy.target is not None:
+        rows.append(("extrema over the turn", f"refined, relative error {number(accuracy.target, 2)}"))
+    else:
+        rows.append(("extrema over the turn", f"on a grid of {accuracy.samples} crank angles"))
+    rows.append(("command", f"sweep run {data.study.name}"))
+    return rows + run_rows(data.runs)
+
+
+def run_rows(runs: tuple[dict[str, Any], ...]) -> list[tuple[str, str]]:
+    """The last run as it was recorded."""
+    if not runs:
+        return []
+    return [(str(key), str(value)) for key, value in runs[-1].items() if not isinstance(value, (dict, list))]
+
+
+def _number(row: Any, name: str) -> float:
+    value = None if row is None else row.get(name)
+    return math.nan if value is None else float(value)
+
+
+def _yes(value: float) -> str:
+    return "–" if math.isnan(value) else "yes" if value else "no"
