@@ -45,12 +45,19 @@ def run(
 @click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers to plan for.")
 @click.option("--smoke", is_flag=True, help="The tiny version: smoke.toml beside the study.")
 def check(study: Path, jobs: int, smoke: bool) -> None:
-    """Validate a study and print what running it would compute and cost; nothing is written."""
+    """Validate a study and print what running it would compute and cost; nothing is written.
+
+    Limits are printed in mm and rad.  A study over its budget ends with exit code 3.
+    """
     from sweep.cli.plan import plan_lines
     from sweep.study import load_study
+    from sweep.study.estimate import check_budget, estimate
 
-    for line in plan_lines(load_study(study, smoke=smoke), jobs):
+    model = load_study(study, smoke=smoke)
+    cost = estimate(model, jobs)
+    for line in plan_lines(model, cost):
         click.echo(line)
+    check_budget(model, cost)
 
 
 @click.command()

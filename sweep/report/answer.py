@@ -105,17 +105,15 @@ def answer(data: Dataset, found: Scan) -> list[str]:
 
 def _headline(data: Dataset, who: str, name: str) -> str:
     shown = quantity(name, data.units.get(name, ""))
-    value = _value(data.result, name)
-    text = f"{who} has {shown.symbol} = {_with_speed(data, shown, value)}, the {shown.words}"
+    value, old = _value(data.result, name), _value(data.reference, name)
+    text = f"{who} has a {shown.words} of {_with_speed(data, shown, value)}"
     if data.reference is None:
-        return text + "."
-    old = _value(data.reference, name)
+        return f"{text}."
     if math.isnan(old):
-        return f"{text}. The reference design has no such value: {data.reference_status}."
+        return f"{text}. The reference design has none: {data.reference_status}."
     change = percent_change(value, old)
     than = "the same as" if change == "the same" else f"{change} than"
-    fast = shown.at_speed(old, data.study.speed)
-    return f"{text}: {than} the reference design, which has {shown.show(old)}{f' or {fast}' if fast else ''}."
+    return f"{text}, {than} the reference design with {_with_speed(data, shown, old)}."
 
 
 def _comparison(data: Dataset, name: str) -> str:

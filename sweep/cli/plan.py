@@ -1,0 +1,101 @@
+"""What ``sweep check`` prints: what a study would compute, how, and at what cost."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from sweep.cli.listing import aligned
+
+if TYPE_CHECKING:
+    from sweep.study import Limit, Study
+    from sweep.study.estimate import Estimate
+    from sweep.study.space import Axis
+
+
+def plan_lines(study: Study, cost: Estimate) -> list[str]:
+    """The plan of a study, line by line.
+
+    Parameters
+    ----------
+    study : checked study
+    cost : its estimate
+    """
+    from sweep.summaries import output_names, routes
+
+    lines = [f"{study.name}: {study.title}" if study.title else study.name]
+    lines += [f"mechanism {study.family.name} ({study.family.title})"]
+    if study.speed is not None:
+        lines += [f"speed {study.speed * 30.0 / math.pi:g} rpm ({study.speed:.6g} rad/s)"]
+    kind = "every combination" if study.space.kind == "product" else "Sobol sample"
+    lines += ["", f"{study.space.count} designs, {kind} of"]
+    lines += aligned([(axis.name, _axis(axis)) for axis in study.space.axes])
+
+    limits = {limit.output: _limit(limit) for limit in study.limits}
+    found = routes(study.family, study.want, study.accuracy)
+    lines += ["", f"will be computed, {_accuracy(study)}; only designs within the limits so far go on to the next line"]
+    lines += aligned(
+        [
+            (
+                f"{k}. {route.name}",
+                f"{route.ns_per_design:.3g} ns per design",
+                ", ".join(name + (f" {limits[name]}" if name in limits else "") for name in route.outputs),
+            )
+            for k, route in enumerate(found, 1)
+        ]
+    )
+    left = [name for name in output_names(study.family) if name not in study.want]
+    lines += ["", "will not be computed, because nothing asks for it", f"  {', '.join(left) or 'nothing is left out'}"]
+    if study.objective is not None:
+        lines += ["", f"to be made small: {study.objective.output}"]
+    if study.optimise is not None:
+        budget = study.optimise.time_budget
+        lines += [
+            f"optimiser: {study.optimise.starts} starts, {'no limit of time' if budget is None else duration(budget)}"
+        ]
+    lines += ["", "estimated cost, without the first compilation of the kernels"]
+    lines += aligned(
+        [
+            ("chunks", f"{cost.chunks} of {cost.chunk_size} designs"),
+            ("rows kept", f"{cost.kept:.3g} of all designs ({study.output.keep}, {study.output.dtype})"),
+            ("memory", size(cost.memory_bytes)),
+            ("disk", f"{size(cost.disk_bytes)}, allowed {size(study.budget.disk_bytes)}"),
+            ("time", f"{duration(cost.seconds)} with {cost.jobs} workers, allowed {duration(study.budget.seconds)}"),
+        ]
+    )
+    return lines
+
+
+def _axis(axis: Axis) -> str:
+    unit = "" if axis.unit == "1" else f" {axis.unit}"
+    low, high = axis.low / axis.factor, axis.high / axis.factor
+    count = "" if axis.values is None else f", {axis.count} values"
+    return f"{low:g} to {high:g}{unit}{count}{', log' if axis.scale == 'log' else ''}"
+
+
+def _limit(limit: Limit) -> str:
+    low, high = limit.minimum, limit.maximum
+    if low is not None and high is not None:
+        return f"(= {low:g})" if low == high else f"({low:g} to {high:g})"
+    return f"(>= {low:g})" if low is not None else f"(<= {high:g})"
+
+
+def _accuracy(study: Study) -> str:
+    if study.accuracy.target is not None:
+        return f"extrema to a relative error of {study.accuracy.target:g}"
+    return f"extrema on a grid of {study.accuracy.samples} crank angles"
+
+
+def size(count: float) -> str:
+    """A number of bytes, in words."""
+    for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= scale:
+            return f"{count / scale:.3g} {unit}"
+    return f"{count:.0f} bytes"
+
+
+def duration(seconds: float) -> str:
+    """A time, in words."""
+    if seconds < 120.0:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
