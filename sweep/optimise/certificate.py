@@ -84,8 +84,8 @@ class Result:
     ``design`` (P,) in the family's units.  ``gap`` is the difference between the maximum the search worked with and the
     true one found afterwards on a finer grid, relative to the objective.  ``violation`` is the largest scaled
     violation; ``relaxation`` says by how much every violated limit would have to give way, in the unit of its output.
-    ``multipliers`` are changes of the scaled objective per unit of each active limit, scaled likewise.  ``status`` is OK,
-    LIMIT_EXCEEDED (infeasible) or NOT_CONVERGED, and ``ended`` says how the search ended: "converged", "stalled",
+    ``multipliers`` are changes of the scaled objective per unit of each active limit, scaled likewise.  ``status`` is
+    OK, LIMIT_EXCEEDED (infeasible) or NOT_CONVERGED, and ``ended`` says how the search ended: "converged", "stalled",
     "infeasible", "time" or "interrupted".
     """
 

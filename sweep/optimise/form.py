@@ -148,8 +148,7 @@ class Program:
 class _Layout:
     def __init__(self, curves: Curves, points: Points, design: Array, scalars: tuple[str, ...]) -> None:
         self.curves, self.points, self.scalars = curves, points, scalars
-        names = curves.family.parameter_names
-        self.outward = float(design[names.index("branch")]) if "branch" in names else 1.0
+        self.design = design
         self.terms: list[Term] = []
         self.rest: list[tuple[float, float, bool, Label]] = []
 
@@ -212,7 +211,8 @@ class _Layout:
         if m.kind == "range":
             pairs = [(i, j) for i in maxima[:4] for j in minima[:4]]
             return [({i: 1.0, j: -1.0}, 0.0) for i, j in (pairs if above else pairs[:1])]
-        ext, fold = (maxima[0], minima[0]) if self.outward > 0.0 else (minima[0], maxima[0])
+        outward = self._outward(m.series[0].output)
+        ext, fold = (maxima[0], minima[0]) if outward > 0.0 else (minima[0], maxima[0])
         k, other = len(self.points), {"ext": ext, "fold": fold}
         if m.kind in ("ext", "fold"):
             return [({other[m.kind]: 1.0}, 0.0)]
@@ -221,6 +221,14 @@ class _Layout:
             return [({k + end: 1.0}, self._turns(end))]
         apart = self.points.phi[fold] - self.points.phi[ext]
         return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
+
+    def _outward(self, position: str) -> float:
+        """+1 where the extended position is the largest: the branch of the stage (of the last one) says so."""
+        names = self.curves.family.parameter_names
+        branches = [name for name in names if name.rstrip("0123456789") == "branch"]
+        own = "branch" + position.lstrip("abcdefghijklmnopqrstuvwxyz")
+        chosen = own if own in branches else max(branches, default="")
+        return float(self.design[names.index(chosen)]) if chosen else 1.0
 
     def _turns(self, k: int) -> float:
         return -2.0 * math.pi * math.floor(self.points.phi[k] / (2.0 * math.pi))

@@ -114,8 +114,8 @@ def _result(number: int, problem: Problem, program: Program, descent: Descent, e
     else:
         status, how = st.NOT_CONVERGED, "stalled"
     return Result(
-        start=number, design=state.design, objective=value, gap=descent.gap, violation=state.violation, kkt_residual=residual,
-        active=tuple(words), multipliers=words, relaxation=_relaxation(program, values, state),
+        start=number, design=state.design, objective=value, gap=descent.gap, violation=state.violation,
+        kkt_residual=residual, active=tuple(words), multipliers=words, relaxation=_relaxation(program, values, state),
         values=values, status=status, ended=ended or how,
     )  # fmt: skip
 

@@ -1,0 +1,134 @@
+"""Where searches begin: good designs of a sweep, or of a sample, that are not all alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels import status as st
+from sweep.families.base import Accuracy, Array
+from sweep.optimise.measures import ROTATABLE_MARGIN, margins
+from sweep.optimise.problem import Problem
+
+if TYPE_CHECKING:
+    from sweep.study import Study
+
+KEPT = 100_000  # best rows of a dataset that are looked at
+SCREENED = 256  # sample designs per start where a dataset gives none
+
+
+def diverse(problem: Problem, designs: Array, merit: Array, count: int) -> Array:
+    """The best designs that keep a distance from each other, best first.
+
+    The best one is taken, its neighbourhood left out, and so on; the distance (in variables scaled to their bounds) is
+    halved until there are enough.  Designs of different signs are never neighbours.  Ties go to the earlier row.
+
+    Parameters
+    ----------
+    problem : whose variables count
+    designs : (k, P)
+    merit : (k,) the smaller the better; rows that are not finite are never taken
+    count : how many at most
+    """
+    order = np.argsort(merit, kind="stable")
+    order = order[np.isfinite(merit[order])]
+    ranked = designs[order]
+    place = problem.scaled(ranked)
+    others = [c for c in range(designs.shape[1]) if c not in problem.columns]
+    distance = 0.5 * np.sqrt(len(problem.columns) / 6.0)  # half of what two random designs keep on average
+    taken: list[int] = []
+    for _ in range(12):
+        taken, free = [], np.ones(len(ranked), dtype=np.bool_)
+        while len(taken) < count and free.any():
+            best = int(np.argmax(free))
+            taken.append(best)
+            near = np.linalg.norm(place - place[best], axis=1) < distance
+            free &= ~(near & (ranked[:, others] == ranked[best, others]).all(axis=1))
+            free[best] = False
+        if len(taken) == count:
+            break
+        distance *= 0.5
+    return ranked[taken]
+
+
+def from_dataset(problem: Problem, folder: Path, count: int) -> Array:
+    """Diverse best designs among the feasible rows of a dataset; at most ``count``, possibly none.
+
+    Only the parameters, the objective and the status are read, batch by batch; the best 10^5 rows are kept.
+    """
+    import pyarrow.parquet as pq
+
+    from sweep.store import parts
+
+    names = problem.family.parameter_names
+    designs, merit = np.empty((0, len(names))), np.empty(0)
+    for part in parts(folder):
+        with pq.ParquetFile(part.path) as file:
+            for batch in file.iter_batches(batch_size=KEPT, columns=[*names, problem.objective, "status"]):
+                good = np.asarray(batch["status"]) == st.OK
+                more = np.column_stack([np.asarray(batch[name], np.float64) for name in names])[good]
+                designs = np.concatenate([designs, more])
+                merit = np.concatenate([merit, np.asarray(batch[problem.objective], np.float64)[good]])
+                if len(merit) > KEPT:
+                    best = np.sort(np.argsort(merit, kind="stable")[:KEPT])
+                    designs, merit = designs[best], merit[best]
+    return diverse(problem, designs, merit, count)
+
+
+def from_sample(problem: Problem, signs: list[dict[str, float]], count: int, seed: int) -> Array:
+    """Diverse best designs of a Sobol sample between the bounds; the signs take turns.
+
+    Ranked by how far the limits are missed, then by the objective, on 64 poses per turn.
+
+    Parameters
+    ----------
+    problem : what is to be minimised
+    signs : combinations of the parameters that are not varied (branches)
+    count : how many at most
+    seed : of the sample
+    """
+    from scipy.stats import qmc
+
+    size = 1 << int(np.ceil(np.log2(SCREENED * count)))
+    sample = qmc.Sobol(len(problem.variables), seed=seed).random(size)
+    values = problem.lower + sample * problem.span
+    blocks = [problem.rows(values[k :: len(signs)], **choice) for k, choice in enumerate(signs)]
+    designs = np.concatenate(blocks)
+    return diverse(problem, designs, _merit(problem, designs), count)
+
+
+def _merit(problem: Problem, designs: Array) -> Array:
+    """Objective where all limits are kept; far above it the largest scaled violation; above that what does not turn."""
+    from sweep.summaries import design_outputs
+
+    turning = ["margin"] if margins(problem.family) else []
+    limits = [limit for limit in problem.limits if not limit.output.startswith("rotatable")]
+    wanted = list(dict.fromkeys([*turning, *(limit.output for limit in limits), problem.objective]))
+    columns: dict[str, Any] = design_outputs(problem.family, designs, wanted, Accuracy(samples=64), problem.window)
+    violation = np.zeros(len(designs))
+    for limit in limits:
+        value = np.asarray(columns[limit.output], np.float64)
+        if limit.output.rstrip("0123456789") in ("swing", "stroke"):
+            value = np.abs(value)
+        for bound, sense in ((limit.minimum, 1.0), (limit.maximum, -1.0)):
+            if bound is not None:
+                violation = np.fmax(violation, sense * (bound - value) / (abs(bound) or 1.0))
+    objective = np.asarray(columns[problem.objective], np.float64)
+    spread = 1.0 + np.abs(objective[np.isfinite(objective)]).max(initial=0.0)
+    merit = np.where(violation > 0.0, spread * (1.0 + violation), objective)
+    for name in turning:
+        margin = np.asarray(columns[name], np.float64)
+        merit = np.where(margin < ROTATABLE_MARGIN, spread * 1e6 - margin, merit)
+    return merit
+
+
+def sign_choices(study: Study) -> list[dict[str, float]]:
+    """Combinations of branch and sign values that a study's space holds."""
+    choices: list[dict[str, float]] = [{}]
+    signs = {p.name for p in study.family.parameters if p.choices is not None}
+    for axis in study.space.axes:
+        if axis.name in signs and axis.values is not None:
+            choices = [c | {axis.name: float(v)} for c in choices for v in np.unique(axis.values)]
+    return choices
