@@ -17,6 +17,7 @@ INVALID_INPUT = 7
 SINGULAR = 8
 NOT_OSCILLATING = 9
 JAMMED = 10
+NOT_LINEAR = 11
 NO_DWELL = 11
 
 MEANING: dict[int, str] = {
@@ -30,6 +31,7 @@ MEANING: dict[int, str] = {
     INVALID_INPUT: "a parameter is not finite, a length is not positive, or their scale leaves float64",
     SINGULAR: "the position is not defined (a joint lies on the axis it turns about)",
     NOT_OSCILLATING: "the follower turns fully: it has no limit positions",
+    NOT_LINEAR: "the deflection is too large for the linearised equation; the number given solves that equation only",
     JAMMED: "friction blocks the motion, or its iteration does not contract",
     NO_DWELL: "the output does not make one turn per turn of the input: no dwell is defined",
 }

@@ -27,8 +27,8 @@ Status = NDArray[np.uint8]
 
 DRIVEN, DRIVING = 0, 1
 
-# Below this sine of the angle between coupler and finger axis the finger couple, ~ 1/sine^3, has no digit left.
-LEAST_SINE = 1e-7
+# Below this sine of the angle between coupler and finger axis the axis n has no direction left in float64.
+LEAST_SINE = 1e-13
 
 
 class Coupler(NamedTuple):

@@ -1,0 +1,136 @@
+"""D4: fluctuation of the crank speed over a turn in the steady state of a drive of constant mean speed.
+
+Dynamics sheet, section 3: W is the zero-mean primitive of the torque excess, omega = sqrt(2 (E + W)/J), and E follows
+from the mean speed in time, 2 pi / omega_mean = the integral of d phi / omega, which falls strictly with E.
+A whole-turn effect: it takes samples on a uniform odd grid.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.periodic import coefficients, series, tail
+
+Array = NDArray[np.float64]
+Status = NDArray[np.uint8]
+
+NEWTON = 60
+RESOLVED = 1e-9
+
+
+@kernel
+def speed_fluctuation(
+    inertia: Array,
+    excess: Array,
+    mean_speed: Array,
+    phi: Array,
+    status: Status,
+    delta: Array,
+    fastest: Array,
+    slowest: Array,
+    energy: Array,
+    speed: Array | None,
+    acceleration: Array | None,
+) -> None:
+    """Steady-state speed, its extremes and the degree of unevenness.
+
+    Parameters
+    ----------
+    inertia : (n, N) inertia reduced to the crank on the grid 2 pi j / N, N odd
+    excess : (n, N) drive minus load torque, reduced to the crank; its mean is removed
+    mean_speed : (n,) mean in time [rad/s]
+    phi : (n, m) or (1, m), where speed and acceleration are wanted
+    status : (n,) out; JAMMED where the machine stalls (no E above -min W), NOT_CONVERGED where N resolves too little,
+        NOT_ROTATABLE where a sample is nan
+    delta, fastest, slowest, energy : (n,) out; (max - min)/mean, extremes of omega, the constant E
+    speed, acceleration : (n, m) or None; omega and d omega/d t = (1/2) d(omega^2)/d phi
+    """
+    n = inertia.shape[1]
+    half = (n + 1) // 2
+    jc, js, wc, ws = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
+    work = np.empty(n)
+    for i in range(inertia.shape[0]):
+        row = i if phi.shape[0] > 1 else 0
+        coefficients(inertia[i], jc, js)
+        coefficients(excess[i], wc, ws)
+        code = st.OK if math.isfinite(jc[0] + wc[0]) else st.NOT_ROTATABLE
+        if code == st.OK and (tail(jc, js) > RESOLVED or tail(wc, ws) > RESOLVED):
+            code = st.NOT_CONVERGED
+        wc[0], ws[0] = 0.0, 0.0
+        for k in range(1, half):
+            wc[k], ws[k] = -ws[k] / k, wc[k] / k
+        least = math.inf
+        for j in range(n):
+            work[j] = series(wc, ws, 2.0 * math.pi * j / n)[0]
+            least = min(least, work[j])
+        e = _energy(inertia[i], work, least, mean_speed[i], jc[0]) if code == st.OK else math.nan
+        if code == st.OK and not math.isfinite(e):
+            code = st.JAMMED
+        status[i], energy[i] = code, e
+        high = _extreme(jc, js, wc, ws, e, 1.0, n) if code == st.OK else math.nan
+        low = _extreme(jc, js, wc, ws, e, -1.0, n) if code == st.OK else math.nan
+        fastest[i], slowest[i], delta[i] = high, low, (high - low) / mean_speed[i]
+        if speed is not None or acceleration is not None:
+            for j in range(phi.shape[1]):
+                j_red, dj = series(jc, js, phi[row, j])
+                w, dw = series(wc, ws, phi[row, j])
+                square = 2.0 * (e + w) / j_red
+                if speed is not None:
+                    speed[i, j] = math.sqrt(square) if code == st.OK else math.nan
+                if acceleration is not None:
+                    acceleration[i, j] = (dw - 0.5 * square * dj) / j_red if code == st.OK else math.nan
+
+
+@inline
+def _energy(inertia: Array, work: Array, least: float, mean_speed: float, mean_inertia: float) -> float:
+    """Newton on the period, kept above -min W; nan where the period stays too short even there (stall)."""
+    n = work.size
+    low = -least
+    e = max(0.5 * mean_inertia * mean_speed * mean_speed, low + 1e-3 * abs(low) + 1e-300)
+    for _ in range(NEWTON):
+        period, slope = 0.0, 0.0
+        for j in range(n):
+            room = e + work[j]
+            slow = math.sqrt(0.5 * inertia[j] / room)
+            period += slow
+            slope -= 0.5 * slow / room
+        # In 1/period^2 the relation is nearly linear in E, so the step is taken there.
+        ratio = period / n * mean_speed
+        step = 0.5 * (ratio * ratio - 1.0) * period / -slope
+        new = e + step
+        if new <= low:
+            new = 0.5 * (e + low)
+        if abs(new - e) <= 1e-15 * abs(new):
+            return new
+        e = new
+        if e - low < 1e-12 * max(abs(low), 1e-300):
+            return math.nan
+    return e
+
+
+@inline
+def _extreme(jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float, n: int) -> float:
+    """Largest (sign +1) or smallest (-1) speed: best of 4 N samples, then bisection on the slope beside it."""
+    best, where = -math.inf, 0.0
+    for j in range(4 * n):
+        angle = 0.5 * math.pi * j / n
+        value = sign * (e + series(wc, ws, angle)[0]) / series(jc, js, angle)[0]
+        if value > best:
+            best, where = value, angle
+    low, high = where - 0.5 * math.pi / n, where + 0.5 * math.pi / n
+    # The slope of (E + W)/J has the sign of W' J - (E + W) J'.
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        j_red, dj = series(jc, js, middle)
+        w, dw = series(wc, ws, middle)
+        if sign * (dw * j_red - (e + w) * dj) > 0.0:
+            low = middle
+        else:
+            high = middle
+    middle = 0.5 * (low + high)
+    return math.sqrt(2.0 * (e + series(wc, ws, middle)[0]) / series(jc, js, middle)[0])

@@ -1,0 +1,239 @@
+"""Every effect against its 25-digit table.
+
+Tolerances: 64 * 2^-53 * max(sens, |y|) for pressure angles and reactions, as dynamics-and-thread section 10 rule 4 (the
+sensitivity is tabulated per row; couples also carry 2^-53 * b * |R_B|).  Friction rows have no sensitivity: the same
+linear solve is iterated, so they get 64 units of the largest force of the pose.  Bearings are a dozen operations:
+16 units.  The elastic steady state is a linear system of 121 unknowns with condition ~1e4: 1e-10.
+"""
+
+from __future__ import annotations
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from kernels import status as st
+from kernels.effects import bearings, elasticity, friction, kinetostatics, pressure, speed_fluctuation
+from kernels.effects.coupler import DRIVEN, DRIVING, coupler_point
+from sweep.families import family
+from sweep.families.base import Angles
+from tests.oracle_rows import factor, geometry, joint_records, rows
+
+CONSTRUCTIONS = {"driven": DRIVEN, "driving": DRIVING}
+
+
+def load_columns(inputs):
+    columns = []
+    for body in "123":
+        j = inputs[f"J{body}"]
+        columns += [inputs[f"m{body}"], *inputs[f"com{body}"], j[0][0], j[0][1], j[0][2], j[1][1], j[1][2], j[2][2]]
+    return [*columns, *inputs["gravity"], inputs["M_load"], inputs["omega"], inputs["epsilon"]]
+
+
+def in_bearing_axes(got, i, designs):
+    """M_A along X and e2, M_D along X and Y: the components the tables give."""
+    u = designs[i, :3]
+    got["M_A"] = np.array([got["M_A"][0], got["M_A"] @ np.array([0.0, u[2], -u[1]])])
+    got["M_D"] = got["M_D"][:2]
+
+
+@pytest.mark.parametrize("construction", CONSTRUCTIONS)
+def test_reactions_equal_oracle(construction):
+    table = [r for r in rows("kinetostatics") if r["inputs"]["construction"] == construction]
+    designs, phi = geometry([r["inputs"] for r in table])
+    poses, fixed, status = joint_records(designs, phi)
+    loads = np.array([load_columns(r["inputs"]) for r in table])
+    shape = status.shape
+    out = {name: np.empty((*shape, 3)) for name in ("R_A", "R_B", "R_C", "R_D", "M_A", "M_D")}
+    out |= {name: np.empty(shape) for name in ("m_finger", "M_drive", "J_red", "dJ_red")}
+    kinetostatics.kinetostatics(poses, fixed, loads, CONSTRUCTIONS[construction], status, *out.values())
+    assert (status == st.OK).all()
+    assert len(table) > 30
+    for i, row in enumerate(table):
+        got = {name: values[i, 0] for name, values in out.items()}
+        in_bearing_axes(got, i, fixed)
+        size_b = mp.norm([mp.mpf(x) for x in row["expected"]["R_B"]])
+        for name, sens in row["sens"].items():
+            scale = mp.mpf(sens) + (row["inputs"]["b"] * size_b if name in ("M_A", "M_D", "m_finger") else 0)
+            assert factor(got[name], row["expected"][name], scale) < 64, (i, row["case"], name)
+
+
+def test_reduced_inertia_equals_oracle():
+    """No sensitivity is tabulated for J: on the regular rows it is a sum of a dozen products of exact data."""
+    table = [r for r in rows("kinetostatics", case="regular") if r["inputs"]["construction"] == "driven"]
+    designs, phi = geometry([r["inputs"] for r in table])
+    poses, fixed, status = joint_records(designs, phi)
+    loads = np.array([load_columns(r["inputs"]) for r in table])
+    j_red, dj_red = np.empty(status.shape), np.empty(status.shape)
+    kinetostatics.kinetostatics(poses, fixed, loads, DRIVEN, status, *[None] * 8, j_red, dj_red)
+    for i, row in enumerate(table):
+        assert float(j_red[i, 0]) == pytest.approx(float(row["expected"]["J_red"]), rel=1e-12)
+        size = max(abs(float(row["expected"]["dJ_red"])), float(row["expected"]["J_red"]))
+        assert float(dj_red[i, 0]) == pytest.approx(float(row["expected"]["dJ_red"]), abs=1e-11 * size)
+
+
+@pytest.mark.parametrize("construction", CONSTRUCTIONS)
+def test_friction_equals_oracle(construction):
+    table = [r for r in rows("friction") if r["inputs"]["construction"] == construction]
+    names = ("mu_A", "mu_B", "mu_C", "mu_D", "r_A", "r_B", "r_C", "r_D", "rt_A", "rt_D", "zA1", "zA2", "zD1", "zD2")
+    designs, phi = geometry([r["inputs"] for r in table])
+    poses, fixed, status = joint_records(designs, phi)
+    loads = np.array([load_columns(r["inputs"]) for r in table])
+    data = np.array([[r["inputs"]["friction"][name] for name in names] for r in table])
+    shape = status.shape
+    out = {name: np.empty((*shape, 3)) for name in ("R_A", "R_B", "R_C", "R_D", "M_A", "M_D")}
+    out |= {name: np.empty(shape) for name in ("m_finger", "M_drive", "T_fric_A", "T_fric_D")}
+    out |= {"T_fric_B": np.empty((*shape, 3)), "T_fric_C": np.empty((*shape, 3)), "supports": np.empty((*shape, 4))}
+    passes = np.empty(shape)
+    friction.friction_loads(poses, fixed, loads, data, CONSTRUCTIONS[construction], status, *out.values(), passes)
+    assert (status == st.OK).all()
+    assert passes.max() < friction.PASSES
+    for i, row in enumerate(table):
+        got = {name: values[i, 0] for name, values in out.items()}
+        in_bearing_axes(got, i, fixed)
+        got |= dict(zip(("F_A1", "F_A2", "F_D1", "F_D2"), got.pop("supports"), strict=True))
+        force = max(mp.norm([mp.mpf(x) for x in row["expected"][name]]) for name in ("R_A", "R_B", "R_C", "R_D"))
+        for name, values in got.items():
+            couple = name[0] in "MT" or name == "m_finger"
+            scale = force * (row["inputs"]["b"] if couple else 1)
+            assert factor(values, row["expected"][name], scale) < 64, (i, row["case"], name)
+
+
+def test_friction_reports_a_jam_instead_of_the_last_iterate():
+    """Close to a dead point with a large coefficient the iteration diverges: status, and nan in every result."""
+    row = rows("friction", case="regular")[0]
+    designs, phi = geometry([row["inputs"]])
+    poses, fixed, status = joint_records(designs, phi)
+    names = ("mu_A", "mu_B", "mu_C", "mu_D", "r_A", "r_B", "r_C", "r_D", "rt_A", "rt_D", "zA1", "zA2", "zD1", "zD2")
+    data = np.array([[row["inputs"]["friction"][name] for name in names]])
+    data[0, 3], data[0, 7] = 3.0, 2.0 * row["inputs"]["c"]
+    drive = np.empty(status.shape)
+    loads = np.array([load_columns(row["inputs"])])
+    friction.friction_loads(poses, fixed, loads, data, DRIVEN, status, *[None] * 7, drive, *[None] * 6)
+    assert status[0, 0] == st.JAMMED
+    assert np.isnan(drive[0, 0])
+
+
+def test_coupler_point_equals_oracle():
+    for construction, code in CONSTRUCTIONS.items():
+        table = [r for r in rows("coupler") if r["construction"] == construction]
+        designs, phi = geometry(table)
+        poses, fixed, status = joint_records(designs, phi)
+        point = np.array([[r["x"], r["y"], r["z"]] for r in table])
+        out = {name: np.empty((*status.shape, 3)) for name in ("P", "dP", "ddP")}
+        coupler_point(poses, fixed, point, code, status, *out.values(), None, None, None)
+        assert len(table) > 40
+        for i, row in enumerate(table):
+            assert status[i, 0] == st.OK, row["kind"]
+            scale = mp.mpf(0)
+            for name, values in out.items():
+                # The tolerance of order n takes the largest condition of the lower orders (theory section 12).
+                scale = max(scale, *(mp.mpf(c) for c in row["cond"][name]), *(abs(mp.mpf(x)) for x in row[name]))
+                assert factor(values[i, 0], row[name], scale) < 16, (i, row["kind"], name)
+
+
+def test_pressure_directions_equal_oracle():
+    table = rows("pressure", kind="rssr")
+    designs, phi = geometry([r["inputs"] for r in table])
+    poses, fixed, status = joint_records(designs, phi)
+    names = ("t_tau", "t_rho", "t_k", "theta1", "theta2", "theta3")
+    out = {name: np.empty(status.shape) for name in names}
+    pressure.directions(poses, fixed, status, *out.values(), None, None, None)
+    theta = family("rssr").poses(designs, Angles.of(phi[:, None]), frozenset({"pressure_angle"}))["pressure_angle"]
+    out["theta"] = theta
+    for i, row in enumerate(table):
+        assert status[i, 0] == st.OK
+        for name, sens in row["sens"].items():
+            if name in out:
+                got, expected = float(out[name][i, 0]), float(row["expected"][name])
+                if name in ("theta2", "theta3"):  # a tangent's angle: +pi/2 and -pi/2 are the same direction
+                    got += np.pi * round((expected - got) / np.pi)
+                assert factor(got, row["expected"][name], sens) < 64, (i, row["case"], name)
+
+
+def test_sliding_bearings_equal_oracle():
+    for row in rows("bearings", kind="sliding"):
+        given, expected = row["inputs"], row["expected"]
+        data = np.array([[given[name] for name in bearings.Sliding._fields]])
+        sine = np.sin(given["theta1"])
+        direction = [np.array([[x]]) for x in (np.cos(given["theta1"]), sine, sine * np.tan(given["theta2"]))]
+        status = np.zeros((1, 1), np.uint8)
+        out = {name: np.empty((1, 1)) for name in ("R1", "R2", "X", "p1", "p2", "p3")}
+        bearings.sliding_bearings(*direction, np.array([given["M_c"]]), data, status, *out.values())
+        assert status[0, 0] == st.OK
+        for name, values in out.items():
+            assert factor(values[0], expected[name], 0) < 16, (row["case"], name)
+
+
+def test_permissible_pressure_angle_equals_oracle():
+    for row in rows("bearings", kind="permissible_theta1"):
+        given = row["inputs"]
+        data = np.array([[given[name] for name in bearings.Sliding._fields]])
+        limits = np.array([[given["p1_adm"], given["p2_adm"], given["p3_adm"]]])
+        theta1, status = np.empty(1), np.empty(1, np.uint8)
+        arguments = np.array([given["theta2"]]), np.array([given["M_c"]])
+        bearings.permissible_theta1(*arguments, data, limits, theta1, status)
+        assert status[0] == st.OK
+        assert factor(theta1, row["expected"]["theta1"], 1) < 16
+
+
+def test_rolling_bearings_equal_oracle():
+    names = ("c", "z1", "z2", "V", "Xf", "Y", "e_lim", "p", "C_dyn", "Kb", "axial_on")
+    for row in rows("bearings", kind="rolling"):
+        given = row["inputs"]
+        data = np.array([[given[name] for name in names]], dtype=float)
+        sine = np.sin(given["theta1"])
+        direction = [np.array([[x]]) for x in (np.cos(given["theta1"]), sine, sine * np.tan(given["theta2"]))]
+        status = np.zeros((1, 1), np.uint8)
+        out = {name: np.empty((1, 1)) for name in ("P_eq1", "P_eq2", "L10_1", "L10_2")}
+        bearings.rolling_bearings(*direction, np.array([given["M_c"]]), data, status, *out.values())
+        for name, values in out.items():
+            assert factor(values[0], row["expected"][name], 0) < 16, (row["case"], name)
+
+
+def elastic_inputs(given, phi):
+    designs, _ = geometry([given])
+    wanted = frozenset({"d2psi", "discriminant"})
+    motion = family("rssr").poses(designs, Angles.of(np.atleast_2d(phi)), wanted)
+    return given["sigma"] * np.sqrt(motion["discriminant"]) / (2.0 * given["b"]), motion["d2psi"]
+
+
+def test_elastic_lag_equals_oracle():
+    for row in rows("elasticity", kind="coupler_elasticity"):
+        given, expected = row["inputs"], row["expected"]
+        data = np.array([[given["J"], given["k"], given["h"], given["omega"], given["M0"]]])
+        c, phi = np.array([given["c"]]), np.array([given["phi"]])
+        p, d2psi = elastic_inputs(given, phi)
+        status = np.zeros(p.shape, np.uint8)
+        lag, ratio = np.empty(p.shape), np.empty(p.shape)
+        elasticity.quasi_static(p, d2psi, c, data, status, lag, None, ratio)
+        np.testing.assert_allclose(lag[0], np.array(expected["eta_quasistatic"], float), rtol=1e-13)
+        np.testing.assert_allclose(ratio[0], np.array(expected["frequency_ratio"], float), rtol=1e-14)
+
+        grid = 2.0 * np.pi * np.arange(121) / 121
+        p, d2psi = elastic_inputs(given, grid)
+        turn = np.empty(1, np.uint8)
+        eta, elongation, floquet = np.empty(phi.shape), np.empty(phi.shape), np.empty(1)
+        elasticity.steady_state(p, d2psi, c, data, phi, turn, eta, elongation, floquet)
+        assert turn[0] in (st.OK, st.NOT_LINEAR)
+        dynamic = np.array(expected["eta_dynamic"], float)
+        np.testing.assert_allclose(eta[0], dynamic, atol=1e-10 * abs(dynamic).max())
+        np.testing.assert_allclose(floquet[0], float(expected["floquet_max"]), atol=6e-7)
+
+
+def test_speed_fluctuation_equals_oracle():
+    grid = 2.0 * np.pi * np.arange(65) / 65
+    for row in rows("elasticity", kind="speed_fluctuation"):
+        i, expected = row["inputs"], row["expected"]
+        inertia = i["J0"] + i["J1"] * np.cos(grid - i["d1"]) + i["J2"] * np.cos(2 * grid - i["d2"])
+        excess = i["M1"] * np.cos(grid - i["g1"]) + i["M2"] * np.cos(2 * grid - i["g2"])
+        out = {name: np.empty(1) for name in ("delta", "omega_max", "omega_min", "E_const")}
+        status = np.empty(1, np.uint8)
+        speed_fluctuation.speed_fluctuation(
+            inertia[None], excess[None], np.array([i["omega_mean"]]), grid[None], status, *out.values(), None, None
+        )
+        assert status[0] == st.OK
+        for name, values in out.items():
+            # delta is a difference of two speeds: its digits are those of the speeds.
+            scale = float(expected["omega_max"]) / i["omega_mean"] if name == "delta" else abs(float(expected[name]))
+            assert float(values[0]) == pytest.approx(float(expected[name]), abs=1e-13 * scale)
