@@ -1,0 +1,277 @@
+"""True extrema over one turn of any pose output of any family, from its poses alone; docs/extrema.md.
+
+Sampled, refined between the samples, and sampled again more densely where the samples do not resolve the curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from kernels import scan
+from kernels import status as st
+from sweep.families.base import Array, Family
+from sweep.refine import EPS, Peaks, refine_peaks
+from sweep.sampling import (
+    TWO_PI,
+    Index,
+    Mask,
+    Status,
+    blocks,
+    discriminants,
+    is_angle_of_follower,
+    pose_columns,
+    sample_turn,
+)
+from sweep.window import Window, edges
+
+Mode: TypeAlias = Literal[-1, 0, 1]
+
+START = 32  # samples of the first look
+LIMIT = 32768  # samples beyond which a design is given up as NOT_CONVERGED
+SHARE = 0.6  # a peak below this share of the best sample is not refined
+ROUGH = 0.2  # fourth difference of samples against their size, above which they do not resolve the curve
+PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
+DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
+
+
+class Request(NamedTuple):
+    """An extremum that is wanted: of which pose output, and which (0 largest magnitude, +1 largest, -1 least)."""
+
+    pose: str
+    mode: Mode
+    windowed: bool = False  # only poses whose position lies in the search's window count
+
+
+class Extremum(NamedTuple):
+    """Extremum of every design, each (n,): the measured value, its crank angle in [0, 2 pi), and their errors."""
+
+    value: Array
+    phi: Array
+    err: Array
+    err_phi: Array
+
+    @classmethod
+    def unknown(cls, count: int) -> Extremum:
+        """All nan."""
+        return cls(*(np.full(count, np.nan) for _ in range(4)))
+
+
+# What a pose's status means for its design; the others keep their meaning.
+DESIGN_STATUS = np.arange(256, dtype=np.uint8)
+DESIGN_STATUS[st.NOT_ASSEMBLED] = st.NOT_ROTATABLE
+DESIGN_STATUS[st.DEAD_POINT] = st.UNDECIDABLE
+
+
+def true_extrema(
+    family: Family,
+    designs: Array,
+    requests: Sequence[Request],
+    target: float,
+    *,
+    locate: bool = False,
+    anywhere: bool = False,
+    window: Window | None = None,
+) -> tuple[dict[Request, Extremum], Status]:
+    """Refined extrema over one turn.
+
+    Parameters
+    ----------
+    family, designs : the (n, P) design matrix of any family
+    requests : which extrema of which pose outputs
+    target : relative accuracy of each value
+    locate : whether crank angles are wanted to ``target`` rad too
+    anywhere : the requested pose outputs are known also where the links do not reach (discriminants): the whole turn
+        counts whatever its status, and only nan in it makes the extremum nan
+    window : for windowed requests, between which positions poses count
+
+    Returns
+    -------
+    extrema : per request; nan where the status is not OK, except NOT_CONVERGED, which keeps its best value
+    status : (n,) OK; NOT_ROTATABLE, UNDECIDABLE, SINGULAR, INVALID_INPUT from poses that the search met;
+        NOT_OSCILLATING where an angle without extremum was asked for; NOT_CONVERGED where 32768 samples do not resolve
+        the curve.  Whether a dead point lies between the samples is for the margin to say (`sweep.margins`).
+
+    Notes
+    -----
+    Starts with 32 samples.  A design is sampled again, with twice as many or more, if the fourth difference of its
+    samples exceeds a fifth of their size, if they stand wider than a twelfth of the distance of the nearest complex
+    zero of a discriminant, or if refinement moved the peak by more than 5 % of its height.
+    """
+    search = _Search(family, designs, tuple(requests), target, locate, anywhere, window)
+    pending, samples = np.arange(len(designs)), START
+    while pending.size:
+        for rows in blocks(pending[search.needed[pending] <= samples], samples):
+            search.block(rows, samples)
+        pending = pending[search.needed[pending] > samples]
+        if samples == LIMIT:
+            search.status[pending] = st.NOT_CONVERGED
+            break
+        samples *= 2
+    for extremum in search.found.values():
+        for column in extremum:
+            column[(search.status != st.OK) & (search.status != st.NOT_CONVERGED)] = np.nan
+    return search.found, search.status
+
+
+class Candidates(NamedTuple):
+    """Samples next to a possible extremum, each (k,): request, row of the block, column, sign that makes it large."""
+
+    request: Index
+    row: Index
+    column: Index
+    sign: Array
+
+    def only(self, which: Mask) -> Candidates:
+        """Some of them."""
+        return Candidates(self.request[which], self.row[which], self.column[which], self.sign[which])
+
+
+@dataclass
+class _Search:
+    """The state of one search: what is found so far, and how many samples each design still needs."""
+
+    family: Family
+    designs: Array
+    requests: tuple[Request, ...]
+    target: float
+    locate: bool
+    anywhere: bool
+    window: Window | None
+    found: dict[Request, Extremum] = field(init=False)
+    status: Status = field(init=False)
+    needed: Index = field(init=False)
+    names: list[str] = field(init=False)
+    guards: list[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.designs)
+        self.found = {request: Extremum.unknown(n) for request in self.requests}
+        self.status = np.zeros(n, np.uint8)
+        self.needed = np.full(n, START)
+        # A discriminant is a smooth function whatever its sign; the motion is not where it vanishes.
+        self.guards = [] if self.anywhere else list(discriminants(self.family))
+        position = [self.family.position] if self.window is not None else []
+        self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
+
+    def block(self, rows: Index, samples: int) -> None:
+        """Sample some designs, and refine those that the samples resolve."""
+        columns, worst, winds = sample_turn(self.family, self.designs[rows], samples, self.names)
+        if self.anywhere:
+            good = np.logical_and.reduce([np.isfinite(columns[name]).all(axis=1) for name in self.names])
+            self.status[rows] = np.where(good, st.OK, DESIGN_STATUS[worst])
+        else:
+            self.status[rows] = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst])
+            good = self.status[rows] == st.OK
+        self.needed[rows] = START
+        if not good.all():
+            rows, columns = rows[good], {name: values[good] for name, values in columns.items()}
+        if not rows.size:
+            return
+        candidates, scales, needed = self._candidates(rows, columns, samples)
+        needed = np.maximum(needed, self._samples_by_singularity(columns, samples, needed))
+        resolved = (needed <= samples) | (samples == LIMIT)
+        candidates = candidates.only(resolved[candidates.row])
+        peaks = self._refine(rows, columns, samples, candidates)
+        for number, request in enumerate(self.requests):
+            mine = candidates.request == number
+            row, found = candidates.row[mine], Peaks(*(column[mine] for column in peaks))
+            if self.window is not None and request.windowed:
+                row, found = self._within_window(rows, columns, request, row, found, resolved)
+            moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[request]
+            needed = np.where(moved & resolved, np.maximum(needed, 2 * samples), needed)
+        self.needed[rows] = needed
+
+    def _candidates(
+        self, rows: Index, columns: dict[str, Array], samples: int
+    ) -> tuple[Candidates, dict[Request, Array], Index]:
+        """Candidates of all requests, the sizes of their curves, and samples needed by the look of the curves."""
+        needed, pieces, scales = np.full(rows.size, START), [], {}
+        for number, request in enumerate(self.requests):
+            values = columns[request.pose]
+            allowed = None
+            if self.window is not None and request.windowed:
+                allowed = self.window.holds(rows, columns[self.family.position])
+            scale, rough = np.empty(rows.size), np.empty(rows.size)
+            row, column = (np.empty(rows.size * (samples // 2 + 1), np.int64) for _ in range(2))
+            count = scan.peaks(values, request.mode, SHARE, allowed, scale, rough, row, column)
+            row, column = row[:count], column[:count]
+            sign = np.sign(values[row, column]) if request.mode == 0 else np.full(count, float(request.mode))
+            pieces.append(Candidates(np.full(count, number), row, column, sign))
+            scales[request] = scale
+            needed[rough > ROUGH] = 2 * samples
+        joined = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
+        return Candidates(*joined), scales, needed
+
+    def _samples_by_singularity(self, columns: dict[str, Array], samples: int, needed: Index) -> Index:
+        distance = np.full(needed.size, np.inf)
+        for name in self.guards:
+            one = np.empty(needed.size)
+            scan.nearest_singularity(columns[name], one)
+            distance = np.minimum(distance, one)
+        # The first looks see a near zero only roughly: at most eight times as many samples at once.
+        wanted = np.minimum(PER_SINGULARITY / np.maximum(distance, 1e-300), 8.0 * samples)
+        samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
+        return samples_needed
+
+    def _refine(self, rows: Index, columns: dict[str, Array], samples: int, candidates: Candidates) -> Peaks:
+        number, row, column, sign = candidates
+        near = (column[:, None] + np.arange(-2, 3)) % samples
+        around = np.empty((row.size, 5))
+        for k, request in enumerate(self.requests):
+            mine = number == k
+            around[mine] = sign[mine, None] * columns[request.pose][row[mine, None], near[mine]]
+        middle = sign * around[:, 2]
+
+        def sample(active: Index, phi: Array) -> Array:
+            designs = rows[row[active]]
+            poses, status = pose_columns(self.family, self.designs[designs], phi, self.names)
+            if not self.anywhere:
+                bad = status != st.OK
+                hit = bad.any(axis=1)
+                self.status[designs[hit]] = DESIGN_STATUS[status[hit, bad[hit].argmax(axis=1)]]
+            out = np.empty(phi.shape)
+            for k, request in enumerate(self.requests):
+                mine = number[active] == k
+                values = poses[request.pose][mine]
+                if is_angle_of_follower(request.pose):
+                    values = values + TWO_PI * np.rint((middle[active][mine, None] - values) / TWO_PI)
+                out[mine] = sign[active][mine, None] * values
+            return out
+
+        spacing = TWO_PI / samples
+        centre: Array = column * spacing
+        return refine_peaks(sample, centre, spacing, around, self.target, self.locate)
+
+    def _within_window(
+        self, rows: Index, columns: dict[str, Array], request: Request, row: Index, peaks: Peaks, resolved: Mask
+    ) -> tuple[Index, Peaks]:
+        """Drop the peaks outside the window; its edges are candidates too."""
+        assert self.window is not None
+        poses, _ = pose_columns(self.family, self.designs[rows[row]], peaks.phi[:, None], self.names)
+        inside = self.window.holds(rows[row], poses[self.family.position])[:, 0]
+        edge = edges(self.family, self.designs, rows, self.window, columns[self.family.position], request.pose)
+        edge = edge.only(resolved[edge.row])
+        height = np.abs(edge.values) if request.mode == 0 else request.mode * edge.values
+        none = np.zeros(edge.row.size)
+        added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height)
+        joined = Peaks(*(np.concatenate([p[inside], q]) for p, q in zip(peaks, added, strict=True)))
+        return np.concatenate([row[inside], edge.row]), joined
+
+    def _keep_best(self, rows: Index, request: Request, row: Index, peaks: Peaks) -> Array:
+        """Store the best candidate of each row; by how much refinement moved it from the guess (0 where none)."""
+        best, which = np.full(rows.size, -np.inf), np.full(rows.size, -1)
+        scan.best_candidate(row, peaks.height, best, which)
+        has = which >= 0
+        chosen = which[has]
+        found = self.found[request]
+        found.value[rows[has]] = peaks.height[chosen] * (-1.0 if request.mode == -1 else 1.0)
+        found.phi[rows[has]] = np.mod(peaks.phi[chosen], TWO_PI)
+        found.err[rows[has]] = peaks.err_height[chosen]
+        found.err_phi[rows[has]] = peaks.err_phi[chosen]
+        moved = np.zeros(rows.size)
+        moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
+        return moved

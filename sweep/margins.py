@@ -1,0 +1,155 @@
+"""Rotatability, margin and largest pressure angle of any family, stage by stage; docs/extrema.md."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels import status as st
+from sweep.extrema import DESIGN_STATUS, Request, true_extrema
+from sweep.families.base import Accuracy, Array, Columns, Family, Step
+from sweep.families.chain import Chain, Stage
+from sweep.sampling import pose_columns
+
+NAMES = ("rotatable", "margin", "max_pressure_angle")
+# Smallest values are refined to this part of themselves: their sign is what matters.
+TARGET = 1e-10
+
+
+def margin_suffixes(family: Family) -> tuple[str, ...]:
+    """What follows the names of a stage's margin: nothing for a single family, the stage numbers for a chain.
+
+    Stages without a discriminant (a geared drive turns always) are left out.
+    """
+    if isinstance(family, Chain):
+        return tuple(str(s.number) for s in family.stages if "discriminant" in s.family.pose_names)
+    return ("",) if "discriminant" in family.pose_names else ()
+
+
+def margins(family: Family, designs: Array, suffixes: tuple[str, ...], accuracy: Accuracy) -> Columns:
+    """Whether the stages turn fully, their smallest cos^2(pressure angle) and largest pressure angle over the turn.
+
+    Parameters
+    ----------
+    family, designs : the (n, P) design matrix
+    suffixes : which stages (see `margin_suffixes`); a later stage is only asked where the earlier ones turn
+    accuracy : handed to the families' own steps, which are preferred
+
+    Returns
+    -------
+    Columns
+        per suffix ``rotatable``, ``margin`` (negative where the stage does not turn, nan where an earlier one does
+        not), ``max_pressure_angle`` [rad] (nan unless it turns), each with its ``err_``; and ``status``.
+
+    Notes
+    -----
+    The margin of what does not turn is the least discriminant over 4 b^2 c^2, or over b^2 if it is a squared length:
+    where the links reach this equals cos^2(pressure angle), so the margin is smooth across zero.
+    """
+    n = len(designs)
+    columns: Columns = {}
+    status = np.zeros(n, np.uint8)
+    for suffix in suffixes:
+        alive = np.flatnonzero(status == st.OK)
+        part = _stage_margin(family, designs[alive], suffix, accuracy)
+        status[alive] = part["status"]
+        for name in NAMES:
+            for key in (f"{name}{suffix}", f"err_{name}{suffix}"):
+                whole = np.zeros(n, np.bool_) if key.startswith("rotatable") else np.full(n, np.nan)
+                whole[alive] = part[key]
+                columns[key] = whole
+    return columns | {"status": status}
+
+
+def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
+    """The whole chain's margins from those of its stages: the weakest stage decides."""
+    rotatable = np.logical_and.reduce([columns[f"rotatable{s}"] for s in suffixes])
+    result: Columns = {"rotatable": rotatable, "err_rotatable": np.zeros(rotatable.size)}
+    for name, sign in (("margin", -1.0), ("max_pressure_angle", 1.0)):
+        values = np.stack([np.asarray(columns[f"{name}{s}"], np.float64) for s in suffixes])
+        errors = np.stack([np.asarray(columns[f"err_{name}{s}"], np.float64) for s in suffixes])
+        which = np.where(np.isnan(values), -np.inf, sign * values).argmax(axis=0)[None, :]
+        result[name] = np.take_along_axis(values, which, axis=0)[0]
+        result[f"err_{name}"] = np.take_along_axis(errors, which, axis=0)[0]
+    result["max_pressure_angle"][~rotatable] = np.nan
+    result["err_max_pressure_angle"][~rotatable] = np.nan
+    return result
+
+
+def own_step(family: Family, suffix: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
+    """The family's own exact route to the margin, if it has one; a chain's first stage turns by itself."""
+    stage = None
+    if isinstance(family, Chain):
+        if suffix != "1":
+            return None
+        stage = family.stages[0]
+        family = stage.family
+    for step in family.steps:
+        if step.applies(accuracy) and set(NAMES) <= {o.name for o in step.provides}:
+            return step, stage
+    return None
+
+
+def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accuracy) -> Columns:
+    own = own_step(family, suffix, accuracy)
+    if own is None:
+        return _from_poses(family, designs, suffix)
+    step, stage = own
+    found = step.run(stage.designs(designs) if stage else designs, frozenset(NAMES), accuracy)
+    columns: Columns = {f"{name}{suffix}": found[name] for name in NAMES}
+    columns[f"err_rotatable{suffix}"] = np.zeros(len(designs))
+    for name in NAMES[1:]:
+        values = np.asarray(found[name], np.float64)
+        columns[f"err_{name}{suffix}"] = found.get(f"err_{name}", np.abs(values) * (accuracy.target or TARGET))
+    return columns | {"status": found["status"]}
+
+
+def _from_poses(family: Family, designs: Array, suffix: str) -> Columns:
+    """The margin from the family's discriminant, refined to its least value."""
+    designs = _unit_lengths(family, designs)
+    discriminant, angle = f"discriminant{suffix}", f"pressure_angle{suffix}"
+    request = Request(discriminant, -1)
+    found, unknown = true_extrema(family, designs, [request], TARGET, anywhere=True)
+    least = found[request]
+    known = np.isfinite(least.value)
+    phi = np.where(known, least.phi, 0.0)[:, None]
+    poses, state = pose_columns(family, designs, phi, (discriminant, angle))
+    at_least = DESIGN_STATUS[state[:, 0]]
+    # A discriminant with nan in it: the status of the poses that have none says why.
+    status = np.where(known, at_least, np.where(unknown == st.OK, st.NOT_CONVERGED, unknown)).astype(np.uint8)
+    turns = status == st.OK
+    scale = _scale(family, designs, suffix)
+    pressure = np.where(turns, poses[angle][:, 0], np.nan)
+    err_margin = least.err / scale
+    margin = np.where(turns, np.cos(pressure) ** 2, least.value / scale)
+    # d(angle) = d(cos^2) / sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
+    with np.errstate(divide="ignore"):
+        err_angle = np.minimum(err_margin / np.abs(np.sin(2.0 * pressure)), np.sqrt(err_margin)) + 2.0**-51
+    return {
+        f"rotatable{suffix}": turns,
+        f"err_rotatable{suffix}": np.zeros(len(designs)),
+        f"margin{suffix}": margin,
+        f"err_margin{suffix}": err_margin + 2.0**-51,
+        f"max_pressure_angle{suffix}": pressure,
+        f"err_max_pressure_angle{suffix}": np.where(turns, err_angle, np.nan),
+        "status": status,
+    }
+
+
+def _unit_lengths(family: Family, designs: Array) -> Array:
+    """The same mechanisms, brought near unit size by a power of two: no discriminant overflows, no bit changes."""
+    lengths = [k for k, p in enumerate(family.parameters) if p.unit == "length"]
+    scaled = designs.copy()
+    if lengths:
+        _, exponent = np.frexp(np.abs(designs[:, lengths]).max(axis=1))
+        scaled[:, lengths] = np.ldexp(designs[:, lengths], -exponent[:, None])
+    return scaled
+
+
+def _scale(family: Family, designs: Array, suffix: str) -> Array:
+    unit = next(o.unit for o in family.pose_outputs if o.name == f"discriminant{suffix}")
+    names = family.parameter_names
+    b: Array = designs[:, names.index(f"b{suffix}")]
+    if unit == "length^2":
+        return b * b
+    c: Array = designs[:, names.index(f"c{suffix}")]
+    return (2.0 * b * c) ** 2

@@ -1,0 +1,82 @@
+"""Poses over whole turns: the same angles for many designs, in blocks that stay in the cache."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from typing import TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import scan
+from sweep.families.base import Angles, Array, Family
+
+Index: TypeAlias = NDArray[np.int64]
+Mask: TypeAlias = NDArray[np.bool_]
+Status: TypeAlias = NDArray[np.uint8]
+
+BLOCK = 2**17  # samples handled at once: a few columns of that many stay in the cache
+TWO_PI = 2.0 * np.pi
+
+
+@lru_cache(maxsize=32)
+def turn(samples: int) -> Angles:
+    """Equidistant crank angles of one turn, from 0, shape (1, samples)."""
+    phi: Array = np.arange(samples, dtype=np.float64)[None, :] * (TWO_PI / samples)
+    angles = Angles.of(phi)
+    for column in angles:
+        column.flags.writeable = False
+    return angles
+
+
+def blocks(rows: Index, samples: int) -> Iterator[Index]:
+    """Pieces of ``rows`` small enough that their samples stay in the cache."""
+    size = max(1, BLOCK // samples)
+    for start in range(0, rows.size, size):
+        yield rows[start : start + size]
+
+
+def is_angle_of_follower(pose: str) -> bool:
+    """Whether the pose output is a follower's angle, known only up to full turns."""
+    return re.fullmatch(r"psi\d*", pose) is not None
+
+
+def discriminants(family: Family) -> tuple[str, ...]:
+    """Pose outputs that tell how near a stage is to a dead point: one per stage of a chain."""
+    numbered = tuple(name for name in family.pose_names if re.fullmatch(r"discriminant\d+", name))
+    return numbered or tuple(name for name in family.pose_names if name == "discriminant")
+
+
+def sample_turn(
+    family: Family, designs: Array, samples: int, names: Sequence[str]
+) -> tuple[dict[str, Array], Status, Mask]:
+    """Pose outputs over one turn, (n, samples), with angles made continuous.
+
+    Returns
+    -------
+    columns : the pose outputs
+    worst : (n,) gravest status of the turn
+    winds : (n,) whether a wanted follower's angle makes full turns, so that it has no extremum
+    """
+    columns, status = _evaluate(family, designs, turn(samples), names)
+    worst = np.empty(len(designs), np.uint8)
+    scan.worst_status(status, worst)
+    winds = np.zeros(len(designs), np.bool_)
+    for name in filter(is_angle_of_follower, names):
+        winding = np.empty(len(designs), np.int64)
+        scan.unwrap(columns[name], winding)
+        winds |= winding != 0
+    return columns, worst, winds
+
+
+def pose_columns(family: Family, designs: Array, phi: Array, names: Sequence[str]) -> tuple[dict[str, Array], Status]:
+    """Pose outputs of each design at its own crank angles, (n, m), and their status."""
+    return _evaluate(family, designs, Angles.of(phi), names)
+
+
+def _evaluate(family: Family, designs: Array, angles: Angles, names: Sequence[str]) -> tuple[dict[str, Array], Status]:
+    columns = family.poses(designs, angles, frozenset(names))
+    # Designs and angles are float64 here, so the pose outputs are too.
+    return {name: cast(Array, columns[name]) for name in names}, cast(Status, columns["status"])

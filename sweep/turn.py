@@ -1,0 +1,194 @@
+"""The general routes to design outputs over one turn: margins, limit positions, reductions of pose outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from kernels import scan
+from kernels import status as st
+from sweep.catalogue import Way, general_way
+from sweep.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
+from sweep.families.base import Accuracy, Array, Columns, Family
+from sweep.families.chain import Chain
+from sweep.margins import combined, margin_suffixes, margins, own_step
+from sweep.sampling import TWO_PI, Mask, Status, blocks, sample_turn
+from sweep.window import Window
+
+Group: TypeAlias = Literal["margin", "limits", "reductions"]
+Found: TypeAlias = dict[Request, Extremum]
+
+
+def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
+    """Rotatability, margins and largest pressure angles; only the stages that the names need, all if there are none."""
+    ways = _ways(family, names)
+    known = margin_suffixes(family)
+    last = max((known.index(way.suffix) if way.suffix else len(known) - 1 for way in ways), default=len(known) - 1)
+    suffixes = known[: last + 1]
+    columns = margins(family, designs, suffixes, accuracy)
+    if suffixes != ("",) and suffixes == known:
+        columns |= combined(columns, suffixes)
+    return columns
+
+
+def limits_and_reductions(
+    family: Family,
+    designs: Array,
+    names: Sequence[str],
+    accuracy: Accuracy,
+    part: tuple[float, float] | None = None,
+) -> Columns:
+    """Limit positions and extrema of pose outputs over one turn, on samples or refined.
+
+    Parameters
+    ----------
+    family, designs : the (n, P) design matrix of any family
+    names : design outputs of the grammar and of the limit positions
+    accuracy : dense grid or refined
+    part : the window of the stroke for deviations
+
+    Returns
+    -------
+    Columns
+        the names and ``err_<name>`` (nan on samples), each (n,), and ``status``
+    """
+    ways = _ways(family, names)
+    windowed = part is not None
+    requests = list(dict.fromkeys(r for way in ways for r in way.requests(windowed)))
+    locate = any(way.locates for way in ways)
+    window, status = None, np.zeros(len(designs), np.uint8)
+    found: Found = {}
+    if part is not None and any(r.windowed for r in requests):
+        ends = [Request(family.position, 1), Request(family.position, -1)]
+        found, status = _extrema(family, designs, ends, accuracy, locate, None)
+        most, least = (found[r] for r in ends)
+        err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(len(designs))
+        window = Window.of_stroke(least.value, most.value, err, part)
+        requests = [r for r in requests if r not in ends]
+    more, now = _extrema(family, designs, requests, accuracy, locate, window)
+    columns: Columns = {"status": np.where(status == st.OK, now, status).astype(np.uint8)}
+    for name, way in zip(names, ways, strict=True):
+        value, err_value = _value(family, designs, way, found | more, windowed)
+        columns[name], columns[f"err_{name}"] = value, err_value
+    return columns
+
+
+def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy) -> float:
+    """Estimated cost of a general route [ns per design], from measurements of chains and single families."""
+    stages = len(family.stages) if isinstance(family, Chain) else 1
+    if group == "margin":
+        return sum(100.0 if own_step(family, s, accuracy) else NS_MARGIN for s in margin_suffixes(family))
+    requests = {r for way in _ways(family, names) for r in way.requests(False)}
+    if accuracy.samples is not None:
+        return accuracy.samples * (NS_POSE * stages + NS_SCAN * len(requests))
+    return NS_SEARCH * stages + NS_PEAK * stages * len(requests)
+
+
+# Measured on one core of a Zen 4 at 3.7 GHz (docs/extrema.md).
+NS_POSE = 12.0
+NS_SCAN = 1.5
+NS_SEARCH = 1000.0
+NS_PEAK = 1200.0
+NS_MARGIN = 2000.0
+
+
+def _ways(family: Family, names: Sequence[str]) -> list[Way]:
+    ways = [general_way(family, name) for name in names]
+    assert all(way is not None for way in ways)
+    return [way for way in ways if way is not None]
+
+
+def _extrema(
+    family: Family, designs: Array, requests: Sequence[Request], accuracy: Accuracy, locate: bool, window: Window | None
+) -> tuple[Found, Status]:
+    if not requests:
+        return {}, np.zeros(len(designs), np.uint8)
+    if accuracy.samples is not None:
+        return sampled_extrema(family, designs, requests, accuracy.samples, window)
+    assert accuracy.target is not None
+    return true_extrema(family, designs, requests, accuracy.target, locate=locate, window=window)
+
+
+def sampled_extrema(
+    family: Family, designs: Array, requests: Sequence[Request], samples: int, window: Window | None = None
+) -> tuple[Found, Status]:
+    """Extrema on a grid of ``samples`` equidistant crank angles from 0; nan where the status is not OK.
+
+    Errors are not estimated (nan).  A window without a sample in it gives NOT_CONVERGED.
+    """
+    n = len(designs)
+    found = {request: Extremum.unknown(n) for request in requests}
+    status = np.zeros(n, np.uint8)
+    names = [*(r.pose for r in requests), *([family.position] if window is not None else [])]
+    for rows in blocks(np.arange(n), samples):
+        columns, worst, winds = sample_turn(family, designs[rows], samples, list(dict.fromkeys(names)))
+        state = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst]).astype(np.uint8)
+        good = state == st.OK
+        status[rows] = state
+        rows, columns = rows[good], {name: values[good] for name, values in columns.items()}
+        for request in requests:
+            allowed = None
+            if window is not None and request.windowed:
+                allowed = window.holds(rows, columns[family.position])
+            best, column = np.empty(rows.size), np.empty(rows.size, np.int64)
+            scan.best_sample(columns[request.pose], request.mode, allowed, best, column)
+            found[request].value[rows] = -best if request.mode == -1 else best
+            found[request].phi[rows] = np.where(column < 0, np.nan, column * (TWO_PI / samples))
+            status[rows[column < 0]] = st.NOT_CONVERGED
+    return found, status
+
+
+def _value(family: Family, designs: Array, way: Way, found: Found, windowed: bool) -> tuple[Array, Array]:
+    """A design output and its error from the extrema it is made of."""
+    first = found[way.requests(windowed)[0]]
+    if way.base == "phi_max_abs":
+        return first.phi, first.err_phi
+    if way.base in ("max_abs", "max", "min"):
+        return first.value, first.err
+    most, least = (found[r] for r in way.requests(windowed))
+    if way.base in ("range", "stroke"):
+        return most.value - least.value, most.err + least.err
+    return _limit(way, most, least, _extended_is_largest(family, designs, way.suffix))
+
+
+def _extended_is_largest(family: Family, designs: Array, suffix: str) -> Mask:
+    """In assembly mode +1 crank and coupler are in line outward where the follower is farthest (sheet 3.2)."""
+    stage = suffix or (str(len(family.stages)) if isinstance(family, Chain) else "")
+    if f"branch{stage}" not in family.parameter_names:
+        return np.ones(len(designs), np.bool_)
+    outward: Mask = designs[:, family.parameter_names.index(f"branch{stage}")] > 0.0
+    return outward
+
+
+def _limit(way: Way, most: Extremum, least: Extremum, outward: Mask) -> tuple[Array, Array]:
+    ext = Extremum(*(np.where(outward, a, b) for a, b in zip(most, least, strict=True)))
+    fold = Extremum(*(np.where(outward, b, a) for a, b in zip(most, least, strict=True)))
+    swing, phi0 = fold.value - ext.value, np.mod(fold.phi - ext.phi, TWO_PI)
+    err_phi0 = ext.err_phi + fold.err_phi
+    match way.base:
+        case "phi_ext":
+            return ext.phi, ext.err_phi
+        case "phi_fold":
+            return fold.phi, fold.err_phi
+        case "phi0":
+            return phi0, err_phi0
+        case "stroke_ratio":
+            return phi0 / (TWO_PI - phi0), err_phi0 * TWO_PI / (TWO_PI - phi0) ** 2
+        case "swing":
+            return swing, ext.err + fold.err
+        case "psi_ext":
+            return _principal(ext.value), ext.err
+        case "psi_fold":
+            return _principal(ext.value) + swing, fold.err
+        case "s_ext":
+            return ext.value, ext.err
+        case "s_fold":
+            return fold.value, fold.err
+    raise AssertionError(way.base)
+
+
+def _principal(angle: Array) -> Array:
+    """The angle in (-pi, pi]."""
+    return angle - TWO_PI * np.ceil((angle - np.pi) / TWO_PI)

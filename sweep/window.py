@@ -1,0 +1,102 @@
+"""The part of a turn in which the follower's position lies between two limits: where it begins and ends."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels import scan
+from sweep.families.base import Array, Family
+from sweep.refine import EPS
+from sweep.sampling import Index, Mask, pose_columns
+
+PASSES = 60
+
+
+class Window(NamedTuple):
+    """Positions between which poses count, of every design, each (n,), and how far they may be wrong."""
+
+    low: Array
+    high: Array
+    err: Array
+
+    @classmethod
+    def of_stroke(cls, least: Array, most: Array, err: Array, part: tuple[float, float]) -> Window:
+        """The part (fractions of the stroke, from the smallest position) of a motion between two positions."""
+        # A fraction 0 or 1 is open: rounding of the extreme position must not cut off the pose that reaches it.
+        low = least + part[0] * (most - least) if part[0] > 0.0 else np.full(least.size, -np.inf)
+        high = least + part[1] * (most - least) if part[1] < 1.0 else np.full(least.size, np.inf)
+        return cls(low, high, err)
+
+    def holds(self, rows: Index, positions: Array) -> Mask:
+        """Whether the positions (k, m) of the designs ``rows`` (k,) lie in the window."""
+        return (positions >= self.low[rows, None]) & (positions <= self.high[rows, None])
+
+
+class Edges(NamedTuple):
+    """Poses at which a window begins or ends, each (k,): row of the block, angle, values there and their errors."""
+
+    row: Index
+    phi: Array
+    values: Array
+    err: Array
+
+    def only(self, which: Mask) -> Edges:
+        """Some of them."""
+        return Edges(self.row[which], self.phi[which], self.values[which], self.err[which])
+
+
+def edges(family: Family, designs: Array, rows: Index, window: Window, positions: Array, pose: str) -> Edges:
+    """Where the follower enters or leaves the window, and a pose output there.
+
+    Parameters
+    ----------
+    family, designs : the whole (n, P) design matrix
+    rows : (r,) designs of the block
+    positions : (r, m) their positions over one turn
+    pose : which pose output is wanted at the edges
+
+    Notes
+    -----
+    Regula falsi in the Illinois form between the two samples on either side of each edge, all edges at once.  The error
+    is what is left of the position's error, and the error of the stroke's ends, carried over by the slope.
+    """
+    samples, spacing = positions.shape[1], 2.0 * np.pi / positions.shape[1]
+    row, column, level = _brackets(rows, window, positions)
+    left, right = column * spacing, (column + 1) * spacing
+    f_left, f_right = positions[row, column] - level, positions[row, (column + 1) % samples] - level
+    phi, slope, side = 0.5 * (left + right), np.zeros(row.size), np.zeros(row.size)
+    values, f, size = np.full(row.size, np.nan), f_right.copy(), np.abs(positions).max(axis=1)[row]
+    names = (family.position, pose)
+    a = np.arange(row.size)
+    for _ in range(PASSES):
+        if not a.size:
+            break
+        phi[a] = right[a] - f_right[a] * (right[a] - left[a]) / (f_right[a] - f_left[a])
+        columns, _ = pose_columns(family, designs[rows[row[a]]], phi[a, None], names)
+        here, now = columns[pose][:, 0], columns[family.position][:, 0] - level[a]
+        moved = np.abs(now - f[a])
+        tells = (moved > 1e-7 * size[a]) & np.isfinite(values[a])
+        slope[a] = np.where(tells, np.abs(here - values[a]) / np.where(tells, moved, 1.0), slope[a])
+        values[a], f[a] = here, now
+        onto_left = (now >= 0.0) == (f_left[a] >= 0.0)
+        # Illinois: the end that stays a second time has its value halved, so that both ends close in.
+        f_right[a] = np.where(onto_left, np.where(side[a] == -1.0, 0.5, 1.0) * f_right[a], now)
+        f_left[a] = np.where(onto_left, now, np.where(side[a] == 1.0, 0.5, 1.0) * f_left[a])
+        left[a], right[a] = np.where(onto_left, phi[a], left[a]), np.where(onto_left, right[a], phi[a])
+        side[a] = np.where(onto_left, -1.0, 1.0)
+        a = a[(np.abs(now) > 8.0 * EPS * size[a]) & (right[a] - left[a] > 8.0 * EPS)]
+    err = slope * (np.abs(f) + window.err[rows[row]] + 4.0 * EPS * size) + 4.0 * EPS * np.abs(values)
+    return Edges(row, phi, values, err)
+
+
+def _brackets(rows: Index, window: Window, positions: Array) -> tuple[Index, Index, Array]:
+    row, column = np.empty(positions.size, np.int64), np.empty(positions.size, np.int64)
+    found = []
+    for level in (window.low[rows], window.high[rows]):
+        count = scan.crossings(positions, level, row, column)
+        found.append((row[:count].copy(), column[:count].copy(), level[row[:count]]))
+    first, second = found
+    return (np.concatenate([first[0], second[0]]), np.concatenate([first[1], second[1]]),
+            np.concatenate([first[2], second[2]]))  # fmt: skip
