@@ -69,10 +69,16 @@ class Interrupted(LinksweepError):
         self.exit_code = 128 + signal_number
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string."""
+def closest(word: str, known: Iterable[str]) -> str | None:
+    """The known word nearest to ``word``, or None if none is near."""
     choices = list(known)
     # Case first: among e1, f1, g1 the letters of E1 say nothing.
     matches = [k for k in choices if k.casefold() == word.casefold()]
     matches = matches or difflib.get_close_matches(word, choices, n=1, cutoff=0.5)
-    return f", did you mean '{matches[0]}'?" if matches else ""
+    return matches[0] if matches else None
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string."""
+    guess = closest(word, known)
+    return f", did you mean '{guess}'?" if guess else ""

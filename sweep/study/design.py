@@ -60,7 +60,7 @@ def read_reference(family: Family, raw: Mapping[str, Any], faults: Faults) -> di
             place = (*key, parameter.name)
             entry = raw[parameter.name]
             if isinstance(entry, dict) and "value" not in entry:
-                faults.value(place, entry, _one_value(parameter))
+                faults.value(place, entry, f"one value: {_forms(parameter)}")
                 continue
             value = _read_entry(parameter, entry, place, faults, sampled=False)
             if isinstance(value, float):
@@ -78,7 +78,8 @@ def _check_names(family: Family, raw: Mapping[str, Any], key: Key, faults: Fault
             )
     for p in family.parameters:
         if p.name not in raw and p.default is None:
-            faults.missing((*key, p.name), f"{p.text}; {_one_value(p)}")
+            axis = "" if key[0] == "reference" else f", or an axis {_axis_form(p)}"
+            faults.missing((*key, p.name), f"{p.text}: {_forms(p)}{axis}")
 
 
 def _read_entry(p: Parameter, raw: object, key: Key, faults: Faults, sampled: bool) -> Axis | float | None:
@@ -166,7 +167,7 @@ def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faul
         if internal == "1":
             return _Written("1", 1.0)
         if "unit" not in raw:
-            faults.missing((*key, "unit"), f"{units.example(internal)}, as unit = {_usual(internal)!r}")
+            faults.missing((*key, "unit"), f'{units.example(internal)}, as unit = "{_usual(internal)}"')
         return None
     try:
         return _Written(unit, units.factor(unit, internal))
@@ -191,10 +192,6 @@ def _usual(internal: str) -> str:
     return {"rad": "deg"}.get(internal, internal)
 
 
-def _one_value(p: Parameter) -> str:
-    return "one value, " + _forms(p).removeprefix("a ").removeprefix("an ")
-
-
 def _forms(p: Parameter, number: object = None) -> str:
     """The right ways to write a fixed value of this parameter."""
     if p.choices is not None:
@@ -204,6 +201,11 @@ def _forms(p: Parameter, number: object = None) -> str:
         return "a number"
     shown = 40.0 if number is None else number
     usual = _usual(internal)
-    return f'a {p.unit} with its unit, as "{shown} {usual}" or {{ value = {shown}, unit = "{usual}" }}'.replace(
-        "a angle", "an angle"
-    )
+    article = "an" if p.unit == "angle" else "a"
+    return f'{article} {p.unit} with its unit, as "{shown} {usual}" or {{ value = {shown}, unit = "{usual}" }}'
+
+
+def _axis_form(p: Parameter) -> str:
+    internal = units.internal_unit(p.unit)
+    unit = "" if internal == "1" else f', unit = "{_usual(internal)}"'
+    return f"{{ from = ..., to = ..., count = ...{unit} }}"

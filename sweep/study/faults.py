@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from sweep.errors import nearest
+from sweep.errors import closest, nearest
 
 if TYPE_CHECKING:
     from sweep.study.model import Section
@@ -17,27 +17,38 @@ _LONGEST_VALUE = 60
 
 
 class Faults:
-    """The list of faults, and the files in which keys are looked up, the last one first."""
+    """The list of faults, and the files in which keys are looked up, the last one first.
+
+    A key that is missing because it is misspelt is one fault, so unknown keys are reported before missing ones.
+    """
 
     def __init__(self, files: Mapping[str, Mapping[str, Any]]) -> None:
         self.lines: list[str] = []
         self._files = files
+        self._misspelt: set[Key] = set()
 
     def value(self, key: Key, value: object, allowed: str) -> None:
         """Report a value that may not stand there."""
-        shown = repr(value)
+        shown = str(value).lower() if isinstance(value, bool) else repr(value)
         shown = shown if len(shown) <= _LONGEST_VALUE else shown[: _LONGEST_VALUE - 3] + "..."
         self._add(key, f"{spelled(key)} = {shown}; allowed: {allowed}")
 
-    def missing(self, key: Key, needed: str) -> None:
-        """Report a key that must be there."""
-        self._add(key, f"{spelled(key)} is missing; needed: {needed}")
+    def missing(self, key: Key, needed: str, instead: str = "") -> None:
+        """Report a key that must be there, or another one instead."""
+        if key not in self._misspelt and (*key[:-1], instead) not in self._misspelt:
+            self._add(key, f"{spelled(key)} is missing; needed: {needed}")
 
     def unknown(self, key: Key, known: Iterable[str], what: str = "key") -> None:
         """Report a key that nobody reads, with the nearest right one."""
         names = list(known)
-        guess = nearest(str(key[-1]), names)
-        self._add(key, f"{spelled(key)} is no {what} of the study; allowed: {', '.join(names)}{guess}")
+        guess = closest(str(key[-1]), names)
+        if guess is not None:
+            self._misspelt.add((*key[:-1], guess))
+        self.unknown_name(key, what, f"{', '.join(names)}{nearest(str(key[-1]), names)}")
+
+    def unknown_name(self, key: Key, what: str, allowed: str) -> None:
+        """Report a key that should be the name of something."""
+        self._add(key, f"{spelled(key)}: unknown {what}; allowed: {allowed}")
 
     def _add(self, key: Key, text: str) -> None:
         line = f"{self._file_of(key)}: {text}"

@@ -17,13 +17,16 @@ _YES_OR_NO = re.compile(r"rotatable\d*")
 
 
 def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Output | None:
-    """The design output of that name, or a fault that gives the nearest."""
+    """The design output named by the value at ``key``, or by the key itself; or a fault that gives the nearest."""
     from sweep.summaries import output
 
     try:
         return output(family, name)
     except InputError as error:
-        faults.value(key, name, error.allowed)
+        if key[-1] == name:
+            faults.unknown_name(key, "design output", error.allowed)
+        else:
+            faults.value(key, name, error.allowed)
         return None
 
 
@@ -49,7 +52,7 @@ def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple
 def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Faults) -> list[Limit]:
     entry = read_section(LimitEntry, raw, key, faults)
     if "min" not in raw and "max" not in raw:
-        faults.missing((*key, "max"), f"min, max or both, as {_form(output)}")
+        faults.missing((*key, "max"), f"min, max or both, as {_form(output)}", instead="min")
     if entry.min is not None and entry.max is not None and entry.min > entry.max:
         faults.value((*key, "max"), entry.max, f"a number not below min = {entry.min:g}")
     internal = units.internal_unit(output.unit)

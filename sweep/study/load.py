@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sweep.errors import InputError, StudyError, nearest
+from sweep.errors import InputError, StudyError, closest, nearest
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
@@ -149,7 +149,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     family = _family(families, data, faults)
     if family is None:
         raise StudyError(str(path), faults.lines)
-    for k, name in enumerate(scene.want):
+    for k, name in _texts(data, "scene", "want"):
         read_output_name(family, name, ("scene", "want", k), faults)
     limits = read_limits(family, bounds or {}, faults)
     if goal is not None:
@@ -192,6 +192,12 @@ def _free_table(name: str, data: Mapping[str, Any], faults: Faults) -> dict[str,
         return raw
     faults.value((name,), raw, f"a table [{name}]")
     return None
+
+
+def _texts(data: Mapping[str, Any], table: str, key: str) -> list[tuple[int, str]]:
+    """The texts of a list as it stands in the file, with their places, whatever else is wrong with it."""
+    raw = data[table].get(key) if isinstance(data.get(table), dict) else None
+    return [(k, name) for k, name in enumerate(raw) if isinstance(name, str)] if isinstance(raw, list) else []
 
 
 def _quantity(text: str | None, internal: str, key: Key, faults: Faults) -> float | None:
@@ -238,23 +244,27 @@ def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults
     if isinstance(raw, dict) and "family" in raw and "chain" in raw:
         faults.value(("mechanism", "chain"), raw["chain"], "either family or chain, not both")
     if isinstance(raw, dict) and "family" not in raw and "chain" not in raw:
-        faults.missing(("mechanism", "family"), f"one of {', '.join(NAMES)}; or chain, a list of them")
+        faults.missing(("mechanism", "family"), f"one of {', '.join(NAMES)}; or chain, a list of them", instead="chain")
     if section.family is not None:
         return (section.family,)
     return tuple(section.chain or ())
 
 
 def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> Family | None:
-    """The mechanism, or None with a fault for each unknown name, or for a chain that cannot be."""
+    """The mechanism, or None with a fault for each unknown name, or for a chain that cannot be.
+
+    A misspelt family is a fault, but the rest is checked against the nearest one, so that no second round is needed.
+    """
     single = "family" in data.get("mechanism", {}) if names else False
     unknown = [k for k, name in enumerate(names) if name not in NAMES]
     for k in unknown:
         key: Key = ("mechanism", "family") if single else ("mechanism", "chain", k)
         faults.value(key, names[k], f"one of {', '.join(NAMES)}{nearest(names[k], NAMES)}")
-    if unknown or not names:
+    guessed = tuple(closest(name, NAMES) if name not in NAMES else name for name in names)
+    if not guessed or None in guessed:
         return None
     try:
-        return find_family(names)
+        return find_family([name for name in guessed if name is not None])
     except InputError as error:
         faults.value(("mechanism", "chain"), list(names), error.allowed)
         return None

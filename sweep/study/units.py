@@ -77,7 +77,11 @@ def factor(unit: str, internal: str) -> float:
     UnitFault
         if the unit is unknown or measures something else.
     """
-    ours, theirs = _parse(internal), _parse(unit)
+    ours = _parse(internal)
+    try:
+        theirs = _parse(unit)
+    except UnitFault as fault:
+        raise UnitFault(f"{example(internal)}{fault}") from None
     if _dimensions(theirs, ours) != _dimensions(ours, ours):
         raise UnitFault(example(internal))
     bridge = ours * _parse("rad") ** (_power(theirs, "[angle]") - _power(ours, "[angle]"))
@@ -120,7 +124,7 @@ def _parse(text: str) -> pint.Unit:
         match = _TERM.fullmatch(part)
         if match is None or (match[1] not in SYMBOLS and match[1] != "1"):
             symbol = part if match is None else match[1]
-            raise UnitFault(f"a unit made of {', '.join(SYMBOLS)}, as mm/rad^2{nearest(symbol, SYMBOLS)}")
+            raise UnitFault(nearest(symbol, SYMBOLS))
     unit = _registry().Unit("")
     for operator, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
         symbol, _, exponent = part.partition("^")
