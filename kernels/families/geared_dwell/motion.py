@@ -9,7 +9,7 @@ import numpy as np
 from kernels import status as st
 from kernels._jit import kernel
 from kernels.complex_step import arctan2
-from kernels.families.geared_dwell.closure import Numbers, Status, pin, reduce_design, velocity
+from kernels.families.geared_dwell.closure import EPS, Numbers, Status, pin, reduce_design, velocity
 
 TWO_PI = 2.0 * math.pi
 
@@ -36,7 +36,7 @@ def poses(
     ----------
     designs : (n, 2) columns of :class:`Design`; complex128 for gradients by the complex step
     phi, cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; phi only tells the turn, so that psi is continuous
-    status : (n, m) out; OK, SINGULAR (the pin is on the output axis within rounding) or INVALID_INPUT
+    status : (n, m) out; OK, SINGULAR (on the output axis within the rounding of phi) or INVALID_INPUT
     psi ... y_b : (n, m) out, or None: what is None is neither computed nor compiled
 
     Notes
@@ -58,8 +58,10 @@ def poses(
             code = st.OK
             if not r.valid or square.real != square.real:
                 code = st.INVALID_INPUT
-            elif square.real <= tolerance * tolerance:
-                code = st.SINGULAR
+            else:
+                # one rounding of phi moves the pin by as much again
+                tolerance += 4.0 * EPS * abs(phi[row, j].real) * 2.0 * (1.0 + abs(h.k.real))
+                code = st.SINGULAR if square.real <= tolerance * tolerance else st.OK
             status[i, j] = code
             if code != st.OK:
                 square = square * math.nan  # every output below is a quotient by it, or is made nan like x and y
