@@ -126,7 +126,7 @@ def poses(
     Notes
     -----
     Where the status is not OK the values are nan, except that a dead point keeps its position (Delta = 0) and the
-    discriminant is always given.  Measured: errors below 1.4 x 2^-53 max(cond, |y|) over the oracle table.
+    discriminant is always given.  Measured: errors below 2.0 x 2^-53 max(cond, |y|) over the oracle table.
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
