@@ -226,6 +226,30 @@ def crossings(values: Array, level: Array, row: Index, column: Index) -> int:
 
 
 @kernel
+def grazes(values: Array, level: Array, doubtful: Mask) -> None:
+    """Rows with a turning point between samples that may lie beyond a level which the samples do not pass.
+
+    Parameters
+    ----------
+    values : (n, m) samples over one turn
+    level : (n,)
+    doubtful : (n,) in and out; set where the parabola through a turning point passes the level and its sample does not
+    """
+    m = values.shape[1]
+    for i in range(values.shape[0]):
+        for j in range(m):
+            left, here = values[i, j - 1], values[i, j]
+            right = values[i, j + 1 if j + 1 < m else 0]
+            bend = left + right - 2.0 * here
+            if (left - here) * (right - here) >= 0.0 and bend != 0.0:
+                slope = 0.5 * (right - left)
+                # Twice the parabola's overshoot: it is an estimate.
+                beyond = here - slope * slope / bend
+                if (here >= level[i]) != (beyond >= level[i]):
+                    doubtful[i] = True
+
+
+@kernel
 def quartic_peak(z: Array, place: Array, height: Array, ripple: Array, blur: Array) -> None:
     """Highest point of the quartic through five equidistant samples, sought from the best sample.
 

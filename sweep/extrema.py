@@ -175,7 +175,7 @@ class _Search:
         needed = np.maximum(needed, self._samples_by_singularity(columns, samples, needed))
         resolved = (needed <= samples) | (samples == LIMIT)
         candidates = candidates.only(resolved[candidates.row])
-        peaks = self._refine(rows, columns, samples, candidates)
+        peaks = self._refine(rows, columns, samples, candidates, scales)
         for number, request in enumerate(self.requests):
             mine = candidates.request == number
             row, found = candidates.row[mine], Peaks(*(column[mine] for column in peaks))
@@ -195,6 +195,7 @@ class _Search:
             allowed = None
             if self.window is not None and request.windowed:
                 allowed = self.window.holds(rows, columns[self.family.position])
+                needed[self.window.grazed(rows, columns[self.family.position])] = 2 * samples
             scale, rough = np.empty(rows.size), np.empty(rows.size)
             row, column = (np.empty(rows.size * (samples // 2 + 1), np.int64) for _ in range(2))
             count = scan.peaks(values, request.mode, SHARE, allowed, scale, rough, row, column)
@@ -217,14 +218,25 @@ class _Search:
         samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
         return samples_needed
 
-    def _refine(self, rows: Index, columns: dict[str, Array], samples: int, candidates: Candidates) -> Peaks:
+    def _refine(
+        self,
+        rows: Index,
+        columns: dict[str, Array],
+        samples: int,
+        candidates: Candidates,
+        scales: dict[Request, Array],
+    ) -> Peaks:
         number, row, column, sign = candidates
-        near = (column[:, None] + np.arange(-2, 3)) % samples
-        around = np.empty((row.size, 5))
+        near = (column[:, None] + np.arange(-3, 4)) % samples
+        around, size, rounding = np.empty((row.size, 7)), np.empty(row.size), np.empty(row.size)
+        amplified = self._amplification(columns, row, column)
         for k, request in enumerate(self.requests):
             mine = number == k
             around[mine] = sign[mine, None] * columns[request.pose][row[mine, None], near[mine]]
-        middle = sign * around[:, 2]
+            size[mine] = scales[request][row[mine]]
+            derivative = request.pose in self.family.derivative_of.values()
+            rounding[mine] = amplified[mine] if derivative else np.sqrt(amplified[mine])
+        middle = sign * around[:, 3]
 
         def sample(active: Index, phi: Array) -> Array:
             designs = rows[row[active]]
@@ -243,8 +255,19 @@ class _Search:
             return out
 
         spacing = TWO_PI / samples
-        centre: Array = column * spacing
-        return refine_peaks(sample, centre, spacing, around, self.target, self.locate)
+        centre = np.multiply(column, spacing, dtype=np.float64)
+        tolerance: Array = self.target * size
+        peaks = refine_peaks(sample, centre, spacing, around, tolerance, self.target if self.locate else None)
+        # Rounding that is the same for neighbouring poses leaves no ripple.
+        return peaks._replace(err_height=peaks.err_height + 4.0 * EPS * rounding * np.abs(peaks.height))
+
+    def _amplification(self, columns: dict[str, Array], row: Index, column: Index) -> Array:
+        """How much a pose near a dead point amplifies the rounding of its discriminant (docs/extrema.md)."""
+        amplified = np.ones(row.size)
+        for name in self.guards:
+            values = columns[name]
+            amplified += values.max(axis=1)[row] / np.maximum(values[row, column], 1e-300)
+        return amplified
 
     def _within_window(
         self, rows: Index, columns: dict[str, Array], request: Request, row: Index, peaks: Peaks, resolved: Mask
@@ -253,7 +276,7 @@ class _Search:
         assert self.window is not None
         poses, _ = pose_columns(self.family, self.designs[rows[row]], peaks.phi[:, None], self.names)
         inside = self.window.holds(rows[row], poses[self.family.position])[:, 0]
-        edge = edges(self.family, self.designs, rows, self.window, columns[self.family.position], request.pose)
+        edge = edges(self.family, self.designs, rows, self.window, columns, request.pose)
         edge = edge.only(resolved[edge.row])
         height = np.abs(edge.values) if request.mode == 0 else request.mode * edge.values
         none = np.zeros(edge.row.size)

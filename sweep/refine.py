@@ -20,6 +20,7 @@ PASSES = 12
 # The quartic over a five-point window errs in proportion to at least the fourth power of its width, so one pass to the
 # next divides the error by at least 8^4; a sixty-fourth of the last change is claimed, which leaves a factor of 64.
 CLAIM = 1.0 / 64.0
+RIPPLE = 0.25  # of the fourth difference: eight times the noise of one sample on average, and what a quartic leaves out
 EPS = 2.0**-53
 
 
@@ -34,7 +35,12 @@ class Peaks(NamedTuple):
 
 
 def refine_peaks(
-    sample: Sampler, centre: Array, spacing: float, around: Array, target: float, locate: bool = False
+    sample: Sampler,
+    centre: Array,
+    spacing: float,
+    around: Array,
+    tolerance: Array,
+    locate: float | None = None,
 ) -> Peaks:
     """Highest points near the given samples, by quartics through five points ever closer together.
 
@@ -43,21 +49,29 @@ def refine_peaks(
     sample : evaluates the measured quantity; called with the candidates that are not finished yet
     centre : (k,) crank angles of the best samples [rad]
     spacing : distance of the samples [rad]
-    around : (k, 5) measured values at the best sample and its two neighbours on either side
-    target : relative accuracy of the height
-    locate : whether the place must also be as good as ``target`` [rad]; otherwise it is what the height left
+    around : (k, 7) measured values at the best sample and its three neighbours on either side
+    tolerance : (k,) error allowed in the height
+    locate : error allowed in the place [rad]; without it the place is as good as the height left it
 
     Notes
     -----
-    No derivative is needed, so every pose output is refined by the same few passes of five poses each: one for
-    1e-3, two for 1e-8, three or four where the place is wanted.  A peak that leaves its window is followed.
+    No derivative is needed, so every pose output is refined by the same few passes of five poses each: none for
+    1e-2, one for 1e-4, two for 1e-8, three or four where the place is wanted.  A peak that leaves its window is
+    followed.
     """
-    place, height, _, _ = _quartic(around)
+    place, height, ripple, blur = _quartic(np.ascontiguousarray(around[:, 1:6]))
+    # One fourth difference may vanish by chance where the curve is not yet resolved; three in a row do not.
+    fourth = np.abs(around[:, :3] + around[:, 4:] - 4.0 * (around[:, 1:4] + around[:, 3:6]) + 6.0 * around[:, 2:5])
+    widest = fourth.max(axis=1)
     guess = height.copy()
     phi = centre + spacing * place
+    err_height = RIPPLE * widest + 4.0 * EPS * np.abs(height)
+    err_phi = spacing * np.minimum(blur * widest / np.maximum(ripple, EPS * EPS), 2.0)
     step = np.full(centre.size, SHRINK * spacing)
-    err_height, err_phi = np.full(centre.size, np.inf), np.full(centre.size, np.inf)
-    active = np.arange(centre.size)
+    enough = (np.abs(place) < 2.0) & (err_height <= tolerance)
+    if locate is not None:
+        enough &= err_phi <= locate
+    active = np.flatnonzero(~enough)
     for _ in range(PASSES):
         if not active.size:
             break
@@ -66,14 +80,14 @@ def refine_peaks(
         inside = np.abs(place) < 2.0
         claim = np.where(inside, CLAIM, 1.0)
         # Samples that no longer follow a quartic are noise, and noise does not shrink with the window.
-        error = claim * np.abs(top - height[active]) + 0.25 * ripple + 4.0 * EPS * np.abs(top)
+        error = claim * np.abs(top - height[active]) + RIPPLE * ripple + 4.0 * EPS * np.abs(top)
         phi[active] += u * place
         height[active] = top
         err_height[active] = error
         err_phi[active] = u * (claim * np.abs(place) + blur) + 4.0 * EPS * np.pi
-        enough = inside & (error <= target * np.abs(top))
-        if locate:
-            enough &= err_phi[active] <= target
+        enough = inside & (error <= tolerance[active])
+        if locate is not None:
+            enough &= err_phi[active] <= locate
         step[active] = np.where(inside, SHRINK * u, u)
         active = active[~enough & (step[active] > 1e-6 * spacing)]
     return Peaks(phi, height, err_phi, err_height, guess)

@@ -33,6 +33,13 @@ class Window(NamedTuple):
         """Whether the positions (k, m) of the designs ``rows`` (k,) lie in the window."""
         return (positions >= self.low[rows, None]) & (positions <= self.high[rows, None])
 
+    def grazed(self, rows: Index, positions: Array) -> Mask:
+        """Whether the motion may enter or leave the window between two samples and come back at once."""
+        doubtful = np.zeros(rows.size, np.bool_)
+        for level in (self.low[rows], self.high[rows]):
+            scan.grazes(positions, level, doubtful)
+        return doubtful
+
 
 class Edges(NamedTuple):
     """Poses at which a window begins or ends, each (k,): row of the block, angle, values there and their errors."""
@@ -47,14 +54,14 @@ class Edges(NamedTuple):
         return Edges(self.row[which], self.phi[which], self.values[which], self.err[which])
 
 
-def edges(family: Family, designs: Array, rows: Index, window: Window, positions: Array, pose: str) -> Edges:
+def edges(family: Family, designs: Array, rows: Index, window: Window, columns: dict[str, Array], pose: str) -> Edges:
     """Where the follower enters or leaves the window, and a pose output there.
 
     Parameters
     ----------
     family, designs : the whole (n, P) design matrix
     rows : (r,) designs of the block
-    positions : (r, m) their positions over one turn
+    columns : (r, m) position and that pose output over one turn
     pose : which pose output is wanted at the edges
 
     Notes
@@ -62,11 +69,14 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, positions
     Regula falsi in the Illinois form between the two samples on either side of each edge, all edges at once.  The error
     is what is left of the position's error, and the error of the stroke's ends, carried over by the slope.
     """
-    samples, spacing = positions.shape[1], 2.0 * np.pi / positions.shape[1]
+    positions, samples = columns[family.position], columns[pose].shape[1]
+    spacing = 2.0 * np.pi / samples
     row, column, level = _brackets(rows, window, positions)
     left, right = column * spacing, (column + 1) * spacing
-    f_left, f_right = positions[row, column] - level, positions[row, (column + 1) % samples] - level
-    phi, slope, side = 0.5 * (left + right), np.zeros(row.size), np.zeros(row.size)
+    after = (column + 1) % samples
+    f_left, f_right = positions[row, column] - level, positions[row, after] - level
+    slope = np.abs(columns[pose][row, after] - columns[pose][row, column]) / np.abs(f_right - f_left)
+    phi, side = 0.5 * (left + right), np.zeros(row.size)
     values, f, size = np.full(row.size, np.nan), f_right.copy(), np.abs(positions).max(axis=1)[row]
     names = (family.position, pose)
     a = np.arange(row.size)
@@ -74,8 +84,8 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, positions
         if not a.size:
             break
         phi[a] = right[a] - f_right[a] * (right[a] - left[a]) / (f_right[a] - f_left[a])
-        columns, _ = pose_columns(family, designs[rows[row[a]]], phi[a, None], names)
-        here, now = columns[pose][:, 0], columns[family.position][:, 0] - level[a]
+        poses, _ = pose_columns(family, designs[rows[row[a]]], phi[a, None], names)
+        here, now = poses[pose][:, 0], poses[family.position][:, 0] - level[a]
         moved = np.abs(now - f[a])
         tells = (moved > 1e-7 * size[a]) & np.isfinite(values[a])
         slope[a] = np.where(tells, np.abs(here - values[a]) / np.where(tells, moved, 1.0), slope[a])
