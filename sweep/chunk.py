@@ -24,6 +24,9 @@ BLOCK = 4096
 # A clockwise and an anticlockwise follower of the same amplitude meet the same requirement.
 MAGNITUDES = ("swing", "stroke")
 
+# With these one output is missing or rough, the others are worth having where all rows are kept.
+PARTIAL = (codes.NOT_OSCILLATING, codes.NOT_CONVERGED)
+
 
 class Dropped(Exception):
     """The chunk was given up half way because the run was asked to stop."""
@@ -46,11 +49,17 @@ class Cascade:
     reached: tuple[int, ...]
 
 
-def output_columns(study: Study) -> tuple[str, ...]:
-    """Names of the result columns: what the study wants, each followed by its error estimate if a target is set."""
-    if study.accuracy.target is None:
-        return study.want
-    return tuple(name for wanted in study.want for name in (wanted, f"err_{wanted}"))
+def output_columns(study: Study) -> dict[str, str]:
+    """Names and types of the result columns: what the study wants, each number with its error estimate if there is one.
+
+    An estimate is stored in float32 always; whether a crank turns is not a number and has none.
+    """
+    columns: dict[str, str] = {}
+    for name in study.want:
+        columns[name] = study.output.dtype
+        if study.accuracy.target is not None and not name.startswith("rotatable"):
+            columns[f"err_{name}"] = "float32"
+    return columns
 
 
 def parameter_matrix(study: Study, start: int, stop: int) -> Array:
@@ -77,6 +86,7 @@ def cascade(study: Study, designs: Array) -> Cascade:
     outputs = {name: np.full(n, np.nan) for name in output_columns(study)}
     status = np.zeros(n, np.uint8)
     alive = np.arange(n)
+    go_on = (codes.OK,) if study.output.keep == "feasible" else (codes.OK, *PARTIAL)
     reached = []
     for route in routes(study.family, study.want, study.accuracy):
         reached.append(alive.size)
@@ -85,12 +95,12 @@ def cascade(study: Study, designs: Array) -> Cascade:
         found = design_outputs(study.family, designs[alive], route.outputs, study.accuracy, study.window)
         for name in outputs.keys() & found.keys():
             outputs[name][alive] = found[name]
-        fate = found["status"].astype(np.uint8)
+        fate = np.where(status[alive] == codes.OK, found["status"], status[alive])
         for limit in study.limits:
             if limit.output in found:
                 fate[(fate == codes.OK) & ~meets(limit, found[limit.output])] = codes.LIMIT_EXCEEDED
         status[alive] = fate
-        alive = alive[fate == codes.OK]
+        alive = alive[np.isin(fate, go_on)]
     return Cascade(outputs, status, tuple(reached))
 
 
@@ -142,20 +152,21 @@ def compute_chunk(study: Study, start: int, stop: int, should_stop: Callable[[],
     """
     if not 0 <= start <= stop <= study.space.count:
         raise InputError("designs", f"{start}:{stop}", f"a range inside 0:{study.space.count}", f"study {study.name}")
-    dtype = np.dtype(study.output.dtype)
     counts = np.zeros(256, np.int64)
     blocks: list[Columns] = []
     for low in range(start, stop, BLOCK):
         if should_stop():
             raise Dropped
-        blocks.append(_block(study, low, min(low + BLOCK, stop), dtype, counts))
+        block = _block(study, low, min(low + BLOCK, stop), counts)
+        if len(block["design"]):
+            blocks.append(block)
     if not blocks:
-        blocks.append(_block(study, start, stop, dtype, counts))
+        blocks.append(_block(study, stop, stop, counts))
     columns = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     return ChunkResult(columns, {code: int(counts[code]) for code in np.flatnonzero(counts).tolist()})
 
 
-def _block(study: Study, start: int, stop: int, dtype: np.dtype[np.floating], counts: NDArray[np.int64]) -> Columns:
+def _block(study: Study, start: int, stop: int, counts: NDArray[np.int64]) -> Columns:
     matrix = parameter_matrix(study, start, stop)
     result = cascade(study, matrix)
     counts += np.bincount(result.status, minlength=counts.size)
@@ -164,5 +175,5 @@ def _block(study: Study, start: int, stop: int, dtype: np.dtype[np.floating], co
         rows = np.flatnonzero(result.status == codes.OK)
     columns: Columns = {"design": start + rows.astype(np.int64)}
     columns |= {name: matrix[rows, k] for k, name in enumerate(study.family.parameter_names)}
-    columns |= {name: values[rows].astype(dtype) for name, values in result.outputs.items()}
+    columns |= {name: result.outputs[name][rows].astype(dtype) for name, dtype in output_columns(study).items()}
     return columns | {"status": result.status[rows]}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import signal
 import socket
 import subprocess
 import time
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from sweep import store
-from sweep.errors import InputError, Interrupted, LinksweepError, WorkerDied, nearest
+from sweep.errors import InputError, Interrupted, StoreError, WorkerDied, nearest
 from sweep.signals import Stop, stop_on_signal
 
 if TYPE_CHECKING:
@@ -74,14 +75,16 @@ def run(
     model = _model(study, smoke, accuracy)
     _check_budget(model, jobs, force)
     folder = Path(out) if out is not None else Path("results", *(["smoke"] if smoke else []), model.name, "designs")
-    with store.locked(folder), stop_on_signal() as stop:
+    with store.locked(folder):
         head = {"run": uuid.uuid4().hex[:12]}
         begin = time.monotonic()
         store.append_run(folder, head | {"event": "start"} | _circumstances(jobs, backend))
         try:
-            computed = _sweep(model, folder, jobs, backend, force, stop, progress)
-        except LinksweepError as error:
-            if error.exit_code != 74:  # the log stands on the disk that has just refused
+            computed = _sweep(model, folder, jobs, backend, force, progress)
+            if model.optimise is not None:
+                _optimise(model, folder)
+        except Exception as error:
+            if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
                 store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
             raise
         store.append_run(folder, head | _end(begin, "complete", f"{computed} chunks computed"))
@@ -102,29 +105,28 @@ def _check_budget(study: Study, jobs: int, force: bool) -> None:
         check_budget(study, estimate(study, jobs))
 
 
-def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, stop: Stop, progress: bool) -> int:
-    """Compute the missing chunks, note the totals, optimise; returns the number of chunks computed."""
+def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, progress: bool) -> int:
+    """Compute the missing chunks and note the totals; returns the number of chunks computed."""
     from sweep.progress import Progress
 
-    store.remove_temporary(folder)
-    plan = _open_plan(study, folder, force)
-    finished = store.finished_chunks(folder, plan)
-    missing = [index for index in range(plan.chunks) if index not in finished]
-    done = plan.designs - sum(len(range(*plan.bounds(index))) for index in missing)
     failure: Exception | None = None
-    with Progress(study.name, plan.designs, done, progress) as shown:
-        for result in _results(study, plan, folder, missing, jobs, backend, stop):
-            if result.error is not None:
-                failure = failure or result.error
-                stop.event.set()
-            shown.advance(result.designs)
+    with stop_on_signal() as stop:
+        store.remove_temporary(folder)
+        plan = _open_plan(study, folder, force)
+        finished = store.finished_chunks(folder, plan)
+        missing = [index for index in range(plan.chunks) if index not in finished]
+        done = plan.designs - sum(len(range(*plan.bounds(index))) for index in missing)
+        with Progress(study.name, plan.designs, done, progress) as shown:
+            for result in _results(study, plan, folder, missing, jobs, backend, stop):
+                if result.error is not None:
+                    failure = failure or result.error
+                    stop.event.set()
+                shown.advance(result.designs)
     if failure is not None:
         raise failure
     _raise_if_signalled(stop, folder)
     note = _plan_note(study, folder, plan) | {"counts": store.total_counts(folder), "complete": True}
     store.write_plan(folder, note)
-    if study.optimise is not None:
-        _optimise(study, folder, note)
     return len(missing)
 
 
@@ -209,15 +211,20 @@ def _raise_if_signalled(stop: Stop, folder: Path) -> None:
         raise Interrupted(stop.signal_number, text)
 
 
-def _optimise(study: Study, folder: Path, note: dict[str, Any]) -> None:
+def _optimise(study: Study, folder: Path) -> None:
     """Run the optimiser unless its result for these very sources is there already."""
     from sweep.optimise import optimise_study
     from sweep.plan import optimiser_hash
 
+    note = store.read_plan(folder) or {}
     key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
-    if note.get("optimised") == key and (folder / store.OPTIMUM).is_file() and (folder / store.CURVES).is_file():
+    if note.get("optimised") == key and (folder / store.OPTIMUM).is_file():
         return
-    optimise_study(study, folder)
+    try:
+        optimise_study(study, folder)
+    except KeyboardInterrupt:
+        text = f"{folder}: stopped while optimising; all designs are kept, run again to continue"
+        raise Interrupted(signal.SIGINT, text) from None
     store.write_plan(folder, note | {"optimised": key})
 
 

@@ -27,6 +27,9 @@ class InputError(LinksweepError, ValueError):
         self.name, self.value, self.allowed, self.place = name, value, allowed, place
         super().__init__(f"{place}: {name} = {value!r}; allowed: {allowed}")
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, object, str, str]]:
+        return type(self), (self.name, self.value, self.allowed, self.place)
+
 
 class StudyError(LinksweepError, ValueError):
     """A study file has faults; all of them are reported at once, each with its place."""
@@ -35,6 +38,9 @@ class StudyError(LinksweepError, ValueError):
         self.path, self.faults = path, list(faults)
         noun = "fault" if len(self.faults) == 1 else "faults"
         super().__init__("\n".join([f"{path}: {len(self.faults)} {noun}", *(f"  {f}" for f in self.faults)]))
+
+    def __reduce__(self) -> tuple[type[StudyError], tuple[str, list[str]]]:
+        return type(self), (self.path, self.faults)
 
 
 class BudgetError(LinksweepError):
@@ -65,8 +71,12 @@ class Interrupted(LinksweepError):
     """A signal stopped the run; finished chunks are kept and the next run continues with the missing ones."""
 
     def __init__(self, signal_number: int, message: str) -> None:
+        self.signal_number = signal_number
         super().__init__(message)
         self.exit_code = 128 + signal_number
+
+    def __reduce__(self) -> tuple[type[Interrupted], tuple[int, str]]:
+        return type(self), (self.signal_number, str(self))
 
 
 def closest(word: str, known: Iterable[str]) -> str | None:

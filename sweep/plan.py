@@ -35,8 +35,8 @@ PARAMETER_UNITS = {"length": "mm", "angle": "rad", "ratio": "1", "sign": "1", "c
 
 # Parts of the package that decide no value in a chunk; everything else does.
 NOT_VALUES = frozenset(
-    "optimise report cli templates __init__.py __main__.py engine.py progress.py signals.py poses.py compare.py".split()
-)
+    ["optimise", "report", "cli", "templates", "__init__.py", "__main__.py", "engine.py", "progress.py"]
+) | {"signals.py", "poses.py", "compare.py"}
 
 # Sections of the study file that decide no value in a chunk.
 NOT_IN_CHUNKS = ("study", "optimise", "reference", "budget", "report")
@@ -161,7 +161,7 @@ def describe_columns(study: Study) -> tuple[Column, ...]:
     columns += [
         Column(p.name, "float64", PARAMETER_UNITS[p.unit], p.text, "parameter") for p in study.family.parameters
     ]
-    columns += [_output_column(study.family, name, study.output.dtype) for name in output_columns(study)]
+    columns += [_output_column(study.family, name, dtype) for name, dtype in output_columns(study).items()]
     columns.append(Column("status", "uint8", "1", "0 = ok, others say why a value is missing", "status"))
     return tuple(columns)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -10,13 +12,14 @@ import pytest
 
 import sweep.plan
 from kernels import status as codes
-from sweep.chunk import BLOCK, compute_chunk, meets
+from sweep.chunk import BLOCK, cascade, compute_chunk, meets, parameter_matrix
 from sweep.engine import run
 from sweep.errors import InputError
+from sweep.families.base import Array, Columns
 from sweep.plan import make_plan
 from sweep.store import is_complete, load, read_plan, read_runs
-from sweep.study import Limit, Study, load_study
-from sweep.summaries import design_outputs
+from sweep.study import Limit, OutputSettings, Study, load_study
+from sweep.summaries import Route, design_outputs
 from sweep.tables import design_matrix
 from tests.engine_study import chunk_bytes, write_study
 
@@ -61,13 +64,72 @@ def test_rows_equal_a_direct_computation_of_all_designs(study: Study, tmp_path: 
     assert frame.loc[ok].notna().all().all()
 
 
-def test_failing_designs_have_nan_in_what_was_not_computed(study: Study, tmp_path: Path) -> None:
+class Recorder:
+    """Stands for a family with three routes: outputs x (the design's a), y (its b), z (1); a > 50 does not turn."""
+
+    def __init__(self) -> None:
+        self.ran: dict[str, int] = {}
+
+    def routes(self, family: object, want: object, accuracy: object) -> tuple[Route, ...]:
+        return tuple(Route(name, (name,), 1.0) for name in "xyz")
+
+    def design_outputs(
+        self, family: object, designs: Array, wanted: tuple[str, ...], accuracy: object, window: object
+    ) -> Columns:
+        self.ran[wanted[0]] = len(designs)
+        status = np.zeros(len(designs), np.uint8)
+        if wanted == ("x",):
+            status[designs[:, 0] > 50.0] = codes.NOT_ROTATABLE
+            status[designs[:, 0] < 15.0] = codes.NOT_OSCILLATING
+        return {
+            wanted[0]: {"x": designs[:, 0], "y": designs[:, 1], "z": designs[:, 2] ** 0}[wanted[0]],
+            "status": status,
+        }
+
+
+@pytest.mark.parametrize("keep", ["all", "feasible"])
+def test_cascade_runs_a_route_only_on_survivors(
+    study: Study, monkeypatch: pytest.MonkeyPatch, keep: Literal["all", "feasible"]
+) -> None:
+    recorder = Recorder()
+    monkeypatch.setattr("sweep.chunk.routes", recorder.routes)
+    monkeypatch.setattr("sweep.chunk.design_outputs", recorder.design_outputs)
+    limits = (Limit("x", 20.0, None), Limit("y", None, 100.0))
+    tiny = replace(study, want=("x", "y", "z"), limits=limits, output=OutputSettings(keep))
+    matrix = parameter_matrix(tiny, 0, tiny.space.count)
+    a, b = matrix[:, 0], matrix[:, 1]
+    found = cascade(tiny, matrix)
+
+    after_x = (a >= 20.0) & (a <= 50.0)
+    expected = np.select(
+        [a > 50.0, a < 15.0, a < 20.0, b > 100.0],
+        [codes.NOT_ROTATABLE, codes.NOT_OSCILLATING, codes.LIMIT_EXCEEDED, codes.LIMIT_EXCEEDED],
+        codes.OK,
+    )
+    go_on = after_x | (a < 15.0) if keep == "all" else after_x
+    last = (after_x & (b <= 100.0)) | ((a < 15.0) & (keep == "all"))
+    np.testing.assert_array_equal(found.status, expected)
+    assert recorder.ran == {"x": len(a), "y": int(go_on.sum()), "z": int(last.sum())}
+    assert found.reached == tuple(recorder.ran.values())
+    assert 0 < last.sum() < go_on.sum() < len(a), "every route must lose some designs"
+    np.testing.assert_array_equal(np.isnan(found.outputs["y"]), ~go_on)
+    np.testing.assert_array_equal(np.isnan(found.outputs["z"]), ~last)
+
+
+def test_no_nan_without_a_status(study: Study, tmp_path: Path) -> None:
     frame = load(run(study, tmp_path / "out"))
-    over = frame[frame["status"] == codes.LIMIT_EXCEEDED]
-    assert len(over) and over["margin" if "margin" in over else "max_pressure_angle"].notna().all()
-    assert over["max_abs_d2psi"].isna().all(), "the cascade computed an output of designs it had already refused"
+    assert (frame["status"] == codes.NOT_ROTATABLE).any() and (frame["status"] == codes.LIMIT_EXCEEDED).any()
+    assert frame.loc[frame["status"] == codes.OK].notna().all().all()
     stuck = frame[frame["status"] == codes.NOT_ROTATABLE]
-    assert len(stuck) and (stuck["rotatable"] == 0).all() and stuck["swing"].isna().all()
+    assert not (stuck["rotatable"] == 1).any() and stuck["max_abs_d2psi"].isna().all()
+
+
+def test_error_estimates_stand_beside_refined_results(tmp_path: Path) -> None:
+    folder = run(write_study(tmp_path / "s", keep="feasible", count=2), tmp_path / "out", accuracy=1e-9)
+    frame = load(folder)
+    assert len(frame) and "err_rotatable" not in frame
+    assert frame["err_max_abs_d2psi"].dtype == np.float32
+    assert (frame["err_max_abs_d2psi"] <= 1e-9 * frame["max_abs_d2psi"] * 1.001).all()
 
 
 def test_keep_feasible_drops_and_counts_the_others(tmp_path: Path) -> None:
