@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from sweep.engine import run
 from sweep.errors import InputError, LinksweepError, StudyError
 from sweep.poses import evaluate
+from sweep.store import is_complete, load
 
-__all__ = ["InputError", "LinksweepError", "StudyError", "evaluate"]
+__all__ = ["InputError", "LinksweepError", "StudyError", "evaluate", "is_complete", "load", "run"]
