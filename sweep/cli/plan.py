@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from sweep.cli.listing import aligned
+from sweep.cli.listing import aligned, main_outputs
 
 if TYPE_CHECKING:
-    from sweep.study import Limit, Study
+    from sweep.study import Study
     from sweep.study.estimate import Estimate
     from sweep.study.space import Axis
 
@@ -21,7 +21,9 @@ def plan_lines(study: Study, cost: Estimate) -> list[str]:
     study : checked study
     cost : its estimate
     """
-    from sweep.summaries import output_names, routes
+    from sweep.report.answer import bound_words
+    from sweep.report.quantities import quantity
+    from sweep.summaries import output, routes
 
     lines = [f"{study.name}: {study.title}" if study.title else study.name]
     lines += [f"mechanism {study.family.name} ({study.family.title})"]
@@ -31,7 +33,10 @@ def plan_lines(study: Study, cost: Estimate) -> list[str]:
     lines += ["", f"{study.space.count} designs, {kind} of"]
     lines += aligned([(axis.name, _axis(axis)) for axis in study.space.axes])
 
-    limits = {limit.output: _limit(limit) for limit in study.limits}
+    limits = {
+        limit.output: bound_words(limit, quantity(limit.output, output(study.family, limit.output).unit))
+        for limit in study.limits
+    }
     found = routes(study.family, study.want, study.accuracy)
     lines += ["", f"will be computed, {_accuracy(study)}; only designs within the limits so far go on to the next line"]
     lines += aligned(
@@ -39,13 +44,13 @@ def plan_lines(study: Study, cost: Estimate) -> list[str]:
             (
                 f"{k}. {route.name}",
                 f"{route.ns_per_design:.3g} ns per design",
-                ", ".join(name + (f" {limits[name]}" if name in limits else "") for name in route.outputs),
+                ", ".join(name + (f" ({limits[name]})" if name in limits else "") for name in route.outputs),
             )
             for k, route in enumerate(found, 1)
         ]
     )
-    left = [name for name in output_names(study.family) if name not in study.want]
-    lines += ["", "will not be computed, because nothing asks for it", f"  {', '.join(left) or 'nothing is left out'}"]
+    left = [name for name in main_outputs(study.family) if name not in study.want]
+    lines += ["", "will not be computed, because nothing asks for it", f"  {', '.join(left)}"]
     if study.objective is not None:
         lines += ["", f"to be made small: {study.objective.output}"]
     if study.optimise is not None:
@@ -71,13 +76,6 @@ def _axis(axis: Axis) -> str:
     low, high = axis.low / axis.factor, axis.high / axis.factor
     count = "" if axis.values is None else f", {axis.count} values"
     return f"{low:g} to {high:g}{unit}{count}{', log' if axis.scale == 'log' else ''}"
-
-
-def _limit(limit: Limit) -> str:
-    low, high = limit.minimum, limit.maximum
-    if low is not None and high is not None:
-        return f"(= {low:g})" if low == high else f"({low:g} to {high:g})"
-    return f"(>= {low:g})" if low is not None else f"(<= {high:g})"
 
 
 def _accuracy(study: Study) -> str:

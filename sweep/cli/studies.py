@@ -47,7 +47,7 @@ def run(
 def check(study: Path, jobs: int, smoke: bool) -> None:
     """Validate a study and print what running it would compute and cost; nothing is written.
 
-    Limits are printed in mm and rad.  A study over its budget ends with exit code 3.
+    A study over its budget ends with exit code 3.
     """
     from sweep.cli.plan import plan_lines
     from sweep.study import load_study

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kernels import status as codes
 from sweep.chunk import MAGNITUDES, meets
 from sweep.report.quantities import Quantity, number, percent_change, quantity
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 Row = Mapping[str, Any]
 ACTIVE = 1e-5  # a limit is called active if the optimum is this near to it, relative to its size
 KKT = 1e-6  # residual above which the optimiser's result is not called a local optimum
+MISSED = ("missed", "unknown")
 NO_PROOF = "This is no proof of a global optimum"
 
 
@@ -41,10 +43,10 @@ def limit_state(
     """Whether a design keeps a limit, and with how much room."""
     shown = quantity(limit.output, unit)
     value, other = _value(row, limit.output), _value(reference, limit.output)
-    if limit.output.rstrip("0123456789") == "rotatable":
+    if _is_flag(limit.output):
         words = {1.0: "yes", 0.0: "no"}
         state = "unknown" if math.isnan(value) else "met" if meets(limit, np.array([value]))[0] else "missed"
-        return LimitState(shown, "must turn fully", words.get(value, "–"), words.get(other, "–"), "", state)
+        return LimitState(shown, bound_words(limit, shown), words.get(value, "–"), words.get(other, "–"), "", state)
     size = abs(value) if limit.output.rstrip("0123456789") in MAGNITUDES else value
     rooms = []
     if limit.minimum is not None:
@@ -67,6 +69,8 @@ def limit_state(
 
 def bound_words(limit: Limit, shown: Quantity) -> str:
     """``at most 45°``, ``24.4 to 24.6 mm``."""
+    if _is_flag(limit.output):
+        return "must turn fully"
     if limit.minimum is not None and limit.maximum is not None:
         if limit.minimum == limit.maximum:
             return f"exactly {shown.show(limit.maximum)}"
@@ -90,6 +94,9 @@ def answer(data: Dataset, found: Scan) -> list[str]:
         return [f"No design of the {_count(total)} in the sweep meets all limits.", *_sweep_sentences(data, found)]
     sentences = []
     who = "The optimum" if data.optimum is not None else "The best design of the sweep"
+    if data.optimum is not None and int(data.optimum.get("status", 0)) == codes.LIMIT_EXCEEDED:
+        sentences.append("No design was found that keeps all limits; what follows is the nearest one found.")
+        who = "The nearest design"
     objective = data.study.objective
     if objective is not None:
         sentences.append(_headline(data, who, objective.output))
@@ -98,6 +105,7 @@ def answer(data: Dataset, found: Scan) -> list[str]:
         sentences.append(_comparison(data, second))
     sentences += _limit_sentences(limit_states(data))
     sentences += _sweep_sentences(data, found)
+    sentences += _against_reference(data)
     sentences += not_achieved(data, found)
     sentences.append(_proof(data))
     return [s for s in sentences if s]
@@ -146,30 +154,40 @@ def _limit_sentences(states: list[LimitState]) -> list[str]:
 
 
 def not_achieved(data: Dataset, found: Scan) -> list[str]:
-    """What the result does not reach: limits, outputs worse than the reference, an optimiser that did not settle."""
-    missed = [
-        f"{s.shown.words}: {s.value} instead of {s.bound}"
-        for s in limit_states(data)
-        if s.state in ("missed", "unknown")
-    ]
-    criteria = [data.study.objective.output if data.study.objective is not None else None, data.second]
-    worse = [
-        f"{quantity(name, data.units.get(name, '')).words} is larger than the reference's"
-        for name in criteria
-        if name is not None and abs(_value(data.result, name)) > abs(_value(data.reference, name)) * (1.0 + 1e-9)
-    ]
-    faults = missed + worse
+    """What the result does not reach: limits it misses, an optimiser that did not settle or lost a better design."""
+    faults = [f"{s.shown.words}: {s.value} instead of {s.bound}" for s in limit_states(data) if s.state in MISSED]
+    objective = data.study.objective
     if data.optimum is not None:
         residual = _value(data.optimum, "kkt_residual")
         if not residual <= KKT:
             faults.append(f"the optimiser did not settle (KKT residual {number(residual, 3)}, {number(KKT)} is wanted)")
-        objective = data.study.objective
         if objective is not None and found.best_row:
             best, value = found.best_row[objective.output], _value(data.optimum, objective.output)
             if not abs(value) <= abs(best) * (1.0 + 1e-6):
                 shown = quantity(objective.output, data.units.get(objective.output, ""))
                 faults.append(f"the optimiser ended above the best design of the sweep, {shown.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
+
+
+def _against_reference(data: Dataset) -> list[str]:
+    """Where the reference is better, and which limits it misses itself."""
+    if data.reference is None:
+        return []
+    criteria = [data.study.objective.output if data.study.objective is not None else None, data.second]
+    worse = [
+        f"{quantity(name, data.units.get(name, '')).words}"
+        for name in criteria
+        if name is not None and abs(_value(data.result, name)) > abs(_value(data.reference, name)) * (1.0 + 1e-9)
+    ]
+    missed = []
+    for limit in data.study.limits:
+        state = limit_state(limit, data.reference, None, data.units.get(limit.output, ""), frozenset())
+        if state.state in MISSED:
+            missed.append(f"{state.shown.words} ({state.value}, {state.bound})")
+    return [
+        f"Worse than in the reference: {'; '.join(worse)}." if worse else "",
+        f"Limits the reference itself misses: {'; '.join(missed)}." if missed else "",
+    ]
 
 
 def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
@@ -198,6 +216,10 @@ def _proof(data: Dataset) -> str:
 def _value(row: Row | None, name: str) -> float:
     value = None if row is None else row.get(name)
     return math.nan if value is None else float(value)
+
+
+def _is_flag(name: str) -> bool:
+    return name.rstrip("0123456789") == "rotatable"
 
 
 def _is_number(row: Row, name: str) -> bool:

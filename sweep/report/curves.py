@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from sweep.families.base import Array
     from sweep.study import Limit
 
-STYLES: dict[str, dict[str, Any]] = {
-    "optimum": {"color": OPTIMUM},
-    "reference": {"color": REFERENCE, "linestyle": (0, (4, 2))},
-}
 SHOWN = re.compile(r"(d[23]?)?(s|psi)|dev|pressure_angle\d*")
+
+
+def style_of(role: str) -> dict[str, Any]:
+    """The reference is dashed, the result solid."""
+    return {"color": REFERENCE, "linestyle": (0, (4, 2))} if role == "reference" else {"color": OPTIMUM}
 
 
 def shown_curves(columns: list[str]) -> list[str]:
@@ -45,15 +46,17 @@ def motion_figure(
 ) -> Figure:
     """Panels over the crank angle from the lowest position, so that two mechanisms can be laid over each other."""
     names = shown_curves(list(curves.columns))
-    turns = {role: curves[curves["role"] == role] for role in ("optimum", "reference")}
-    turns = {role: turn for role, turn in turns.items() if len(turn)}
+    turns = {str(role): turn for role, turn in curves.groupby("role", sort=False)}
+    label = "crank angle [°]"
+    if not any(rotates(turn, position) for turn in turns.values()):
+        label = "crank angle from the lowest position [°]"
     figure = new_figure(WIDTH, 2.1 * -(-len(names) // 2) + 0.5)
     panels = np.atleast_1d(figure.subplots(-(-len(names) // 2), 2, sharex=True)).ravel()
     for axes, name in zip(panels, names, strict=False):
         shown = quantity(name, units.get(name, ""))
         for role, turn in turns.items():
             angle, values = aligned_turn(turn, name, position)
-            axes.plot(np.degrees(angle), values * shown.factor, label=role, zorder=3, **STYLES[role])
+            axes.plot(np.degrees(angle), values * shown.factor, label=role, zorder=3, **style_of(role))
         _limit_lines(axes, name, shown, limits)
         axes.set_title(shown.title)
         if name == "dev" and window is not None:
@@ -69,7 +72,7 @@ def motion_figure(
     for column in range(2):
         used = [k for k in range(len(names)) if k % 2 == column]
         if used:
-            panels[used[-1]].set_xlabel("crank angle from the lowest position [°]")
+            panels[used[-1]].set_xlabel(label)
             panels[used[-1]].tick_params(labelbottom=True)
     if len(turns) > 1:
         handles, labels = panels[0].get_legend_handles_labels()
@@ -89,7 +92,7 @@ def _show_window(
         sizes.append(float(np.nanmax(np.abs(dev[inside]))) * factor)
         axes.fill_between(
             np.degrees(angle), 0, 1, where=inside, transform=axes.get_xaxis_transform(),
-            color=STYLES[role]["color"], alpha=0.08, linewidth=0, zorder=1,
+            color=style_of(role)["color"], alpha=0.08, linewidth=0, zorder=1,
         )  # fmt: skip
     top = 1.25 * max(sizes)
     if np.isfinite(top) and top > 0.0:
@@ -103,24 +106,29 @@ def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
     return (fraction >= window[0]) & (fraction <= window[1])
 
 
-def aligned_turn(curve: pd.DataFrame, name: str, position: str) -> tuple[Array, Array]:
+def rotates(turn: pd.DataFrame, position: str) -> bool:
+    """Whether the follower itself turns fully, so that it has no lowest position."""
+    if position != "psi":
+        return False
+    path = np.unwrap(turn[position].to_numpy(float))
+    return bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
+
+
+def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, Array]:
     """One closed turn that starts where the position is smallest; the position itself counts from there."""
-    phi = curve["phi"].to_numpy(float)
-    values = curve[name].to_numpy(float)
-    path = curve[position].to_numpy(float) if position in curve else values
+    phi, values = turn["phi"].to_numpy(float), turn[name].to_numpy(float)
+    path = turn[position].to_numpy(float)
     if position == "psi":
         path = np.unwrap(path)
     if name == position:
         values = path
-    turns = abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi and position == "psi"
-    start = 0 if turns or not np.isfinite(path).any() else int(np.nanargmin(path))
+    if rotates(turn, position):
+        full = np.copysign(2.0 * np.pi, path[-1] - path[0]) if name == position else 0.0
+        return np.append(phi, 2.0 * np.pi), np.append(values, values[0] + full)
+    start = int(np.nanargmin(path)) if np.isfinite(path).any() else 0
     order = np.r_[start : phi.size, 0:start]
-    angle = np.mod(phi[order] - phi[start], 2.0 * np.pi)
-    values = values[order]
-    if name == position and not turns:
-        values = values - values[0]
-    closing = values[0] + 2.0 * np.pi * np.sign(path[-1] - path[0]) if turns and name == position else values[0]
-    return np.append(angle, 2.0 * np.pi), np.append(values, closing)
+    values = values[order] - (values[start] if name == position else 0.0)
+    return np.append(np.mod(phi[order] - phi[start], 2.0 * np.pi), 2.0 * np.pi), np.append(values, values[0])
 
 
 def _limit_lines(axes: Axes, name: str, shown: Quantity, limits: tuple[Limit, ...]) -> None:

@@ -25,7 +25,8 @@ class Dataset:
     """Parts, optimum and curves of one folder, and the study they answer.
 
     ``units`` and ``definitions`` come from the field metadata of the Parquet files; ``best`` is the best row of the
-    sweep once it has been read, None if no design is feasible.
+    sweep once it has been read, None if no design is feasible; ``computed_reference`` the reference where no optimiser
+    has left it in the folder.
     """
 
     folder: Path
@@ -38,6 +39,7 @@ class Dataset:
     curves: pd.DataFrame | None
     runs: tuple[dict[str, Any], ...]
     best: Row | None = None
+    computed_reference: Row | None = None
 
     @property
     def counts(self) -> dict[int, int]:
@@ -58,7 +60,8 @@ class Dataset:
     @cached_property
     def reference(self) -> Row | None:
         """The design the result is compared with."""
-        return self._role("reference")
+        stored = self._role("reference")
+        return self.computed_reference if stored is None else stored
 
     @property
     def result(self) -> Row | None:
@@ -79,11 +82,9 @@ class Dataset:
 
     @property
     def active(self) -> list[str]:
-        """Limits the optimiser calls active."""
-        names = None if self.optimum is None else self.optimum.get("active")
-        if names is None:
-            return []
-        return names.replace(",", " ").split() if isinstance(names, str) else [str(name) for name in names]
+        """Outputs and parameters whose limits and bounds the optimiser calls active."""
+        words = "" if self.optimum is None else str(self.optimum.get("active") or "")
+        return [word.split()[0].rstrip(":,") for word in words.split(";") if word.strip()]
 
     @property
     def reference_status(self) -> str:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from sweep.families.base import Array
 
-JOINT = re.compile(r"x_([a-z])(\d*)")
+COORDINATE = re.compile(r"[xyz]_([a-z])(\d*)")
 POSITIONS = 8
 PATH = "#2f8f5b"
 ON_PATH = 1e-6  # a path is taken for a circle or a line if it departs from it by less than this part of its size
@@ -57,8 +57,8 @@ def stages(curve: pd.DataFrame) -> list[Stage]:
     """The stages whose joints stand in the columns, ordered by number."""
     found: dict[str, Stage] = {}
     for name in sorted(map(str, curve.columns)):
-        match = JOINT.fullmatch(name)
-        if match is None:
+        match = COORDINATE.fullmatch(name)
+        if match is None or not name.startswith("x"):
             continue
         letter, number = match.groups()
         joint = _joint(letter, _path(curve, letter, number))
@@ -93,10 +93,9 @@ def _joint(letter: str, path: Array) -> Joint:
     return Joint(letter, path, middle + np.array([x, y]) @ directions[:2], straight=False)
 
 
-def mechanism_figure(curves: pd.DataFrame) -> Figure | None:
-    """Every stage in several positions, optimum above reference; a spatial stage in two projections."""
-    roles = [role for role in ("optimum", "reference") if (curves["role"] == role).any()]
-    drawn = [(role, stages(curves[curves["role"] == role])) for role in roles]
+def mechanism_figure(curves: pd.DataFrame, unit: str) -> Figure | None:
+    """Every stage in several positions, result above reference; a spatial stage in two projections."""
+    drawn = [(str(role), stages(turn)) for role, turn in curves.groupby("role", sort=False)]
     drawn = [(role, found) for role, found in drawn if found]
     if not drawn:
         return None
@@ -112,7 +111,7 @@ def mechanism_figure(curves: pd.DataFrame) -> Figure | None:
     panels = figure.subplots(len(drawn), len(views), squeeze=False, width_ratios=shapes)
     for row, (role, found) in zip(panels, drawn, strict=True):
         for axes, (k, plane), frame in zip(row, views, frames, strict=True):
-            _draw(axes, found[k], plane, OPTIMUM if role == "optimum" else REFERENCE)
+            _draw(axes, found[k], plane, REFERENCE if role == "reference" else OPTIMUM, unit)
             axes.set_xlim(frame[0])
             axes.set_ylim(frame[1])
             side = "" if len(views) == len(found) else {"xy": ", front", "zy": ", side"}[plane]
@@ -131,7 +130,7 @@ def _frame(same: list[Stage], plane: str) -> tuple[tuple[float, float], tuple[fl
     return (float(low[0]) - margin, float(high[0]) + margin), (float(low[1]) - margin, float(high[1]) + margin)
 
 
-def _draw(axes: Axes, stage: Stage, plane: str, colour: str) -> None:
+def _draw(axes: Axes, stage: Stage, plane: str, colour: str, unit: str) -> None:
     columns = ["xyz".index(letter) for letter in plane]
     joints = [*stage.held, *stage.free]
     poses = np.linspace(0, len(joints[0].path), POSITIONS, endpoint=False).astype(int)
@@ -162,5 +161,5 @@ def _draw(axes: Axes, stage: Stage, plane: str, colour: str) -> None:
             x, y = joint.pivot[columns]
             axes.scatter(x, y, marker="^", s=60, color="#333333", zorder=6)
     axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel(f"{plane[0]} [mm]")
-    axes.set_ylabel(f"{plane[1]} [mm]")
+    axes.set_xlabel(f"{plane[0]} [{unit}]" if unit else plane[0])
+    axes.set_ylabel(f"{plane[1]} [{unit}]" if unit else plane[1])

@@ -56,7 +56,7 @@ def map_figure(
     for axes, (values, colours, label) in zip(panels, fields, strict=True):
         axes.set_facecolor("#eceef1")
         axes.grid(False)
-        norm = _norm(values) if colours == "viridis_r" else _share_norm()
+        norm = _norm(values) if colours == "viridis_r" else _share_norm(values)
         mesh = axes.pcolormesh(*edges, values, cmap=colours, norm=norm, rasterized=True)
         figure.colorbar(mesh, ax=axes, label=label, orientation="horizontal", location="top", shrink=0.9, aspect=32)
         axes.set_xlabel(x_shown.label)
@@ -109,7 +109,7 @@ def trade_off_figure(
     axes.scatter(
         scatter[:, 0],
         scatter[:, 1],
-        s=3,
+        s=3 if len(scatter) > 5000 else 9,
         color=QUIET,
         alpha=0.35,
         linewidths=0,
@@ -159,7 +159,7 @@ def _norm(values: Array) -> object:
     return Normalize(low, high if high > low else low + 1.0)
 
 
-def _share_norm() -> object:
+def _share_norm(values: Array) -> object:
     from matplotlib.colors import Normalize
 
-    return Normalize(0.0, 100.0)
+    return Normalize(0.0, float(np.nanmax(values)) if np.isfinite(values).any() else 100.0)

@@ -12,12 +12,13 @@ from sweep.errors import StoreError
 from sweep.report import answer, tables
 from sweep.report.curves import motion_figure
 from sweep.report.dataset import Dataset, read_dataset
-from sweep.report.drawing import mechanism_figure
+from sweep.report.drawing import COORDINATE, mechanism_figure
 from sweep.report.figures import TEMPLATES, Saved, house_style, save
 from sweep.report.files import copy_tables, write_survivors
 from sweep.report.maps import Overlay, line_figure, map_figure, trade_off_figure
 from sweep.report.quantities import Quantity, quantity
 from sweep.report.scan import Cells, Scan, most_telling, scan
+from sweep.report.turns import curves, reference_row
 
 if TYPE_CHECKING:
     from sweep.study import Study
@@ -32,6 +33,10 @@ def write(folder: Path, out: Path) -> Path:
     cells = divided_axes(data.study)
     found = scan(data.parts, cells, objective, data.second if objective is not None else None)
     data = replace(data, best=found.best_row or None)
+    if data.optima is None:
+        data = replace(data, computed_reference=reference_row(data.study))
+    if data.curves is None and data.study.output.curves != "none":
+        data = replace(data, curves=curves(data.study, marked(data)))
     try:
         out.mkdir(parents=True, exist_ok=True)
         with house_style():
@@ -73,7 +78,7 @@ def draw(data: Dataset, found: Scan, cells: list[Cells], objective: str | None, 
     if pair is not None:
         x, y = pair
         at = {role: (float(row[x]), float(row[y])) for role, row in marks.items()}
-        known = overlays(study, by_name[x], by_name[y])
+        known = overlays(study, x, y)
         grid = found.grids[pair]
         sides = (by_name[x], axis_quantity(data, x)), (by_name[y], axis_quantity(data, y))
         figures["map"] = save(map_figure(grid, *sides, data.designs, shown, at, known), folder / "map.svg")
@@ -89,10 +94,11 @@ def draw(data: Dataset, found: Scan, cells: list[Cells], objective: str | None, 
         at = {role: (abs(float(row[shown.name])), abs(float(row[second.name]))) for role, row in marks.items()}
         bound = next((limit.maximum for limit in study.limits if limit.output == second.name), None)
         figures["trade_off"] = save(trade_off_figure(found, shown, second, at, bound), folder / "trade-off.svg")
-    if data.curves is not None:
+    if data.curves is not None and len(data.curves):
         motion = motion_figure(data.curves, data.units, study.family.position, study.speed, study.limits, study.window)
         figures["motion"] = save(motion, folder / "motion.svg")
-        mechanism = mechanism_figure(data.curves)
+        joint = next((name for name in data.curves.columns if COORDINATE.fullmatch(str(name))), "")
+        mechanism = mechanism_figure(data.curves, quantity("joint", data.units.get(joint, "mm")).unit)
         if mechanism is not None:
             figures["mechanism"] = save(mechanism, folder / "mechanism.svg")
     return figures
@@ -109,18 +115,18 @@ def axis_quantity(data: Dataset, name: str) -> Quantity:
     return replace(shown, symbol=name, words=data.definitions.get(name, name))
 
 
-def overlays(study: Study, x: Cells, y: Cells) -> list[Overlay]:
-    """Known lines of equal parameters, ``[report] curves`` of the study, that lie in the plane of the map."""
+def overlays(study: Study, x: str, y: str) -> list[Overlay]:
+    """Known lines, ``[report] curves`` of the study, that lie in the plane of the map; points in the axes' units."""
     import numpy as np
 
-    low, high = max(x.edges[0], y.edges[0]), min(x.edges[-1], y.edges[-1])
-    along = np.linspace(low, high, 2)
-    curves = study.data.get("report", {}).get("curves", [])
-    return [
-        Overlay(curve["label"], along, along)
-        for curve in curves
-        if {curve["x"], curve["y"]} <= {x.name, y.name} and low < high
-    ]
+    factors = {axis.name: axis.factor for axis in study.space.axes}
+    found = []
+    for curve in study.data.get("report", {}).get("curves", []):
+        if {curve["x"], curve["y"]} == {x, y}:
+            points = np.asarray(curve["points"], dtype=np.float64) * (factors[curve["x"]], factors[curve["y"]])
+            along = points if curve["x"] == x else points[:, ::-1]
+            found.append(Overlay(curve["label"], along[:, 0], along[:, 1]))
+    return found
 
 
 def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Saved]) -> str:

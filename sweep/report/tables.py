@@ -120,6 +120,8 @@ def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
     rows = []
     for name in data.study.want:
         error = f"err_{name}"
+        if name.startswith("phi_") or name.rstrip("0123456789") == "rotatable":
+            continue  # an error relative to an angle's zero, or of a yes, says nothing
         if error not in found.errors and math.isnan(_number(data.result, error)):
             continue
         shown = quantity(error, data.units.get(error, data.units.get(name, "")))

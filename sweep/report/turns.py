@@ -1,0 +1,46 @@
+"""What a study without an optimiser leaves to the report: the reference's outputs, and curves over one turn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sweep.families.base import Angles
+from sweep.report.curves import SHOWN
+from sweep.report.drawing import COORDINATE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.study import Study
+
+POSES = 720
+
+
+def reference_row(study: Study) -> dict[str, float] | None:
+    """Parameters and outputs of the study's reference design, computed as the sweep computes its designs."""
+    if study.reference is None:
+        return None
+    from sweep.summaries import design_outputs
+    from sweep.tables import design_matrix
+
+    matrix, _ = design_matrix(study.family, study.reference)
+    outputs = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)
+    parameters = dict(zip(study.family.parameter_names, matrix[0].tolist(), strict=True))
+    return parameters | {name: float(values[0]) for name, values in outputs.items()}
+
+
+def curves(study: Study, rows: Mapping[str, Mapping[str, Any] | None]) -> pd.DataFrame:
+    """Poses over one turn of the design of every role, as ``_curves.parquet`` holds them."""
+    import pandas as pd
+
+    family = study.family
+    known = {role: row for role, row in rows.items() if row is not None}
+    names = [name for name in family.pose_names if SHOWN.fullmatch(name) or COORDINATE.fullmatch(name)]
+    matrix = np.array([[float(row[p]) for p in family.parameter_names] for row in known.values()])
+    phi = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
+    columns = family.poses(matrix.reshape(len(known), -1), Angles.of(phi[None, :]), frozenset(names))
+    head = {"role": np.repeat(list(known), POSES), "phi": np.tile(phi, len(known))}
+    return pd.DataFrame(head | {name: columns[name].ravel() for name in [*names, "status"]})
