@@ -39,6 +39,7 @@ MAX_OUTPUTS = (
     Output("max_abs_d3psi", "1", "largest jerk analogue over the turn", "(9)"),
 )
 
+ROUNDING = 2.0**-53
 _POSE_NAMES = tuple(o.name for o in POSE_OUTPUTS)
 _SAMPLED_OUTPUTS = tuple(o for o in MAX_OUTPUTS if o.name.startswith("max"))
 
@@ -54,17 +55,35 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Dwell measures from their closed forms and a bracketed root; to rounding, whatever the accuracy asked."""
+    """Dwell measures from their closed forms and a bracketed root; to rounding, whatever the accuracy asked.
+
+    The errors are bounds of those measured: below 8 roundings on the oracle table.
+    """
     status, outputs = _empty(DWELL_OUTPUTS, wanted, len(designs))
     geared_dwell.dwell_measures(designs, status, *outputs.values())
-    return _columns(outputs, status)
+    columns = _columns(outputs, status)
+    for name, value in outputs.items():
+        if value is not None and accuracy.target is not None:
+            columns[f"err_{name}"] = 0.0 * value if name == "turns" else 32.0 * ROUNDING * abs(value)
+    return columns
 
 
 def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Maxima over the turn from all stationary points, to rounding."""
+    """Maxima over the turn from all stationary points, to rounding.
+
+    The errors are bounds of those measured against 60 digits on 1100 designs: below 40 roundings, growing towards
+    k = 1, a = -1, where three singularities meet, as the distance to the power -5/4.  They are relative for a maximum,
+    absolute for its place.
+    """
     status, outputs = _empty(MAX_OUTPUTS, wanted, len(designs))
     geared_dwell.turn_maxima(designs, status, *outputs.values())
-    return _columns(outputs, status)
+    columns = _columns(outputs, status)
+    with np.errstate(divide="ignore"):
+        growth = 128.0 * ROUNDING * (1.0 + np.hypot(designs[:, 0] - 1.0, designs[:, 1] + 1.0) ** -1.25)
+    for name, value in outputs.items():
+        if value is not None:
+            columns[f"err_{name}"] = growth * (1.0 + 0.0 * value if name.startswith("phi") else abs(value))
+    return columns
 
 
 def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
