@@ -6,5 +6,6 @@ from sweep.engine import run
 from sweep.errors import InputError, LinksweepError, StudyError
 from sweep.poses import evaluate
 from sweep.store import is_complete, load
+from sweep.summaries import summarise
 
-__all__ = ["InputError", "LinksweepError", "StudyError", "evaluate", "is_complete", "load", "run"]
+__all__ = ["InputError", "LinksweepError", "StudyError", "evaluate", "is_complete", "load", "run", "summarise"]
