@@ -12,6 +12,7 @@ import numpy as np
 from kernels import status as codes
 from sweep.chunk import MAGNITUDES, meets
 from sweep.report.quantities import Quantity, number, percent_change, quantity
+from sweep.report.tables import parameter_rows
 
 if TYPE_CHECKING:
     from sweep.report.dataset import Dataset
@@ -104,6 +105,7 @@ def answer(data: Dataset, found: Scan) -> list[str]:
     if second is not None and _is_number(data.result, second):
         sentences.append(_comparison(data, second))
     sentences += _limit_sentences(limit_states(data))
+    sentences += _edge_sentence(data)
     sentences += _sweep_sentences(data, found)
     sentences += _against_reference(data)
     sentences += not_achieved(data, found)
@@ -144,13 +146,23 @@ def rpm(speed: float | None) -> str:
 
 def _limit_sentences(states: list[LimitState]) -> list[str]:
     active = [f"{s.shown.words} ({s.bound})" for s in states if s.state == "active"]
-    slack = [f"{s.shown.words} ({s.value}, {s.bound})" for s in states if s.state == "met"]
+    slack = [f"{s.shown.words} ({s.value}, {s.bound})" for s in states if s.state == "met" and s.slack]
     return [
-        f"Active {'limit' if len(active) == 1 else 'limits'}, which hold the result back: {'; '.join(active)}."
+        f"Held back by {'the active limit' if len(active) == 1 else 'the active limits'}: {'; '.join(active)}."
         if active
         else "",
         f"Met with room to spare: {'; '.join(slack)}." if slack else "",
     ]
+
+
+def _edge_sentence(data: Dataset) -> list[str]:
+    """Parameters that lie on the edge of what was searched."""
+    edges = [f"{row.name} ({row.edge}, {row.value})" for row in parameter_rows(data) if row.edge]
+    return (
+        [f"On the edge of the space that was searched: {'; '.join(edges)}. A wider one may hold better."]
+        if edges
+        else []
+    )
 
 
 def not_achieved(data: Dataset, found: Scan) -> list[str]:

@@ -47,9 +47,7 @@ def motion_figure(
     """Panels over the crank angle from the lowest position, so that two mechanisms can be laid over each other."""
     names = shown_curves(list(curves.columns))
     turns = {str(role): turn for role, turn in curves.groupby("role", sort=False)}
-    label = "crank angle [°]"
-    if not any(rotates(turn, position) for turn in turns.values()):
-        label = "crank angle from the lowest position [°]"
+    label = "crank angle [°]" if turning(curves, position) else "crank angle from the lowest position [°]"
     figure = new_figure(WIDTH, 2.1 * -(-len(names) // 2) + 0.5)
     panels = np.atleast_1d(figure.subplots(-(-len(names) // 2), 2, sharex=True)).ravel()
     for axes, name in zip(panels, names, strict=False):
@@ -112,6 +110,23 @@ def rotates(turn: pd.DataFrame, position: str) -> bool:
         return False
     path = np.unwrap(turn[position].to_numpy(float))
     return bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
+
+
+def turning(curves: pd.DataFrame, position: str) -> bool:
+    """Whether the follower of any of the mechanisms turns fully."""
+    return any(rotates(turn, position) for _, turn in curves.groupby("role", sort=False))
+
+
+def motion_caption(curves: pd.DataFrame, position: str, speed: str, window: tuple[float, float] | None) -> str:
+    """What the panels show."""
+    text = "Derivatives are with respect to the crank angle" + (f"; right-hand scales: at {speed}. " if speed else ". ")
+    if not turning(curves, position):
+        text += "Every curve starts at the lowest position, from which the position counts. "
+    text += "Dotted red: limits."
+    if window is not None and "dev" in curves:
+        text += f" Shaded: the part of the stroke in which the deviation counts, {100 * window[0]:g} to"
+        text += f" {100 * window[1]:g} % from the lowest position; outside it the curve may leave the panel."
+    return text
 
 
 def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, Array]:

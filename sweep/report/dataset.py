@@ -125,16 +125,17 @@ def read_dataset(folder: Path) -> Dataset:
         raise InputError("folder", str(folder), allowed, "report")
     if not store.is_complete(folder):
         raise InputError("folder", str(folder), "a complete dataset; run the study again to resume it", "report")
+    study = study_of(plan, folder)
     optima, curves = folder / store.OPTIMUM, folder / store.CURVES
     parts = tuple(part.path for part in store.parts(folder))
     units, definitions = field_metadata([path for path in (*parts[:1], optima, curves) if path.exists()])
     return Dataset(
         folder=folder,
         plan=plan,
-        study=study_of(plan, folder),
+        study=study,
         parts=parts,
-        units=units,
-        definitions=definitions,
+        units={o.name: o.unit.replace("length", "mm") for o in study.family.pose_outputs} | units,
+        definitions={o.name: o.text for o in study.family.pose_outputs} | definitions,
         optima=pd.read_parquet(optima) if optima.exists() else None,
         curves=pd.read_parquet(curves) if curves.exists() else None,
         runs=tuple(store.read_runs(folder)),

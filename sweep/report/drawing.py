@@ -147,11 +147,17 @@ def _draw(axes: Axes, stage: Stage, plane: str, colour: str, unit: str) -> None:
         for joint in stage.free:
             for end in coupler:
                 axes.plot(*np.array([end, at[joint.letter]]).T, zorder=3, **style)
-        if first:
-            points = np.array(list(at.values()))
-            axes.scatter(
-                points[:, 0], points[:, 1], s=22, facecolors="white", edgecolors=colour, linewidths=1.3, zorder=5
-            )
+        points = np.array(list(at.values()))
+        axes.scatter(
+            points[:, 0],
+            points[:, 1],
+            s=22 if first else 9,
+            facecolors="white",
+            edgecolors=colour,
+            linewidths=1.3 if first else 0.8,
+            alpha=1.0 if first else 0.5,
+            zorder=6 if first else 5,
+        )
     for joint in joints:
         line = joint.path[:, columns]
         free = joint in stage.free or joint.straight

@@ -134,8 +134,8 @@ def trade_off_figure(
         positive = scatter[:, k][scatter[:, k] > 0.0]
         if positive.size == len(scatter) and positive.size and positive.max() > 30.0 * positive.min():
             axis("log")
-    axes.set_xlabel(f"{objective.words}, {objective.label}")
-    axes.set_ylabel(f"{second.words}, {second.label}")
+    axes.set_xlabel(objective.title)
+    axes.set_ylabel(second.title)
     axes.legend(loc="best")
     return figure
 
@@ -143,7 +143,9 @@ def trade_off_figure(
 def _place(axes: Axes, marks: dict[str, tuple[float, float]], x_factor: float, y_factor: float) -> None:
     for role, (x, y) in marks.items():
         if np.isfinite(x) and np.isfinite(y):
-            axes.scatter(x * x_factor, y * y_factor, label=role, zorder=5, edgecolors="white", **MARKS[role])
+            axes.scatter(
+                x * x_factor, y * y_factor, label=role, zorder=5, edgecolors="white", clip_on=False, **MARKS[role]
+            )
 
 
 def _norm(values: Array) -> object:
