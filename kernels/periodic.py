@@ -46,9 +46,9 @@ def series(cosines: Array, sines: Array, phi: float) -> tuple[float, float]:
 
 
 @inline
-def tail(cosines: Array, sines: Array) -> float:
-    """Size of the two highest harmonics in proportion to the largest: how much of the function the grid misses."""
-    largest = 0.0
+def tail(cosines: Array, sines: Array, size: float) -> float:
+    """Size of the two highest harmonics in proportion to the largest or to ``size``: what the grid may miss."""
+    largest = size
     for k in range(cosines.size):
         largest = max(largest, math.hypot(cosines[k], sines[k]))
     last = cosines.size - 1

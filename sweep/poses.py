@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sweep.effects import extended
 from sweep.errors import InputError, nearest
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Family
@@ -44,7 +45,7 @@ def evaluate(
     """
     import pandas as pd
 
-    mechanism = find_family(family)
+    mechanism = extended(find_family(family), [want] if isinstance(want, str) else want)
     wanted = pose_wants(mechanism, want)
     matrix, extras = design_matrix(mechanism, table, extra=() if phi is not None else ("phi",))
     if phi is None:

@@ -52,7 +52,9 @@ def _parameter_column(family: Family, p: Parameter, table: Table, names: list[st
             return np.full(rows, p.default)
         guess = nearest(p.name, [n for n in names if n not in family.parameter_names])
         present = ", ".join(names) or "none"
-        raise InputError("column", p.name, f"a column of that name; found {present}{guess}", f"table of {family.name}")
+        raise InputError(
+            p.name, "missing", f"a column with the {p.text}; found {present}{guess}", f"table of {family.name}"
+        )
     values = np.broadcast_to(_numbers(table[p.name], p.name), rows)
     _refuse(~np.isfinite(values), values, p.name, "a finite number")
     if p.positive:

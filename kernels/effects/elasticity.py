@@ -114,7 +114,7 @@ def steady_state(
         coefficients(lag, ec, es)  # type: ignore[arg-type]
         floquet[i] = _largest_multiplier(pc, ps, stiffness / mass, damping * speed / mass)
         status[i] = st.OK
-        if not tail(ec, es) < RESOLVED or not floquet[i] < 1.0:
+        if not tail(ec, es, 0.0) < RESOLVED or not floquet[i] < 1.0:
             status[i] = st.NOT_CONVERGED
         for j in range(n):
             if status[i] == st.OK and not abs(lag[j]) <= LINEAR * abs(p[i, j]) / c[i]:

@@ -59,7 +59,9 @@ def speed_fluctuation(
         coefficients(inertia[i], jc, js)
         coefficients(excess[i], wc, ws)
         code = st.OK if math.isfinite(jc[0] + wc[0]) else st.NOT_ROTATABLE
-        if code == st.OK and (tail(jc, js) > RESOLVED or tail(wc, ws) > RESOLVED):
+        # A torque excess far below the inertia torque moves no speed: its noise need not be resolved.
+        energy_scale = jc[0] * mean_speed[i] * mean_speed[i]
+        if code == st.OK and (tail(jc, js, 0.0) > RESOLVED or tail(wc, ws, energy_scale) > RESOLVED):
             code = st.NOT_CONVERGED
         wc[0], ws[0] = 0.0, 0.0
         for k in range(1, half):

@@ -11,7 +11,10 @@ from numpy.typing import DTypeLike, NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = dict[str, NDArray[np.generic]]
-Unit = Literal["length", "angle", "ratio", "sign", "count", "none"]
+Unit = Literal[
+    "length", "angle", "ratio", "sign", "count", "none", "choice",
+    "mass", "inertia", "force", "torque", "stiffness", "damping", "speed", "angular_acceleration", "acceleration",
+]  # fmt: skip
 
 
 class Angles(NamedTuple):
@@ -59,6 +62,7 @@ class Accuracy:
 
 PoseFunction: TypeAlias = Callable[[Array, Angles, frozenset[str]], Columns]
 StepFunction: TypeAlias = Callable[[Array, frozenset[str], Accuracy], Columns]
+JointFunction: TypeAlias = Callable[[Array, Angles, Columns, Array, Array], None]
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,8 @@ class Family:
     pose outputs and ``status``, each of shape (n, m).  ``position`` names the follower's coordinate, "psi" or "s"; its
     derivatives with respect to phi are ``d<position>``, ``d2<position>``, ``d3<position>``.  A family whose poses need
     no more than cos(phi) and sin(phi) says ``uses_phi=False``; in a chain that saves an arctangent per pose.
+    ``joints(designs, angles, motion, per_pose, per_design)`` fills the records of :mod:`kernels.joints` that effects
+    work from; a family without it has no effects.
     """
 
     name: str
@@ -95,6 +101,7 @@ class Family:
     steps: tuple[Step, ...] = ()
     derivative_of: Mapping[str, str] = field(default_factory=dict)
     uses_phi: bool = True
+    joints: JointFunction | None = None
 
     @property
     def parameter_names(self) -> tuple[str, ...]:

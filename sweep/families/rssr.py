@@ -48,6 +48,14 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return columns | {"status": status}
 
 
+def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
+    """Fill the joint records that effects work from; ``motion`` holds the pose outputs they are made of."""
+    cos_psi, sin_psi, dpsi, d2psi, discriminant = (
+        np.asarray(motion[name], dtype=np.float64) for name in ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
+    )
+    rssr.joints(designs, angles.cos, angles.sin, cos_psi, sin_psi, dpsi, d2psi, discriminant, per_pose, per_design)
+
+
 FAMILY = Family(
     name="rssr",
     title="spatial crank-rocker",
@@ -57,4 +65,5 @@ FAMILY = Family(
     poses=poses,
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     uses_phi=False,
+    joints=joint_records,
 )

@@ -7,4 +7,5 @@
 from kernels.families.rssr.closure import Design as Design
 from kernels.families.rssr.dense import dense_maxima as dense_maxima
 from kernels.families.rssr.margin import margin as margin
+from kernels.families.rssr.joints import joints as joints
 from kernels.families.rssr.motion import poses as poses

@@ -1,0 +1,95 @@
+"""How an effect presents itself: what it gives, what it needs, what it costs, and when a scene calls for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.joints import PER_DESIGN, PER_POSE
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
+
+Status: TypeAlias = NDArray[np.uint8]
+Rows: TypeAlias = NDArray[np.intp]
+
+
+@dataclass
+class Scene:
+    """One block of designs at their crank angles, as the effects see it; what two effects share is computed once."""
+
+    family: Family
+    designs: Array  # (n, P) of the bare family
+    angles: Angles
+    inputs: dict[str, Array]  # input name -> (n,)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of designs and of poses of each."""
+        return len(self.designs), self.angles.cos.shape[1]
+
+    @cached_property
+    def motion(self) -> Columns:
+        """Pose outputs of the family that the joint records are made of."""
+        return self.family.poses(self.designs, self.angles, frozenset(JOINT_NEEDS))
+
+    @cached_property
+    def records(self) -> tuple[Array, Array]:
+        """Joint records per pose (n, m, PER_POSE) and per design (n, PER_DESIGN); see :mod:`kernels.joints`."""
+        if self.family.joints is None:
+            raise TypeError(f"{self.family.name} has no joint records")
+        per_pose, per_design = np.empty((*self.shape, PER_POSE)), np.empty((len(self.designs), PER_DESIGN))
+        self.family.joints(self.designs, self.angles, self.motion, per_pose, per_design)
+        return per_pose, per_design
+
+    def status(self) -> Status:
+        """Return a fresh copy of the motion's status for a kernel to write on."""
+        return np.array(self.motion["status"], dtype=np.uint8)
+
+    def table(self, names: tuple[str, ...]) -> Array:
+        """Inputs side by side, (n, len(names))."""
+        return np.column_stack([self.inputs[name] for name in names])
+
+    def at(self, phi: Array) -> Scene:
+        """Return the same designs at other crank angles, (1, m): what a whole-turn effect samples."""
+        return Scene(self.family, self.designs, Angles.of(phi), self.inputs)
+
+
+JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
+
+ComputeFunction: TypeAlias = Callable[[Scene, frozenset[str]], Columns]
+
+
+@dataclass(frozen=True)
+class DesignResult:
+    """Outputs an effect gives per design instead of per pose: a whole-turn effect's, or a closed form."""
+
+    outputs: tuple[Output, ...]
+    run: Callable[[Family, Array, dict[str, Array], frozenset[str], Accuracy], Columns]
+    ns_per_design: float
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One row of the register; ``compute(scene, wanted)`` returns the wanted outputs (n, m) and ``status`` (n, m).
+
+    ``whole_turn`` effects couple different crank angles: they sample the turn themselves, whatever is asked for.
+    """
+
+    key: str
+    name: str
+    title: str
+    equation: str
+    families: tuple[str, ...]
+    needs: tuple[str, ...]
+    inputs: tuple[Parameter, ...]
+    outputs: tuple[Output, ...]
+    compute: ComputeFunction
+    ns_per_pose: float
+    called_for: str
+    negligible: str
+    whole_turn: bool = False
+    design_result: DesignResult | None = None

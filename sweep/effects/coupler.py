@@ -1,0 +1,73 @@
+"""C0: motion of a coupler point and of the coupler itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.effects.coupler import coupler_point
+from sweep.effects.base import Effect, Scene
+from sweep.families.base import Columns, Output, Parameter
+
+CONSTRUCTION = Parameter(
+    "finger", "choice", "which ball joint carries the finger: 0 the driven one (at C), 1 the driving one (at B)",
+    default=0.0, choices=(0.0, 1.0),
+)  # fmt: skip
+
+INPUTS = (
+    Parameter("x_point", "length", "coupler point from B along the coupler"),
+    Parameter("y_point", "length", "coupler point along n x s, in the coupler's plane", default=0.0),
+    Parameter("z_point", "length", "coupler point along n, normal to the coupler's plane", default=0.0),
+    CONSTRUCTION,
+)
+
+_GROUPS = {
+    "": ("{axis}_p", "length", "{axis} of the coupler point, fixed axes"),
+    "d": ("d{axis}_p", "length", "velocity analogue of the coupler point along {axis}"),
+    "d2": ("d2{axis}_p", "length", "acceleration analogue of the coupler point along {axis}"),
+    "n": ("n_{axis}", "1", "{axis} of the unit vector n of the coupler"),
+    "omega": ("omega_{axis}", "1", "angular velocity of the coupler along {axis} per unit crank speed"),
+    "eps": ("eps_{axis}", "1", "angular acceleration of the coupler along {axis} per unit crank speed squared"),
+}
+OUTPUTS = tuple(
+    Output(name.format(axis=axis), unit, text.format(axis=axis), "spatial sheet 4.1, 4.2")
+    for name, unit, text in _GROUPS.values()
+    for axis in "xyz"
+)
+
+
+def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Wanted components; each group of three costs what one of them does."""
+    columns: Columns = {}
+    total = scene.status()
+    point = scene.table(("x_point", "y_point", "z_point"))
+    for finger in np.unique(scene.inputs["finger"]):
+        rows = np.flatnonzero(scene.inputs["finger"] == finger)
+        per_pose, per_design = (np.ascontiguousarray(record[rows]) for record in scene.records)
+        status = np.ascontiguousarray(total[rows])
+        out = [
+            np.empty((*status.shape, 3)) if any(name.format(axis=axis) in wanted for axis in "xyz") else None
+            for name, _, _ in _GROUPS.values()
+        ]
+        coupler_point(per_pose, per_design, point[rows], int(finger), status, *out)
+        total[rows] = status
+        for (name, _, _), values in zip(_GROUPS.values(), out, strict=True):
+            for k, axis in enumerate("xyz"):
+                if values is not None and name.format(axis=axis) in wanted:
+                    columns.setdefault(name.format(axis=axis), np.empty(scene.shape))[rows] = values[:, :, k]
+    return columns | {"status": total}
+
+
+EFFECT = Effect(
+    key="C0",
+    name="coupler",
+    title="motion of a coupler point, orientation and rates of the coupler",
+    equation="spatial sheet 4.1, 4.2",
+    families=("rssr",),
+    needs=(),
+    inputs=INPUTS,
+    outputs=OUTPUTS,
+    compute=compute,
+    ns_per_pose=90.0,
+    called_for="a tool on the coupler, a coupler whose centre of mass is off the line B-C",
+    negligible="coupler mass much below the rocker's inertia over c^2, and balanced",
+)

@@ -1,0 +1,54 @@
+"""P2, P3: radial, axial and crank-side pressure angles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.effects.pressure import directions
+from sweep.effects.base import Effect, Scene
+from sweep.families.base import Columns, Output, optional_outputs
+
+OUTPUTS = (
+    Output("t_tau", "1", "component of the coupler direction along the follower's motion, signed by the branch", "1.1"),
+    Output("t_rho", "1", "component of the coupler direction along the follower", "1.1"),
+    Output("t_k", "1", "component of the coupler direction along the follower's axis", "1.1"),
+    Output("theta1", "rad", "radial pressure angle at the follower, in its plane of motion", "1.1"),
+    Output("theta2", "rad", "axial pressure angle at the follower, tan = axial/radial", "1.1"),
+    Output("theta3", "rad", "axial pressure angle at the crank", "1.1"),
+)
+_NAMES = tuple(o.name for o in OUTPUTS)
+
+
+def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Wanted directions and angles of every pose."""
+    status = scene.status()
+    outputs = optional_outputs(_NAMES, wanted, scene.shape)
+    per_pose, per_design = scene.records
+    directions(per_pose, per_design, status, *[*outputs, None, None, None])
+    found: Columns = {name: out for name, out in zip(_NAMES, outputs, strict=True) if out is not None}
+    return found | {"status": status}
+
+
+def bearing_directions(scene: Scene) -> tuple[np.ndarray, ...]:
+    """cos(theta1), sin(theta1), sin(theta1) tan(theta2) and status: what the bearing criteria take."""
+    status = scene.status()
+    cos1, sin1, axial = (np.empty(scene.shape) for _ in range(3))
+    per_pose, per_design = scene.records
+    directions(per_pose, per_design, status, None, None, None, None, None, None, cos1, sin1, axial)
+    return cos1, sin1, axial, status
+
+
+EFFECT = Effect(
+    key="P2, P3",
+    name="pressure",
+    title="radial, axial and crank-side pressure angles",
+    equation="dynamics sheet 1.1, (19)-(21)",
+    families=("rssr",),
+    needs=(),
+    inputs=(),
+    outputs=OUTPUTS,
+    compute=compute,
+    ns_per_pose=40.0,
+    called_for="choice of the follower's and the crank's bearings",
+    negligible="planar linkage: theta2 = theta3 = 0",
+)
