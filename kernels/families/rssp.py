@@ -80,8 +80,8 @@ def poses(
 ) -> None:
     """Slider displacement, transfer functions, discriminant and pressure angle of every design at its crank angles.
 
-    Equations (1)-(3), (5), (6) of docs/rssp.md: Q = (b - m)(b + m) - n^2, s = y_B + branch sqrt(Q), cos(pressure angle) =
-    sqrt(Q)/b, and the derivatives of Q in the factored form that keeps full relative accuracy for tiny cranks.
+    Equations (1)-(3), (5) and (6) of docs/rssp.md: Q = (b - m)(b + m) - n^2, s = y_B + branch sqrt(Q), cos(pressure
+    angle) = sqrt(Q)/b, and the derivatives of Q in the factored form that stays accurate for tiny cranks.
 
     Parameters
     ----------
