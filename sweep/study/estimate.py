@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from sweep.errors import BudgetError
 from sweep.study.study import Study
 
 # With no survivor in the pilot, this share is assumed.
 LEAST_KEPT = 1e-3
-# Measured: the parameter values of a design take 100 ns, writing its row 120 ns; a result of eight bytes packs to some
-# six, a lattice's parameters, design number and status together to two bytes a row, a sampled parameter to seven.
+# Measured: the parameter values of a design take 100 ns, writing its row 120 ns.
 SPACE_SECONDS = 100e-9
 WRITE_SECONDS_PER_ROW = 120e-9
-PACKED = 0.75
-DISK_BYTES_PER_ROW = 2.0
+# Measured: what zstd leaves of a result and of its error estimate; a sampled parameter keeps seven of its eight bytes,
+# the parameters of a lattice, design number and status together take less than half a byte a row.
+PACKED_RESULT, PACKED_ERROR = 0.78, 0.4
 SAMPLED_VALUE_BYTES = 7.0
+OTHER_BYTES_PER_ROW = 0.5
 
 # Python, numpy, pandas, pyarrow and the compiled kernels.
 BASE_MEMORY_BYTES = 350e6
@@ -52,8 +55,9 @@ def estimate(study: Study, jobs: int) -> Estimate:
     -------
     Estimate
         ``seconds`` of the sweep alone, without the first compilation of the kernels; ``optimise_seconds`` is the time
-        the optimiser may take, None without optimiser or budget.  If the pilot keeps no design, one in a thousand
-        is assumed.
+        the optimiser may take, None without optimiser or budget.  If the pilot keeps no design, one in a thousand is
+        assumed.  ``disk_bytes`` takes every result of a row as computed and free of repetition, which is too much where
+        rows of infeasible designs are kept or symmetries make values repeat.
     """
     from sweep.plan import choose_chunk_size, describe_columns, pilot, row_bytes
 
@@ -62,7 +66,9 @@ def estimate(study: Study, jobs: int) -> Estimate:
     designs = study.space.count
     kept = 1.0 if study.output.keep == "all" else max(found.feasible, LEAST_KEPT)
     results = sum(
-        8 if column.dtype == "float64" else 4 for column in describe_columns(study) if column.role == "output"
+        np.dtype(column.dtype).itemsize * (PACKED_ERROR if column.name.startswith("err_") else PACKED_RESULT)
+        for column in describe_columns(study)
+        if column.role == "output" and not column.name.startswith("rotatable")
     )
     sampled = len(study.space.axes) * SAMPLED_VALUE_BYTES if study.space.kind == "sobol" else 0.0
     work = designs * (found.seconds_per_design + SPACE_SECONDS + kept * WRITE_SECONDS_PER_ROW)
@@ -73,7 +79,7 @@ def estimate(study: Study, jobs: int) -> Estimate:
         jobs=jobs,
         kept=kept,
         memory_bytes=BASE_MEMORY_BYTES + jobs * COPIES_OF_A_CHUNK * min(chunk_size, designs) * row_bytes(study),
-        disk_bytes=designs * kept * (DISK_BYTES_PER_ROW + sampled + PACKED * results),
+        disk_bytes=designs * kept * (OTHER_BYTES_PER_ROW + sampled + results),
         seconds=work / (1.0 if jobs == 1 else jobs * THREAD_EFFICIENCY),
         optimise_seconds=None if study.optimise is None else study.optimise.time_budget,
     )

@@ -1,0 +1,90 @@
+"""The cost of a study before it starts, against what a run leaves behind; and the refusal over the budget."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from sweep.errors import BudgetError
+from sweep.study import Budget, Study, load_study
+from sweep.study.estimate import check_budget, estimate
+
+TEXT = """
+[study]
+name = "cost"
+[mechanism]
+family = "rssr"
+[scene]
+want = ["margin", "max_pressure_angle"]
+[design]
+a = "10 mm"
+b = { from = 30, to = 60, count = COUNT, unit = "mm" }
+c = { from = 20, to = 60, count = 50, unit = "mm" }
+e = "40 mm"
+f = "5 mm"
+g = "3 mm"
+alpha = { from = 0, to = 90, count = 10, unit = "deg" }
+[limits]
+rotatable = true
+[output]
+keep = "KEEP"
+"""
+
+
+def study(folder: Path, count: int = 40, keep: str = "feasible") -> Study:
+    (folder / "study.toml").write_text(TEXT.replace("COUNT", str(count)).replace("KEEP", keep))
+    return load_study(folder)
+
+
+def test_estimate_grows_with_the_designs(tmp_path: Path) -> None:
+    small, large = estimate(study(tmp_path), 2), estimate(study(tmp_path, 40_000), 2)
+    assert large.designs == 1000 * small.designs == 20_000_000
+    assert large.chunks == -(-large.designs // large.chunk_size)
+    assert large.seconds == pytest.approx(1000 * small.seconds, rel=0.2)
+    assert large.disk_bytes == pytest.approx(1000 * small.disk_bytes, rel=0.2)
+    assert large.memory_bytes < 2 * 2**30
+
+
+def test_two_workers_take_half_the_time_and_more_memory(tmp_path: Path) -> None:
+    one, two = estimate(study(tmp_path), 1), estimate(study(tmp_path), 2)
+    assert one.seconds == pytest.approx(1.94 * two.seconds)
+    assert one.memory_bytes < two.memory_bytes
+
+
+def test_dropping_infeasible_designs_saves_disk(tmp_path: Path) -> None:
+    some, everything = estimate(study(tmp_path), 2), estimate(study(tmp_path, keep="all"), 2)
+    assert everything.kept == 1.0
+    assert some.disk_bytes == pytest.approx(some.kept * everything.disk_bytes)
+
+
+def test_disk_estimate_is_close_to_that_of_a_run(tmp_path: Path) -> None:
+    from sweep.engine import run
+
+    question = study(tmp_path, 400)
+    expected = estimate(question, 2)
+    folder = run(question, tmp_path / "designs")
+    size = sum(part.stat().st_size for part in folder.glob("part-*"))
+    assert expected.disk_bytes / 1.5 < size < expected.disk_bytes * 1.5
+    assert len(list(folder.glob("part-*"))) == expected.chunks
+
+
+def test_within_the_budget_nothing_is_raised(tmp_path: Path) -> None:
+    question = study(tmp_path)
+    check_budget(question, estimate(question, 2))
+
+
+def test_over_the_budget_is_refused_with_both_reasons_and_exit_code_3(tmp_path: Path) -> None:
+    question = replace(study(tmp_path), budget=Budget(disk_bytes=1.0, seconds=1e-6))
+    with pytest.raises(BudgetError, match=r"time about .* \(budget.time\); disk about .* \(budget.disk\)") as caught:
+        check_budget(question, estimate(question, 2))
+    assert caught.value.exit_code == 3
+
+
+def test_the_default_budget_refuses_10_to_the_12_designs(tmp_path: Path) -> None:
+    text = TEXT.replace("count = 50", "count = 100000").replace("COUNT", "1000000").replace("KEEP", "feasible")
+    (tmp_path / "study.toml").write_text(text)
+    question = load_study(tmp_path)
+    with pytest.raises(BudgetError, match="1000000000000 designs on 2 workers"):
+        check_budget(question, estimate(question, 2))
