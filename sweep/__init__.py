@@ -2,10 +2,34 @@
 
 from __future__ import annotations
 
-from sweep.engine import run
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from sweep.errors import InputError, LinksweepError, StudyError
-from sweep.poses import evaluate
-from sweep.store import is_complete, load
-from sweep.summaries import summarise
+
+if TYPE_CHECKING:
+    from sweep.engine import run
+    from sweep.poses import evaluate
+    from sweep.store import is_complete, load
+    from sweep.summaries import summarise
 
 __all__ = ["InputError", "LinksweepError", "StudyError", "evaluate", "is_complete", "load", "run", "summarise"]
+
+# Imported when first used, so that the command line answers at once: numba alone takes a quarter of a second.
+_HOMES = {
+    "evaluate": "sweep.poses",
+    "is_complete": "sweep.store",
+    "load": "sweep.store",
+    "run": "sweep.engine",
+    "summarise": "sweep.summaries",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})
