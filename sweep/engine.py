@@ -220,11 +220,14 @@ def _optimise(study: Study, folder: Path) -> None:
     key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
     if note.get("optimised") == key and (folder / store.OPTIMUM).is_file():
         return
-    try:
-        optimise_study(study, folder)
-    except KeyboardInterrupt:
-        text = f"{folder}: stopped while optimising; all designs are kept, run again to continue"
-        raise Interrupted(signal.SIGINT, text) from None
+    store.write_plan(folder, note | {"optimised": None})
+    with stop_on_signal() as stop:
+        try:
+            optimise_study(study, folder, lambda: bool(stop))
+        except KeyboardInterrupt:
+            number = stop.signal_number or signal.SIGINT
+            text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
+            raise Interrupted(number, text) from None
     store.write_plan(folder, note | {"optimised": key})
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+WATCH, WATCH_SECONDS = "linksweep: is the parent there", 0.5
 
 
 class Stop:
@@ -46,7 +50,19 @@ def stop_on_signal() -> Iterator[Stop]:
             signal.signal(number, handler)
 
 
-def leave_to_parent() -> None:
-    """In a worker process: a signal sent to the whole group is the parent's affair."""
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
+def depend_on_parent(parent: int) -> None:
+    """In a worker process: leave signals, which a terminal sends to the whole group, to the parent, and die with it.
+
+    Without its parent a worker holds no lock on the folder and would wait for work for minutes.
+    """
+    if threading.current_thread() is threading.main_thread():
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+    if WATCH not in [thread.name for thread in threading.enumerate()]:
+        threading.Thread(target=_end_with, args=(parent,), name=WATCH, daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(WATCH_SECONDS)
+    os._exit(1)

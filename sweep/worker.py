@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from sweep.chunk import Dropped, compute_chunk
 from sweep.errors import LinksweepError
-from sweep.signals import leave_to_parent
+from sweep.signals import depend_on_parent
 from sweep.store import write_chunk
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def work(study: Study, plan: Plan, folder: Path, index: int, parent: int, stop: 
     """Compute and write one chunk.
 
     An error is handed back as a value: the other workers finish what they hold, and the parent raises it when all is
-    quiet.  A worker process gives up as soon as its parent is gone, so that nobody writes without the lock.
+    quiet.
 
     Parameters
     ----------
@@ -42,18 +42,15 @@ def work(study: Study, plan: Plan, folder: Path, index: int, parent: int, stop: 
     parent : process id of the engine
     stop : flag shared with the engine, None in another process
     """
-    elsewhere = os.getpid() != parent
-    if elsewhere:
-        leave_to_parent()
+    if os.getpid() != parent:
+        depend_on_parent(parent)
 
     def should_stop() -> bool:
-        return os.getppid() != parent if elsewhere else stop is not None and stop.is_set()
+        return stop is not None and stop.is_set()
 
     start, end = plan.bounds(index)
     try:
         result = compute_chunk(study, start, end, should_stop)
-        if should_stop() and elsewhere:
-            raise Dropped
         write_chunk(folder, plan, index, result)
     except Dropped:
         return Done(index, dropped=True)

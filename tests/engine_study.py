@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
 import time
 from pathlib import Path
@@ -10,6 +11,9 @@ from pathlib import Path
 import sweep.plan
 from sweep.engine import run
 from sweep.errors import LinksweepError
+
+# Plan and log are smaller than this, chunks larger.
+SMALL = 6000
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -55,14 +59,16 @@ def chunk_bytes(folder: Path) -> dict[str, bytes]:
 
 
 def main(study: str, out: str, jobs: str, backend: str, pause: str) -> None:
-    """Run with small chunks and a slow disk, so that signals find work in progress."""
+    """Run with small chunks and a slow disk, so that signals find chunks half-way to it."""
     sync = os.fsync
 
     def slow_sync(descriptor: int) -> None:
-        time.sleep(float(pause))
+        about = os.fstat(descriptor)
+        if stat.S_ISREG(about.st_mode) and about.st_size > SMALL:
+            time.sleep(float(pause))
         sync(descriptor)
 
-    os.fsync = slow_sync
+    os.fsync = slow_sync  # type: ignore[assignment]
     sweep.plan.CHUNK_SECONDS = 1e-9
     try:
         run(study, out, int(jobs), backend)  # type: ignore[arg-type]

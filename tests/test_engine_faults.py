@@ -124,18 +124,51 @@ def test_kill_at_random_moments_leaves_a_readable_folder_and_same_bytes_in_the_e
     assert not list(out.glob("_tmp-*"))
 
 
+def worker_processes(parent: int) -> list[int]:
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            command, about = (entry / "cmdline").read_bytes(), (entry / "stat").read_text()
+        except (FileNotFoundError, ProcessLookupError):  # ended while we looked
+            continue
+        if b"popen_loky" in command and about.rpartition(")")[2].split()[1] == str(parent):
+            found.append(int(entry.name))
+    return found
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
 def test_killed_worker_process_is_reported_and_finished_chunks_are_kept(
     path: Path, whole: dict[str, bytes], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
     process = start(path, out, backend="loky")
     wait_for_chunks(out, 1, process)
-    children = subprocess.run(["ps", "-o", "pid=,args=", "--ppid", str(process.pid)], capture_output=True, text=True)
-    workers = [int(line.split()[0]) for line in children.stdout.splitlines() if "popen_loky" in line]
-    os.kill(workers[0], signal.SIGKILL)
+    os.kill(worker_processes(process.pid)[0], signal.SIGKILL)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == WorkerDied.exit_code == 70, errors
     assert "finished chunks are kept" in errors
+    run(path, out)
+    assert chunk_bytes(out) == whole
+
+
+def test_worker_processes_end_with_their_killed_parent(path: Path, whole: dict[str, bytes], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = start(path, out, backend="loky")
+    wait_for_chunks(out, 1, process)
+    workers = worker_processes(process.pid)
+    assert len(workers) == 2 and all(is_running(pid) for pid in workers)
+    process.kill()
+    process.communicate(timeout=30)
+    deadline = time.monotonic() + 20.0
+    while any(is_running(pid) for pid in workers):
+        assert time.monotonic() < deadline, "a worker outlives its parent"
+        time.sleep(0.05)
     run(path, out)
     assert chunk_bytes(out) == whole
 
