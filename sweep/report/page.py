@@ -28,19 +28,11 @@ CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
 
 def write(folder: Path, out: Path) -> Path:
     """Write everything the report consists of into ``out`` and return the path of ``report.html``."""
-    data = read_dataset(folder)
-    objective = data.study.objective.output if data.study.objective is not None else None
-    cells = divided_axes(data.study)
-    found = scan(data.parts, cells, objective, data.second if objective is not None else None)
-    data = replace(data, best=found.best_row or None)
-    if data.optima is None:
-        data = replace(data, computed_reference=reference_row(data.study))
-    if data.curves is None and data.study.output.curves != "none":
-        data = replace(data, curves=curves(data.study, marked(data)))
+    data, found, cells = gather(folder)
     try:
         out.mkdir(parents=True, exist_ok=True)
         with house_style():
-            figures = draw(data, found, cells, objective, out / "figures")
+            figures = draw(data, found, cells, out / "figures")
         copy_tables(folder, out)
         write_survivors(data.parts, out / "survivors.parquet")
         target = out / "report.html"
@@ -50,6 +42,25 @@ def write(folder: Path, out: Path) -> Path:
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
     return target
+
+
+def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
+    """Read a dataset, go once through its rows, and compute what an optimiser would have left."""
+    data = read_dataset(folder)
+    cells = divided_axes(data.study)
+    objective = objective_of(data.study)
+    found = scan(data.parts, cells, objective, data.second if objective is not None else None)
+    data = replace(data, best=found.best_row or None)
+    if data.optima is None:
+        data = replace(data, computed_reference=reference_row(data.study))
+    if data.curves is None and data.study.output.curves != "none":
+        data = replace(data, curves=curves(data.study, marked(data)))
+    return data, found, cells
+
+
+def objective_of(study: Study) -> str | None:
+    """The output that is to be small, if the study names one."""
+    return None if study.objective is None else study.objective.output
 
 
 def divided_axes(study: Study) -> list[Cells]:
@@ -68,9 +79,10 @@ def divided_axes(study: Study) -> list[Cells]:
     return [Cells.of_values(axis.name, axis.values, most) for axis in swept if axis.values is not None]
 
 
-def draw(data: Dataset, found: Scan, cells: list[Cells], objective: str | None, folder: Path) -> dict[str, Saved]:
+def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[str, Saved]:
     """Every figure the data allow, saved; keys are the names the template knows."""
     study, figures = data.study, {}
+    objective = objective_of(study)
     shown = None if objective is None else quantity(objective, data.units.get(objective, ""))
     by_name = {c.name: c for c in cells}
     marks = {role: row for role, row in marked(data).items() if row is not None}

@@ -41,6 +41,8 @@ def curves(study: Study, rows: Mapping[str, Mapping[str, Any] | None]) -> pd.Dat
     names = [name for name in family.pose_names if SHOWN.fullmatch(name) or COORDINATE.fullmatch(name)]
     matrix = np.array([[float(row[p]) for p in family.parameter_names] for row in known.values()])
     phi = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
-    columns = family.poses(matrix.reshape(len(known), -1), Angles.of(phi[None, :]), frozenset(names))
+    columns = family.poses(
+        matrix.reshape(len(known), len(family.parameters)), Angles.of(phi[None, :]), frozenset(names)
+    )
     head = {"role": np.repeat(list(known), POSES), "phi": np.tile(phi, len(known))}
     return pd.DataFrame(head | {name: columns[name].ravel() for name in [*names, "status"]})
