@@ -144,15 +144,19 @@ class Curves:
             return points
         held = points.how == STATIONARY
         phi = points.phi.copy()
-        for _ in range(20):
+        reach, uphill = np.full(len(phi), stride), np.zeros(len(phi))
+        for _ in range(12):
             slope, curvature, pace, place = self._local(design, phi, points)
             move = np.zeros(len(phi))
             peak = held & (points.sense * curvature < 0.0)
             move[peak] = -slope[peak] / curvature[peak]
             climb = held & ~peak
-            move[climb] = points.sense[climb] * np.sign(slope[climb]) * stride
+            move[climb] = np.copysign(stride, points.sense * slope)[climb]
             self._approach_edges(points, phi, place, pace, move)
-            move = np.nan_to_num(np.clip(move, -stride, stride), nan=0.0)
+            # Who turned round has stepped over the extremum: shorter steps from now on.
+            reach[uphill * move < 0.0] *= 0.5
+            uphill = move
+            move = np.nan_to_num(np.clip(move, -reach, reach), nan=0.0)
             phi += move
             if np.abs(move).max() < 1e-7:
                 break

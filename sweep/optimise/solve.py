@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -13,8 +14,9 @@ from kernels import status as st
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.optimise.certificate import AGREE, Result, in_words
-from sweep.optimise.descent import Descent, State, Stopped, deadline
+from sweep.optimise.descent import Descent
 from sweep.optimise.form import Program
+from sweep.optimise.model import State, Stopped
 from sweep.optimise.problem import PLACE, Problem
 
 if TYPE_CHECKING:
@@ -48,7 +50,7 @@ def minimise(
     if starts.size == 0 or starts.shape[1] != len(problem.family.parameters):
         raise InputError("starts", starts.shape, f"at least one row of {len(problem.family.parameters)} values", PLACE)
     program = Program(problem)
-    asked = deadline(settings.time_budget, stop)
+    asked = _deadline(settings.time_budget, stop)
     results: list[Result] = []
     for number, start in enumerate(starts):
         if results and asked():
@@ -63,7 +65,7 @@ def minimise(
             ended = "time"
         except KeyboardInterrupt:
             ended = "interrupted"
-        descent.stop = lambda: False
+        descent.model.stop = lambda: False
         results.append(_result(number, problem, program, descent, ended))
         if ended == "interrupted":
             break
@@ -89,6 +91,12 @@ def _agrees(r: Result, best: Result) -> bool:
     return abs(r.objective - best.objective) <= AGREE * max(abs(best.objective), 1e-300)
 
 
+def _deadline(seconds: float | None, stop: Callable[[], bool] | None) -> Callable[[], bool]:
+    """A question to ask often: is the time used up, or does the caller want to stop?"""
+    end = math.inf if seconds is None else time.monotonic() + seconds
+    return lambda: time.monotonic() >= end or (stop is not None and stop())
+
+
 def _after_first(asked: Callable[[], bool]) -> Callable[[], bool]:
     calls = iter(range(3))
     return lambda: next(calls, None) is None and asked()
@@ -97,14 +105,14 @@ def _after_first(asked: Callable[[], bool]) -> Callable[[], bool]:
 def _result(number: int, problem: Problem, program: Program, descent: Descent, ended: str) -> Result:
     state = descent.best
     exists = math.isfinite(state.objective) and math.isfinite(state.violation)
-    value = program.value(program.objective, state.form, descent.curves, state.design, state.atoms)
+    value = program.value(program.objective, state.form, descent.model.curves, state.design, state.atoms)
     residual, words = math.nan, {}
     if exists:
-        found = descent.certificate(state)
+        found = descent.model.certificate(state)
         residual = found.residual
         words = in_words(state.form.labels, found, problem.variables)
     values = {
-        r.measure.name: program.value(r.measure, state.form, descent.curves, state.design, state.atoms)
+        r.measure.name: program.value(r.measure, state.form, descent.model.curves, state.design, state.atoms)
         for r in program.requirements
     }
     if not state.feasible:

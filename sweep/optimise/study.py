@@ -11,11 +11,13 @@ import numpy as np
 
 from kernels import status as st
 from sweep import store
+from sweep.chunk import parameter_matrix
 from sweep.errors import InputError
 from sweep.families.base import Angles, Array
+from sweep.fit import fit_line
 from sweep.optimise.certificate import CAVEAT, Result
-from sweep.optimise.descent import Descent
 from sweep.optimise.form import Program
+from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
 from sweep.optimise.solve import minimise
 from sweep.optimise.starts import from_dataset, from_sample, sign_choices
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 POSES = 720
+PILOT, PILOT_RUNS, PILOT_TAILS = 256, 64, (5.0, 95.0)
 _DRAWN = re.compile(r"(pressure_angle|[xyz]_[a-z])\d*")
 
 TEXTS = {
@@ -53,12 +56,35 @@ def problem_of(study: Study) -> Problem:
         raise InputError("objective", None, "[objective] minimise = an output", str(study.path))
     steady = {p.name for p in study.family.parameters if p.choices is None}
     bounds = {name: ends for name, ends in study.space.bounds.items() if name in steady and ends[0] < ends[1]}
+    bounds |= _fitted_bounds(study)
+    for limit in study.parameter_limits:
+        low, high = bounds.get(limit.output, (-np.inf, np.inf))
+        low = low if limit.minimum is None else max(low, limit.minimum)
+        high = high if limit.maximum is None else min(high, limit.maximum)
+        if limit.output in bounds:
+            bounds[limit.output] = low, high
     held = {name: ends[0] for name, ends in study.space.bounds.items() if name in steady and ends[0] == ends[1]}
     names = tuple(name for name in study.family.parameter_names if name in bounds)
     return Problem(
         study.family, names, np.array([bounds[n][0] for n in names]), np.array([bounds[n][1] for n in names]),
-        dict(study.space.fixed) | held, study.objective.output, study.limits, study.window, study.accuracy,
+        dict(study.space.fixed) | held, study.objective.output, study.output_limits, study.window, study.accuracy,
     )  # fmt: skip
+
+
+def _fitted_bounds(study: Study) -> dict[str, tuple[float, float]]:
+    """Where [fit] sets or scales parameters they become variables: bounds from what it made of designs of the space."""
+    if study.fit is None:
+        return {}
+    length = min(PILOT, study.space.count)
+    starts = sorted({k * (study.space.count - length) // PILOT_RUNS for k in range(PILOT_RUNS + 1)})
+    pilot = np.concatenate([parameter_matrix(study, start, start + length) for start in starts])
+    fitted, status = fit_line(study.family, pilot, study.fit, study.window)
+    fitted = fitted[status == st.OK]
+    names = {*study.fit.parameters(study.family), *study.fit.rescaled(study.family)}
+    columns = {name: fitted[:, study.family.parameter_names.index(name)] for name in sorted(names)}
+    # The tails belong to needles that hardly move and were scaled up to the stroke.
+    found = {name: np.percentile(values, PILOT_TAILS) for name, values in columns.items() if values.size}
+    return {name: (float(low), float(high)) for name, (low, high) in found.items() if low < high}
 
 
 def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | None = None) -> Path:
@@ -128,8 +154,8 @@ def _table(study: Study, problem: Problem, results: list[Result]) -> dict[str, A
 def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
     """The study's reference design (1, P), which may lie outside the bounds, and its largest violation."""
     design, _ = design_matrix(study.family, study.reference or {})
-    descent = Descent(problem, Program(problem), design[0], lambda: False)
-    return design, descent.state(problem.scaled(design)[0]).violation
+    model = Model(problem, Program(problem), design[0], lambda: False)
+    return design, model.state(problem.scaled(design)[0]).violation
 
 
 def _outputs(study: Study, designs: Array) -> dict[str, Any]:

@@ -1,0 +1,140 @@
+"""A start's mechanism as the searches see it: true extrema of a design, rows of its program, their gradients."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sweep.families.base import Array
+from sweep.optimise.certificate import Multipliers, multipliers
+from sweep.optimise.form import Form, Program
+from sweep.optimise.gradients import gradients, scalar_gradient
+from sweep.optimise.points import Curves, Points
+from sweep.optimise.problem import Problem
+
+FEASIBLE = 1e-9  # largest scaled violation of a feasible design
+PRICE = 10.0  # of a unit of scaled violation when two designs are compared, until multipliers are known
+SAMPLES = 256  # poses per turn on which extrema are looked for
+NOT_TURNING = 1e6  # added to the violation of a design some of whose limits do not exist
+
+
+class Stopped(Exception):
+    """The time budget is used up, or the caller wants to stop."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A design with its true extrema: objective (in units of the start's) and largest scaled violation."""
+
+    fractions: Array
+    design: Array
+    form: Form
+    atoms: Array
+    objective: float
+    violation: float
+
+    def merit(self, price: float) -> float:
+        """Objective and violation in one number; infinite where the objective does not exist."""
+        return self.objective + price * self.violation
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every limit is kept."""
+        return self.violation <= FEASIBLE
+
+    @property
+    def short(self) -> float:
+        """What the elastic program makes small; designs that do not turn rank behind all that do."""
+        known = self.form.known_violation(self.atoms)
+        return known if self.form.complete else known + NOT_TURNING
+
+
+class Model:
+    """One start: its signs and fixed parameters, the scale of its objective, and who may stop the search.
+
+    Parameters
+    ----------
+    problem, program : what to minimise
+    start : (P,) design; its signs are kept
+    stop : asked at every evaluation; true ends the search by :class:`Stopped`
+    """
+
+    def __init__(self, problem: Problem, program: Program, start: Array, stop: Callable[[], bool]) -> None:
+        self.problem, self.program, self.stop, self.base = problem, program, stop, start
+        self.curves = Curves(problem, program.series)
+        self.samples = problem.accuracy.samples or SAMPLES
+        self.scale, self.price = 1.0, PRICE
+        if program.objective.inner == "same":
+            size = abs(self.state(problem.scaled(start[None, :])[0]).objective)
+            self.scale = size if 1e-12 < size < math.inf else 1.0
+
+    def check(self) -> None:
+        """Raise :class:`Stopped` if the search is to end."""
+        if self.stop():
+            raise Stopped
+
+    def design(self, fractions: Array) -> Array:
+        """Design (P,) with its variables at the fractions of their bounds."""
+        return self.problem.placed(self.base, fractions)
+
+    def state(self, fractions: Array, samples: int | None = None) -> State:
+        """True extrema of a design, looked for on ``samples`` poses and refined."""
+        self.check()
+        design = self.design(fractions)
+        points, turns = self.curves.scan(design, samples or self.samples)
+        form = self.program.lay_out(self.curves, design, points, turns, self.scale)
+        atoms = self.atoms(fractions, form, points)
+        return State(fractions, design, form, atoms, form.objective(atoms), form.violation(atoms))
+
+    def with_points(self, at: State, extra: Points) -> Form:
+        """The form of a design with further points at fixed crank angles."""
+        if not len(extra):
+            return at.form
+        points = Points.joined(at.form.points, self.curves.follow(at.design, extra))
+        return self.program.lay_out(self.curves, at.design, points, at.form.complete, self.scale)
+
+    def atoms(self, fractions: Array, form: Form, points: Points) -> Array:
+        """What the form's rows are made of: curves at the points, their angles, plain numbers."""
+        scalars = [self._scalar(name, fractions[None, :])[0] for name in form.scalars]
+        return np.concatenate([points.value, points.phi, scalars])
+
+    def moved(self, fractions: Array, form: Form, points: Points) -> tuple[Points, Array]:
+        """The points followed to another design, and the atoms there."""
+        self.check()
+        there = self.curves.follow(self.design(fractions), points)
+        return there, self.atoms(fractions, form, there)
+
+    def jacobian(self, fractions: Array, form: Form, points: Points) -> Array:
+        """Gradients (R, n) of the form's rows by the scaled variables, at followed points."""
+        values, moves = gradients(self.curves, self.design(fractions), points, self.program.places)
+        scalars = [
+            scalar_gradient(lambda f, name=name: self._scalar(name, f), fractions)[None, :] for name in form.scalars
+        ]
+        jacobian = np.concatenate([values, moves, *scalars])
+        # The angle of an extremum that no row asks for may have no derivative; it must not spoil the others.
+        jacobian[~form.matrix.any(axis=0)] = 0.0
+        return form.matrix @ jacobian
+
+    def certificate(self, state: State) -> Multipliers:
+        """Multipliers and residual of the optimality conditions at a checked design."""
+        jacobian = self.jacobian(state.fractions, state.form, state.form.points)
+        return multipliers(state.form, state.form.rows(state.atoms, state.objective), jacobian, state.fractions)
+
+    def learn_price(self, state: State) -> None:
+        """Price violations at twice what the multipliers of the limits say they are worth (exact penalty).
+
+        A higher price than needed forbids steps along curved limits that a later step would bring back.
+        """
+        weights = self.certificate(state).weights
+        limits = [abs(w) for w, label in zip(weights, state.form.labels, strict=True) if label.side != "objective"]
+        self.price = max(2.0 * float(sum(limits)), 0.1)
+
+    def _scalar(self, name: str, fractions: Array) -> Array:
+        from sweep.summaries import design_outputs
+
+        designs = np.array([self.design(row) for row in fractions])
+        columns = design_outputs(self.problem.family, designs, [name], self.problem.accuracy, self.problem.window)
+        return np.asarray(columns[name], dtype=np.float64)

@@ -1,0 +1,83 @@
+"""scipy's SLSQP on the epigraph program: the next design, from far away."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sweep.families.base import Array
+from sweep.optimise.form import Form
+from sweep.optimise.model import Model, State
+
+ITERATIONS = 60
+
+
+def propose(model: Model, at: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:
+    """Minimise t under the rows of a form, at most ``radius`` away in every scaled variable.
+
+    Parameters
+    ----------
+    model, at : the start and its present design
+    form : rows; their points are followed as the design moves
+    t : value to begin with
+    radius : of the box the search may not leave
+    floor : lower bound of t, if any
+
+    Returns
+    -------
+    The scaled variables (n,) and the t reached with these rows.
+    """
+    trail = _Trail(model, form)
+    low, high = np.maximum(at.fractions - radius, 0.0), np.minimum(at.fractions + radius, 1.0)
+    begin = np.concatenate([at.fractions, [t]])
+    bounds = [*zip(low, high, strict=True), (floor, None)]
+    z = minimise_last(begin, bounds, form.equal, trail.rows, trail.jacobian, ITERATIONS)
+    return np.clip(z[:-1], low, high), float(z[-1])
+
+
+def minimise_last(
+    begin: Array, bounds: Any, equal: Any, rows: Any, jacobian: Any, iterations: int, objective: Any = None
+) -> Array:
+    """Run SLSQP; the objective is the last variable unless another (value and gradient) is given."""
+    from scipy.optimize import minimize
+
+    gradient = np.zeros(len(begin))
+    gradient[-1] = 1.0
+    last = (lambda z: (z[-1], gradient)) if objective is None else objective
+    constraints = [
+        {"type": kind, "fun": lambda z, own=own: rows(z)[own], "jac": lambda z, own=own: jacobian(z)[own]}
+        for kind, own in (("ineq", ~equal), ("eq", equal))
+        if own.any()
+    ]
+    run: Any = minimize
+    options = {"maxiter": iterations, "ftol": 1e-13}
+    found = run(last, begin, jac=True, method="SLSQP", bounds=bounds, constraints=constraints, options=options)
+    return np.asarray(found.x, np.float64) if np.isfinite(found.x).all() else begin
+
+
+class _Trail:
+    """Rows and gradients along one SLSQP run; the points are followed from the last design that took a gradient."""
+
+    def __init__(self, model: Model, form: Form) -> None:
+        self.model, self.form = model, form
+        self.origin = self.points = form.points
+        self.seen = self.atoms = np.empty(0)
+        self.slopes: Array | None = None
+
+    def _move(self, z: Array) -> None:
+        if not np.array_equal(self.seen, z[:-1]):
+            self.points, self.atoms = self.model.moved(z[:-1], self.form, self.origin)
+            self.seen, self.slopes = z[:-1].copy(), None
+
+    def rows(self, z: Array) -> Array:
+        self._move(z)
+        return self.form.rows(self.atoms, z[-1])
+
+    def jacobian(self, z: Array) -> Array:
+        self._move(z)
+        if self.slopes is None:
+            self.slopes = self.model.jacobian(z[:-1], self.form, self.points)
+            if np.isfinite(self.points.value).all():
+                self.origin = self.points
+        return np.column_stack([np.nan_to_num(self.slopes, posinf=0.0, neginf=0.0), self.form.slack])
