@@ -126,7 +126,7 @@ def _pretty_unit(unit: str) -> str:
 def number(value: float, digits: int = 5) -> str:
     """A number as it is set in a table: significant digits, no trailing zeros, powers of ten written out."""
     if not math.isfinite(value):
-        return "–" if math.isnan(value) else "∞"
+        return "–" if math.isnan(value) else "∞" if value > 0.0 else "−∞"
     if value == 0.0:
         return "0"
     if 1e-4 <= abs(value) < 1e6:

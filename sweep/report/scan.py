@@ -160,9 +160,8 @@ def most_telling(found: Scan) -> tuple[str, str] | None:
             continue
         # A cell without a feasible design tells as much as the worst one that has.
         filled = np.where(reached, grid.best, grid.best[reached].max())
-        size = float(np.abs(filled).mean())
         share = grid.count / max(float(grid.count.max()), 1.0)
-        scores[pair] = (float(filled.std()) / size if size > 0.0 else 0.0, float(share.std()))
+        scores[pair] = float(filled.std()), float(share.std())
     return max(scores, key=lambda pair: scores[pair]) if scores else None
 
 
