@@ -231,7 +231,7 @@ class _Layout:
         return float(self.design[names.index(chosen)]) if chosen else 1.0
 
     def _turns(self, k: int) -> float:
-        return -2.0 * math.pi * math.floor(self.points.phi[k] / (2.0 * math.pi))
+        return -2.0 * math.pi * math.floor(float(self.points.phi[k]) / (2.0 * math.pi))
 
     def _ends(self, series: Sequence[Series]) -> tuple[list[int], list[int]]:
         """Points that are maxima, highest first, and minima, lowest first, of some series."""

@@ -78,4 +78,5 @@ def scalar_gradient(function: Any, fractions: Array) -> Array:
         moved = np.repeat(fractions[None, :], 5, axis=0)
         moved[:, j] += nodes * step
         samples.append(moved)
-    return np.sum(np.reshape(function(np.concatenate(samples)), (n, 5)) * np.array(weights), axis=1)
+    values = np.reshape(function(np.concatenate(samples)), (n, 5))
+    return np.asarray(np.sum(values * np.array(weights), axis=1), np.float64)

@@ -116,7 +116,7 @@ class Model:
         jacobian = np.concatenate([values, moves, *scalars])
         # The angle of an extremum that no row asks for may have no derivative; it must not spoil the others.
         jacobian[~form.matrix.any(axis=0)] = 0.0
-        return form.matrix @ jacobian
+        return np.asarray(form.matrix @ jacobian, np.float64)
 
     def certificate(self, state: State) -> Multipliers:
         """Multipliers and residual of the optimality conditions at a checked design."""

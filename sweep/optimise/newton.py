@@ -12,6 +12,7 @@ from sweep.families.base import Array
 from sweep.optimise.certificate import Multipliers, multipliers
 from sweep.optimise.form import Form
 from sweep.optimise.model import Model, State
+from sweep.optimise.points import Index
 from sweep.optimise.slsqp import minimise_last
 
 DIFFERENCE = 1e-5  # of the scaled variables; gradients are good to 1e-12, so the Hessian is to 1e-5
@@ -48,7 +49,7 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
     return np.clip(at.fractions + best[:-1], 0.0, 1.0), t + float(best[-1])
 
 
-def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Array) -> Array:
+def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index) -> Array:
     """Second derivatives of the Lagrangian by the free variables, from differences of exact gradients."""
     base = found.weights @ np.nan_to_num(model.jacobian(at.fractions, form, form.points))
     columns = []
@@ -59,7 +60,7 @@ def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Array
         points, _ = model.moved(moved, form, form.points)
         columns.append((found.weights @ np.nan_to_num(model.jacobian(moved, form, points)) - base)[free] / -step)
     square = np.array(columns)
-    return 0.5 * (square + square.T)
+    return np.asarray(0.5 * (square + square.T), np.float64)
 
 
 def _quadratic(curvature: Array, full: Array, rows: Array, form: Form, bounds: list[tuple[object, object]]) -> Array:

@@ -103,7 +103,7 @@ class Curves:
         Only maxima in the upper half of a curve's range and minima in the lower half are kept.  A curve that is not
         defined over the whole turn has none.
         """
-        phi = np.arange(samples) * (2.0 * math.pi / samples)
+        phi: Array = np.arange(samples, dtype=np.float64) * (2.0 * math.pi / samples)
         columns = self.poses(design[None, :], phi)
         turns = not columns["status"].any()
         rows: list[tuple[int, float, float, int, float, float]] = []

@@ -94,7 +94,7 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     ----------
     study : with an objective and [optimise]
     folder : its dataset; where it has no feasible row, the starts come from a sample of the same bounds
-    stop : asked often; true ends the search, the best so far is written
+    stop : asked often; true ends the search as Ctrl-C does
 
     Returns
     -------
@@ -107,7 +107,7 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     StoreError
         if the folder cannot be written
     KeyboardInterrupt
-        again, after the best so far was written.
+        if the search was stopped, after the best so far was written.
     """
     place = Path(folder)
     if study.optimise is None:
@@ -120,7 +120,7 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     frame = _table(study, problem, results)
     _write(place / store.OPTIMUM, frame, study)
     _write(place / store.CURVES, _curves(study, frame), study)
-    if any(result.ended == "interrupted" for result in results):
+    if any(result.ended == "interrupted" for result in results) or (stop is not None and stop()):
         raise KeyboardInterrupt
     return place / store.OPTIMUM
 
@@ -174,7 +174,7 @@ def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
     if study.output.curves == "none":
         shown = []
     designs = np.array([[table[name][k] for name in family.parameter_names] for k in shown])
-    phi = np.arange(POSES) * (2.0 * np.pi / POSES)
+    phi: Array = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
     columns = family.poses(
         designs.reshape(len(shown), len(family.parameters)), Angles.of(phi[None, :]), frozenset(wanted)
     )
