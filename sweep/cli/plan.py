@@ -21,9 +21,11 @@ def plan_lines(study: Study, cost: Estimate) -> list[str]:
     study : checked study
     cost : its estimate
     """
+    from sweep.chunk import ordered_routes
+    from sweep.plan import PARAMETER_UNITS
     from sweep.report.answer import bound_words
     from sweep.report.quantities import quantity
-    from sweep.summaries import output, routes
+    from sweep.summaries import output
 
     lines = [f"{study.name}: {study.title}" if study.title else study.name]
     lines += [f"mechanism {study.family.name} ({study.family.title})"]
@@ -35,9 +37,9 @@ def plan_lines(study: Study, cost: Estimate) -> list[str]:
 
     limits = {
         limit.output: bound_words(limit, quantity(limit.output, output(study.family, limit.output).unit))
-        for limit in study.limits
+        for limit in study.output_limits
     }
-    found = routes(study.family, study.want, study.accuracy)
+    found = ordered_routes(study)
     lines += ["", f"will be computed, {_accuracy(study)}; only designs within the limits so far go on to the next line"]
     lines += aligned(
         [
@@ -49,6 +51,14 @@ def plan_lines(study: Study, cost: Estimate) -> list[str]:
             for k, route in enumerate(found, 1)
         ]
     )
+    if study.fit is not None:
+        aim = "" if study.fit.stroke is None else f", scaled to a stroke of {study.fit.stroke:g} mm"
+        names = ", ".join(study.fit.parameters(study.family))
+        lines += ["", f"fitted to the straightest line{aim}, as soon as no earlier stage is left to test: {names}"]
+    if study.parameter_limits:
+        units = {p.name: PARAMETER_UNITS[p.unit] for p in study.family.parameters}
+        words = [f"{x.output} {bound_words(x, quantity(x.output, units[x.output]))}" for x in study.parameter_limits]
+        lines += ["", f"limits on parameters: {'; '.join(words)}"]
     left = [name for name in main_outputs(study.family) if name not in study.want]
     lines += ["", "will not be computed, because nothing asks for it", f"  {', '.join(left)}"]
     if study.objective is not None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sweep.cli.listing import family_names
-from sweep.errors import InputError
+from sweep.errors import InputError, StoreError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -109,6 +109,7 @@ def checked_format(out: Path | None) -> Path | None:
 def read_table(path: Path) -> pd.DataFrame:
     """Read designs from Parquet or CSV; a file that is neither is an :class:`InputError`."""
     import pandas as pd
+    from pyarrow import csv
 
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
@@ -116,9 +117,10 @@ def read_table(path: Path) -> pd.DataFrame:
     try:
         if suffix == ".parquet":
             return pd.read_parquet(path)
-        # The default parser of pandas is off by an ulp for some numbers.
-        return pd.read_csv(path, float_precision="round_trip", skipinitialspace=True)
-    except (ValueError, OSError) as error:  # pandas and pyarrow derive all their complaints about content from these
+        # Not the parser of pandas, whose default was off by an ulp for some numbers up to version 2.
+        table = csv.read_csv(path)
+        return table.rename_columns([name.strip() for name in table.column_names]).to_pandas()
+    except (ValueError, OSError) as error:  # pyarrow derives all its complaints about content from these
         raise InputError("table", path.name, f"readable {suffix[1:]} ({error})", str(path)) from error
 
 
@@ -134,5 +136,7 @@ def write_table(frame: pd.DataFrame, out: Path | None) -> None:
         else:
             frame.to_csv(partial, index=False)
         partial.replace(out)
+    except OSError as error:
+        raise StoreError(f"--out {out}: cannot be written: {error}") from error
     finally:
         partial.unlink(missing_ok=True)
