@@ -18,7 +18,7 @@ SINGULAR = 8
 NOT_OSCILLATING = 9
 JAMMED = 10
 NOT_LINEAR = 11
-NO_DWELL = 11
+NO_DWELL = 12
 
 MEANING: dict[int, str] = {
     OK: "ok",

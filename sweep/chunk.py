@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 from kernels import status as codes
 from sweep.errors import InputError
 from sweep.families.base import Array, Columns
-from sweep.summaries import design_outputs, routes
+from sweep.fit import fit_line
+from sweep.summaries import Route, design_outputs, routes
 from sweep.tables import design_matrix
 
 if TYPE_CHECKING:
@@ -26,6 +28,9 @@ MAGNITUDES = ("swing", "stroke")
 
 # With these one output is missing or rough, the others are worth having where all rows are kept.
 PARTIAL = (codes.NOT_OSCILLATING, codes.NOT_CONVERGED)
+
+
+Rows: TypeAlias = NDArray[np.intp]
 
 
 class Dropped(Exception):
@@ -42,8 +47,9 @@ class ChunkResult:
 
 @dataclass(frozen=True)
 class Cascade:
-    """Outputs and status of some designs, each (n,), and how many designs each route was run on."""
+    """Finished designs (n, P), their outputs and status, each (n,), and how many designs each route was run on."""
 
+    designs: Array
     outputs: dict[str, Array]
     status: NDArray[np.uint8]
     reached: tuple[int, ...]
@@ -83,12 +89,16 @@ def cascade(study: Study, designs: Array) -> Cascade:
         miss one, otherwise the status of the kernel that could not answer.
     """
     n = len(designs)
+    designs = designs.copy()
     outputs = {name: np.full(n, np.nan) for name in output_columns(study)}
     status = np.zeros(n, np.uint8)
     alive = np.arange(n)
+    finished = False
     go_on = (codes.OK,) if study.output.keep == "feasible" else (codes.OK, *PARTIAL)
     reached = []
-    for route in routes(study.family, study.want, study.accuracy):
+    for route in ordered_routes(study):
+        if not finished and not _before_fit(study, route):
+            alive, finished = _finish(study, designs, status, alive), True
         reached.append(alive.size)
         if alive.size == 0:
             continue
@@ -96,12 +106,42 @@ def cascade(study: Study, designs: Array) -> Cascade:
         for name in outputs.keys() & found.keys():
             outputs[name][alive] = found[name]
         fate = np.where(status[alive] == codes.OK, found["status"], status[alive])
-        for limit in study.limits:
+        for limit in study.output_limits:
             if limit.output in found:
                 fate[(fate == codes.OK) & ~meets(limit, found[limit.output])] = codes.LIMIT_EXCEEDED
         status[alive] = fate
         alive = alive[np.isin(fate, go_on)]
-    return Cascade(outputs, status, tuple(reached))
+    if not finished:
+        _finish(study, designs, status, alive)
+    return Cascade(designs, outputs, status, tuple(reached))
+
+
+def ordered_routes(study: Study) -> tuple[Route, ...]:
+    """The routes of a study, cheapest first, those that must wait for [fit] behind the others."""
+    found = routes(study.family, study.want, study.accuracy)
+    return tuple(sorted(found, key=lambda route: not _before_fit(study, route)))
+
+
+def _before_fit(study: Study, route: Route) -> bool:
+    """Whether the route concerns only stages before the one that [fit] finishes."""
+    if study.fit is None:
+        return False
+    last = len(study.families)
+    numbers = [re.search(r"(\d+)$", name) for name in route.outputs]
+    return all(number is not None and int(number[1]) < last for number in numbers)
+
+
+def _finish(study: Study, designs: Array, status: NDArray[np.uint8], alive: Rows) -> Rows:
+    """Fit the designs that are left, in place, drop those whose parameters exceed their limits; the rows that go on."""
+    if study.fit is not None and alive.size:
+        designs[alive], fate = fit_line(study.family, designs[alive], study.fit, study.window)
+        status[alive] = fate
+        alive = alive[fate == codes.OK]
+    for limit in study.parameter_limits:
+        kept = meets(limit, designs[alive, study.family.parameter_names.index(limit.output)])
+        status[alive[~kept]] = codes.LIMIT_EXCEEDED
+        alive = alive[kept]
+    return alive
 
 
 def warm(study: Study) -> None:
@@ -109,7 +149,9 @@ def warm(study: Study) -> None:
     count = study.space.count
     starts = sorted({k * (count - 1) // 7 for k in range(8)})
     designs = np.concatenate([parameter_matrix(study, start, start + 1) for start in starts])
-    for route in routes(study.family, study.want, study.accuracy):
+    if study.fit is not None:
+        designs, _ = fit_line(study.family, designs, study.fit, study.window)
+    for route in ordered_routes(study):
         design_outputs(study.family, designs, route.outputs, study.accuracy, study.window)
 
 
@@ -174,6 +216,6 @@ def _block(study: Study, start: int, stop: int, counts: NDArray[np.int64]) -> Co
     if study.output.keep == "feasible":
         rows = np.flatnonzero(result.status == codes.OK)
     columns: Columns = {"design": start + rows.astype(np.int64)}
-    columns |= {name: matrix[rows, k] for k, name in enumerate(study.family.parameter_names)}
+    columns |= {name: result.designs[rows, k] for k, name in enumerate(study.family.parameter_names)}
     columns |= {name: result.outputs[name][rows].astype(dtype) for name, dtype in output_columns(study).items()}
     return columns | {"status": result.status[rows]}

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from kernels.status import OK
-from sweep.chunk import BLOCK, cascade, output_columns, parameter_matrix
+from sweep.chunk import BLOCK, cascade, ordered_routes, output_columns, parameter_matrix
 from sweep.families.base import Family
-from sweep.summaries import output, routes
+from sweep.summaries import output
 
 if TYPE_CHECKING:
     from sweep.study import Study
@@ -145,7 +145,7 @@ def pilot(study: Study) -> Pilot:
     starts = sorted({int((k * golden) % 1.0 * (count - length + 1)) for k in range(PILOT_RUNS)})
     designs = np.concatenate([parameter_matrix(study, start, start + length) for start in starts])
     found = cascade(study, designs)
-    costs = [route.ns_per_design for route in routes(study.family, study.want, study.accuracy)]
+    costs = [route.ns_per_design for route in ordered_routes(study)]
     nanoseconds = sum(n * cost for n, cost in zip(found.reached, costs, strict=True))
     return Pilot(1e-9 * nanoseconds / len(designs), float(np.mean(found.status == OK)))
 

@@ -32,6 +32,9 @@ FINEST_TARGET = 1e-14
 MOST_SAMPLES = 2**20
 FEWEST_SAMPLES = 8
 
+# With these some outputs are missing or rough, the others are worth having.
+PARTIAL = (st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL)
+
 
 class Route(NamedTuple):
     """Some design outputs that are computed together, by what, and an estimate of the cost [ns per design]."""
@@ -136,8 +139,8 @@ def design_outputs(
         # Refinement meets a dead point between samples, a plain grid does not.
         status = margin_group(family, designs, (), accuracy)["status"].astype(np.uint8)
     for job in jobs:
-        # A follower that turns fully has no limit positions, but extrema it has.
-        alive = np.flatnonzero((status == st.OK) | (status == st.NOT_OSCILLATING) | (status == st.NOT_CONVERGED))
+        # A follower that turns fully has no limit positions, or no dwell, but extrema it has.
+        alive = np.flatnonzero(np.isin(status, PARTIAL))
         found = _run(family, job, designs[alive], accuracy, window)
         for name in job.outputs:
             for key in (name, f"err_{name}") if accuracy.target is not None else (name,):

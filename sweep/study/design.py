@@ -25,11 +25,19 @@ class _Written:
     factor: float
 
 
-def read_space(family: Family, raw: Mapping[str, Any], faults: Faults) -> DesignSpace | None:
-    """The designs of a study, or None if a parameter is faulty (all faults are reported)."""
+def read_space(
+    family: Family, raw: Mapping[str, Any], faults: Faults, fitted: tuple[str, ...] = ()
+) -> DesignSpace | None:
+    """The designs of a study, or None if a parameter is faulty (all faults are reported).
+
+    ``fitted`` parameters are set by [fit]: they must not be given, except lam, which then says where "up" is.
+    """
     before = len(faults.lines)
     sample = read_section(SampleTable, raw["sample"], ("design", "sample"), faults) if "sample" in raw else None
-    _check_names(family, raw, ("design",), faults, extra=("sample",))
+    _check_names(family, raw, ("design",), faults, extra=("sample",), fitted=fitted)
+    for name in fitted:
+        if name in raw and not name.startswith("lam"):
+            faults.value(("design", name), raw[name], "nothing here: [fit] finds it")
     found: dict[str, Axis | float] = {}
     for name in [name for name in raw if name in family.parameter_names]:
         parameter = next(p for p in family.parameters if p.name == name)
@@ -38,6 +46,7 @@ def read_space(family: Family, raw: Mapping[str, Any], faults: Faults) -> Design
             found[name] = entry
     axes = tuple(entry for entry in found.values() if isinstance(entry, Axis))
     fixed = {p.name: p.default for p in family.parameters if p.default is not None and p.name not in found}
+    fixed |= {name: 0.0 for name in fitted if name not in found}
     fixed |= {name: entry for name, entry in found.items() if not isinstance(entry, Axis)}
     if sample is None and (count := math.prod(axis.count for axis in axes)) > MOST_DESIGNS:
         faults.value(("design",), count, f"at most {MOST_DESIGNS:.0e} designs; take fewer values or design.sample")
@@ -68,7 +77,14 @@ def read_reference(family: Family, raw: Mapping[str, Any], faults: Faults) -> di
     return {name: values[name] for name in family.parameter_names if name in values}
 
 
-def _check_names(family: Family, raw: Mapping[str, Any], key: Key, faults: Faults, extra: tuple[str, ...] = ()) -> None:
+def _check_names(
+    family: Family,
+    raw: Mapping[str, Any],
+    key: Key,
+    faults: Faults,
+    extra: tuple[str, ...] = (),
+    fitted: tuple[str, ...] = (),
+) -> None:
     for name in raw:
         if name not in family.parameter_names and name not in extra:
             # The nearest of those still missing is the better guess.
@@ -77,7 +93,7 @@ def _check_names(family: Family, raw: Mapping[str, Any], key: Key, faults: Fault
                 (*key, name), [*unknown_to, *(e for e in extra if e not in raw)], f"parameter of {family.name}"
             )
     for p in family.parameters:
-        if p.name not in raw and p.default is None:
+        if p.name not in raw and p.default is None and p.name not in fitted:
             axis = "" if key[0] == "reference" else f", or an axis {_axis_form(p)}"
             faults.missing((*key, p.name), f"{p.text}: {_forms(p)}{axis}")
 

@@ -35,7 +35,7 @@ def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple
     found = []
     for name, entry in raw.items():
         key: Key = ("limits", name)
-        output = read_output_name(family, name, key, faults)
+        output = _parameter(family, name) or read_output_name(family, name, key, faults)
         if output is None:
             continue
         if _YES_OR_NO.fullmatch(name):
@@ -47,6 +47,12 @@ def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple
         else:
             faults.value(key, entry, _form(output))
     return tuple(found)
+
+
+def _parameter(family: Family, name: str) -> Output | None:
+    """A parameter as something to be bounded: [fit] may set or scale it."""
+    found = next((p for p in family.parameters if p.name == name and p.choices is None), None)
+    return None if found is None else Output(name, found.unit, found.text)
 
 
 def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Faults) -> list[Limit]:

@@ -6,7 +6,7 @@ import copy
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sweep.errors import InputError, StudyError, closest, nearest
 from sweep.families import NAMES
@@ -21,6 +21,7 @@ from sweep.study.model import (
     TABLES,
     AccuracySection,
     BudgetSection,
+    FitSection,
     MechanismSection,
     ObjectiveSection,
     OptimiseSection,
@@ -31,6 +32,9 @@ from sweep.study.model import (
     StudySection,
 )
 from sweep.study.study import Budget, Objective, OptimiseSettings, OutputSettings, Study
+
+if TYPE_CHECKING:
+    from sweep.fit import LineFit
 
 DEFAULT_TARGET = 1e-8
 
@@ -154,12 +158,15 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     limits = read_limits(family, bounds or {}, faults)
     if goal is not None:
         read_output_name(family, goal, ("objective", "minimise"), faults)
-    space = None if design is None else read_space(family, design, faults)
+    fit = _fit(_section(FitSection, "fit", data, faults), family, faults) if "fit" in data else None
+    fitted = fit.parameters(family) if fit is not None else ()
+    space = None if design is None else read_space(family, design, faults, fitted)
     reference = None if reference_design is None else read_reference(family, reference_design, faults)
     _check_curves(report, [name for name in design or () if name in family.parameter_names], faults)
     if faults.lines or space is None or disk_bytes is None or seconds is None:
         raise StudyError(str(path), faults.lines)
 
+    wanted = [*scene.want, *(limit.output for limit in limits), *([goal] if goal else [])]
     defaults = {"accuracy": _without_none(accuracy.__dict__), "output": output.model_dump()}
     return Study(
         name=about.name or "",
@@ -168,8 +175,9 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         path=path,
         families=families,
         speed=speed,
-        want=tuple(dict.fromkeys([*scene.want, *(limit.output for limit in limits), *([goal] if goal else [])])),
+        want=tuple(name for name in dict.fromkeys(wanted) if name not in family.parameter_names),
         space=space,
+        fit=fit,
         limits=limits,
         objective=Objective(goal) if goal else None,
         accuracy=accuracy,
@@ -225,6 +233,18 @@ def _window(scene: SceneSection, faults: Faults) -> tuple[float, float] | None:
     if not low < high:
         faults.value(("scene", "window", "to"), high, f"a fraction greater than from = {low:g}")
     return low, high
+
+
+def _fit(section: FitSection, family: Family, faults: Faults) -> LineFit | None:
+    from sweep.fit import LineFit
+
+    fit = LineFit(_quantity(section.stroke, "mm", ("fit", "stroke"), faults), section.direction == "free")
+    try:
+        fit.parameters(family)
+    except InputError as error:
+        faults.value(("fit",), family.name, error.allowed)
+        return None
+    return fit
 
 
 def _accuracy(section: AccuracySection, faults: Faults) -> Accuracy:

@@ -97,6 +97,13 @@ class LimitEntry(Section):
     unit: str | None = Field(None, description='a unit as a text, as "deg"')
 
 
+class FitSection(Section):
+    """[fit]"""
+
+    stroke: str | None = Field(None, description='a length as a text, as "24.5 mm"')
+    direction: Literal["free", "given"] = Field("free", description='"free" or "given"')
+
+
 class ObjectiveSection(Section):
     """[objective]"""
 
@@ -168,6 +175,7 @@ TABLES = (
     "mechanism",
     "scene",
     "design",
+    "fit",
     "limits",
     "objective",
     "accuracy",

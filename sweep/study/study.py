@@ -8,16 +8,22 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
 from sweep.study.space import DesignSpace
 
+if TYPE_CHECKING:
+    from sweep.fit import LineFit
+
 
 @dataclass(frozen=True)
 class Limit:
-    """Bounds of a design output; equal ones ask for a value.  ``rotatable = true`` is a minimum of 1."""
+    """Bounds of a design output or of a parameter; equal ones ask for a value, ``rotatable = true`` is a minimum of 1.
+
+    A parameter needs bounds of its own where [fit] sets or scales it.
+    """
 
     output: str
     minimum: float | None = None
@@ -73,6 +79,7 @@ class Study:
     speed: float | None
     want: tuple[str, ...]
     space: DesignSpace
+    fit: LineFit | None
     limits: tuple[Limit, ...]
     objective: Objective | None
     accuracy: Accuracy
@@ -82,6 +89,16 @@ class Study:
     output: OutputSettings
     budget: Budget
     data: dict[str, Any]
+
+    @property
+    def parameter_limits(self) -> tuple[Limit, ...]:
+        """The limits that bound a parameter."""
+        return tuple(limit for limit in self.limits if limit.output in self.family.parameter_names)
+
+    @property
+    def output_limits(self) -> tuple[Limit, ...]:
+        """The limits that bound a design output."""
+        return tuple(limit for limit in self.limits if limit.output not in self.family.parameter_names)
 
     @property
     def family(self) -> Family:
@@ -99,6 +116,7 @@ class Study:
             "speed": self.speed,
             "want": self.want,
             "space": _space_content(self.space),
+            "fit": self.fit and asdict(self.fit),
             "limits": sorted((limit.output, limit.minimum, limit.maximum) for limit in self.limits),
             "objective": self.objective and self.objective.output,
             "accuracy": asdict(self.accuracy),

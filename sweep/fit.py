@@ -1,0 +1,127 @@
+"""The inner fit of a guided four-bar: coupler point, line and scale that a study need not sweep.
+
+For the links of the last stage and the swing of what drives it, the coupler point (xi, eta) and the line (lam, h) with
+the smallest largest deviation over the working part follow from a linear problem (kernels/line_fit.py); scaling the
+whole stage then gives the wanted stroke.  So a sweep over proportions is a sweep over finished needle mechanisms.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as codes
+from kernels.line_fit import line_fit
+from sweep.errors import InputError
+from sweep.families import family as find_family
+from sweep.families.base import Accuracy, Angles, Array, Family
+from sweep.families.chain import Chain
+from sweep.summaries import design_outputs
+
+FITTED = ("xi", "eta", "lam", "h")
+SCALED = ("a", "b", "c", "e", "xi", "eta", "h")
+
+# The deviation is a smooth function of the input: 48 Chebyshev points miss 1e-4 of its extremes, which is far below
+# what the optimiser moves afterwards.
+SAMPLES = 48
+SWING_ACCURACY = Accuracy(target=1e-6)
+
+
+@dataclass(frozen=True)
+class LineFit:
+    """What the fit aims at: ``stroke`` along the line [length] or None to keep the size of the links.
+
+    With ``free_direction`` the line may turn up to 90 degrees away from the given lam, which says where "up" is.
+    """
+
+    stroke: float | None
+    free_direction: bool
+
+    def parameters(self, family: Family) -> tuple[str, ...]:
+        """Names of the parameters the fit sets, xi2, eta2 ... in a chain; lam only if its direction is free."""
+        suffix = _suffix(family)
+        return tuple(f"{name}{suffix}" for name in FITTED if self.free_direction or name != "lam")
+
+    def rescaled(self, family: Family) -> tuple[str, ...]:
+        """Names of the parameters whose given values are proportions only."""
+        return () if self.stroke is None else tuple(f"{name}{_suffix(family)}" for name in SCALED)
+
+
+def fit_line(
+    family: Family, designs: Array, fit: LineFit, window: tuple[float, float] | None
+) -> tuple[Array, NDArray[np.uint8]]:
+    """Fit coupler point, line and scale of every design.
+
+    Parameters
+    ----------
+    family : "guide", or a chain that ends in it
+    designs : (n, P) design matrix; the fitted columns are not read, except lam (see :class:`LineFit`)
+    fit : what to aim at
+    window : working part as fractions of the stroke from its smallest s; None is the whole stroke
+
+    Returns
+    -------
+    designs : (n, P), a copy with the fitted and scaled columns filled
+    status : (n,); OK, the status of the driving stages where they do not swing, NOT_ASSEMBLED, or NOT_CONVERGED where
+        the points do not determine a line
+
+    Raises
+    ------
+    InputError
+        if the mechanism has no guided coupler point.
+    """
+    suffix = _suffix(family)
+    column = {name: k for k, name in enumerate(family.parameter_names)}
+    fitted = designs.copy()
+    guide = family.stages[-1].family if isinstance(family, Chain) else family
+    angles, status = _input_angles(family, designs)
+    alive = np.flatnonzero(status == codes.OK)
+    if alive.size == 0:
+        return fitted, status
+    own = fitted[np.ix_(alive, np.array([column[f"{name}{suffix}"] for name in guide.parameter_names]))]
+    wanted = frozenset({"x_b", "y_b", "x_c", "y_c"})
+    pins = guide.poses(np.ascontiguousarray(own), Angles.of(angles[alive]), wanted)
+    missing = pins["status"] != codes.OK
+    parts = [np.where(missing, np.nan, pins[name].astype(np.float64)) for name in ("x_b", "y_b", "x_c", "y_c")]
+    values = {name: np.ascontiguousarray(own[:, guide.parameter_names.index(name)]) for name in FITTED}
+    deviation, travel, found = np.empty(alive.size), np.empty(alive.size), np.empty(alive.size, np.uint8)
+    limits = np.array(window or (0.0, 1.0), dtype=np.float64)
+    line_fit(
+        parts[0], parts[1], parts[2], parts[3], limits, values["lam"], fit.free_direction,
+        values["xi"], values["eta"], values["h"], deviation, travel, found,
+    )  # fmt: skip
+    status[alive] = found
+    for name in FITTED:
+        fitted[alive, column[f"{name}{suffix}"]] = values[name]
+    if fit.stroke is not None:
+        factor = fit.stroke / travel
+        for name in SCALED:
+            fitted[alive, column[f"{name}{suffix}"]] *= factor
+    return fitted, status
+
+
+def _suffix(family: Family) -> str:
+    if isinstance(family, Chain) and family.stages[-1].family.name == "guide":
+        return str(family.stages[-1].number)
+    if family.name == "guide":
+        return ""
+    raise InputError("fit", family.name, "a guide, or a chain that ends in one", "mechanism")
+
+
+def _input_angles(family: Family, designs: Array) -> tuple[Array, NDArray[np.uint8]]:
+    """Input angles of the guide over its swing, Chebyshev points, (n, SAMPLES), and the status of what drives it."""
+    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, SAMPLES))
+    if not isinstance(family, Chain):
+        turn = np.broadcast_to(2.0 * np.pi * share, (len(designs), SAMPLES)).copy()
+        return turn, np.zeros(len(designs), np.uint8)
+    last = family.stages[-1]
+    upstream = find_family([stage.family.name for stage in family.stages[:-1]])
+    driving = np.ascontiguousarray(designs[:, : len(upstream.parameters)])
+    found = design_outputs(upstream, driving, ("psi_ext", "swing"), SWING_ACCURACY)
+    start, swing = found["psi_ext"].astype(np.float64), found["swing"].astype(np.float64)
+    psi = start[:, None] + swing[:, None] * share
+    assert last.kappa is not None and last.offset is not None
+    angles = designs[:, last.kappa, None] * psi + designs[:, last.offset, None]
+    return angles, found["status"].astype(np.uint8)
