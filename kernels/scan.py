@@ -22,6 +22,7 @@ Status = NDArray[np.uint8]
 
 MAGNITUDE = 0
 FLAT = 1e-9
+EPS = 2.0**-53
 TWO_PI = 2.0 * math.pi
 
 
@@ -193,7 +194,7 @@ def nearest_singularity(discriminant: Array, distance: Array) -> None:
                 half_bend = 0.5 * (left + right) - here  # D''/2 h^2
                 if half_bend > 0.0:
                     slope = 0.5 * (right - left)
-                    vertex = here - 0.25 * slope * slope / half_bend
+                    vertex = here - 0.25 * slope * (slope / half_bend)
                     rho2 = min(rho2, max(vertex, 0.0) / half_bend * h * h)
                 elif here <= 0.0:
                     rho2 = 0.0
@@ -244,7 +245,7 @@ def grazes(values: Array, level: Array, doubtful: Mask) -> None:
             if (left - here) * (right - here) >= 0.0 and bend != 0.0:
                 slope = 0.5 * (right - left)
                 # Twice the parabola's overshoot: it is an estimate.
-                beyond = here - slope * slope / bend
+                beyond = here - slope * (slope / bend)
                 if (here >= level[i]) != (beyond >= level[i]):
                     doubtful[i] = True
 
@@ -291,7 +292,8 @@ def quartic_peak(z: Array, place: Array, height: Array, ripple: Array, blur: Arr
                 if done:
                     break
         bend = -(2.0 * p2 + t * (6.0 * p3 + t * (12.0 * p4)))
-        blur[i] = ripple[i] / bend if ripple[i] < 2.0 * bend else 2.0
+        noise = ripple[i] + 16.0 * EPS * abs(c)  # the fourth difference may vanish by chance
+        blur[i] = noise / bend if noise < 2.0 * bend else 2.0
         peak = c + t * (p1 + t * (p2 + t * (p3 + t * p4)))
         if peak >= top:
             place[i], height[i] = t, peak

@@ -14,7 +14,7 @@ import numpy as np
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
-from sweep.refine import EPS, Peaks, refine_peaks
+from sweep.refine import EPS, Peaks, polish_places, refine_peaks
 from sweep.sampling import (
     TWO_PI,
     Index,
@@ -33,7 +33,7 @@ Mode: TypeAlias = Literal[-1, 0, 1]
 START = 32  # samples of the first look
 LIMIT = 32768  # samples beyond which a design is given up as NOT_CONVERGED
 SHARE = 0.6  # a peak below this share of the best sample is not refined
-ROUGH = 0.2  # fourth difference of samples against their size, above which they do not resolve the curve
+ROUGH = 0.1  # fourth difference of samples against their size, above which they do not resolve the curve
 PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
 DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
 
@@ -98,7 +98,7 @@ def true_extrema(
     Notes
     -----
     Starts with 32 samples.  A design is sampled again, with twice as many or more, if the fourth difference of its
-    samples exceeds a fifth of their size, if they stand wider than a twelfth of the distance of the nearest complex
+    samples exceeds a tenth of their size, if they stand wider than a twelfth of the distance of the nearest complex
     zero of a discriminant, or if refinement moved the peak by more than 5 % of its height.
     """
     search = _Search(family, designs, tuple(requests), target, locate, anywhere, window)
@@ -183,7 +183,8 @@ class _Search:
                 row, found = self._within_window(rows, columns, request, row, found, resolved)
             moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[request]
             needed = np.where(moved & resolved, np.maximum(needed, 2 * samples), needed)
-        self.needed[rows] = needed
+        # Everything is looked at with LIMIT samples before it is given up.
+        self.needed[rows] = np.minimum(needed, LIMIT if samples < LIMIT else 2 * LIMIT)
 
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
@@ -210,9 +211,9 @@ class _Search:
     def _samples_by_singularity(self, columns: dict[str, Array], samples: int, needed: Index) -> Index:
         distance = np.full(needed.size, np.inf)
         for name in self.guards:
-            one = np.empty(needed.size)
+            one, largest = np.empty(needed.size), columns[name].max(axis=1)
             scan.nearest_singularity(columns[name], one)
-            distance = np.minimum(distance, one)
+            distance = np.where(_tells(largest), np.minimum(distance, one), distance)
         # The first looks see a near zero only roughly: at most eight times as many samples at once.
         wanted = np.minimum(PER_SINGULARITY / np.maximum(distance, 1e-300), 8.0 * samples)
         samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
@@ -265,8 +266,8 @@ class _Search:
         """How much a pose near a dead point amplifies the rounding of its discriminant (docs/extrema.md)."""
         amplified = np.ones(row.size)
         for name in self.guards:
-            values = columns[name]
-            amplified += values.max(axis=1)[row] / np.maximum(values[row, column], 1e-300)
+            here, largest = columns[name][row, column], columns[name].max(axis=1)[row]
+            amplified += np.divide(largest, here, out=np.ones(row.size), where=_tells(largest) & (here > 0.0))
         return amplified
 
     def _within_window(
@@ -292,9 +293,27 @@ class _Search:
         chosen = which[has]
         found = self.found[request]
         found.value[rows[has]] = peaks.height[chosen] * (-1.0 if request.mode == -1 else 1.0)
-        found.phi[rows[has]] = np.mod(peaks.phi[chosen], TWO_PI)
+        phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
+        slope = self.family.derivative_of.get(request.pose)
+        if self.locate and slope is not None and not request.windowed:
+            phi, err_phi = self._polish(rows[has], slope, phi, err_phi)
+        found.phi[rows[has]] = np.mod(phi, TWO_PI)
         found.err[rows[has]] = peaks.err_height[chosen]
-        found.err_phi[rows[has]] = peaks.err_phi[chosen]
+        found.err_phi[rows[has]] = err_phi
         moved = np.zeros(rows.size)
         moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
         return moved
+
+    def _polish(self, rows: Index, slope: str, phi: Array, err_phi: Array) -> tuple[Array, Array]:
+        """Places of flat tops from the zero of the derivative, which is steep there."""
+
+        def sample(active: Index, angles: Array) -> Array:
+            return pose_columns(self.family, self.designs[rows[active]], angles, [slope])[0][slope]
+
+        return polish_places(sample, phi, err_phi)
+
+
+def _tells(discriminant: Array) -> Mask:
+    """Whether a discriminant is a number to rely on: at scales such as 1e100 or 1e-80 it leaves float64."""
+    usable: Mask = (discriminant > 1e-280) & (discriminant < 1e280)
+    return usable

@@ -17,6 +17,7 @@ Sampler: TypeAlias = Callable[[Index, Array], Array]
 OFFSETS = np.arange(-2.0, 3.0)
 SHRINK = 0.125
 PASSES = 12
+POLISHES = 2
 # The quartic over a five-point window errs in proportion to at least the fourth power of its width, so one pass to the
 # next divides the error by at least 8^4; a sixty-fourth of the last change is claimed, which leaves a factor of 64.
 CLAIM = 1.0 / 64.0
@@ -81,16 +82,45 @@ def refine_peaks(
         claim = np.where(inside, CLAIM, 1.0)
         # Samples that no longer follow a quartic are noise, and noise does not shrink with the window.
         error = claim * np.abs(top - height[active]) + RIPPLE * ripple + 4.0 * EPS * np.abs(top)
-        phi[active] += u * place
+        # Too small a window sees only noise: it may sharpen the height but must not spoil the place.
+        err_place = u * (claim * np.abs(place) + blur) + 4.0 * EPS * np.pi
+        sharper = ~inside | (err_place < err_phi[active])
+        phi[active[sharper]] += (u * place)[sharper]
         height[active] = top
         err_height[active] = error
-        err_phi[active] = u * (claim * np.abs(place) + blur) + 4.0 * EPS * np.pi
+        err_phi[active[sharper]] = err_place[sharper]
         enough = inside & (error <= tolerance[active])
         if locate is not None:
-            enough &= err_phi[active] <= locate
+            enough &= (err_phi[active] <= locate) | ~sharper
         step[active] = np.where(inside, SHRINK * u, u)
         active = active[~enough & (step[active] > 1e-6 * spacing)]
     return Peaks(phi, height, err_phi, err_height, guess)
+
+
+def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Array]:
+    """Places of extrema from the zeros of the derivative, and their errors.
+
+    Parameters
+    ----------
+    slope : evaluates the derivative; called with numbers of places (k,) and angles (k, 3)
+    phi, err_phi : (n,) places and their errors [rad] as `refine_peaks` left them
+
+    Notes
+    -----
+    Secant steps over 1e-4 rad; a step much longer than the error it should remove, or than the secant, is not taken.
+    The height of a top fixes its place to the square root of its rounding only, the derivative to its own rounding.
+    """
+    step, every = 1e-4, np.arange(phi.size)
+    phi, err_phi = phi.copy(), err_phi.copy()
+    for _ in range(POLISHES):
+        below, here, above = slope(every, phi[:, None] + step * np.arange(-1.0, 2.0)).T
+        bend = (above - below) / (2.0 * step)
+        move = -np.divide(here, bend, out=np.full(phi.size, np.inf), where=bend != 0.0)
+        better = np.abs(move) <= np.clip(64.0 * err_phi, 0.01 * step, step)
+        phi[better] += move[better]
+        # The last step is as long as the noise of the derivative lets it be.
+        err_phi[better] = 4.0 * np.abs(move[better]) + 4.0 * EPS * np.pi
+    return phi, err_phi
 
 
 def _quartic(values: Array) -> tuple[Array, Array, Array, Array]:

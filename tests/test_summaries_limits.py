@@ -1,0 +1,107 @@
+"""Limit positions from poses alone: the 25-digit table of crank-rockers, published mechanisms, definitions."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sweep
+from kernels import status as st
+from sweep.families.base import Accuracy
+from sweep.summaries import design_outputs
+from tests.turn_designs import RSSR, crank_rockers, slider_cranks
+
+ROWS = json.loads((Path(__file__).parent / "oracle" / "limits_open.json").read_text())["rows"]
+PLAIN_RSSR = replace(RSSR, steps=())
+
+
+def test_chebyshev_tracer_stays_in_its_published_band():
+    """Crank 1, frame 2, coupler = rocker 2.5, arm 5: over the half turn about 180 degrees the band is 0.009753733.
+
+    A crank-rocker swings the crank over part of that half turn, the middle of the band included.
+    """
+    drive = {"a1": 0.3, "b1": 1.0, "c1": 0.8, "e1": 1.1, "f1": 0.1, "g1": 0.2, "alpha1": 0.3}
+    tracer = {"a2": 1.0, "b2": 2.5, "c2": 2.5, "e2": 2.0, "xi2": 5.0, "eta2": 0.0, "lam2": 0.0, "h2": 4.0}
+    frame = sweep.summarise(
+        ["rssr", "guide"], drive | tracer | {"branch2": [-1.0]}, ["max_abs_dev", "max_psi1", "min_psi1"]
+    )
+    assert frame["status"][0] == st.OK
+    assert 0.5 * np.pi < abs(frame["min_psi1"][0]) < 1.5 * np.pi
+    assert 0.5 * np.pi < abs(frame["max_psi1"][0]) < 1.5 * np.pi
+    assert frame["max_abs_dev"][0] == pytest.approx(0.009753733, abs=1e-9)
+
+
+def test_benchmark_slider_crank_has_its_published_stroke():
+    table = {"a": [0.08], "b": [0.3], "e": [0.1562049935], "f": [0.0], "alpha": [np.pi / 2]}
+    frame = sweep.summarise("rssp", table, ["stroke", "s_ext", "s_fold", "min_s", "max_s"])
+    assert frame["min_s"][0] == pytest.approx(0.1849518884, abs=1e-10)
+    assert frame["max_s"][0] == pytest.approx(0.2901599541, abs=1e-10)
+    assert frame["s_ext"][0] == frame["max_s"][0]
+    assert frame["stroke"][0] == pytest.approx(0.2901599541 - 0.1849518884, abs=2e-10)
+
+
+@pytest.mark.parametrize("branch", [1.0, -1.0])
+def test_planar_slider_crank_is_extended_in_line_outward(branch):
+    frame = sweep.summarise(
+        "rssp",
+        {"a": [1.0], "b": [3.0], "e": [0.5], "f": [0.0], "alpha": [0.0], "branch": [branch]},
+        ["s_ext", "s_fold", "phi_ext", "phi_fold", "phi0", "stroke_ratio"],
+    ).iloc[0]
+    assert frame["s_ext"] == pytest.approx(branch * np.sqrt(4.0**2 - 0.25), rel=1e-12)
+    assert frame["s_fold"] == pytest.approx(branch * np.sqrt(2.0**2 - 0.25), rel=1e-12)
+    # Crank and coupler in line: the crank points to the slider, or away from it.
+    assert np.tan(frame["phi_ext"]) == pytest.approx(frame["s_ext"] / 0.5, rel=1e-6)
+    assert np.cos(frame["phi_ext"]) > 0.0 > np.cos(frame["phi_fold"])
+    phi0 = (frame["phi_fold"] - frame["phi_ext"]) % (2.0 * np.pi)
+    assert frame["phi0"] == pytest.approx(phi0, abs=1e-12)
+    assert frame["stroke_ratio"] == pytest.approx(phi0 / (2.0 * np.pi - phi0), rel=1e-12)
+
+
+def test_extremes_of_spatial_slider_cranks_are_in_line_outward():
+    designs = slider_cranks(400, 41)
+    wanted = ["s_ext", "phi_ext", "s_fold", "phi_fold"]
+    table = dict(zip(("a", "b", "e", "f", "alpha", "branch"), designs.T, strict=True))
+    frame = sweep.summarise("rssp", table, wanted)
+    frame = frame.assign(**table)
+    frame = frame[frame["status"] == st.OK]
+    assert len(frame) > 100
+    for kind, sign in (("ext", 1.0), ("fold", -1.0)):
+        # Position of the slider in the crank plane, along the crank: rho or -rho.
+        x, y = frame["e"], frame[f"s_{kind}"] * np.cos(frame["alpha"])
+        along = x * np.cos(frame[f"phi_{kind}"]) + y * np.sin(frame[f"phi_{kind}"])
+        np.testing.assert_allclose(along, sign * np.hypot(x, y), rtol=1e-9)
+
+
+def test_limit_positions_of_the_table_of_crank_rockers():
+    """All rows but swings below 1e-11 rad, a difference of angles here (the family's own step does better)."""
+    rows = [row for row in ROWS if row["full_rotation"] and row["rocker"] == "oscillates"]
+    rows = [row for row in rows if abs(float(row["psi0"])) > 1e-11]
+    names = ("a", "b", "c", "e", "f", "g", "alpha", "sigma")
+    designs = np.array([[float(row[name]) for name in names] for row in rows])
+    found = design_outputs(PLAIN_RSSR, designs, ["swing", "phi0"], Accuracy(target=1e-10))
+    assert len(rows) > 95
+    # Closer to a change point than 1e-8 no affordable sampling resolves the motion, and the status says so.
+    unresolved = found["status"] != st.OK
+    assert set(found["status"][unresolved]) <= {st.NOT_CONVERGED}
+    assert {rows[i]["kind"] for i in np.flatnonzero(unresolved)} <= {"hard_change_point"}
+    assert unresolved.sum() <= 3
+    for name, column in (("swing", "psi0"), ("phi0", "phi0")):
+        exact = np.array([float(row[column]) for row in rows])
+        cond = np.array([max(1.0, float(row["cond"][column])) for row in rows])
+        error = np.abs(np.angle(np.exp(1j * (found[name] - exact))))
+        assert (error <= found[f"err_{name}"] + 16.0 * 2.0**-53 * cond).all()
+        assert np.median(found[f"err_{name}"]) < 1e-12
+
+
+def test_swing_of_a_general_chain_is_unwrapped():
+    designs = crank_rockers(300, 42)
+    found = design_outputs(PLAIN_RSSR, designs, ["swing", "psi_ext", "psi_fold", "range_psi"], Accuracy(target=1e-8))
+    ok = found["status"] == st.OK
+    np.testing.assert_allclose(np.abs(found["swing"][ok]), found["range_psi"][ok], rtol=1e-12)
+    np.testing.assert_allclose(found["psi_fold"][ok] - found["psi_ext"][ok], found["swing"][ok], atol=1e-12)
+    assert (np.sign(found["swing"][ok]) == -designs[ok, 7]).all()  # sheet (3-sgn)
+    assert (np.abs(found["psi_ext"][ok]) <= np.pi).all()
