@@ -110,9 +110,16 @@ def make_plan(study: Study, chunk_size: int | None = None) -> Plan:
         designs=study.space.count,
         chunk_size=choose_chunk_size(study) if chunk_size is None else chunk_size,
         columns=describe_columns(study),
-        repetitive=tuple(study.space.fixed if study.space.kind == "sobol" else study.space.names),
+        repetitive=_repetitive(study),
         chunk_data={key: value for key, value in study.data.items() if key not in NOT_IN_CHUNKS},
     )
+
+
+def _repetitive(study: Study) -> tuple[str, ...]:
+    """Parameters whose values recur from design to design: what the store writes as a dictionary."""
+    names = study.space.fixed if study.space.kind == "sobol" else study.space.names
+    made = () if study.fit is None else (*study.fit.parameters(study.family), *study.fit.rescaled(study.family))
+    return tuple(name for name in names if name not in made)
 
 
 def designs_fingerprint(study: Study) -> str:
