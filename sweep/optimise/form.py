@@ -203,8 +203,6 @@ class _Layout:
             ends = sorted([*maxima, *minima], key=lambda k: -self.points.sense[k] * value[k])
             if m.kind == "phi_max_abs":
                 return [({len(self.points) + k: 1.0}, self._turns(k)) for k in ends[:1]]
-            size = max((abs(value[k]) for k in ends), default=0.0)
-            ends = [k for k in ends if self.points.sense[k] * value[k] >= 0.5 * size]
             return [({k: float(self.points.sense[k])}, 0.0) for k in (ends if above else ends[:1])]
         if not maxima or not minima:
             return []

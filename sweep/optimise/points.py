@@ -270,7 +270,9 @@ def _extrema(
     before, after, middle = np.roll(x, 1), np.roll(x, -1), 0.5 * (top + bottom)
     rows = []
     for sense in (1.0, -1.0):
-        peak = counts & (sense * x > sense * before) & (sense * x >= sense * after) & (sense * (x - middle) >= 0.0)
+        peak = counts & (sense * x > sense * before) & (sense * x >= sense * after)
+        if inside is None:
+            peak &= sense * (x - middle) >= 0.0  # in a window all count: a refused step cannot add those it met
         rows += [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
     return rows
 
