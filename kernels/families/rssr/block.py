@@ -12,9 +12,10 @@ import numpy as np
 
 from kernels._jit import inline
 from kernels.families.rssr.closure import EPS, Array, reduce_scaled, unit_scale
-from kernels.trigpoly import LAST_STEP, approach, lowest_of_16, minimum, shortfall
+from kernels.reduce import largest, smallest
+from kernels.trigpoly import LAST_STEP, approach, far_minimum, lowest_of_16, minimum, point, shortfall
 
-BLOCK = 128
+BLOCK = 64
 # Rows: the fields of Reduced, the polynomial of Delta, its minimum.  During loading they hold the design itself.
 E, Y0, CA, K0, K1, K2, W_SIZE, COUPLER, ROCKER, Z0, SA, BRANCH, VALID = (k * BLOCK for k in range(13))
 C1, S1, C2, S2, COS, SIN, STEP, DELTA, CURVATURE, TOLERANCE, ACROSS = (k * BLOCK for k in range(13, 24))
@@ -90,3 +91,20 @@ def least_delta(count: int, at: Array) -> None:
         at[k + TOLERANCE] = EPS * (14.0 * mx * mx + 18.0 * my * my + 38.0 * (mx + my) * mw) + w_error * w_error
         z, p = at[k + Z0] - at[k + SA] * v, at[k + ROCKER] - w
         at[k + ACROSS] = math.sqrt(p * p + z * z)
+
+
+@inline
+def singularity_distance(count: int, at: Array) -> None:
+    """Into ACROSS: distance [rad] of the nearest complex zero of Delta from the real axis, to leading order.
+
+    It sets how finely the motion must be sampled.  The second minimum of Delta, where there is one, counts too.
+    """
+    for k in range(count):
+        c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2]
+        u, v, delta = at[k + COS], at[k + SIN], at[k + DELTA]
+        here = point(c1, s1, c2, s2, u, v)
+        near = 2.0 * delta / largest(here.curvature, 1e-300)
+        fu, fv = far_minimum(c2, s2 + 1e-300, u, v)
+        there = point(c1, s1, c2, s2, fu, fv)
+        far = 2.0 * (delta + there.value - here.value) / largest(there.curvature, 1e-300)
+        at[k + ACROSS] = math.sqrt(smallest(near, far))

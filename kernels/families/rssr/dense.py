@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from kernels._jit import kernel_fused
 from kernels.families.rssr.closure import Array, reduce_design
 from kernels.reduce import largest, smallest
+
+Indices: TypeAlias = NDArray[np.int64]
 
 
 @kernel_fused
@@ -18,6 +24,8 @@ def dense_maxima(
     max_abs_dpsi: Array | None,
     max_abs_d2psi: Array | None,
     max_abs_d3psi: Array | None,
+    at: Indices | None = None,
+    values: Array | None = None,
 ) -> None:
     """Largest |psi'|, |psi''|, |psi'''| over a grid of crank angles, and the smallest Delta; the sweep's hot loop.
 
@@ -27,6 +35,8 @@ def dense_maxima(
     cos_phi, sin_phi : (m,) the grid, shared by all designs; m a multiple of 8 is fastest
     min_delta : (n,) out, smallest Delta/b^2 on the grid; where it is not positive the maxima mean nothing
     max_abs_dpsi, max_abs_d2psi, max_abs_d3psi : (n,) out, or None: not computed, not compiled
+    at : (n,) int64 out, or None: position on the grid of the largest value of the highest order wanted
+    values : (m,) scratch, needed with ``at``
 
     Notes
     -----
@@ -54,17 +64,23 @@ def dense_maxima(
                 p = g_ph * per_t  # -psi'
                 if max_abs_dpsi is not None:
                     m1 = largest(m1, abs(p))
+                    if values is not None:
+                        values[j] = abs(p)
                 if max_abs_d2psi is not None or max_abs_d3psi is not None:
                     g_phps = v * s + hu * c
                     q = (w1 - (u * c + hv * s) + p * (w * p - (g_phps + g_phps))) * per_t  # -psi''
                     if max_abs_d2psi is not None:
                         m2 = largest(m2, abs(q))
+                        if values is not None:
+                            values[j] = abs(q)
                     if max_abs_d3psi is not None:
                         g_phphps = u * s - hv * c
                         jerk = (
                             g_ph + p * (3.0 * g_phphps - p * (3.0 * (w_ph - g_ph) + t * p)) + 3.0 * q * (g_phps - w * p)
                         ) * per_t
                         m3 = largest(m3, abs(jerk))
+                        if values is not None:
+                            values[j] = abs(jerk)
         min_delta[i] = least / (r.coupler * r.coupler) if r.valid else math.nan
         if max_abs_dpsi is not None:
             max_abs_dpsi[i] = m1
@@ -72,3 +88,10 @@ def dense_maxima(
             max_abs_d2psi[i] = m2
         if max_abs_d3psi is not None:
             max_abs_d3psi[i] = m3
+        if at is not None and values is not None:
+            most = m3 if max_abs_d3psi is not None else (m2 if max_abs_d2psi is not None else m1)
+            at[i] = 0
+            for j in range(cos_phi.size):
+                if values[j] == most:
+                    at[i] = j
+                    break

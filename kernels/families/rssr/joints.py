@@ -43,7 +43,7 @@ def joints(
         d = per_design[i]
         d[0], d[1], d[2], d[3], d[4], d[5] = 0.0, sa, ca, 0.0, 0.0, 1.0
         d[6], d[7], d[8], d[9], d[10], d[11] = 0.0, f * sa, f * ca, e, 0.0, g
-        d[12], d[13], d[14], d[15] = a, b, c, branch
+        d[12], d[13], d[14], d[15], d[16] = a, b, c, branch, 1.0
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(cos_phi.shape[1]):
             u, v, cp, sp = cos_phi[row, j], sin_phi[row, j], cos_psi[i, j], sin_psi[i, j]

@@ -1,0 +1,120 @@
+"""True maximum of one transfer function by marching and bracketing: for the few designs near a change point.
+
+Steps shrink towards the complex zeros of Delta like the distance to them, so a design whose discriminant nearly
+vanishes costs only the logarithm of how nearly.  Maxima are bracketed by the sign of the next derivative; the march is
+repeated with half the steps until two results agree.
+"""
+
+from __future__ import annotations
+
+import math
+
+from kernels._jit import inline, kernel
+from kernels.families.rssr.closure import EPS
+from kernels.families.rssr.derivatives import follower, order_pair
+
+_TURN = 2.0 * math.pi
+_WIDEST = _TURN / 24.0
+_ATTEMPTS = 8
+
+
+@inline
+def rounding(order: int, delta: float, tolerance: float) -> float:
+    """Relative rounding error of the transfer function of that order: it behaves like Delta^(1/2 - order)."""
+    return (order + 0.5) * tolerance / delta + 32.0 * EPS
+
+
+@inline
+def _gap(phi: float, centre: float) -> float:
+    d = abs(phi - centre) % _TURN
+    return min(d, _TURN - d)
+
+
+@kernel
+def careful_maximum(
+    order: int,
+    e: float,
+    y0: float,
+    ca: float,
+    k0: float,
+    k1: float,
+    k2: float,
+    phi1: float,
+    rho1: float,
+    phi2: float,
+    rho2: float,
+    target: float,
+) -> tuple[float, float, float, bool]:
+    """Largest |d^order psi / dphi^order|, its crank angle, a bound of its error, and whether two marches agreed.
+
+    Parameters
+    ----------
+    order : 1, 2 or 3
+    e ... k2 : of :class:`Reduced`
+    phi1, rho1, phi2, rho2 : where Delta is smallest and how far its complex zeros are there, twice [rad]
+    target : relative error wanted
+    """
+    before = -1.0
+    best, place, error = 0.0, 0.0, 0.0
+    fineness = 0.5
+    for _ in range(_ATTEMPTS):
+        best, place, error, missed = 0.0, 0.0, 0.0, False
+        phi, end = phi1, phi1 + _TURN
+        y, dy = _evaluate(order, e, y0, ca, k0, k1, k2, phi)
+        while phi < end:
+            near = min(math.hypot(rho1, _gap(phi, phi1)), math.hypot(rho2, _gap(phi, phi2)))
+            following = phi + min(2.0 * fineness * _WIDEST, fineness * near)
+            y2, dy2 = _evaluate(order, e, y0, ca, k0, k1, k2, following)
+            if y * dy > 0.0 and y2 * dy2 <= 0.0 and max(abs(y), abs(y2)) > 0.5 * best:
+                if y * y2 < 0.0:
+                    missed = True
+                else:
+                    peak, where, bound = _bracketed(order, e, y0, ca, k0, k1, k2, phi, dy, following, dy2, target)
+                    if peak > best:
+                        best, place, error = peak, where, bound
+            phi, y, dy = following, y2, dy2
+        if not missed and best > 0.0 and abs(best - before) <= max(0.1 * target, 1e-12) * best + error:
+            return best, place, error + abs(best - before), True
+        before = best
+        fineness *= 0.5
+    return best, place, abs(best - before) + error, False
+
+
+@inline
+def _evaluate(
+    order: int, e: float, y0: float, ca: float, k0: float, k1: float, k2: float, phi: float
+) -> tuple[float, float]:
+    p, q, j, k = follower(e, y0, ca, k0, k1, k2, math.cos(phi), math.sin(phi))
+    return order_pair(order, p, q, j, k)
+
+
+@kernel
+def _bracketed(
+    order: int,
+    e: float,
+    y0: float,
+    ca: float,
+    k0: float,
+    k1: float,
+    k2: float,
+    lo: float,
+    f_lo: float,
+    hi: float,
+    f_hi: float,
+    target: float,
+) -> tuple[float, float, float]:
+    """Illinois' regula falsi on the derivative, bisecting every third step: |y|, phi and the error bound |y'| width."""
+    y, mid, bound = 0.0, lo, math.inf
+    for step in range(120):
+        mid = 0.5 * (lo + hi) if step % 3 == 2 else (lo * f_hi - hi * f_lo) / (f_hi - f_lo)
+        if not lo <= mid <= hi:
+            mid = 0.5 * (lo + hi)
+        y, dy = _evaluate(order, e, y0, ca, k0, k1, k2, mid)
+        bound = abs(dy) * (hi - lo)
+        if bound <= 0.01 * target * abs(y) or hi - lo <= 4.0 * EPS * abs(mid):
+            break
+        if (dy > 0.0) == (f_lo > 0.0):
+            lo, f_lo, f_hi = mid, dy, 0.5 * f_hi
+        else:
+            hi, f_hi, f_lo = mid, dy, 0.5 * f_lo
+    return abs(y), mid, bound

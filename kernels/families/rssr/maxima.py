@@ -1,0 +1,319 @@
+"""True maxima of |psi'|, |psi''|, |psi'''| over the turn, refined between samples (docs/rssr.md, section 6).
+
+Per design: the exact margin, then N >= 12/rho samples, where rho is the distance of the nearest complex zero of Delta;
+then every local maximum of at least 60 % of the best is refined on the next derivative, vectorised over the maxima of
+a whole block of designs.  A maximum whose refinement fails its checks, or a design that would need more than 1024
+samples, goes to :mod:`kernels.families.rssr.careful`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.families.rssr.block import (
+    ACROSS,
+    BLOCK,
+    C1,
+    C2,
+    CA,
+    COS,
+    DELTA,
+    K0,
+    K1,
+    K2,
+    S1,
+    S2,
+    SIN,
+    TOLERANCE,
+    VALID,
+    W_SIZE,
+    Y0,
+    E,
+    least_delta,
+    load_block,
+    new_block,
+    singularity_distance,
+)
+from kernels.families.rssr.careful import careful_maximum, rounding
+from kernels.families.rssr.closure import EPS, Array, Status
+from kernels.families.rssr.derivatives import follower
+from kernels.families.rssr.margin import turning_status
+from kernels.reduce import largest
+from kernels.trigpoly import far_minimum, point, rotate
+
+TURN = 2.0 * math.pi
+FEWEST, MOST = 16, 1024
+MOST_PEAKS = 8  # 16 samples cannot have more; a design with more goes to the careful search
+CAPACITY = (
+    BLOCK * MOST_PEAKS + 120
+)  # rows 960 bytes apart modulo 4096, so that they do not evict each other from the cache
+# Rows of the list of maxima under refinement: constants, place, spacing of the samples, results.
+_E, _Y0, _CA, _K0, _K1, _K2, _SIZE, _U, _V, _WIDTH, _LEFT, _PEAK, _RIGHT, _START, _GUESS, _MOVED, _ERROR, _ROUNDING = (
+    k * CAPACITY for k in range(18)
+)
+_ROWS = 18
+_FLOOR, _MARKS = (FEWEST + 2) * BLOCK, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
+_EXPONENT = np.array([0, 0, 1, 13, 2, 16, 14, 6, 3, 8, 17, 12, 15, 5, 7, 11, 4, 10, 9])  # k of 2^k modulo 19
+
+
+def sampling_tables() -> tuple[Array, Array]:
+    """Cosines and sines of N equally spaced angles for N = 16, 32, ... 1024; those of N start at position N - 16."""
+    phi = np.concatenate([np.arange(n) * (2.0 * np.pi / n) for n in (16 << k for k in range(7))])
+    return np.cos(phi), np.sin(phi)
+
+
+@inline
+def _sample(
+    at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, first: Array | None, second: Array | None
+) -> None:
+    """Magnitudes at n equally spaced angles into size[1 ... n], closed periodically."""
+    e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
+    begin = n - FEWEST
+    for i in range(n):
+        p, q, j, _ = follower(e, y0, ca, k0, k1, k2, cos[begin + i], sin[begin + i])
+        size[1 + i] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
+    size[0], size[n + 1] = size[n], size[1]
+
+
+@inline
+def _sample_block(
+    count: int, at: Array, cos: Array, sin: Array, size: Array, first: Array | None, second: Array | None
+) -> None:
+    """As :func:`_sample` with FEWEST angles, for all designs of a block: angle i of design k at (i + 1) BLOCK + k."""
+    for i in range(FEWEST):
+        u, v, row = cos[i], sin[i], (1 + i) * BLOCK
+        for k in range(count):
+            e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
+            p, q, j, _ = follower(e, y0, ca, k0, k1, k2, u, v)
+            size[row + k] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
+    for k in range(count):
+        size[k], size[(FEWEST + 1) * BLOCK + k] = size[FEWEST * BLOCK + k], size[BLOCK + k]
+
+
+@inline
+def _jet(m: Array, i: int, first: Array | None, second: Array | None) -> tuple[float, float, float]:
+    """The wanted transfer function and its next two derivatives at a maximum of the list."""
+    e, y0, ca, k0, k1, k2 = m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2]
+    u, v = m[i + _U], m[i + _V]
+    p, q, j, k = follower(e, y0, ca, k0, k1, k2, u, v)
+    if first is not None:
+        return p, q, j
+    if second is not None:
+        return q, j, k
+    # The fifth derivative only steers the iteration: a difference quotient of the fourth is enough.
+    ahead = 1e-4 * m[i + _WIDTH]
+    u, v = rotate(u, v, ahead)
+    _, _, _, k_ahead = follower(e, y0, ca, k0, k1, k2, u, v)
+    return j, k, (k_ahead - k) / ahead
+
+
+@inline
+def _refine(count: int, m: Array, rounds: int, first: Array | None, second: Array | None) -> None:
+    """Newton steps to the zero of the next derivative, uphill where it is not concave; all maxima side by side."""
+    for i in range(count):
+        left, right = m[i + _PEAK] - m[i + _LEFT], m[i + _PEAK] - m[i + _RIGHT]
+        offset = 0.5 * (left - right) / (left + right)  # vertex of the parabola through the three samples
+        m[i + _GUESS] = m[i + _PEAK] + 0.25 * offset * (left - right)
+        u, v = rotate(m[i + _U], m[i + _V], offset * m[i + _WIDTH])
+        m[i + _U] = u
+        m[i + _V] = v
+        m[i + _MOVED] = offset * m[i + _WIDTH]
+    for _ in range(rounds):
+        for i in range(count):
+            y, dy, d2y = _jet(m, i, first, second)
+            width = m[i + _WIDTH]
+            step = -dy / d2y if y * d2y < 0.0 else math.copysign(width, y * dy)
+            step = min(max(step, -0.5 * width), 0.5 * width)
+            m[i + _MOVED] += step
+            u, v = rotate(m[i + _U], m[i + _V], step)
+            m[i + _U] = u
+            m[i + _V] = v
+
+
+@inline
+def _finish(count: int, m: Array, order: int, target: float, first: Array | None, second: Array | None) -> None:
+    """Peak of the parabola through the last point, what it adds as an error estimate, and the rounding error."""
+    for i in range(count):
+        y, dy, d2y = _jet(m, i, first, second)
+        rise = -0.5 * dy * dy / d2y * math.copysign(1.0, y)
+        peak = abs(y) + rise
+        trusted = (y * d2y < 0.0) & (rise <= target * peak) & (abs(m[i + _MOVED]) <= m[i + _WIDTH])
+        trusted = trusted & (abs(peak - m[i + _GUESS]) <= 0.1 * peak)
+        m[i + _PEAK] = peak
+        m[i + _ERROR] = rise if trusted else math.inf
+        u, v = m[i + _U], m[i + _V]
+        x, yy = m[i + _E] - u, m[i + _Y0] + m[i + _CA] * v
+        w = m[i + _K0] + m[i + _K1] * v - m[i + _K2] * u
+        mx, my = abs(m[i + _E]) + 1.0, abs(m[i + _Y0]) + abs(m[i + _CA])
+        tolerance = 8.0 * EPS * (abs(x) * mx + abs(yy) * my + abs(w) * m[i + _SIZE])
+        m[i + _ROUNDING] = rounding(order, x * x + yy * yy - w * w, tolerance)
+
+
+@inline
+def _mark_peaks(count: int, size: Array) -> None:
+    """For the samples of :func:`_sample_block`: the set of local maxima of at least 60 %, as a sum of powers of two."""
+    for k in range(count):
+        size[_FLOOR + k], size[_MARKS + k] = 0.0, 0.0
+    for i in range(1, FEWEST + 1):
+        for k in range(count):
+            size[_FLOOR + k] = largest(size[_FLOOR + k], 0.6 * size[i * BLOCK + k])
+    mark = 1.0
+    for i in range(1, FEWEST + 1):
+        for k in range(count):
+            y, before, after = size[i * BLOCK + k], size[(i - 1) * BLOCK + k], size[(i + 1) * BLOCK + k]
+            peak = (y >= size[_FLOOR + k]) & (y > before) & (y >= after)
+            size[_MARKS + k] += mark if peak else 0.0
+        mark *= 2.0
+
+
+@inline
+def _list_marked(at: Array, k: int, cos: Array, sin: Array, size: Array, m: Array, count: int) -> int:
+    """Append the marked local maxima of design k to the list; returns its new length."""
+    marks = int(size[_MARKS + k])
+    while marks != 0:
+        lowest = marks & -marks
+        i = _EXPONENT[lowest % 19]
+        here = (i + 1) * BLOCK + k
+        _append(at, k, cos[i], sin[i], size[here - BLOCK], size[here], size[here + BLOCK], FEWEST, i, m, count)
+        marks ^= lowest
+        count += 1
+    return count
+
+
+@inline
+def _list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, m: Array, count: int) -> int:
+    """As the two above for the samples of one design by :func:`_sample`; none if there are implausibly many."""
+    most = 0.0
+    for i in range(n):
+        most = largest(most, size[i])
+    floor, length = 0.6 * most, count
+    for i in range(1, n + 1):
+        if (size[i] >= floor) & (size[i] > size[i - 1]) & (size[i] >= size[i + 1]):
+            if length - count == MOST_PEAKS:
+                return count
+            here = n - FEWEST + i - 1
+            _append(at, k, cos[here], sin[here], size[i - 1], size[i], size[i + 1], n, i - 1, m, length)
+            length += 1
+    return length
+
+
+@inline
+def _append(
+    at: Array, k: int, u: float, v: float, left: float, peak: float, right: float, n: int, sample: int, m: Array, i: int
+) -> None:
+    width = TURN / n
+    m[i + _U], m[i + _V], m[i + _START], m[i + _WIDTH] = u, v, sample * width, width
+    m[i + _LEFT], m[i + _PEAK], m[i + _RIGHT] = left, peak, right
+    m[i + _E], m[i + _Y0], m[i + _CA] = at[k + E], at[k + Y0], at[k + CA]
+    m[i + _K0], m[i + _K1], m[i + _K2], m[i + _SIZE] = at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE]
+
+
+@inline
+def _careful(at: Array, k: int, order: int, target: float) -> tuple[float, float, float, bool]:
+    u, v = at[k + COS], at[k + SIN]
+    c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2] + 1e-300
+    here = point(c1, s1, c2, s2, u, v)
+    fu, fv = far_minimum(c2, s2, u, v)
+    there = point(c1, s1, c2, s2, fu, fv)
+    rho1 = math.sqrt(2.0 * at[k + DELTA] / here.curvature) if here.curvature > 0.0 else math.inf
+    rise = at[k + DELTA] + max(there.value - here.value, 0.0)
+    rho2 = math.sqrt(2.0 * rise / there.curvature) if there.curvature > 0.0 else math.inf
+    return careful_maximum(
+        order, at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2],
+        math.atan2(v, u), rho1, math.atan2(fv, fu), rho2, target,
+    )  # fmt: skip
+
+
+@kernel
+def true_maxima(
+    designs: Array,
+    cos: Array,
+    sin: Array,
+    target: float,
+    status: Status,
+    phi: Array | None,
+    error: Array | None,
+    max_abs_dpsi: Array | None,
+    max_abs_d2psi: Array | None,
+    max_abs_d3psi: Array | None,
+) -> None:
+    """Largest magnitude of one transfer function over the whole turn, where it is, and an estimate of its error.
+
+    Parameters
+    ----------
+    designs : (n, 8) columns of :class:`Design`
+    cos, sin : :func:`sampling_tables`
+    target : relative error wanted, 1e-3 ... 1e-12
+    status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_CONVERGED or INVALID_INPUT
+    phi : (n,) out [rad], crank angle in [0, 2 pi) of the maximum
+    error : (n,) out, estimate of the absolute error: last correction and rounding
+    max_abs_dpsi, max_abs_d2psi, max_abs_d3psi : (n,) out; exactly one of them, the others None
+
+    Notes
+    -----
+    Where the status is not OK the outputs are nan.  The search is statistical, not proven; docs/rssr.md gives the
+    number of random designs it was measured on.
+    """
+    order = 1 if max_abs_dpsi is not None else (2 if max_abs_d2psi is not None else 3)
+    per_rho = 12.0 if order < 3 else 18.0
+    rounds = (2 if order == 1 else 4) - (1 if target > 1e-4 else 0)
+    at, m, size, grid = new_block(), np.empty(_ROWS * CAPACITY), np.empty(MOST + 2), np.empty((FEWEST + 4) * BLOCK)
+    first_peak = np.empty(BLOCK + 1, np.int64)
+    for start in range(0, designs.shape[0], BLOCK):
+        block = min(BLOCK, designs.shape[0] - start)
+        load_block(designs, start, block, at)
+        least_delta(block, at)
+        singularity_distance(block, at)
+        _sample_block(block, at, cos, sin, grid, max_abs_dpsi, max_abs_d2psi)
+        _mark_peaks(block, grid)
+        count = 0
+        for k in range(block):
+            first_peak[k] = count
+            status[start + k] = turning_status(at[k + DELTA], at[k + TOLERANCE], at[k + VALID] != 0.0)
+            if status[start + k] != st.OK or at[k + ACROSS] * MOST < per_rho:
+                continue
+            n = FEWEST
+            while n * at[k + ACROSS] < per_rho:
+                n *= 2
+            if n == FEWEST:
+                count = _list_marked(at, k, cos, sin, grid, m, count)
+            else:
+                _sample(at, k, cos, sin, n, size, max_abs_dpsi, max_abs_d2psi)
+                count = _list_peaks(at, k, cos, sin, n, size, m, count)
+        first_peak[block] = count
+        padded = (count + 7) & ~7  # whole vectors; what stands in the surplus is never read
+        _refine(padded, m, rounds, max_abs_dpsi, max_abs_d2psi)
+        _finish(padded, m, order, target, max_abs_dpsi, max_abs_d2psi)
+        for k in range(block):
+            i = start + k
+            best, place, bound = math.nan, math.nan, math.nan
+            if status[i] == st.OK:
+                best, winner, worst = 0.0, 0, 0.0 if first_peak[k + 1] > first_peak[k] else math.inf
+                for peak in range(first_peak[k], first_peak[k + 1]):
+                    winner = peak if m[peak + _PEAK] > best else winner
+                    best = max(best, m[peak + _PEAK])
+                    worst = max(worst, m[peak + _ERROR])
+                if worst < math.inf:
+                    if error is not None:
+                        bound = m[winner + _ERROR] + best * m[winner + _ROUNDING]
+                    if phi is not None:
+                        place = m[winner + _START] + m[winner + _MOVED]
+                else:
+                    best, place, bound, agreed = _careful(at, k, order, target)
+                    if not agreed:
+                        status[i] = st.NOT_CONVERGED
+                        best, place, bound = math.nan, math.nan, math.nan
+            if phi is not None:
+                phi[i] = place - TURN * math.floor(place / TURN)
+            if error is not None:
+                error[i] = bound
+            if max_abs_dpsi is not None:
+                max_abs_dpsi[i] = best
+            if max_abs_d2psi is not None:
+                max_abs_d2psi[i] = best
+            if max_abs_d3psi is not None:
+                max_abs_d3psi[i] = best
