@@ -123,7 +123,8 @@ class Curves:
         """Values of a series (n, m) out of pose outputs on a set of angles."""
         x = columns[series.output]
         if series.pressure:
-            x = x / _discriminant_scale(x, columns[series.pressure])
+            with np.errstate(invalid="ignore"):
+                x = x / _discriminant_scale(x, columns[series.pressure])
         return x
 
     def stroke(self, points: Points) -> tuple[int, int]:
@@ -249,7 +250,8 @@ def _discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
     distance = np.where(np.isfinite(angle), np.abs(angle - 0.5), np.inf)
     best = np.argmin(distance, axis=1)[:, None]
     cos = np.cos(np.take_along_axis(pressure_angle, best, axis=1))
-    return np.take_along_axis(discriminant, best, axis=1) / (cos * cos)
+    with np.errstate(invalid="ignore"):  # where nothing assembles the scale is nan, and so is all that needs it
+        return np.take_along_axis(discriminant, best, axis=1) / (cos * cos)
 
 
 def _extrema(
