@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.families import rssp
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, optional_outputs
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, optional_outputs
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -34,6 +35,23 @@ JOINT_OUTPUTS = (
     Output("z_c", "length", "slider ball, normal to both", "(6)"),
 )
 
+MARGIN_OUTPUTS = (
+    Output("rotatable", "1", "whether the links reach over the whole turn", "(4)"),
+    Output("margin", "1", "smallest cos^2(pressure angle) over the turn; negative if the crank does not turn", "(4)"),
+    Output("max_pressure_angle", "rad", "largest pressure angle over one turn", "(3)"),
+)
+
+LIMIT_OUTPUTS = (
+    Output("s_ext", "length", "s in the extended position: largest, smallest if branch = -1", "(7)"),
+    Output("s_fold", "length", "s in the folded position: smallest, largest if branch = -1", "(7)"),
+    Output("phi_ext", "rad", "crank angle of the extended position, in [0, 2 pi)", "(8)"),
+    Output("phi_fold", "rad", "crank angle of the folded position, in [0, 2 pi)", "(8)"),
+    Output("phi0", "rad", "crank angle from the extended to the folded position, in [0, 2 pi)", "(9)"),
+    Output("stroke_ratio", "1", "phi0/(2 pi - phi0)", "(9)"),
+    Output("stroke", "length", "largest minus smallest s over one turn", "(10)"),
+)
+
+EPS = 2.0**-53
 _VALUES = tuple(o.name for o in VALUE_OUTPUTS)
 _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 
@@ -53,6 +71,77 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return columns | {"status": status}
 
 
+def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Rotatability, margin and largest pressure angle, exact."""
+    n = len(designs)
+    status = np.empty(n, np.uint8)
+    least, turns, angle = np.empty(n), np.empty(n), np.empty(n)
+    rssp.margin(designs, status, least, turns, angle, None)
+    scale = designs[:, 1] ** 2
+    # Rounding errors of Q = (b - m)(b + m) - n^2, taken where m and n are largest.
+    size = (np.abs(designs[:, 2]) + designs[:, 0]) ** 2 + (np.abs(designs[:, 3]) + designs[:, 0]) ** 2
+    err_margin = 18.0 * EPS * size / scale + 4.0 * EPS
+    # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
+    with np.errstate(divide="ignore"):
+        err_angle = np.minimum(err_margin / np.abs(np.sin(2.0 * angle)), np.sqrt(err_margin)) + 4.0 * EPS
+    columns: Columns = {
+        "rotatable": turns == 1.0,
+        "margin": least,
+        "max_pressure_angle": angle,
+        "err_rotatable": np.zeros(n),
+        "err_margin": err_margin,
+        "err_max_pressure_angle": err_angle,
+    }
+    return _chosen(columns, wanted, status)
+
+
+def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Both limit positions of the slider, to rounding; the errors are bounds of the rounding errors."""
+    n = len(designs)
+    status = np.empty(n, np.uint8)
+    values = {o.name: np.empty(n) for o in LIMIT_OUTPUTS}
+    err_ext, err_fold = np.empty(n), np.empty(n)
+    rssp.limits(designs, status, *values.values(), err_ext, err_fold)
+    stroke, ratio = np.abs(values["stroke"]), values["stroke_ratio"]
+    ca, e = np.abs(np.cos(designs[:, 4])), np.abs(designs[:, 2])
+    rho2 = [np.hypot(e, values[f"s_{end}"] * ca) ** 2 for end in ("ext", "fold")]
+    err_phi = [e * ca * err / square + 8.0 * EPS for err, square in zip((err_ext, err_fold), rho2, strict=True)]
+    # |s_ext + s_fold - 2 f sin(alpha)|, the denominator of the half-stroke identity
+    between = 2.0 * designs[:, 0] * sum(np.sqrt(square) for square in rho2) / stroke
+    err_phi0 = err_phi[0] + err_phi[1]
+    columns: Columns = values | {
+        "stroke": stroke,
+        "err_s_ext": err_ext,
+        "err_s_fold": err_fold,
+        "err_phi_ext": err_phi[0],
+        "err_phi_fold": err_phi[1],
+        "err_phi0": err_phi0,
+        "err_stroke_ratio": err_phi0 * (1.0 + ratio) ** 2 / (2.0 * np.pi),
+        "err_stroke": stroke * (2.0 * (err_ext + err_fold) / between + 16.0 * EPS),
+    }
+    return _chosen(columns, wanted, status)
+
+
+def _chosen(columns: Columns, wanted: frozenset[str], status: NDArray[np.uint8]) -> Columns:
+    return {name: out for name, out in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
+
+
+_JOINT_NEEDS = ("s", "ds", "d2s", "discriminant")
+
+
+def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
+    """Fill the joint records that effects work from; ``motion`` holds the pose outputs they are made of."""
+    s, ds, d2s, discriminant = (np.asarray(motion[name], dtype=np.float64) for name in _JOINT_NEEDS)
+    rssp.joints(designs, angles.cos, angles.sin, s, ds, d2s, discriminant, per_pose, per_design)
+
+
+def ellipse(designs: Array) -> Array:
+    """The curve of the coupler direction across the slide, (n, 7)."""
+    out = np.empty((len(designs), 7))
+    rssp.pressure_ellipse(designs, out)
+    return out
+
+
 FAMILY = Family(
     name="rssp",
     title="spatial slider-crank",
@@ -60,6 +149,13 @@ FAMILY = Family(
     position="s",
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
     poses=poses,
+    steps=(
+        Step("margin", MARGIN_OUTPUTS, margins, 200.0),
+        Step("limit positions", LIMIT_OUTPUTS, limit_positions, 500.0),
+    ),
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
     uses_phi=False,
+    joints=joint_records,
+    joint_needs=_JOINT_NEEDS,
+    ellipse=ellipse,
 )

@@ -1,0 +1,12 @@
+"""Spatial slider-crank: revolute crank, two ball joints, prismatic slider (RSSP); planar for alpha = 0.
+
+``closure`` reduces a design to its constants, ``motion`` evaluates poses, ``margin`` decides rotatability and the
+largest pressure angle, ``limits`` finds the limit positions, ``joints`` and ``ellipse`` are what effects work from.
+"""
+
+from kernels.families.rssp.closure import Design as Design
+from kernels.families.rssp.ellipse import pressure_ellipse as pressure_ellipse
+from kernels.families.rssp.joints import joints as joints
+from kernels.families.rssp.limits import limits as limits
+from kernels.families.rssp.margin import margin as margin
+from kernels.families.rssp.motion import poses as poses
