@@ -174,8 +174,8 @@ def _limit_way(family: Family, name: str) -> Way | None:
             "swing": f"{position} at the folded minus the extended position, where it is {first}",
             "stroke": f"largest minus smallest {position} over one turn",
         }
-        where = f"{first} in the extended" if base.endswith("_ext") else f"{second} in the folded"
-        text = texts.get(base, f"{position} in the limit position where it is {where} position")
+        where = f"extended position: the {first}" if base.endswith("_ext") else f"folded position: the {second}"
+        text = texts.get(base, f"{position} in the {where}")
         return Way(Output(name, units.get(base, unit), text), "limits", base, position, suffix)
     return None
 

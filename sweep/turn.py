@@ -83,15 +83,18 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
     requests = {r for way in _ways(family, names) for r in way.requests(False)}
     if accuracy.samples is not None:
         return accuracy.samples * (NS_POSE * stages + NS_SCAN * len(requests))
-    return NS_SEARCH * stages + NS_PEAK * stages * len(requests)
+    assert accuracy.target is not None
+    dearer = 0.5 - np.log10(accuracy.target) / 16.0
+    return float(stages * (NS_SEARCH + NS_PEAK * dearer * len(requests)))
 
 
-# Measured on one core of a Zen 4 at 3.7 GHz (docs/extrema.md).
-NS_POSE = 12.0
-NS_SCAN = 1.5
-NS_SEARCH = 1000.0
-NS_PEAK = 1200.0
-NS_MARGIN = 2000.0
+# Measured on one core of a Zen 4 (docs/extrema.md): per sample and stage, per sample and extremum, per design and
+# stage, per refined extremum at a target of 1e-8, per margin without a step.
+NS_POSE = 5.0
+NS_SCAN = 2.0
+NS_SEARCH = 800.0
+NS_PEAK = 2200.0
+NS_MARGIN = 1600.0
 
 
 def _ways(family: Family, names: Sequence[str]) -> list[Way]:

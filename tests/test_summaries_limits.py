@@ -77,9 +77,9 @@ def test_extremes_of_spatial_slider_cranks_are_in_line_outward():
 
 
 def test_limit_positions_of_the_table_of_crank_rockers():
-    """All rows but swings below 1e-11 rad, a difference of angles here (the family's own step does better)."""
+    """All rows but swings below 1e-10 rad, a difference of angles here (the family's own step does better)."""
     rows = [row for row in ROWS if row["full_rotation"] and row["rocker"] == "oscillates"]
-    rows = [row for row in rows if abs(float(row["psi0"])) > 1e-11]
+    rows = [row for row in rows if abs(float(row["psi0"])) > 1e-10]
     names = ("a", "b", "c", "e", "f", "g", "alpha", "sigma")
     designs = np.array([[float(row[name]) for name in names] for row in rows])
     found = design_outputs(PLAIN_RSSR, designs, ["swing", "phi0"], Accuracy(target=1e-10))
