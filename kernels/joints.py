@@ -1,7 +1,8 @@
 """What an effect knows of a linkage: joint positions, directions and the follower's motion, never the family.
 
-A crank turns about ``u`` at A and carries the ball joint B; a coupler runs from B to the ball joint C, which turns
-about ``k`` at D.  A family fills one record per pose and one per design; :func:`read` puts them together for one pose.
+A crank turns about ``u`` at A and carries the ball joint B; a coupler runs from B to the ball joint C.  C is carried by
+a follower: a rocker, which turns about ``k`` at D (``turns`` = 1), or a slider, which moves along ``tau`` (``turns`` = 0,
+c = 1, dpsi and d2psi its velocity and acceleration analogues, D = C).  A family fills one record per pose and one per design; :func:`read` puts them together for one pose.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from kernels.vectors import Vector
 Array = NDArray[np.float64]
 
 PER_POSE = 24
-PER_DESIGN = 16
+PER_DESIGN = 17
 
 
 class Joints(NamedTuple):
@@ -41,6 +42,7 @@ class Joints(NamedTuple):
     c: float
     branch: float
     d2psi: float
+    turns: float  # 1 for a rocker, 0 for a slider
 
 
 @inline
@@ -70,4 +72,5 @@ def read(poses: Array, designs: Array) -> Joints:
         designs[14],
         designs[15],
         poses[23],
+        designs[16],
     )

@@ -3,7 +3,7 @@
 A ball joint with a finger is a universal joint: its first axis ``w`` is fixed in the neighbouring link, its second axis
 ``n`` in the coupler, normal to w and to the coupler (spatial-linkages sheet, section 4; Polukhin 1971, 2.6).
 
-* finger on the driven joint C: w = rho (the line D-C), n = branch (w x s)/|w x s|; degenerates only at a dead point,
+* finger on the driven joint C: w = rho (the line D-C; on a slider the common perpendicular, ours), n = branch (w x s)/|w x s|; degenerates only at a dead point,
   |w x s| >= cos(pressure angle);
 * finger on the driving joint B: w = u (crank axis), n = (w x s)/|w x s|; degenerates where the coupler is parallel to
   the crank axis, whatever the pressure angle.
@@ -49,13 +49,13 @@ def orientation(j: Joints, construction: int) -> Coupler:
     """Orientation and rates of the coupler for one pose (sheet 4.1, 4.2, primes with respect to the crank angle)."""
     v_b, a_b = scale(j.a, j.tau_b), scale(-j.a, j.rho_b)
     v_c = scale(j.c * j.dpsi, j.tau)
-    a_c = mix(j.c * j.d2psi, j.tau, -j.c * j.dpsi * j.dpsi, j.rho)
+    a_c = mix(j.c * j.d2psi, j.tau, -j.turns * j.c * j.dpsi * j.dpsi, j.rho)
     per_b = 1.0 / j.b
     ds, d2s = scale(per_b, sub(v_c, v_b)), scale(per_b, sub(a_c, a_b))
     if construction == DRIVEN:
         w = j.rho
-        dw = scale(j.dpsi, j.tau)
-        d2w = mix(j.d2psi, j.tau, -j.dpsi * j.dpsi, j.rho)
+        dw = scale(j.turns * j.dpsi, j.tau)
+        d2w = mix(j.turns * j.d2psi, j.tau, -j.turns * j.dpsi * j.dpsi, j.rho)
         sign = j.branch
     else:
         w, dw, d2w, sign = j.u, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0

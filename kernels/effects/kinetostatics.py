@@ -1,7 +1,8 @@
-"""D1, D3: joint reactions, finger couple, driving torque and reduced inertia of crank, coupler and rocker.
+"""D1, D3: joint reactions, finger couple, driving torque and reduced inertia of crank, coupler and follower.
 
 The dyad solution of the dynamics sheet, section 2: the coupler's moment balance gives the finger couple and the part of
-the force at B normal to the coupler, the rocker's gives the axial force.  Friction couples enter affinely, so the
+the force at B normal to the coupler, the follower's gives the axial force: a rocker's about its axis, a slider's along
+its way.  Friction couples enter affinely, so the
 friction effect calls :func:`solve` again with its couples.
 """
 
@@ -113,16 +114,18 @@ def inertia_loads(j: Joints, coupler: Coupler, loads: Array) -> Loads:
     omega1, eps1 = scale(speed, j.u), scale(change, j.u)
     omega2 = scale(speed, coupler.omega)
     eps2 = mix(square, coupler.eps, change, coupler.omega)
-    omega3, eps3 = scale(speed * j.dpsi, j.k), scale(square * j.d2psi + change * j.dpsi, j.k)
+    along = square * j.d2psi + change * j.dpsi
+    omega3, eps3 = scale(j.turns * (speed * j.dpsi), j.k), scale(j.turns * along, j.k)
     # Rates of the coupler's centre of mass per unit speed serve the reduced inertia as well.
     v2 = add(coupler.v_b, cross(coupler.omega, rod.centre))
     a2 = add(coupler.a_b, spun(coupler.omega, coupler.eps, rod.centre))
     a_g2 = mix(square, a2, change, v2)
     f1 = scale(crank.mass, sub(spun(omega1, eps1, crank.centre), gravity))
     f2 = scale(rod.mass, sub(a_g2, gravity))
-    f3 = scale(rocker.mass, sub(spun(omega3, eps3, rocker.centre), gravity))
+    a_g3 = mix(1.0, spun(omega3, eps3, rocker.centre), (1.0 - j.turns) * along, j.tau)
+    f3 = scale(rocker.mass, sub(a_g3, gravity))
     about_crank = _about_axis(crank, j.u)
-    about_rocker = _about_axis(rocker, j.k)
+    about_rocker = _about_axis(rocker, j.k) if j.turns > 0.0 else rocker.mass
     rod_omega = _inertia_times(rod, coupler.omega)
     j_red = about_crank + rod.mass * dot(v2, v2) + dot(coupler.omega, rod_omega) + about_rocker * j.dpsi * j.dpsi
     dj_red = 2.0 * (rod.mass * dot(v2, a2) + dot(rod_omega, coupler.eps) + about_rocker * j.dpsi * j.d2psi)
@@ -153,12 +156,16 @@ def solve(
     moment3 = add(on.t3, cross(on.d3, on.f3))
     on_rocker = finger if construction == DRIVEN else 0.0
     on_crank = 0.0 if construction == DRIVEN else finger
-    along_k = dot(moment3, j.k) - on.torque - t_d + dot(e_c, j.k) + on_rocker * dot(q, j.k)
-    axial = (along_k / j.c - dot(sub(normal, on.f2), j.tau)) / j.t_tau
+    if j.turns > 0.0:
+        needed = (dot(moment3, j.k) - on.torque - t_d + dot(e_c, j.k) + on_rocker * dot(q, j.k)) / j.c
+    else:
+        needed = dot(on.f3, j.tau) - on.torque
+    axial = (needed - dot(sub(normal, on.f2), j.tau)) / j.t_tau
     r_b = add(normal, scale(axial, j.s))
     r_c = sub(r_b, on.f2)
-    r_d = sub(on.f3, r_c)
-    m_d = add(sub(sub(moment3, scale(j.c, cross(j.rho, r_c))), scale(on.torque, j.k)), add(e_c, scale(on_rocker, q)))
+    r_d = mix(1.0, sub(on.f3, r_c), -(1.0 - j.turns) * on.torque, j.tau)
+    arm, load = j.turns * j.c, j.turns * on.torque
+    m_d = add(sub(sub(moment3, scale(arm, cross(j.rho, r_c))), scale(load, j.k)), add(e_c, scale(on_rocker, q)))
     r_a = add(on.f1, r_b)
     m_a = add(add(add(on.t1, cross(on.d1, on.f1)), scale(j.a, cross(j.rho_b, r_b))), add(e_b, scale(on_crank, q)))
     m_a = sub(m_a, scale(t_a, j.u))
@@ -189,12 +196,13 @@ def kinetostatics(
     ----------
     poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.joints`
     loads : (n, LOADS): per body m, centre of mass, inertia about it (body axes: crank rho_B, tau_B, u from A; coupler
-        s, n x s, n from B; rocker rho, tau, k from D); gravity; torque on the rocker about k; crank speed; its rate
+        s, n x s, n from B; follower rho, tau, k from D); gravity; torque on the rocker about k or force on the slider
+        along tau; crank speed; its rate
     construction : DRIVEN or DRIVING, which ball joint carries the finger
     status : (n, m), in and out; DEAD_POINT where cos(pressure angle) < LEAST_COSINE, SINGULAR where the finger axis
         meets the coupler: both give nan
-    r_a, r_b, r_c, r_d : (n, m, 3) or None; force frame on crank, crank on coupler, coupler on rocker, frame on rocker
-    m_a, m_d : (n, m, 3) or None; moment of the frame on crank (about A) and rocker (about D), fixed axes
+    r_a, r_b, r_c, r_d : (n, m, 3) or None; force frame on crank, crank on coupler, coupler and frame on follower
+    m_a, m_d : (n, m, 3) or None; moment of the frame on crank (about A) and follower (about D), fixed axes
     m_finger, m_drive : (n, m) or None; couple of the finger along n x w, torque on the crank about u
     j_red, dj_red : (n, m) or None; inertia reduced to the crank and its derivative
 

@@ -13,7 +13,8 @@ Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = dict[str, NDArray[np.generic]]
 Unit = Literal[
     "length", "angle", "ratio", "sign", "count", "none", "choice",
-    "mass", "inertia", "force", "torque", "stiffness", "damping", "speed", "angular_acceleration", "acceleration",
+    "mass", "inertia", "force", "torque", "pressure", "stiffness", "damping", "speed", "angular_acceleration",
+    "acceleration", "time",
 ]  # fmt: skip
 
 
@@ -63,6 +64,7 @@ class Accuracy:
 PoseFunction: TypeAlias = Callable[[Array, Angles, frozenset[str]], Columns]
 StepFunction: TypeAlias = Callable[[Array, frozenset[str], Accuracy], Columns]
 JointFunction: TypeAlias = Callable[[Array, Angles, Columns, Array, Array], None]
+EllipseFunction: TypeAlias = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,9 @@ class Family:
     derivatives with respect to phi are ``d<position>``, ``d2<position>``, ``d3<position>``.  A family whose poses need
     no more than cos(phi) and sin(phi) says ``uses_phi=False``; in a chain that saves an arctangent per pose.
     ``joints(designs, angles, motion, per_pose, per_design)`` fills the records of :mod:`kernels.joints` that effects
-    work from; a family without it has no effects.
+    work from, out of the pose outputs ``joint_needs``; ``ellipse(designs)`` gives the curve that
+    :mod:`kernels.effects.pressure_extrema` takes.  A family without them has no effects.  ``dear`` names, for pose
+    outputs that cost far more than the motion, what they are computed by and its cost [ns per pose].
     """
 
     name: str
@@ -102,6 +106,9 @@ class Family:
     derivative_of: Mapping[str, str] = field(default_factory=dict)
     uses_phi: bool = True
     joints: JointFunction | None = None
+    joint_needs: tuple[str, ...] = ()
+    ellipse: EllipseFunction | None = None
+    dear: Mapping[str, tuple[str, float]] = field(default_factory=dict)
 
     @property
     def parameter_names(self) -> tuple[str, ...]:

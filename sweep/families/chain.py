@@ -84,6 +84,10 @@ def chain(families: tuple[Family, ...]) -> Chain:
         poses=partial(_poses, stages),
         derivative_of=dict(last.derivative_of) | own,
         uses_phi=families[0].uses_phi,
+        dear={
+            f"{name}{s.number}": (f"{what}{s.number}", ns) for s in stages for name, (what, ns) in s.family.dear.items()
+        }
+        | dict(last.dear),
         stages=stages,
     )
 

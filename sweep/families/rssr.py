@@ -48,12 +48,20 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return columns | {"status": status}
 
 
+_JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
+
+
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
     """Fill the joint records that effects work from; ``motion`` holds the pose outputs they are made of."""
-    cos_psi, sin_psi, dpsi, d2psi, discriminant = (
-        np.asarray(motion[name], dtype=np.float64) for name in ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
-    )
+    cos_psi, sin_psi, dpsi, d2psi, discriminant = (np.asarray(motion[name], dtype=np.float64) for name in _JOINT_NEEDS)
     rssr.joints(designs, angles.cos, angles.sin, cos_psi, sin_psi, dpsi, d2psi, discriminant, per_pose, per_design)
+
+
+def ellipse(designs: Array) -> Array:
+    """The curve of the coupler direction across the rocker's motion, (n, 7)."""
+    out = np.empty((len(designs), 7))
+    rssr.pressure_ellipse(designs, out)
+    return out
 
 
 FAMILY = Family(
@@ -66,4 +74,6 @@ FAMILY = Family(
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     uses_phi=False,
     joints=joint_records,
+    joint_needs=_JOINT_NEEDS,
+    ellipse=ellipse,
 )
