@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as st
-from sweep.families.base import Accuracy, Array
+from sweep.families.base import Accuracy, Array, Family
 from sweep.optimise.measures import ROTATABLE_MARGIN, margins
 from sweep.optimise.problem import Problem
 
@@ -53,28 +53,43 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int) -> Array
     return ranked[taken]
 
 
-def from_dataset(problem: Problem, folder: Path, count: int) -> Array:
-    """Diverse best designs among the feasible rows of a dataset; at most ``count``, possibly none.
+def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Array]:
+    """The best feasible designs of a dataset (k, P), k up to 10^5, and their objective.
 
-    Only the parameters, the objective and the status are read, batch by batch; the best 10^5 rows are kept.
+    Only the parameters, the objective and the status are read, batch by batch.
     """
     import pyarrow.parquet as pq
 
     from sweep.store import parts
 
-    names = problem.family.parameter_names
+    names = family.parameter_names
     designs, merit = np.empty((0, len(names))), np.empty(0)
     for part in parts(folder):
         with pq.ParquetFile(part.path) as file:
-            for batch in file.iter_batches(batch_size=KEPT, columns=[*names, problem.objective, "status"]):
+            for batch in file.iter_batches(batch_size=KEPT, columns=[*names, objective, "status"]):
                 good = np.asarray(batch["status"]) == st.OK
                 more = np.column_stack([np.asarray(batch[name], np.float64) for name in names])[good]
                 designs = np.concatenate([designs, more])
-                merit = np.concatenate([merit, np.asarray(batch[problem.objective], np.float64)[good]])
+                merit = np.concatenate([merit, np.asarray(batch[objective], np.float64)[good]])
                 if len(merit) > KEPT:
                     best = np.sort(np.argsort(merit, kind="stable")[:KEPT])
                     designs, merit = designs[best], merit[best]
-    return diverse(problem, designs, merit, count)
+    return designs, merit
+
+
+def drawn(study: Study, count: int, seed: int) -> Array:
+    """Designs of a study's space at random, finished by its [fit] if it has one: for datasets without feasible rows."""
+    from sweep.chunk import parameter_matrix
+    from sweep.fit import fit_line
+
+    length = min(64, study.space.count)
+    blocks = max(1, SCREENED * count // length)
+    begins = np.random.default_rng(seed).integers(0, study.space.count - length + 1, blocks)
+    designs = np.concatenate([parameter_matrix(study, int(k), int(k) + length) for k in begins])
+    if study.fit is None:
+        return designs
+    fitted, status = fit_line(study.family, designs, study.fit, study.window)
+    return np.asarray(fitted[status == st.OK], np.float64)
 
 
 def from_sample(problem: Problem, signs: list[dict[str, float]], count: int, seed: int) -> Array:
@@ -96,10 +111,10 @@ def from_sample(problem: Problem, signs: list[dict[str, float]], count: int, see
     values = problem.lower + sample * problem.span
     blocks = [problem.rows(values[k :: len(signs)], **choice) for k, choice in enumerate(signs)]
     designs = np.concatenate(blocks)
-    return diverse(problem, designs, _merit(problem, designs), count)
+    return diverse(problem, designs, ranking(problem, designs), count)
 
 
-def _merit(problem: Problem, designs: Array) -> Array:
+def ranking(problem: Problem, designs: Array) -> Array:
     """Objective where all limits are kept; far above it the largest scaled violation; above that what does not turn."""
     from sweep.summaries import design_outputs
 
@@ -122,13 +137,3 @@ def _merit(problem: Problem, designs: Array) -> Array:
         margin = np.asarray(columns[name], np.float64)
         merit = np.where(margin < ROTATABLE_MARGIN, spread * 1e6 - margin, merit)
     return merit
-
-
-def sign_choices(study: Study) -> list[dict[str, float]]:
-    """Combinations of branch and sign values that a study's space holds."""
-    choices: list[dict[str, float]] = [{}]
-    signs = {p.name for p in study.family.parameters if p.choices is not None}
-    for axis in study.space.axes:
-        if axis.name in signs and axis.values is not None:
-            choices = [c | {axis.name: float(v)} for c in choices for v in np.unique(axis.values)]
-    return choices

@@ -11,23 +11,21 @@ import numpy as np
 
 from kernels import status as st
 from sweep import store
-from sweep.chunk import parameter_matrix
 from sweep.errors import InputError
 from sweep.families.base import Angles, Array
-from sweep.fit import fit_line
 from sweep.optimise.certificate import CAVEAT, Result
 from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
 from sweep.optimise.solve import minimise
-from sweep.optimise.starts import from_dataset, from_sample, sign_choices
+from sweep.optimise.starts import best_rows, diverse, drawn, ranking
 from sweep.tables import design_matrix
 
 if TYPE_CHECKING:
-    from sweep.study import Study
+    from sweep.study import OptimiseSettings, Study
 
 POSES = 720
-PILOT, PILOT_RUNS, PILOT_TAILS = 256, 64, (5.0, 95.0)
+TAILS = (2.0, 98.0)  # percent; beyond are needles that hardly moved and were scaled up to the stroke
 _DRAWN = re.compile(r"(pressure_angle|[xyz]_[a-z])\d*")
 
 TEXTS = {
@@ -44,8 +42,12 @@ TEXTS = {
 }
 
 
-def problem_of(study: Study) -> Problem:
-    """The optimisation problem of a study: its swept steady parameters between the ends of their axes.
+def problem_of(study: Study, designs: Array) -> Problem:
+    """The optimisation problem of a study.
+
+    Swept steady parameters vary between the ends of their axes, those that [fit] sets or scales as far as ``designs``
+    (k, P) reach and half their size beyond; limits on parameters narrow both.  An angle swept over a whole turn may go
+    on for half a turn.
 
     Raises
     ------
@@ -54,37 +56,49 @@ def problem_of(study: Study) -> Problem:
     """
     if study.objective is None:
         raise InputError("objective", None, "[objective] minimise = an output", str(study.path))
-    steady = {p.name for p in study.family.parameters if p.choices is None}
-    bounds = {name: ends for name, ends in study.space.bounds.items() if name in steady and ends[0] < ends[1]}
-    bounds |= _fitted_bounds(study)
-    for limit in study.parameter_limits:
-        low, high = bounds.get(limit.output, (-np.inf, np.inf))
-        low = low if limit.minimum is None else max(low, limit.minimum)
-        high = high if limit.maximum is None else min(high, limit.maximum)
-        if limit.output in bounds:
-            bounds[limit.output] = low, high
-    held = {name: ends[0] for name, ends in study.space.bounds.items() if name in steady and ends[0] == ends[1]}
-    names = tuple(name for name in study.family.parameter_names if name in bounds)
+    made = () if study.fit is None else (*study.fit.parameters(study.family), *study.fit.rescaled(study.family))
+    bounds: dict[str, tuple[float, float]] = {}
+    for column, parameter in enumerate(study.family.parameters):
+        if parameter.name in made:
+            low, high = (float(end) for end in np.percentile(designs[:, column], TAILS))
+            reach = 0.5 * max(abs(low), abs(high)) if parameter.unit == "length" else 0.5
+            low, high = (0.2 * low if parameter.positive else low - reach), high + reach
+        elif parameter.name in study.space.bounds and parameter.choices is None:
+            low, high = study.space.bounds[parameter.name]
+            if parameter.unit == "angle" and high - low >= 2.0 * np.pi - 1e-9:
+                low, high = low - np.pi, high + np.pi
+        else:
+            continue
+        for limit in study.parameter_limits:
+            if limit.output == parameter.name:
+                low = low if limit.minimum is None else max(low, limit.minimum)
+                high = high if limit.maximum is None else min(high, limit.maximum)
+        bounds[parameter.name] = (low, high)
+    held = {name: ends[0] for name, ends in bounds.items() if ends[0] == ends[1]}
+    names = tuple(name for name in bounds if name not in held)
     return Problem(
         study.family, names, np.array([bounds[n][0] for n in names]), np.array([bounds[n][1] for n in names]),
         dict(study.space.fixed) | held, study.objective.output, study.output_limits, study.window, study.accuracy,
     )  # fmt: skip
 
 
-def _fitted_bounds(study: Study) -> dict[str, tuple[float, float]]:
-    """Where [fit] sets or scales parameters they become variables: bounds from what it made of designs of the space."""
-    if study.fit is None:
-        return {}
-    length = min(PILOT, study.space.count)
-    starts = sorted({k * (study.space.count - length) // PILOT_RUNS for k in range(PILOT_RUNS + 1)})
-    pilot = np.concatenate([parameter_matrix(study, start, start + length) for start in starts])
-    fitted, status = fit_line(study.family, pilot, study.fit, study.window)
-    fitted = fitted[status == st.OK]
-    names = {*study.fit.parameters(study.family), *study.fit.rescaled(study.family)}
-    columns = {name: fitted[:, study.family.parameter_names.index(name)] for name in sorted(names)}
-    # The tails belong to needles that hardly move and were scaled up to the stroke.
-    found = {name: np.percentile(values, PILOT_TAILS) for name, values in columns.items() if values.size}
-    return {name: (float(low), float(high)) for name, (low, high) in found.items() if low < high}
+def problem_and_starts(study: Study, folder: Path) -> tuple[OptimiseSettings, Problem, Array]:
+    """Settings, problem and starts: the diverse best of the dataset, or of random designs where no row is feasible."""
+    if study.optimise is None or study.objective is None:
+        raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
+    count = study.optimise.starts
+    designs, merit = best_rows(study.family, study.objective.output, folder)
+    if len(designs):
+        problem = problem_of(study, designs)
+    else:
+        designs = drawn(study, count, study.optimise.seed)
+        if not len(designs):
+            raise InputError(
+                "design space", study.space.count, "at least one design that [fit] can finish", str(study.path)
+            )
+        problem = problem_of(study, designs)
+        merit = ranking(problem, designs)
+    return study.optimise, problem, diverse(problem, designs, merit, count)
 
 
 def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | None = None) -> Path:
@@ -110,13 +124,8 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
         if the search was stopped, after the best so far was written.
     """
     place = Path(folder)
-    if study.optimise is None:
-        raise InputError("optimise", None, "an [optimise] section", str(study.path))
-    problem = problem_of(study)
-    starts = from_dataset(problem, place, study.optimise.starts)
-    if not len(starts):
-        starts = from_sample(problem, sign_choices(study), study.optimise.starts, study.optimise.seed)
-    results = minimise(problem, starts, study.optimise, stop)
+    settings, problem, starts = problem_and_starts(study, place)
+    results = minimise(problem, starts, settings, stop)
     frame = _table(study, problem, results)
     _write(place / store.OPTIMUM, frame, study)
     _write(place / store.CURVES, _curves(study, frame), study)
