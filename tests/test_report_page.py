@@ -16,7 +16,7 @@ from sweep.report.answer import answer
 from sweep.report.curves import aligned_turn, in_window, rotates
 from sweep.report.figures import house_style
 from sweep.report.maps import map_figure
-from sweep.report.page import gather, overlays
+from sweep.report.page import divided_axes, gather, overlays
 from sweep.report.quantities import quantity
 from sweep.report.scan import Cells, Grid
 from sweep.study import study_from_data
@@ -153,6 +153,23 @@ def test_overlay_is_drawn_in_its_plane_in_stored_units(tmp_path: Path) -> None:
         figure = map_figure(grid, sides[0], sides[1], 16.0, None, {}, [found])
     (line,) = figure.axes[0].get_lines()
     np.testing.assert_allclose(line.get_xydata(), [[10.0, 0.0], [30.0, 90.0]])
+
+
+def test_axes_of_the_map_are_what_the_sweep_itself_set() -> None:
+    """Not signs, and not the lengths that [fit] makes afterwards out of the sampled proportions."""
+    kept = {k: v for k, v in study_data()["design"].items() if k not in ("xi2", "eta2", "h2", "lam2", "b2")}
+    design = kept | {
+        "sample": {"kind": "sobol", "n": 4096},
+        "a1": {"from": 10.0, "to": 30.0, "unit": "mm"},
+        "alpha1": {"from": 0.0, "to": 90.0, "unit": "deg"},
+        "b2": {"from": 50.0, "to": 80.0, "unit": "mm"},
+        "branch2": {"values": [1, -1]},
+        "lam2": {"values": [0, 180], "unit": "deg"},
+    }
+    fit = {"stroke": "24.5 mm", "direction": "free"}
+    study = study_from_data(study_data(design=design, fit=fit), "study.toml")
+    for feasible, cells in ((0, 4), (200, 8), (10**6, 32)):
+        assert [(c.name, len(c.weights)) for c in divided_axes(study, feasible)] == [("a1", cells), ("alpha1", cells)]
 
 
 def test_follower_that_turns_is_not_cut_at_its_lowest_position() -> None:

@@ -119,7 +119,8 @@ def read_table(path: Path) -> pd.DataFrame:
             return pd.read_parquet(path)
         # Not the parser of pandas, whose default was off by an ulp for some numbers up to version 2.
         table = csv.read_csv(path)
-        return table.rename_columns([name.strip() for name in table.column_names]).to_pandas()
+        frame: pd.DataFrame = table.rename_columns([name.strip() for name in table.column_names]).to_pandas()
+        return frame
     except (ValueError, OSError) as error:  # pyarrow derives all its complaints about content from these
         raise InputError("table", path.name, f"readable {suffix[1:]} ({error})", str(path)) from error
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,12 +23,16 @@ Row = Mapping[str, Any]
 ACTIVE = 1e-5  # a limit is called active if the optimum is this near to it, relative to its size
 KKT = 1e-6  # residual above which the optimiser's result is not called a local optimum
 MISSED = ("missed", "unknown")
+NEAREST = 4  # limits with room to spare that are named in the answer; the table has them all
 NO_PROOF = "This is no proof of a global optimum"
 
 
 @dataclass(frozen=True)
 class LimitState:
-    """One limit and where the result stands; ``state`` is "active", "met", "missed" or "unknown"."""
+    """One limit and where the result stands; ``state`` is "active", "met", "missed" or "unknown".
+
+    ``room`` is the distance to the limit relative to its size, negative where it is missed.
+    """
 
     shown: Quantity
     bound: str
@@ -36,13 +40,19 @@ class LimitState:
     reference: str
     slack: str
     state: str
+    room: float = 0.0
+
+
+def limited(data: Dataset, name: str) -> Quantity:
+    """An output under a limit; a parameter keeps its own name."""
+    shown = quantity(name, data.units.get(name, ""))
+    return replace(shown, symbol=name, words=name) if name in data.study.family.parameter_names else shown
 
 
 def limit_state(
-    limit: Limit, row: Row | None, reference: Row | None, unit: str, active_names: frozenset[str]
+    limit: Limit, row: Row | None, reference: Row | None, shown: Quantity, active_names: frozenset[str]
 ) -> LimitState:
     """Whether a design keeps a limit, and with how much room."""
-    shown = quantity(limit.output, unit)
     value, other = _value(row, limit.output), _value(reference, limit.output)
     if _is_flag(limit.output):
         words = {1.0: "yes", 0.0: "no"}
@@ -65,7 +75,15 @@ def limit_state(
     else:
         state = "met"
     slack = "" if state in ("unknown", "active") else shown.show(abs(room), 3)
-    return LimitState(shown, bound_words(limit, shown), shown.show(value), shown.show(other), slack, state)
+    return LimitState(
+        shown,
+        bound_words(limit, shown),
+        shown.show(value),
+        shown.show(other),
+        slack,
+        state,
+        room / max(abs(bound), 1e-12),
+    )
 
 
 def bound_words(limit: Limit, shown: Quantity) -> str:
@@ -85,7 +103,7 @@ def limit_states(data: Dataset) -> list[LimitState]:
     """Every limit of the study at the result of the study."""
     row = data.result
     active = frozenset(data.active)
-    return [limit_state(x, row, data.reference, data.units.get(x.output, ""), active) for x in data.study.limits]
+    return [limit_state(x, row, data.reference, limited(data, x.output), active) for x in data.study.limits]
 
 
 def answer(data: Dataset, found: Scan) -> list[str]:
@@ -146,12 +164,12 @@ def rpm(speed: float | None) -> str:
 
 def _limit_sentences(states: list[LimitState]) -> list[str]:
     active = [f"{s.shown.words} ({s.bound})" for s in states if s.state == "active"]
-    slack = [f"{s.shown.words} ({s.value}, {s.bound})" for s in states if s.state == "met" and s.slack]
+    met = sorted((s for s in states if s.state == "met" and s.slack), key=lambda s: s.room)
+    slack = [f"{s.shown.words} ({s.value}, {s.bound})" for s in met[:NEAREST]]
+    slack += [f"{len(met) - NEAREST} more"] if len(met) > NEAREST else []
     return [
-        f"Held back by {'the active limit' if len(active) == 1 else 'the active limits'}: {'; '.join(active)}."
-        if active
-        else "",
-        f"Met with room to spare: {'; '.join(slack)}." if slack else "",
+        f"Held back by the active limit{'s' if len(active) > 1 else ''}: {'; '.join(active)}." if active else "",
+        f"Met with room to spare, the nearest first: {'; '.join(slack)}." if slack else "",
     ]
 
 
@@ -193,7 +211,7 @@ def _against_reference(data: Dataset) -> list[str]:
     ]
     missed = []
     for limit in data.study.limits:
-        state = limit_state(limit, data.reference, None, data.units.get(limit.output, ""), frozenset())
+        state = limit_state(limit, data.reference, None, limited(data, limit.output), frozenset())
         if state.state in MISSED:
             missed.append(f"{state.shown.words} ({state.value}, {state.bound})")
     return [
@@ -218,7 +236,7 @@ def _proof(data: Dataset) -> str:
     if data.optimum is None:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
     starts, agree = data.starts, _value(data.optimum, "agree")
-    text = f"{NO_PROOF}: the optimiser started from {starts} designs of the sweep"
+    text = f"{NO_PROOF}: the optimiser started from {starts} design{'s' if starts != 1 else ''} of the sweep"
     if math.isfinite(agree):
         text += f", {number(agree)} of which ended at this value"
     residual, violation = _value(data.optimum, "kkt_residual"), _value(data.optimum, "violation")

@@ -94,7 +94,7 @@ def _joint(letter: str, path: Array) -> Joint:
 
 
 def mechanism_figure(curves: pd.DataFrame, unit: str) -> Figure | None:
-    """Every stage in several positions, result above reference; a spatial stage in two projections."""
+    """Every stage in several positions, result beside or above reference; a spatial stage in two projections."""
     drawn = [(str(role), stages(turn)) for role, turn in curves.groupby("role", sort=False)]
     drawn = [(role, found) for role, found in drawn if found]
     if not drawn:
@@ -106,9 +106,12 @@ def mechanism_figure(curves: pd.DataFrame, unit: str) -> Figure | None:
     ]
     frames = [_frame([found[k] for _, found in drawn], plane) for k, plane in views]
     shapes = [min(max((right - left) / (top - bottom), 0.35), 3.0) for (left, right), (bottom, top) in frames]
-    height = min((WIDTH - 0.9 * len(views)) / sum(shapes), 3.4) + 0.75
-    figure = new_figure(WIDTH, height * len(drawn))
-    panels = figure.subplots(len(drawn), len(views), squeeze=False, width_ratios=shapes)
+    if len(views) == 1:  # one panel for each mechanism: side by side
+        figure = new_figure(WIDTH, min((WIDTH / len(drawn) - 0.9) / shapes[0], 3.4) + 1.0)
+        panels = figure.subplots(1, len(drawn), squeeze=False).T
+    else:
+        figure = new_figure(WIDTH, (min((WIDTH - 0.9 * len(views)) / sum(shapes), 3.4) + 1.0) * len(drawn))
+        panels = figure.subplots(len(drawn), len(views), squeeze=False, width_ratios=shapes)
     for row, (role, found) in zip(panels, drawn, strict=True):
         for axes, (k, plane), frame in zip(row, views, frames, strict=True):
             _draw(axes, found[k], plane, REFERENCE if role == "reference" else OPTIMUM, unit)

@@ -8,10 +8,11 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from kernels import status as codes
 from sweep.errors import StoreError
 from sweep.report import answer, tables
 from sweep.report.curves import motion_caption, motion_figure
-from sweep.report.dataset import Dataset, read_dataset
+from sweep.report.dataset import Dataset, made_by_fit, read_dataset
 from sweep.report.drawing import COORDINATE, mechanism_figure
 from sweep.report.figures import TEMPLATES, Saved, house_style, save
 from sweep.report.files import copy_tables, write_survivors
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
+DESIGNS_PER_CELL = 3.0
 
 
 def write(folder: Path, out: Path) -> Path:
@@ -47,7 +49,7 @@ def write(folder: Path, out: Path) -> Path:
 def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
     """Read a dataset, go once through its rows, and compute what an optimiser would have left."""
     data = read_dataset(folder)
-    cells = divided_axes(data.study)
+    cells = divided_axes(data.study, data.counts.get(codes.OK, 0))
     objective = objective_of(data.study)
     found = scan(data.parts, cells, objective, data.second if objective is not None else None)
     data = replace(data, best=found.best_row or None)
@@ -63,13 +65,19 @@ def objective_of(study: Study) -> str | None:
     return None if study.objective is None else study.objective.output
 
 
-def divided_axes(study: Study) -> list[Cells]:
-    """The swept axes, divided into cells: finely if a single map shows them all, else coarsely."""
-    swept = [axis for axis in study.space.axes if axis.high > axis.low]
+def divided_axes(study: Study, feasible: int) -> list[Cells]:
+    """The swept axes, divided into cells: finely if a single map shows them all, else coarsely.
+
+    Axes of a sample are divided so that a cell holds some of the ``feasible`` designs on average.  Left out are signs,
+    which make no map, and what [fit] changes afterwards.
+    """
+    signs = {p.name for p in study.family.parameters if p.choices is not None}
+    fitted, scaled = made_by_fit(study)
+    swept = [axis for axis in study.space.axes if axis.high > axis.low and axis.name not in signs | fitted | scaled]
     most = CELLS_OF_PAIR if len(swept) <= 2 else CELLS_OF_MANY
     if study.space.kind == "sobol":
         # A power of two: a Sobol sequence puts equally many points into such cells.
-        sampled = 2 ** min(5, max(2, math.floor(math.log2(max(study.space.count, 4)) / 3.0)))
+        sampled = 2 ** min(5, max(2, math.floor(0.5 * math.log2(max(feasible, 1) / DESIGNS_PER_CELL))))
         return [
             Cells.of_range(axis.name, axis.low, axis.high, sampled)
             if axis.values is None

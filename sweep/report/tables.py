@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
+from sweep.report.dataset import made_by_fit
 from sweep.report.quantities import Quantity, number, percent_change, quantity
 
 if TYPE_CHECKING:
@@ -87,17 +88,22 @@ def change(shown: Quantity, value: float, other: float) -> str:
 def parameter_rows(data: Dataset) -> list[ParameterRow]:
     """All parameters of the mechanism with what was searched."""
     study, rows = data.study, []
-    bounds = study.space.bounds
+    fitted, scaled = made_by_fit(study)
     for p in study.family.parameters:
         shown = quantity(p.name, data.units.get(p.name, {"length": "mm", "angle": "rad"}.get(p.unit, "1")))
         value, other = _number(data.result, p.name), _number(data.reference, p.name)
         space, edge = "fixed", ""
-        if p.name in bounds:
-            low, high = bounds[p.name]
+        low, high = study.space.bounds.get(p.name, (math.nan, math.nan))
+        if p.name in fitted:
+            space = "fitted"
+        elif p.choices is not None and high > low:
+            space = " or ".join(number(choice) for choice in p.choices)
+        elif high > low:
             space = f"{number(low * shown.factor)} to {shown.show(high)}"
             near = 1e-9 * (high - low)
-            if high > low and not math.isnan(value):
+            if p.name not in scaled:
                 edge = "lower edge" if value - low <= near else "upper edge" if high - value <= near else ""
+        space += ", then scaled" if p.name in scaled else ""
         rows.append(ParameterRow(p.name, p.text, shown.show(value, 6), shown.show(other, 6), space, edge))
     return rows
 
@@ -146,15 +152,23 @@ def provenance(data: Dataset) -> list[tuple[str, str]]:
         rows.append(("extrema over the turn", f"refined, relative error {number(accuracy.target, 2)}"))
     else:
         rows.append(("extrema over the turn", f"on a grid of {accuracy.samples} crank angles"))
-    rows.append(("command", f"sweep run {data.study.name}"))
+    rows.append(("command", f"sweep run studies/{data.study.name}"))
     return rows + run_rows(data.runs)
 
 
 def run_rows(runs: tuple[dict[str, Any], ...]) -> list[tuple[str, str]]:
-    """The last run as it was recorded."""
-    if not runs:
+    """When, on what and with which versions the last run was made; how long all of them took."""
+    starts = [run for run in runs if run.get("event") == "start"]
+    if not starts:
         return []
-    return [(str(key), str(value)) for key, value in runs[-1].items() if not isinstance(value, (dict, list))]
+    last = starts[-1]
+    rows = [
+        (key, str(last[key])) for key in ("time", "commit", "machine", "python", "jobs", "backend") if last.get(key)
+    ]
+    rows.append(("versions", ", ".join(f"{name} {release}" for name, release in last.get("versions", {}).items())))
+    seconds = sum(run.get("seconds", 0.0) for run in runs)
+    rows.append(("time taken", f"{number(seconds, 3)} s in {len(starts)} run{'s' if len(starts) > 1 else ''}"))
+    return rows
 
 
 def _number(row: Any, name: str) -> float:
