@@ -20,13 +20,15 @@ _FLAGS = ("nnan", "nsz")
 def _float_intrinsic(name: str) -> Any:
     @intrinsic
     def function(typingctx: Any, a: Any, b: Any) -> Any:
+        single = a == types.float32 and b == types.float32
+
         def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            double = ir.DoubleType()
-            two_doubles = ir.FunctionType(double, [double, double])
-            llvm_function = builder.module.declare_intrinsic(name, [double], two_doubles)
+            number = ir.FloatType() if single else ir.DoubleType()
+            llvm_function = builder.module.declare_intrinsic(name, [number], ir.FunctionType(number, [number, number]))
             return builder.call(llvm_function, args, fastmath=_FLAGS)
 
-        return types.float64(types.float64, types.float64), codegen
+        kind = types.float32 if single else types.float64
+        return kind(kind, kind), codegen
 
     return function
 
