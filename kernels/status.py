@@ -19,6 +19,7 @@ NOT_OSCILLATING = 9
 JAMMED = 10
 NOT_LINEAR = 11
 NO_DWELL = 12
+NOT_ADMISSIBLE = 13
 
 MEANING: dict[int, str] = {
     OK: "ok",
@@ -34,4 +35,5 @@ MEANING: dict[int, str] = {
     NOT_LINEAR: "the deflection is too large for the linearised equation; the number given solves that equation only",
     JAMMED: "friction blocks the motion, or its iteration does not contract",
     NO_DWELL: "the output does not make one turn per turn of the input: no dwell is defined",
+    NOT_ADMISSIBLE: "the point of the locus gives no mechanism that meets the requirement",
 }

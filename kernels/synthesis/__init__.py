@@ -1,0 +1,13 @@
+"""Link lengths from what the follower has to do: the loci of the driven joint and the tests a mechanism must pass.
+
+``rssr_locus`` and ``rssp_locus`` give the mechanisms of requirements, ``arcs`` where the loci are admissible,
+``acceptance`` numbers the tests.
+"""
+
+from kernels.synthesis.arcs import rssp_arc_ends as rssp_arc_ends
+from kernels.synthesis.arcs import rssr_arc_ends as rssr_arc_ends
+from kernels.synthesis.rssp_locus import rssp_at_offset as rssp_at_offset
+from kernels.synthesis.rssp_locus import rssp_at_place as rssp_at_place
+from kernels.synthesis.rssp_locus import rssp_on_locus as rssp_on_locus
+from kernels.synthesis.rssr_locus import rssr_at_direction as rssr_at_direction
+from kernels.synthesis.rssr_locus import rssr_on_locus as rssr_on_locus

@@ -1,0 +1,156 @@
+"""Crank-rockers (RSSR) from swing and crank angle between the limits; equations (1)-(8) of docs/synthesis.md.
+
+Position 1 is extended, position 2 folded; X, Y are the coordinates of the rocker ball about the rocker axis, h = g sin
+alpha.  In both positions the ball lies in the plane of crank axis and crank: two linear equations for X1, Y1 once the
+crank angles phi1 and phi2 = phi1 + phi0 are given.  All differences that vanish with the swing are written with
+sin(swing/2), so a swing of 1e-9 rad costs no digit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from kernels._jit import inline, kernel
+from kernels.synthesis.acceptance import EPS, Array, Status, design_status, first_failure
+from kernels.synthesis.angles import PI, sine_cosine
+
+
+class _Requirement(NamedTuple):
+    """One row of the requirements and the sines it needs."""
+
+    e: float
+    f: float
+    h: float
+    g_axial: float  # g cos(alpha)
+    sa: float
+    ca: float
+    sin_half: float  # of the swing
+    cos_half: float
+    sin_swing: float
+    versed: float  # 1 - cos(swing)
+    sin_phi0: float
+    cos_phi0: float
+    branch: float
+    valid: bool
+
+
+@inline
+def _read(requirements: Array, i: int) -> _Requirement:
+    swing, phi0 = requirements[i, 0], requirements[i, 1]
+    e, f, g, alpha = requirements[i, 3], requirements[i, 4], requirements[i, 5], requirements[i, 6]
+    sh, ch = sine_cosine(0.5 * swing)
+    s0, c0 = sine_cosine(phi0)
+    sa, ca = sine_cosine(alpha)
+    valid = 0.0 < abs(swing) < 2.0 * PI and 0.0 < phi0 < 2.0 * PI and abs(alpha) < 1e5
+    valid = valid and abs(requirements[i, 2]) < 1e5 and abs(e) + abs(f) + abs(g) < 1e150
+    branch = -1.0 if swing > 0.0 else 1.0  # sheet (3-sgn)
+    return _Requirement(e, f, g * sa, g * ca, sa, ca, sh, ch, 2.0 * sh * ch, 2.0 * sh * sh, s0, c0, branch, valid)
+
+
+@inline
+def _finish(
+    r: _Requirement, point: bool, x1: float, y1: float, ahead: float, back: float, u1: float, v1: float,
+    i: int, status: Status, failed: Status, designs: Array, requirements: Array,
+) -> None:  # fmt: skip
+    """Crank and coupler of (6), (7), the tests (i)-(iii), and the row of the design matrix."""
+    c = math.sqrt(x1 * x1 + y1 * y1)
+    x_mid, y_mid = x1 * r.cos_half - y1 * r.sin_half, y1 * r.cos_half + x1 * r.sin_half
+    a = 2.0 * r.sin_half * (r.e * y_mid + r.f * r.sa * x_mid) / (ahead - back)
+    axial, radial = r.g_axial + y1 * r.sa - r.f, ahead - a
+    b = math.sqrt(axial * axial + radial * radial)
+    # c dF/dpsi/(2 c) = -X sin psi - Y cos psi at both limits
+    x2, y2 = x_mid * r.cos_half - y_mid * r.sin_half, y_mid * r.cos_half + x_mid * r.sin_half
+    u2, v2 = u1 * r.cos_phi0 - v1 * r.sin_phi0, v1 * r.cos_phi0 + u1 * r.sin_phi0
+    t1 = -(r.e - a * u1) * y1 - (r.f * r.sa + a * r.ca * v1) * x1
+    t2 = -(r.e - a * u2) * y2 - (r.f * r.sa + a * r.ca * v2) * x2
+    finite = point and 0.0 < c < math.inf and 0.0 < b < math.inf
+    test = first_failure(finite, ahead, back, a, t1, t2, r.branch)
+    failed[i] = test
+    status[i] = design_status(r.valid, test)
+    good = r.valid and test == 0
+    designs[i, 0] = a if good else math.nan
+    designs[i, 1] = b if good else math.nan
+    designs[i, 2] = c if good else math.nan
+    designs[i, 3], designs[i, 4], designs[i, 5] = r.e, r.f, requirements[i, 5]
+    designs[i, 6], designs[i, 7] = requirements[i, 6], r.branch
+
+
+@kernel
+def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: Array, psi1: Array | None) -> None:
+    """Crank-rockers at given crank angles of the extended position: the linear parametrisation of the locus.
+
+    Equations (1)-(7) of docs/synthesis.md.
+
+    Parameters
+    ----------
+    requirements : (n, 7) swing, phi0, phi1 [rad], e, f, g [length], alpha [rad]; swing signed, extended to folded,
+        0 < |swing| < 2 pi, 0 < phi0 < 2 pi
+    status : (n,) out; OK, NOT_ADMISSIBLE (``failed`` says why) or INVALID_INPUT
+    failed : (n,) out, number of the first acceptance test failed, see :mod:`kernels.synthesis.acceptance`
+    designs : (n, 8) out, columns a, b, c, e, f, g, alpha, branch; lengths nan where the status is not OK
+    psi1 : (n,) out [rad], rocker angle of the extended position in (-pi, pi], or None
+
+    Notes
+    -----
+    Only the tests (i)-(iii) are made here; rotatability and pressure angles are the family's own exact margin.
+    """
+    for i in range(requirements.shape[0]):
+        r = _read(requirements, i)
+        v1, u1 = sine_cosine(requirements[i, 2])
+        u2, v2 = u1 * r.cos_phi0 - v1 * r.sin_phi0, v1 * r.cos_phi0 + u1 * r.sin_phi0
+        ss, q, ca = r.sin_swing, r.versed, r.ca
+        across, along = -ss * (v1 * v2 + ca * ca * u1 * u2), ca * (1.0 - q) * r.sin_phi0
+        det = across + along
+        per_det = 1.0 / det
+        x1 = (r.e * (ss * v1 * v2 - ca * (r.sin_phi0 + q * v1 * u2)) + r.h * u1 * (ss * v2 - q * ca * u2)) * per_det
+        y1 = (r.h * (r.sin_phi0 - q * u1 * v2 - ss * ca * u1 * u2) - r.e * v1 * (q * v2 + ss * ca * u2)) * per_det
+        ahead = (r.h * (ss * v2 - q * ca * u2) - r.e * ca * (q * v2 + ss * ca * u2)) * per_det
+        back = (r.h * (ss * v1 + q * ca * u1) + r.e * ca * (q * v1 - ss * ca * u1)) * per_det
+        point = abs(det) > 8.0 * EPS * (abs(ss) * (1.0 + ca * ca) + abs(along))
+        _finish(r, point, x1, y1, ahead, back, u1, v1, i, status, failed, designs, requirements)
+        if psi1 is not None:
+            psi1[i] = math.atan2(y1, x1) if status[i] == 0 else math.nan
+
+
+@kernel
+def rssr_at_direction(
+    requirements: Array, root: Array, status: Status, failed: Status, designs: Array, phi1: Array | None
+) -> None:
+    """Crank-rockers at given rocker angles of the extended position: a quadratic equation for the rocker length.
+
+    Equations (5)-(8) of docs/synthesis.md.
+
+    Parameters
+    ----------
+    requirements : (n, 7) swing, phi0, psi1 [rad], e, f, g [length], alpha [rad], otherwise as :func:`rssr_on_locus`
+    root : (n,) +1 for the root of larger, -1 for the one of smaller magnitude
+    status, failed, designs : as :func:`rssr_on_locus`
+    phi1 : (n,) out [rad], crank angle of the extended position in (-pi, pi], or None
+
+    Notes
+    -----
+    Measured: the errors of a, b, c and phi1 over the RSSR rows of the oracle table are in docs/synthesis.md.
+    """
+    for i in range(requirements.shape[0]):
+        r = _read(requirements, i)
+        s1, c1 = sine_cosine(requirements[i, 2])
+        cm, sm = c1 * r.cos_half - s1 * r.sin_half, s1 * r.cos_half + c1 * r.sin_half
+        c2, s2 = cm * r.cos_half - sm * r.sin_half, sm * r.cos_half + cm * r.sin_half
+        ca, s0, c0 = r.ca, r.sin_phi0, r.cos_phi0
+        p2 = ca * r.sin_swing * c0 - (c1 * c2 + ca * ca * s1 * s2) * s0
+        turn = 2.0 * r.sin_half * (r.e * ca * cm - r.h * sm) * c0
+        p1 = turn - 2.0 * r.cos_half * (r.e * cm - r.h * ca * sm) * s0
+        p0 = -(r.e * r.e + r.h * r.h) * s0
+        inner = p1 * p1 - 4.0 * p2 * p0
+        large = -0.5 * (p1 + math.copysign(math.sqrt(max(inner, 0.0)), p1))
+        c = large / p2 if root[i] > 0.0 else p0 / large
+        x1, y1 = c * c1, c * s1
+        qx1, qy1, qx2, qy2 = x1 + r.e, ca * y1 - r.h, c * c2 + r.e, ca * (c * s2) - r.h
+        rho1, rho2 = math.sqrt(qx1 * qx1 + qy1 * qy1), math.sqrt(qx2 * qx2 + qy2 * qy2)
+        side = (qx1 * qx2 + qy1 * qy2) * c0 + (qx1 * qy2 - qy1 * qx2) * s0
+        point = inner >= 0.0 and c > 0.0 and rho1 > 0.0
+        back = -rho2 if side < 0.0 else rho2
+        _finish(r, point, x1, y1, rho1, back, qx1 / rho1, qy1 / rho1, i, status, failed, designs, requirements)
+        if phi1 is not None:
+            phi1[i] = math.atan2(qy1, qx1) if status[i] == 0 else math.nan
