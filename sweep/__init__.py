@@ -12,8 +12,19 @@ if TYPE_CHECKING:
     from sweep.poses import evaluate
     from sweep.store import is_complete, load
     from sweep.summaries import summarise
+    from sweep.synthesis.mechanisms import synthesise
 
-__all__ = ["InputError", "LinksweepError", "StudyError", "evaluate", "is_complete", "load", "run", "summarise"]
+__all__ = [
+    "InputError",
+    "LinksweepError",
+    "StudyError",
+    "evaluate",
+    "is_complete",
+    "load",
+    "run",
+    "summarise",
+    "synthesise",
+]
 
 # Imported when first used, so that the command line answers at once: numba alone takes a quarter of a second.
 _HOMES = {
@@ -22,6 +33,7 @@ _HOMES = {
     "load": "sweep.store",
     "run": "sweep.engine",
     "summarise": "sweep.summaries",
+    "synthesise": "sweep.synthesis.mechanisms",
 }
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 
 from sweep.errors import InputError, nearest
-from sweep.families.base import Array, Family, Parameter
+from sweep.families.base import Array, Parameter
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -16,7 +16,18 @@ if TYPE_CHECKING:
     Table: TypeAlias = pd.DataFrame | Mapping[str, Any]
 
 
-def design_matrix(family: Family, table: Table, extra: Sequence[str] = ()) -> tuple[Array, dict[str, Array]]:
+class Parametrised(Protocol):
+    """What has named columns: a family, or the requirement of a synthesis."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...  # noqa: D102
+    @property
+    def parameter_names(self) -> tuple[str, ...]: ...  # noqa: D102
+
+
+def design_matrix(family: Parametrised, table: Table, extra: Sequence[str] = ()) -> tuple[Array, dict[str, Array]]:
     """Check a table and lay its parameters out as the (n, P) matrix the kernels take.
 
     Parameters
@@ -46,7 +57,7 @@ def design_matrix(family: Family, table: Table, extra: Sequence[str] = ()) -> tu
     return matrix, extras
 
 
-def _parameter_column(family: Family, p: Parameter, table: Table, names: list[str], rows: int) -> Array:
+def _parameter_column(family: Parametrised, p: Parameter, table: Table, names: list[str], rows: int) -> Array:
     if p.name not in names:
         if p.default is not None:
             return np.full(rows, p.default)

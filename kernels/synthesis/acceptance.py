@@ -26,6 +26,7 @@ BRANCH = 4
 ROTATION = 5
 PRESSURE = 6
 
+NAMES = ("", "point", "side", "crank", "branch", "rotation", "pressure angle")
 MEANING: dict[int, str] = {
     PASSED: "",
     NO_POINT: "the locus has no point here: at infinity, or no real root",

@@ -101,7 +101,8 @@ def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) 
     status = np.empty(n, np.uint8)
     values = {o.name: np.empty(n) for o in LIMIT_OUTPUTS}
     err_ext, err_fold = np.empty(n), np.empty(n)
-    rssp.limits(designs, status, *values.values(), err_ext, err_fold)
+    outputs = [*values.values(), err_ext, err_fold]
+    rssp.limits(designs, status, *outputs)
     stroke, ratio = np.abs(values["stroke"]), values["stroke_ratio"]
     ca, e = np.abs(np.cos(designs[:, 4])), np.abs(designs[:, 2])
     rho2 = [np.hypot(e, values[f"s_{end}"] * ca) ** 2 for end in ("ext", "fold")]

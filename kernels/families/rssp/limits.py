@@ -72,7 +72,7 @@ def _extended(r: Reduced, ca: float, sa: float, f: float, folded: float) -> tupl
             return following if inside else s, True
         if not inside or abs(following - s) > 0.5 * before:
             following = 0.5 * (inner + outer)
-            if following == inner or following == outer:
+            if following in (inner, outer):
                 return s, True
         before = abs(following - s)
         s = following

@@ -1,0 +1,104 @@
+"""``synthesise``: families of mechanisms from a table of requirements, each with the verdict of its tests."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels import status as st
+from kernels.families import rssp, rssr
+from kernels.synthesis import acceptance
+from sweep.errors import InputError
+from sweep.families import family as find_family
+from sweep.families.base import Array
+from sweep.synthesis.locus import TWO_PI, Found, locus
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.tables import Table
+
+_MARGIN = {"rssr": rssr.margin, "rssp": rssp.margin}
+
+
+def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = None) -> pd.DataFrame:
+    """Mechanisms that meet requirements, one row per solution, in the order of the table.
+
+    Parameters
+    ----------
+    family : "rssr" or "rssp"
+    table : DataFrame or mapping, one length unit, rad.  ``rssr``: swing, phi0, e, f, g, alpha and either phi1 (the
+        place on the locus: crank angle of the extended position) or psi1 (rocker angle there).  ``rssp``: stroke, f,
+        alpha and phi0 with either phi1 or e; or, without phi0, e and the place s1 where the stroke begins.
+        Swing and stroke are signed, folded minus extended.  Where psi1 or e is given there are two solutions, told
+        apart by ``root``; without such a column both are returned, one row each.
+    max_pressure_angle : limit for test (v) [rad]; none if not given
+
+    Returns
+    -------
+    DataFrame
+        the parameters of the family; the limit positions ``phi_ext phi_fold`` [rad in 0 ... 2 pi), ``psi_ext psi_fold``
+        or ``s_ext s_fold``; ``swing`` or ``stroke`` (signed) and ``phi0``; ``margin`` and ``max_pressure_angle``;
+        ``failed``, the first acceptance test not passed ("" or point, side, crank, branch, rotation, pressure angle;
+        what they mean: :data:`kernels.synthesis.acceptance.MEANING`), and ``status``: OK, NOT_ADMISSIBLE,
+        NOT_ROTATABLE, UNDECIDABLE or LIMIT_EXCEEDED.  Lengths are nan where there is no mechanism, and kept where only
+        test (iv) or (v) failed.  Indexed like the table; two solutions of a row share its index, and ``root`` is shown.
+
+    Raises
+    ------
+    InputError
+        for a missing or misspelt column, a bad number, a swing or stroke of zero, angles outside one turn.
+    """
+    import pandas as pd
+
+    if max_pressure_angle is not None and not 0.0 < max_pressure_angle <= 0.5 * np.pi:
+        raise InputError("max_pressure_angle", max_pressure_angle, "an angle between 0 and pi/2", "synthesise")
+    way = locus(family, tuple(str(name) for name in table))
+    matrix = way.read(table)
+    index = table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(len(matrix))
+    if way.has_roots and "root" not in table:
+        matrix = np.repeat(matrix, 2, axis=0)
+        matrix[:, -1] = np.tile([1.0, -1.0], len(matrix) // 2)
+        index = index.repeat(2)
+    found = way.solve(matrix)
+    amplitude = matrix[:, 0]
+    columns: dict[str, object] = dict(zip(find_family(family).parameter_names, found.designs.T, strict=True))
+    if way.has_roots:
+        columns["root"] = matrix[:, -1]
+    columns |= _limits(family, found, amplitude)
+    columns |= _verdict(family, found, max_pressure_angle)
+    return pd.DataFrame(columns, index=index)
+
+
+def _limits(family: str, found: Found, amplitude: Array) -> dict[str, object]:
+    letter, name = ("psi", "swing") if family == "rssr" else ("s", "stroke")
+    good = found.status == st.OK
+    phi1, start = (np.where(good, x, np.nan) for x in (found.phi1, found.start))
+    return {
+        "phi_ext": phi1,
+        "phi_fold": (phi1 + found.phi0) % TWO_PI,
+        f"{letter}_ext": start,
+        f"{letter}_fold": start + amplitude,
+        name: amplitude,
+        "phi0": found.phi0,
+    }
+
+
+def _verdict(family: str, found: Found, limit: float | None) -> dict[str, object]:
+    """Tests (iv) and (v) for what passed the first three."""
+    import pandas as pd
+
+    status, failed = found.status.copy(), found.failed.copy()
+    alive = np.flatnonzero(status == st.OK)
+    margin, angle = np.full(len(status), np.nan), np.full(len(status), np.nan)
+    turning = np.empty(alive.size, np.uint8)
+    least, largest = np.empty(alive.size), np.empty(alive.size)
+    _MARGIN[family](found.designs[alive], turning, least, None, largest, None)
+    margin[alive], angle[alive], status[alive] = least, largest, turning
+    failed[alive[turning != st.OK]] = acceptance.ROTATION
+    if limit is not None:
+        steep = (status == st.OK) & (angle > limit)
+        status[steep], failed[steep] = st.LIMIT_EXCEEDED, acceptance.PRESSURE
+    words = pd.Categorical.from_codes(failed.astype(np.int8), pd.Index(acceptance.NAMES))
+    return {"margin": margin, "max_pressure_angle": angle, "failed": words, "status": status}
