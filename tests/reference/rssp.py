@@ -27,3 +27,50 @@ def outputs(design: tuple[float, ...], phi: float) -> dict[str, Any]:
             result[name] = mp.diff(lambda x: joints(*numbers, x)[1][1], mp.mpf(phi), order)
         result["pressure_angle"] = mp.acos(abs(c_ball[1] - b_pin[1]) / numbers[1])
         return result
+
+
+def limit_positions(design: tuple[float, ...], samples: int = 720) -> dict[str, Any]:
+    """Extended and folded position: where the slider's motion has its extremes, found on a grid and polished."""
+    with mp.workdps(50):
+        numbers = [mp.mpf(x) for x in design]
+        branch = numbers[5]
+
+        def place(phi: Any) -> Any:
+            return joints(*numbers, phi)[1][1]
+
+        grid = [2 * mp.pi * k / samples for k in range(samples)]
+        values = [place(phi) for phi in grid]
+        step = 2 * mp.pi / samples
+        result = {}
+        for name, sign in (("ext", branch), ("fold", -branch)):
+            start = max(range(samples), key=lambda k: sign * values[k])
+            left, right = grid[start] - step, grid[start] + step
+            phi = mp.findroot(lambda x: mp.diff(place, x), (left, right), solver="illinois", tol=mp.mpf(10) ** -40)
+            result[f"phi_{name}"], result[f"s_{name}"] = phi % (2 * mp.pi), place(phi)
+        result["phi0"] = (result["phi_fold"] - result["phi_ext"]) % (2 * mp.pi)
+        result["stroke_ratio"] = result["phi0"] / (2 * mp.pi - result["phi0"])
+        result["stroke"] = abs(result["s_fold"] - result["s_ext"])
+        return result
+
+
+def least_discriminant(design: tuple[float, ...], samples: int = 64) -> Any:
+    """Smallest b^2 - (distance of the crank pin from the slide line)^2 over the turn, 60 digits."""
+    with mp.workdps(60):
+        a, b, e, f, alpha, _ = (mp.mpf(x) for x in design)
+
+        def q(phi: Any) -> Any:
+            pin = [a * mp.cos(phi), f * mp.cos(alpha) - a * mp.sin(alpha) * mp.sin(phi)]
+            return b**2 - (e - pin[0]) ** 2 - pin[1] ** 2
+
+        grid = [2 * mp.pi * k / samples for k in range(samples)]
+        values = [q(phi) for phi in grid]
+        lows = [k for k in range(samples) if values[k] <= values[k - 1] and values[k] <= values[(k + 1) % samples]]
+        step = 2 * mp.pi / samples
+        best = min(values)
+        for k in lows:
+            low, high = grid[k] - step, grid[k] + step
+            for _ in range(140):  # golden section: q is flat there, its value needs half the digits of the place
+                one, two = low + (high - low) * mp.mpf("0.382"), low + (high - low) * mp.mpf("0.618")
+                low, high = (low, two) if q(one) < q(two) else (one, high)
+            best = min(best, q((low + high) / 2))
+        return best

@@ -57,6 +57,6 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     alpha, branch = designs[i, 4], designs[i, 5]
     sa, ca = np.sin(alpha), np.cos(alpha)
     m_size, n_size = abs(e.real) + a.real, abs(f.real) + a.real
-    valid = a.real > 0.0 and b.real > 0.0 and m_size < 1e140 and n_size < 1e140
+    valid = a.real > 0.0 and 0.0 < b.real <= 1.0 and m_size < 1e140 and n_size < 1e140
     valid = valid and abs(alpha.real) < 1e5 and branch.real * branch.real == 1.0
     return Reduced(a, b, e, f * sa, a * ca, f * ca, a * sa, m_size, n_size, branch, unit, valid)
