@@ -8,6 +8,8 @@ from kernels.families.rssr.closure import Design as Design
 from kernels.families.rssr.dense import dense_maxima as dense_maxima
 from kernels.families.rssr.ellipse import pressure_ellipse as pressure_ellipse
 from kernels.families.rssr.joints import joints as joints
+from kernels.families.rssr.limits import LIMIT_NAMES as LIMIT_NAMES
+from kernels.families.rssr.limits import limits as limits
 from kernels.families.rssr.margin import margin as margin
 from kernels.families.rssr.maxima import sampling_tables as sampling_tables
 from kernels.families.rssr.maxima import true_maxima as true_maxima

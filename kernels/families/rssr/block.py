@@ -95,9 +95,12 @@ def least_delta(count: int, at: Array) -> None:
 
 @inline
 def singularity_distance(count: int, at: Array) -> None:
-    """Into ACROSS: distance [rad] of the nearest complex zero of Delta from the real axis, to leading order.
+    """Into ACROSS: distance [rad] of the nearest singularity of the motion from the real axis, to leading order.
 
-    It sets how finely the motion must be sampled.  The second minimum of Delta, where there is one, counts too.
+    It sets how finely the motion must be sampled.  Singular are the complex zeros of Delta (its second minimum, where
+    there is one, counts too) and those of R = X^2 + Y^2, where the crank pin would lie on the rocker axis: X + i Y = 0
+    puts the point (e, y0) on an ellipse confocal with that of the crank pin, and the difference of their elliptic
+    coordinates is the distance.
     """
     for k in range(count):
         c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2]
@@ -107,4 +110,8 @@ def singularity_distance(count: int, at: Array) -> None:
         fu, fv = far_minimum(c2, s2 + 1e-300, u, v)
         there = point(c1, s1, c2, s2, fu, fv)
         far = 2.0 * (delta + there.value - here.value) / largest(there.curvature, 1e-300)
-        at[k + ACROSS] = math.sqrt(smallest(near, far))
+        e, y0, ca, sa = at[k + E], at[k + Y0], at[k + CA], at[k + SA]
+        focal = 0.5 * (math.sqrt((e - sa) * (e - sa) + y0 * y0) + math.sqrt((e + sa) * (e + sa) + y0 * y0))
+        size, own = focal + math.sqrt(largest(focal * focal - sa * sa, 0.0)), 1.0 + abs(ca)
+        axis = 2.0 * abs(size - own) / (size + own)
+        at[k + ACROSS] = smallest(math.sqrt(smallest(near, far)), axis)

@@ -19,9 +19,14 @@ _ATTEMPTS = 8
 
 
 @inline
-def rounding(order: int, delta: float, tolerance: float) -> float:
-    """Relative rounding error of the transfer function of that order: it behaves like Delta^(1/2 - order)."""
-    return (order + 0.5) * tolerance / delta + 32.0 * EPS
+def rounding(
+    order: int, e: float, y0: float, ca: float, k0: float, k1: float, k2: float, w_size: float, u: float, v: float
+) -> float:
+    """Relative rounding error of the transfer function of that order, which behaves like Delta^(1/2 - order)."""
+    x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
+    mx, my = abs(e) + 1.0, abs(y0) + abs(ca)
+    tolerance = 8.0 * EPS * (abs(x) * mx + abs(y) * my + abs(w) * w_size)
+    return (order + 0.5) * tolerance / (x * x + y * y - w * w) + 32.0 * EPS
 
 
 @inline
@@ -39,6 +44,7 @@ def careful_maximum(
     k0: float,
     k1: float,
     k2: float,
+    w_size: float,
     phi1: float,
     rho1: float,
     phi2: float,
@@ -50,7 +56,7 @@ def careful_maximum(
     Parameters
     ----------
     order : 1, 2 or 3
-    e ... k2 : of :class:`Reduced`
+    e ... w_size : of :class:`Reduced`
     phi1, rho1, phi2, rho2 : where Delta is smallest and how far its complex zeros are there, twice [rad]
     target : relative error wanted
     """
@@ -73,11 +79,13 @@ def careful_maximum(
                     if peak > best:
                         best, place, error = peak, where, bound
             phi, y, dy = following, y2, dy2
-        if not missed and best > 0.0 and abs(best - before) <= max(0.1 * target, 1e-12) * best + error:
-            return best, place, error + abs(best - before), True
+        error += best * rounding(order, e, y0, ca, k0, k1, k2, w_size, math.cos(place), math.sin(place))
+        change = abs(best - before)
+        if not missed and best > 0.0 and change <= 0.1 * target * best + error:
+            return best, place, change + error, True
         before = best
         fineness *= 0.5
-    return best, place, abs(best - before) + error, False
+    return best, place, math.inf, False
 
 
 @inline

@@ -1,6 +1,6 @@
 """True maxima of |psi'|, |psi''|, |psi'''| over the turn, refined between samples (docs/rssr.md, section 6).
 
-Per design: the exact margin, then N >= 12/rho samples, where rho is the distance of the nearest complex zero of Delta;
+Per design: the exact margin, then N >= 11/rho samples, rho being the distance of the nearest singularity of the motion;
 then every local maximum of at least 60 % of the best is refined on the next derivative, vectorised over the maxima of
 a whole block of designs.  A maximum whose refinement fails its checks, or a design that would need more than 1024
 samples, goes to :mod:`kernels.families.rssr.careful`.
@@ -39,7 +39,7 @@ from kernels.families.rssr.block import (
     singularity_distance,
 )
 from kernels.families.rssr.careful import careful_maximum, rounding
-from kernels.families.rssr.closure import EPS, Array, Status
+from kernels.families.rssr.closure import Array, Status
 from kernels.families.rssr.derivatives import follower
 from kernels.families.rssr.margin import turning_status
 from kernels.reduce import largest
@@ -142,15 +142,21 @@ def _finish(count: int, m: Array, order: int, target: float, first: Array | None
         rise = -0.5 * dy * dy / d2y * math.copysign(1.0, y)
         peak = abs(y) + rise
         trusted = (y * d2y < 0.0) & (rise <= target * peak) & (abs(m[i + _MOVED]) <= m[i + _WIDTH])
-        trusted = trusted & (abs(peak - m[i + _GUESS]) <= 0.1 * peak)
+        trusted = trusted & (abs(peak - m[i + _GUESS]) <= 0.2 * peak)
         m[i + _PEAK] = peak
         m[i + _ERROR] = rise if trusted else math.inf
-        u, v = m[i + _U], m[i + _V]
-        x, yy = m[i + _E] - u, m[i + _Y0] + m[i + _CA] * v
-        w = m[i + _K0] + m[i + _K1] * v - m[i + _K2] * u
-        mx, my = abs(m[i + _E]) + 1.0, abs(m[i + _Y0]) + abs(m[i + _CA])
-        tolerance = 8.0 * EPS * (abs(x) * mx + abs(yy) * my + abs(w) * m[i + _SIZE])
-        m[i + _ROUNDING] = rounding(order, x * x + yy * yy - w * w, tolerance)
+        m[i + _ROUNDING] = rounding(
+            order,
+            m[i + _E],
+            m[i + _Y0],
+            m[i + _CA],
+            m[i + _K0],
+            m[i + _K1],
+            m[i + _K2],
+            m[i + _SIZE],
+            m[i + _U],
+            m[i + _V],
+        )
 
 
 @inline
@@ -223,7 +229,7 @@ def _careful(at: Array, k: int, order: int, target: float) -> tuple[float, float
     rise = at[k + DELTA] + max(there.value - here.value, 0.0)
     rho2 = math.sqrt(2.0 * rise / there.curvature) if there.curvature > 0.0 else math.inf
     return careful_maximum(
-        order, at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2],
+        order, at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE],
         math.atan2(v, u), rho1, math.atan2(fv, fu), rho2, target,
     )  # fmt: skip
 
@@ -259,7 +265,7 @@ def true_maxima(
     number of random designs it was measured on.
     """
     order = 1 if max_abs_dpsi is not None else (2 if max_abs_d2psi is not None else 3)
-    per_rho = 12.0 if order < 3 else 18.0
+    per_rho = 11.0 if order < 3 else 18.0
     rounds = (2 if order == 1 else 4) - (1 if target > 1e-4 else 0)
     at, m, size, grid = new_block(), np.empty(_ROWS * CAPACITY), np.empty(MOST + 2), np.empty((FEWEST + 4) * BLOCK)
     first_peak = np.empty(BLOCK + 1, np.int64)

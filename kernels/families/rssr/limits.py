@@ -1,0 +1,233 @@
+"""Limit positions of the rocker, its swing and the stroke ratio (docs/rssr.md, section 5).
+
+At a limit position the rocker ball lies in the plane of crank axis and crank, eta = 0: extended with the crank towards
+it, folded with the crank away.  A fully turning crank with an oscillating rocker passes exactly one of each on its
+branch, so eta changes sign exactly twice per turn.  The rocker turns fully if and only if the discriminant of the
+closure in phi, a trigonometric polynomial of degree 2 in psi, has no negative value.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.families.rssr.block import (
+    BLOCK,
+    BRANCH,
+    CA,
+    DELTA,
+    K0,
+    K1,
+    K2,
+    ROCKER,
+    TOLERANCE,
+    VALID,
+    W_SIZE,
+    Y0,
+    E,
+    least_delta,
+    load_block,
+    new_block,
+)
+from kernels.families.rssr.closure import EPS, Array, Status
+from kernels.families.rssr.derivatives import follower
+from kernels.families.rssr.margin import turning_status
+from kernels.trigpoly import minimum
+
+LIMIT_NAMES = ("psi_ext", "psi_fold", "phi_ext", "phi_fold", "swing", "phi0", "stroke_ratio")
+TURN = 2.0 * math.pi
+FEWEST, MOST = 32, 8192  # samples of the sign of eta
+_TINY_SWING = 0.25  # below, the half-swing identity is more accurate than the difference of two angles
+
+
+@inline
+def _ball(at: Array, k: int, phi: float) -> tuple[float, float, float, float, float, float]:
+    """In units of the crank at phi: eta, xi, d eta/d phi along the motion, sin psi, cos psi, T."""
+    e, y0, ca, k0, k1, k2, c = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + ROCKER]
+    u, v = math.cos(phi), math.sin(phi)
+    x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
+    rr = x * x + y * y
+    t = math.sqrt(max(rr - w * w, 0.0))
+    cos, sin = -(x * w + y * t) / rr, (y * w - x * t) / rr
+    xc, yc = e + c * cos, c * (ca * sin - k1)
+    xi, eta = u * xc + v * yc, u * yc - v * xc
+    return eta, xi, -xi + (u * ca * cos + v * sin) * (eta / t), sin, cos, t
+
+
+@inline
+def _root(at: Array, k: int, lo: float, hi: float, rising: bool) -> float:
+    """Zero of eta in a bracket: Newton, bisection where it would leave the bracket or does not gain."""
+    phi, before = 0.5 * (lo + hi), hi - lo
+    for _ in range(100):
+        eta, _, slope, _, _, _ = _ball(at, k, phi)
+        if (eta > 0.0) == rising:
+            hi = phi
+        else:
+            lo = phi
+        step = -eta / slope
+        if not (lo <= phi + step <= hi and abs(step) <= 0.6 * before):
+            step = 0.5 * (lo + hi) - phi
+        before = abs(step)
+        phi += step
+        if before <= 4.0 * EPS * max(1.0, abs(phi)):
+            break
+    return phi
+
+
+@inline
+def _rocker_turns(at: Array, k: int) -> bool:
+    """Is the closure solvable for phi at every psi?  Then the rocker has no limit positions; (6*) of the page."""
+    e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
+    m = minimum(2.0 * (k2 - e * k0), 2.0 * (y0 * k0 - k1 * ca), 0.5 * (1.0 - e * e - ca * ca + y0 * y0), e * y0)
+    return m.value + (k1 * k1 + k2 * k2 - k0 * k0) + 0.5 * (1.0 - e * e + ca * ca - y0 * y0) > 0.0
+
+
+@inline
+def _turning_points(at: Array, k: int, n: int, begin: Array) -> int:
+    """Sample numbers after which psi' changes sign, into ``begin``; returns how many there are (at most 3 are told)."""
+    found, first, before = 0, False, False
+    for i in range(n + 1):
+        phi = (i % n) * (TURN / n)
+        p, _, _, _ = follower(
+            at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], math.cos(phi), math.sin(phi)
+        )
+        now = p > 0.0
+        first = now if i == 0 else first
+        if i > 0 and now != before and found < 3:
+            begin[found] = i - 1.0
+            found += 1
+        before = now
+    return found
+
+
+@inline
+def _mark_turning_points(count: int, at: Array, cos: Array, sin: Array, marks: Array) -> None:
+    """Signs of psi' at FEWEST angles, all designs of the block side by side, as sums of powers of two."""
+    for k in range(count):
+        marks[k] = 0.0
+    mark = 1.0
+    for i in range(FEWEST):
+        u, v = cos[i], sin[i]
+        for k in range(count):
+            p, _, _, _ = follower(at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], u, v)
+            marks[k] += mark if p > 0.0 else 0.0
+        mark *= 2.0
+
+
+@inline
+def _unmark(marks: float, begin: Array) -> int:
+    """As :func:`_turning_points` from the signs of :func:`_mark_turning_points`."""
+    signs, found = int(marks), 0
+    changes = signs ^ ((signs >> 1) | ((signs & 1) << (FEWEST - 1)))  # bit i: between sample i and i + 1
+    i = 0
+    while changes != 0 and found < 3:
+        if changes & 1:
+            begin[found] = i
+            found += 1
+        changes >>= 1
+        i += 1
+    return found
+
+
+@inline
+def _wrapped(phi: float) -> float:
+    turned = phi - TURN * math.floor(phi / TURN)
+    return turned if turned < TURN else 0.0
+
+
+@inline
+def _swing(at: Array, k: int, s1: float, c1: float, s2: float, c2: float, rho: float) -> tuple[float, float]:
+    """Signed swing of the mirrored mechanism, always negative, and how much its error exceeds those of the angles.
+
+    rho is the sum of the two distances of the ball from the crank axis.  The half-swing identity keeps its relative
+    accuracy for tiny swings; its sign also tells a swing near 2 pi from one near 0.
+    """
+    difference = math.atan2(s2 * c1 - c2 * s1, c1 * c2 + s1 * s2)
+    if abs(difference) > _TINY_SWING:
+        return (difference if difference < 0.0 else difference - TURN), math.inf
+    sm, cm = s1 + s2, c1 + c2
+    length = math.hypot(sm, cm)
+    sm, cm = sm / length, cm / length
+    lever = at[k + E] * sm + at[k + Y0] * cm
+    half = math.asin(max(min(rho / (2.0 * at[k + ROCKER] * lever), 0.5), -0.5))
+    across = at[k + E] * cm - at[k + Y0] * sm
+    return (2.0 * half if half < 0.0 else 2.0 * half - TURN), abs(2.0 * half * across / lever)
+
+
+@kernel
+def limits(designs: Array, status: Status, out: Array, error: Array | None) -> None:
+    """Limit positions, swing and stroke ratio of every design whose crank turns fully.
+
+    Parameters
+    ----------
+    designs : (n, 8) columns of :class:`Design`
+    status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_OSCILLATING, NOT_CONVERGED or INVALID_INPUT
+    out : (n, 7) out, columns LIMIT_NAMES [rad]: rocker angles in (-pi, pi], crank angles in [0, 2 pi); swing
+        psi_fold - psi_ext signed and unwrapped, its sign that of -branch; phi0 = phi_fold - phi_ext modulo 2 pi;
+        stroke_ratio phi0/(2 pi - phi0)
+    error : (n, 7) out, or None: rounding error estimates of the same
+
+    Notes
+    -----
+    Where the status is not OK all are nan.  Largest error over the 122 oracle rows: see docs/rssr.md.
+    """
+    at, marks, begin = new_block(), np.empty(BLOCK), np.empty(3)
+    cos, sin = np.empty(FEWEST), np.empty(FEWEST)
+    for i in range(FEWEST):
+        cos[i], sin[i] = math.cos(i * (TURN / FEWEST)), math.sin(i * (TURN / FEWEST))
+    for start in range(0, designs.shape[0], BLOCK):
+        count = min(BLOCK, designs.shape[0] - start)
+        load_block(designs, start, count, at)
+        least_delta(count, at)
+        _mark_turning_points(count, at, cos, sin, marks)
+        for k in range(count):
+            i = start + k
+            for column in range(7):
+                out[i, column] = math.nan
+                if error is not None:
+                    error[i, column] = math.nan
+            status[i] = turning_status(at[k + DELTA], at[k + TOLERANCE], at[k + VALID] != 0.0)
+            if status[i] != st.OK:
+                continue
+            n, found = FEWEST, _unmark(marks[k], begin)
+            if found == 0 and _rocker_turns(at, k):
+                status[i] = st.NOT_OSCILLATING
+                continue
+            while found != 2 and n < MOST:
+                n *= 4
+                found = _turning_points(at, k, n, begin)
+            if found != 2 or not _fill(at, k, n, begin, out[i], error[i] if error is not None else None):
+                status[i] = st.NOT_CONVERGED
+
+
+@inline
+def _fill(at: Array, k: int, n: int, begin: Array, out: Array, error: Array | None) -> bool:
+    """Refine the two turning points and write the seven outputs; false if they are not one extended, one folded."""
+    width = TURN / n
+    p_start = _ball(at, k, begin[0] * width)[0]
+    phi1 = _root(at, k, begin[0] * width, (begin[0] + 1.0) * width, p_start <= 0.0)
+    phi2 = _root(at, k, begin[1] * width, (begin[1] + 1.0) * width, p_start > 0.0)
+    _, xi1, _, s1, c1, t1 = _ball(at, k, phi1)
+    _, xi2, _, s2, c2, t2 = _ball(at, k, phi2)
+    if xi1 < 0.0:  # the first one is the folded position: exchange
+        phi1, xi1, s1, c1, t1, phi2, xi2, s2, c2, t2 = phi2, xi2, s2, c2, t2, phi1, xi1, s1, c1, t1
+    if not (xi1 > 0.0 and xi2 < 0.0):
+        return False
+    branch, rocker = at[k + BRANCH], at[k + ROCKER]
+    swing, lever = _swing(at, k, s1, c1, s2, c2, xi1 - xi2)
+    phi0 = _wrapped(phi2 - phi1)
+    out[0], out[1] = math.atan2(branch * s1, c1), math.atan2(branch * s2, c2)
+    out[2], out[3] = _wrapped(phi1), _wrapped(phi2)
+    out[4], out[5], out[6] = branch * swing, phi0, phi0 / (TURN - phi0)
+    if error is not None:
+        size = 8.0 * EPS * (abs(at[k + E]) + 2.0 + abs(at[k + Y0]) + at[k + W_SIZE])
+        error[0], error[1] = size / t1 + 4.0 * EPS, size / t2 + 4.0 * EPS
+        error[2], error[3] = error[0] * rocker / xi1 + 16.0 * EPS, error[1] * rocker / -xi2 + 16.0 * EPS
+        both = error[0] + error[1]
+        error[4] = min(both, both * lever + 32.0 * EPS * abs(swing))
+        error[5] = error[2] + error[3]
+        error[6] = error[5] * TURN / ((TURN - phi0) * (TURN - phi0))
+    return True
