@@ -69,10 +69,12 @@ class Descent:
 
         A refused design shortens the next step, and its extrema that the rows did not know are added to them.
         """
-        radius, extra = 0.25, Points.of([])
+        radius, extra, refused = 0.25, Points.of([]), False
         for _ in range(ROUNDS):
             at = self.best
             form, t, floor = self.model.with_points(at, extra), at.objective, None
+            if not refused:
+                form = form.near(at.atoms, t if math.isfinite(t) else 0.0)
             if relaxed:
                 form, t, floor = form.relaxed({"rotatable"} if at.form.complete else set()), at.short, 0.0
                 if not at.form.complete:
@@ -82,7 +84,7 @@ class Descent:
             gain = at.short - new.short if relaxed else at.merit(self.model.price) - new.merit(self.model.price)
             step = float(np.abs(fractions - at.fractions).max())
             if gain > 0.0:
-                self.best, extra = new, Points.of([])
+                self.best, extra, refused = new, Points.of([]), False
                 if not relaxed:
                     self.model.learn_price(new)
                 radius = max(radius, min(1.0, 2.0 * step))
@@ -93,7 +95,7 @@ class Descent:
             elif step < 1e-10 or gain > -1e-13 or radius < 1e-7:
                 return
             else:
-                radius = 0.25 * min(radius, step)
+                radius, refused = 0.25 * min(radius, step), True
                 extra = Points.joined(extra, self._unknown(new.form.points, form.points))
 
     def _unknown(self, found: Points, known: Points) -> Points:

@@ -19,6 +19,7 @@ from sweep.optimise.points import Curves, Points
 from sweep.optimise.problem import PLACE, Problem
 
 Term = dict[int, float]
+AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first
 FAR = 1e3  # stands for a row that cannot be computed at a trial design: far outside, but a number
 
 
@@ -81,6 +82,15 @@ class Form:
         if np.isnan(c[own]).any():
             return math.inf
         return float(np.maximum(np.where(self.equal, np.abs(c), -c)[own], 0.0).max(initial=0.0))
+
+    def near(self, atoms: Array, t: float) -> Form:
+        """The form without the rows that are far inside: no short step reaches them."""
+        keep = (self.rows(atoms, t) < AT_HAND) | self.equal
+        labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
+        return replace(
+            self, matrix=self.matrix[keep], constant=self.constant[keep], slack=self.slack[keep],
+            equal=self.equal[keep], labels=labels,
+        )  # fmt: skip
 
     def relaxed(self, hard: set[str]) -> Form:
         """The elastic program: smallest t by which all limits but the ``hard`` ones have to give way."""

@@ -34,7 +34,7 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
     bounds = [*zip(low, high, strict=True), (None if floor is None else floor - t, None)]
     step = _quadratic(curvature, full, rows, form, bounds)
     best, value = step, np.inf
-    for _ in range(3):
+    for _ in range(2):
         there = np.clip(at.fractions + step[:-1], 0.0, 1.0)
         _, atoms = model.moved(there, form, points)
         true = form.rows(atoms, t + step[-1])
