@@ -1,8 +1,9 @@
 """What an effect knows of a linkage: joint positions, directions and the follower's motion, never the family.
 
 A crank turns about ``u`` at A and carries the ball joint B; a coupler runs from B to the ball joint C.  C is carried by
-a follower: a rocker, which turns about ``k`` at D (``turns`` = 1), or a slider, which moves along ``tau`` (``turns`` = 0,
-c = 1, dpsi and d2psi its velocity and acceleration analogues, D = C).  A family fills one record per pose and one per design; :func:`read` puts them together for one pose.
+a follower: a rocker, which turns about ``k`` at D (``turns`` = 1), or a slider, which moves along ``tau``
+(``turns`` = 0, c = 1, dpsi and d2psi its velocity and acceleration analogues, D = C).  A family fills one record per
+pose and one per design; :func:`read` puts them together for one pose.
 """
 
 from __future__ import annotations

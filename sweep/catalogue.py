@@ -19,6 +19,7 @@ REDUCTIONS = {
     "max": "largest value over one turn of",
     "min": "smallest value over one turn of",
     "range": "largest minus smallest value over one turn of",
+    "rms": "root mean square over one turn of",
 }
 _MODES: dict[str, tuple[Mode, ...]] = {
     "max_abs": (0,),
@@ -26,6 +27,7 @@ _MODES: dict[str, tuple[Mode, ...]] = {
     "max": (1,),
     "min": (-1,),
     "range": (1, -1),
+    "rms": (),
 }
 MARGIN_TEXTS = {
     "rotatable": ("1", "whether the links reach over the whole turn"),
@@ -39,7 +41,7 @@ class Way:
     """One design output and the general route to it."""
 
     output: Output
-    kind: Literal["margin", "limits", "reduction"]
+    kind: Literal["margin", "limits", "reduction", "mean"]
     base: str  # the name without what it is taken of: "margin", "swing", "max_abs" ...
     of: str = ""  # pose output of a reduction, or position of the limits
     suffix: str = ""  # stage number, for margins and limits
@@ -47,7 +49,7 @@ class Way:
     @property
     def modes(self) -> tuple[Mode, ...]:
         """Which extrema of the pose output it is made of."""
-        return _MODES[self.base] if self.kind == "reduction" else (1, -1)
+        return _MODES.get(self.base, (1, -1))
 
     @property
     def locates(self) -> bool:
@@ -106,7 +108,7 @@ def output(family: Family, name: str) -> Output:
     way = general_way(family, name)
     if way is None:
         names = output_names(family)
-        known = "max_abs_x, phi_max_abs_x, max_x, min_x, range_x of a pose output x, or one of "
+        known = "max_abs_x, phi_max_abs_x, max_x, min_x, range_x, rms_x of a pose output x, or one of "
         special = ", ".join(n for n in names if not n.startswith(tuple(f"{r}_" for r in REDUCTIONS)))
         raise InputError("output", name, f"{known}{special}{nearest(name, names)}", f"design outputs of {family.name}")
     return way.output
@@ -198,7 +200,6 @@ def _reduction_way(family: Family, name: str) -> Way | None:
         for base, text in REDUCTIONS.items():
             if name == f"{base}_{pose.name}":
                 unit = "rad" if base == "phi_max_abs" else pose.unit
-                return Way(
-                    Output(name, unit, f"{text} {pose.name}: {pose.text}", pose.equation), "reduction", base, pose.name
-                )
+                of_turn = Output(name, unit, f"{text} {pose.name}: {pose.text}", pose.equation)
+                return Way(of_turn, "mean" if base == "rms" else "reduction", base, pose.name)
     return None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sweep.effects import extended
+from sweep.effects import extended, input_names
 from sweep.errors import InputError, nearest
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Family
@@ -45,9 +45,11 @@ def evaluate(
     """
     import pandas as pd
 
-    mechanism = extended(find_family(family), [want] if isinstance(want, str) else want)
+    bare = find_family(family)
+    mechanism = extended(bare, [want] if isinstance(want, str) else want)
     wanted = pose_wants(mechanism, want)
-    matrix, extras = design_matrix(mechanism, table, extra=() if phi is not None else ("phi",))
+    extra = () if phi is not None else ("phi",)
+    matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))
     if phi is None:
         if "phi" not in extras:
             raise InputError("phi", None, "a column phi, or the argument phi=", f"table of {mechanism.name}")

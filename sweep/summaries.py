@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from sweep.catalogue import applying_step, general_way, is_position, output, output_names
+from sweep.effects import extended, input_names
 from sweep.errors import InputError
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.chain import Stage
 from sweep.margins import margin_suffixes
+from sweep.means import mean_squares
 from sweep.sampling import Index
 from sweep.tables import design_matrix
 from sweep.turn import Group, group_ns, limits_and_reductions, margin_group
@@ -69,8 +71,10 @@ def summarise(
     Parameters
     ----------
     family : "rssr", "guide", ... or a list of them for a chain
-    table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1
-    want : names of design outputs: ``rotatable``, ``margin``, ``stroke``, ``max_abs_d2s`` ... (see ``sweep families``)
+    table : DataFrame or mapping with a column per parameter [one length unit, rad], and per input of the effects that
+        ``want`` calls for; missing ``branch`` means +1
+    want : names of design outputs: ``rotatable``, ``margin``, ``stroke``, ``max_abs_d2s`` ... (see ``sweep families``),
+        ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``)
     samples : extrema on a dense grid of so many crank angles
     accuracy : true extrema, refined to this relative error; 1e-8 if neither is given
     window : ``max_abs_dev`` and the other reductions of ``dev`` count only poses whose position lies between these
@@ -90,11 +94,12 @@ def summarise(
     """
     import pandas as pd
 
-    mechanism = find_family(family)
     wanted = [want] if isinstance(want, str) else list(dict.fromkeys(want))
+    bare = find_family(family)
+    mechanism = extended(bare, wanted)
     wanted = [name for name in wanted if name != "status"]
     chosen = _accuracy(samples, accuracy)
-    matrix, _ = design_matrix(mechanism, table)
+    matrix, _ = design_matrix(mechanism, table, unused=input_names(bare))
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
     errors = [f"err_{name}" for name in wanted] if chosen.target is not None else []
     index = table.index if isinstance(table, pd.DataFrame) else None
@@ -171,9 +176,8 @@ def _jobs(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> list[_Jo
             step, stage = own
             steps.setdefault((step.name, stage.number if stage else 0), (step, stage, []))[2].append(name)
         elif way is not None:
-            group: Group = (
-                "margin" if way.kind == "margin" else "limits" if is_position(family, way.of) else "reductions"
-            )
+            position: Group = "limits" if is_position(family, way.of) else "reductions"
+            group: Group = "margin" if way.kind == "margin" else "means" if way.kind == "mean" else position
             groups.setdefault(group, []).append(name)
         else:
             output(family, name)  # unknown names end here, with the nearest known one
@@ -195,6 +199,8 @@ def _jobs(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> list[_Jo
 def _run(family: Family, job: _Job, designs: Array, accuracy: Accuracy, window: tuple[float, float] | None) -> Columns:
     if job.group == "margin":
         return margin_group(family, designs, job.outputs, accuracy)
+    if job.group == "means":
+        return mean_squares(family, designs, job.outputs, accuracy)
     if not isinstance(job.group, Step):
         return limits_and_reductions(family, designs, job.outputs, accuracy, window)
     own = {name: name.removesuffix("1") if job.stage else name for name in job.outputs}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
@@ -27,7 +27,9 @@ class Parametrised(Protocol):
     def parameter_names(self) -> tuple[str, ...]: ...  # noqa: D102
 
 
-def design_matrix(family: Parametrised, table: Table, extra: Sequence[str] = ()) -> tuple[Array, dict[str, Array]]:
+def design_matrix(
+    family: Parametrised, table: Table, extra: Sequence[str] = (), unused: Container[str] = ()
+) -> tuple[Array, dict[str, Array]]:
     """Check a table and lay its parameters out as the (n, P) matrix the kernels take.
 
     Parameters
@@ -35,6 +37,7 @@ def design_matrix(family: Parametrised, table: Table, extra: Sequence[str] = ())
     family : whose parameters are expected
     table : DataFrame or mapping of equally long columns (scalars are repeated); missing columns take the default
     extra : further columns that may stand in the table (``phi``); returned separately if present
+    unused : names that mean something elsewhere (inputs of effects that are not called for) and are no misspelling
 
     Raises
     ------
@@ -45,7 +48,7 @@ def design_matrix(family: Parametrised, table: Table, extra: Sequence[str] = ())
     names = [str(name) for name in table]
     for name in names:
         missing = [k for k in known if k not in names]
-        if name not in known and nearest(name, missing):
+        if name not in known and name not in unused and nearest(name, missing):
             raise InputError("column", name, f"the columns {', '.join(known)}{nearest(name, missing)}", "table")
     rows = _row_count(table, [n for n in names if n in known])
     matrix = np.empty((rows, len(family.parameters)))

@@ -17,7 +17,7 @@ from sweep.margins import combined, margin_suffixes, margins, own_step
 from sweep.sampling import TWO_PI, Mask, Status, blocks, sample_turn
 from sweep.window import Window
 
-Group: TypeAlias = Literal["margin", "limits", "reductions"]
+Group: TypeAlias = Literal["margin", "limits", "reductions", "means"]
 Found: TypeAlias = dict[Request, Extremum]
 
 
@@ -80,12 +80,19 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
     stages = len(family.stages) if isinstance(family, Chain) else 1
     if group == "margin":
         return sum(100.0 if own_step(family, s, accuracy) else NS_MARGIN for s in margin_suffixes(family))
-    requests = {r for way in _ways(family, names) for r in way.requests(False)}
+    ways = _ways(family, names)
+    requests = {r for way in ways for r in way.requests(False)}
+    # What effects add is paid once per effect and pose, and far outweighs the motion.
+    effects = sum(dict(family.dear[way.of] for way in ways if way.of in family.dear).values())
     if accuracy.samples is not None:
-        return accuracy.samples * (NS_POSE * stages + NS_SCAN * len(requests))
+        scans = len(ways) if group == "means" else len(requests)
+        return accuracy.samples * (NS_POSE * stages + NS_SCAN * scans + effects)
+    if group == "means":
+        return POSES_MEAN * (NS_POSE * stages + NS_SCAN * len(ways) + effects)
     assert accuracy.target is not None
     dearer = 0.5 - np.log10(accuracy.target) / 16.0
-    return float(stages * (NS_SEARCH + NS_PEAK * dearer * len(requests)))
+    poses = POSES_SEARCH + POSES_PEAK * dearer * len(requests)
+    return float(stages * (NS_SEARCH + NS_PEAK * dearer * len(requests)) + poses * effects)
 
 
 # Measured on one core of a Zen 4 (docs/extrema.md): per sample and stage, per sample and extremum, per design and
@@ -95,6 +102,10 @@ NS_SCAN = 2.0
 NS_SEARCH = 800.0
 NS_PEAK = 2200.0
 NS_MARGIN = 1600.0
+# Poses per design on average: of a mean, of a search without its peaks, per refined extremum.
+POSES_MEAN = 130.0
+POSES_SEARCH = 50.0
+POSES_PEAK = 20.0
 
 
 def _ways(family: Family, names: Sequence[str]) -> list[Way]:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from kernels.effects import bearings, elasticity, friction, kinetostatics, pressure, speed_fluctuation
+from kernels.effects import bearings, elasticity, friction, kinetostatics, permissible, pressure, speed_fluctuation
 from kernels.effects.coupler import DRIVEN, DRIVING, coupler_point
 from sweep.families import family
 from sweep.families.base import Angles
@@ -84,10 +84,16 @@ def test_friction_equals_oracle(construction):
     out = {name: np.empty((*shape, 3)) for name in ("R_A", "R_B", "R_C", "R_D", "M_A", "M_D")}
     out |= {name: np.empty(shape) for name in ("m_finger", "M_drive", "T_fric_A", "T_fric_D")}
     out |= {"T_fric_B": np.empty((*shape, 3)), "T_fric_C": np.empty((*shape, 3)), "supports": np.empty((*shape, 4))}
-    passes = np.empty(shape)
-    friction.friction_loads(poses, fixed, loads, data, CONSTRUCTIONS[construction], status, *out.values(), passes)
+    passes, contraction = np.empty(shape), np.empty(shape)
+    friction.friction_loads(
+        poses, fixed, loads, data, CONSTRUCTIONS[construction], status, *out.values(), passes, contraction
+    )
     assert (status == st.OK).all()
     assert passes.max() < friction.PASSES
+    # The bound is one: no observed rate exceeds it, and it is not idle (sheet 2.1: rate/bound between 0.1 and 0.98).
+    rates = np.array([float(r["expected"]["contraction_rate"]) for r in table])
+    assert (rates <= contraction[:, 0] * (1 + 1e-6)).all()
+    assert (rates >= 0.05 * contraction[:, 0]).all()
     for i, row in enumerate(table):
         got = {name: values[i, 0] for name, values in out.items()}
         in_bearing_axes(got, i, fixed)
@@ -109,7 +115,7 @@ def test_friction_reports_a_jam_instead_of_the_last_iterate():
     data[0, 3], data[0, 7] = 3.0, 2.0 * row["inputs"]["c"]
     drive = np.empty(status.shape)
     loads = np.array([load_columns(row["inputs"])])
-    friction.friction_loads(poses, fixed, loads, data, DRIVEN, status, *[None] * 7, drive, *[None] * 6)
+    friction.friction_loads(poses, fixed, loads, data, DRIVEN, status, *[None] * 7, drive, *[None] * 7)
     assert status[0, 0] == st.JAMMED
     assert np.isnan(drive[0, 0])
 
@@ -166,15 +172,18 @@ def test_sliding_bearings_equal_oracle():
 
 
 def test_permissible_pressure_angle_equals_oracle():
+    """A direction with the table's axial angle; its radial angle does not enter what is permissible."""
     for row in rows("bearings", kind="permissible_theta1"):
         given = row["inputs"]
         data = np.array([[given[name] for name in bearings.Sliding._fields]])
         limits = np.array([[given["p1_adm"], given["p2_adm"], given["p3_adm"]]])
-        theta1, status = np.empty(1), np.empty(1, np.uint8)
-        arguments = np.array([given["theta2"]]), np.array([given["M_c"]])
-        bearings.permissible_theta1(*arguments, data, limits, theta1, status)
-        assert status[0] == st.OK
-        assert factor(theta1, row["expected"]["theta1"], 1) < 16
+        components = np.array([[1.0]]), np.array([[1.0]]), np.array([[np.tan(given["theta2"])]])
+        theta1, reserve, status = np.empty((1, 1)), np.empty((1, 1)), np.zeros((1, 1), np.uint8)
+        moment = np.array([given["M_c"]])
+        permissible.sliding_limits(*components, moment, data, limits, status, None, theta1, reserve)
+        assert status[0, 0] == st.OK
+        assert factor(theta1[0], row["expected"]["theta1"], 1) < 16
+        assert reserve[0, 0] == theta1[0, 0] - np.arctan(1.0)
 
 
 def test_rolling_bearings_equal_oracle():

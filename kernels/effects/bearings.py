@@ -19,9 +19,6 @@ from kernels._jit import inline, kernel
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
 
-SCAN = 128
-BISECTIONS = 60
-
 
 class Sliding(NamedTuple):
     """Columns of the sliding-bearing matrix [length, -]; r_t is the mean thrust radius of the collar."""
@@ -70,7 +67,8 @@ class Criteria(NamedTuple):
 
 
 @inline
-def _sliding(data: Array, i: int) -> Sliding:
+def sliding_data(data: Array, i: int) -> Sliding:
+    """Row of the sliding-bearing matrix."""
     return Sliding(
         data[i, 0], data[i, 1], data[i, 2], data[i, 3], data[i, 4], data[i, 5], data[i, 6], data[i, 7], data[i, 8],
         data[i, 9],
@@ -122,7 +120,7 @@ def sliding_bearings(
     pressure1, pressure2, pressure3 : (n, m) or None; mean pressures of the journals and the collar
     """
     for i in range(cos_theta1.shape[0]):
-        data = _sliding(bearings, i)
+        data = sliding_data(bearings, i)
         for j in range(cos_theta1.shape[1]):
             r = sliding_criteria(data, moment[i], cos_theta1[i, j], sin_theta1[i, j], axial[i, j])
             if status[i, j] == st.OK and not r.arm > 0.0:
@@ -140,51 +138,6 @@ def sliding_bearings(
                 pressure2[i, j] = good * r.p2
             if pressure3 is not None:
                 pressure3[i, j] = good * r.p3
-
-
-@inline
-def _utilisation(s: Sliding, moment: float, theta1: float, tan2: float, limits: Array, i: int) -> float:
-    sin1 = math.sin(theta1)
-    r = sliding_criteria(s, moment, math.cos(theta1), sin1, sin1 * tan2)
-    if not r.arm > 0.0:
-        return math.inf
-    worst: float = max(r.p1 / limits[i, 0], max(r.p2 / limits[i, 1], r.p3 / limits[i, 2]))
-    return worst
-
-
-@kernel
-def permissible_theta1(
-    theta2: Array, moment: Array, bearings: Array, limits: Array, theta1: Array, status: Status
-) -> None:
-    """Largest radial pressure angle the bearings permit at a given axial angle: first crossing of max p/p_adm = 1.
-
-    Parameters
-    ----------
-    theta2 : (n,) axial pressure angle [rad];  moment : (n,);  bearings : (n, 10)
-    limits : (n, 3) permissible mean pressures of journal 1, journal 2, collar
-    theta1 : (n,) out [rad]; 0 with LIMIT_EXCEEDED where even theta1 = 0 is too much
-    status : (n,) out
-    """
-    for i in range(theta2.size):
-        data = _sliding(bearings, i)
-        tan2 = math.tan(theta2[i])
-        status[i] = st.OK
-        if _utilisation(data, moment[i], 0.0, tan2, limits, i) > 1.0:
-            theta1[i], status[i] = 0.0, st.LIMIT_EXCEEDED
-            continue
-        low, high = 0.0, 0.5 * math.pi
-        for k in range(1, SCAN + 1):
-            high = 0.5 * math.pi * k / SCAN
-            if _utilisation(data, moment[i], high, tan2, limits, i) > 1.0:
-                break
-            low = high
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (low + high)
-            if _utilisation(data, moment[i], middle, tan2, limits, i) > 1.0:
-                high = middle
-            else:
-                low = middle
-        theta1[i] = low
 
 
 @kernel
@@ -221,8 +174,8 @@ def rolling_bearings(
             force = moment[i] / (c * cos1)
             thrust = abs(force * axial[i, j])
             span = abs(z2 - z1)
-            first = _equivalent(bearings, i, abs(force) * pi1 / span, thrust if bearings[i, 10] == 1.0 else 0.0)
-            second = _equivalent(bearings, i, abs(force) * pi2 / span, thrust if bearings[i, 10] == 2.0 else 0.0)
+            first = equivalent_load(bearings, i, abs(force) * pi1 / span, thrust if bearings[i, 10] == 1.0 else 0.0)
+            second = equivalent_load(bearings, i, abs(force) * pi2 / span, thrust if bearings[i, 10] == 2.0 else 0.0)
             if equivalent1 is not None:
                 equivalent1[i, j] = good * first
             if equivalent2 is not None:
@@ -234,7 +187,8 @@ def rolling_bearings(
 
 
 @inline
-def _equivalent(bearings: Array, i: int, radial: float, thrust: float) -> float:
+def equivalent_load(bearings: Array, i: int, radial: float, thrust: float) -> float:
+    """Dynamic equivalent load K_b (V R) or K_b (X V R + Y F_a) of a rolling bearing, columns of :class:`Rolling`."""
     v, x, y, e_limit, shock = bearings[i, 3], bearings[i, 4], bearings[i, 5], bearings[i, 6], bearings[i, 9]
     load: float = v * radial if thrust <= e_limit * v * radial else x * v * radial + y * thrust
     return float(shock * load)

@@ -3,8 +3,8 @@
 A ball joint with a finger is a universal joint: its first axis ``w`` is fixed in the neighbouring link, its second axis
 ``n`` in the coupler, normal to w and to the coupler (spatial-linkages sheet, section 4; Polukhin 1971, 2.6).
 
-* finger on the driven joint C: w = rho (the line D-C; on a slider the common perpendicular, ours), n = branch (w x s)/|w x s|; degenerates only at a dead point,
-  |w x s| >= cos(pressure angle);
+* finger on the driven joint C: w = rho (the line D-C; on a slider the common perpendicular, which is ours),
+  n = branch (w x s)/|w x s|; degenerates only at a dead point, |w x s| >= cos(pressure angle);
 * finger on the driving joint B: w = u (crank axis), n = (w x s)/|w x s|; degenerates where the coupler is parallel to
   the crank axis, whatever the pressure angle.
 """

@@ -55,7 +55,7 @@ def extrema_expected(a1: float, b1: float, a2: float, b2: float) -> float:
 def zeros(
     a1: float, b1: float, a2: float, b2: float, cut: float, quartic: Array, scratch: Array, found: Array, phi: Array
 ) -> int:
-    """Zeros of a1 cos + b1 sin + a2 cos 2 + b2 sin 2 in one turn from ``cut``, ascending; their number, -1 if over 4."""
+    """Zeros of a1 cos + b1 sin + a2 cos 2 + b2 sin 2 in one turn from ``cut``, ascending; their number, or -1."""
     count = 0
     for quarter in range(4):
         start = cut + 0.5 * math.pi * quarter
@@ -100,8 +100,8 @@ def pressure_extrema(
 
     Notes
     -----
-    Measured on the oracle tables: pressure angles within 1.4 x 2^-53 times the size of the terms that round, crank angles
-    within 0.7 x 2^-53 size^2/|curvature|.
+    Measured on the oracle tables: pressure angles within 1.4 x 2^-53 times the size of the terms that round, crank
+    angles within 0.7 x 2^-53 size^2/|curvature|.
     """
     quartic, scratch, found, at = np.empty(5), np.empty((4, 5)), np.empty(4), np.empty(4)
     for i in range(ellipse.shape[0]):

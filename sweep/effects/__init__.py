@@ -12,21 +12,25 @@ from dataclasses import replace
 from functools import lru_cache, partial
 from importlib import import_module
 
-import numpy as np
-
-from kernels.status import OK
-from sweep.effects.base import Effect, Scene
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Parameter, Step
+from sweep.effects.base import Effect
+from sweep.effects.evaluation import effect_poses, on_own_columns, run_design
+from sweep.families.base import Family, Output, Parameter, Step
+from sweep.families.chain import Chain, chain
 
 # Name of each effect's entry: module and constant.  A new effect is a kernel file, an entry file and its line here.
 _ENTRIES = {
     "pressure": ("pressure", "EFFECT"),
+    "pressure_extrema": ("pressure_extrema", "EFFECT"),
     "coupler": ("coupler", "EFFECT"),
     "kinetostatics": ("kinetostatics", "EFFECT"),
+    "slider_kinetostatics": ("kinetostatics", "SLIDER"),
     "friction": ("friction", "EFFECT"),
     "speed_fluctuation": ("speed", "EFFECT"),
     "sliding_bearings": ("bearings", "SLIDING"),
     "rolling_bearings": ("bearings", "ROLLING"),
+    "sliding_limits": ("bearings", "SLIDING_LIMIT"),
+    "rolling_limits": ("bearings", "ROLLING_LIMIT"),
+    "bearing_life": ("bearing_life", "EFFECT"),
     "elasticity": ("elasticity", "STATIC"),
     "dynamic_elasticity": ("elasticity", "DYNAMIC"),
 }
@@ -52,33 +56,61 @@ def applicable(family: Family) -> tuple[Effect, ...]:
 def called_for(family: Family, wanted: Iterable[str]) -> tuple[Effect, ...]:
     """The effects that some wanted pose output, design output or reduction belongs to, in the order of the register."""
     names = {name[len(prefix) :] for name in wanted for prefix in _REDUCTIONS if name.startswith(prefix)}
-    return tuple(entry for entry in applicable(family) if names & _own_outputs(entry))
+    return tuple(entry for entry in applicable(family) if not names.isdisjoint(o.name for o in outputs(entry)))
 
 
-def _own_outputs(entry: Effect) -> set[str]:
-    design = entry.design_result.outputs if entry.design_result else ()
-    return {o.name for o in (*entry.outputs, *design)}
+def outputs(entry: Effect) -> tuple[Output, ...]:
+    """Pose and design outputs of an effect."""
+    return (*entry.outputs, *(entry.design_result.outputs if entry.design_result else ()))
+
+
+def input_names(family: Family) -> frozenset[str]:
+    """Inputs of all effects that can be asked of a family, or of the stages of a chain."""
+    if isinstance(family, Chain):
+        return frozenset(f"{name}{s.number}" for s in family.stages for name in input_names(s.family))
+    return frozenset(p.name for entry in applicable(family) for p in entry.inputs)
 
 
 def extended(family: Family, wanted: Iterable[str]) -> Family:
     """The family with the effects that ``wanted`` calls for; the family itself where it calls for none.
 
-    The inputs of the effects become further parameters, after the family's own.
+    The inputs of the effects become further parameters, after the family's own.  In a chain an effect belongs to a
+    stage, and its inputs and outputs carry the stage's number.
     """
-    return with_effects(family, called_for(family, wanted))
+    names = tuple(wanted)
+    if isinstance(family, Chain):
+        stages = tuple(_extended_stage(family, k, names) for k in range(len(family.stages)))
+        same = all(new is stage.family for new, stage in zip(stages, family.stages, strict=True))
+        return family if same else chain(stages)
+    return with_effects(family, called_for(family, names))
+
+
+def _extended_stage(family: Chain, k: int, wanted: tuple[str, ...]) -> Family:
+    stage = family.stages[k]
+    number = str(stage.number)
+    own = [name.removesuffix(number) for name in wanted if name.endswith(number)]
+    if k == len(family.stages) - 1:
+        own += [name for name in wanted if not name.endswith(number)]
+    return with_effects(stage.family, tuple(e for e in called_for(stage.family, own) if k == 0 or _any_crank(e)))
+
+
+def _any_crank(entry: Effect) -> bool:
+    """Whether an effect also holds where the crank does not turn evenly, as in the later stages of a chain."""
+    steady = any(p.name == "speed" for p in entry.inputs)
+    return not (steady or entry.whole_turn or entry.design_result)
 
 
 def with_effects(family: Family, effects: tuple[Effect, ...]) -> Family:
     """The family with the outputs and inputs of these effects."""
     if not effects:
         return family
-    inputs = _inputs(effects)
+    added = _inputs(effects)
     own = len(family.parameters)
     steps = tuple(
         Step(
             name=entry.name,
             provides=entry.design_result.outputs,
-            run=partial(_run_design, family, entry, inputs, own),
+            run=partial(run_design, family, entry, added, own),
             ns_per_design=entry.design_result.ns_per_design,
         )
         for entry in effects
@@ -86,10 +118,11 @@ def with_effects(family: Family, effects: tuple[Effect, ...]) -> Family:
     )
     return replace(
         family,
-        parameters=(*family.parameters, *inputs),
+        parameters=(*family.parameters, *added),
         pose_outputs=(*family.pose_outputs, *(o for entry in effects for o in entry.outputs)),
-        poses=partial(_poses, family, effects, inputs, own),
-        steps=(*(_on_own_columns(step, own) for step in family.steps), *steps),
+        poses=partial(effect_poses, family, effects, added, own),
+        steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
+        dear={o.name: (entry.name, entry.ns_per_pose) for entry in effects for o in entry.outputs},
     )
 
 
@@ -98,59 +131,10 @@ def _inputs(effects: tuple[Effect, ...]) -> tuple[Parameter, ...]:
     merged: dict[str, Parameter] = {}
     for entry in effects:
         for p in entry.inputs:
-            p = replace(p, text=f"{p.text}; for {entry.name}")
             kept = merged.get(p.name)
-            if kept is not None:
-                p = replace(
-                    kept, text=f"{kept.text}, {entry.name}", default=kept.default if p.default is not None else None
-                )
-            merged[p.name] = p
+            if kept is None:
+                merged[p.name] = replace(p, text=f"{p.text}; for {entry.name}")
+            else:
+                default = kept.default if p.default is not None else None
+                merged[p.name] = replace(kept, text=f"{kept.text}, {entry.name}", default=default)
     return tuple(merged.values())
-
-
-def _on_own_columns(step: Step, own: int) -> Step:
-    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-        return step.run(np.ascontiguousarray(designs[:, :own]), wanted, accuracy)
-
-    return replace(step, run=run)
-
-
-def _columns(inputs: tuple[Parameter, ...], designs: Array, own: int) -> dict[str, Array]:
-    return {p.name: np.ascontiguousarray(designs[:, own + k]) for k, p in enumerate(inputs)}
-
-
-def _run_design(
-    family: Family,
-    entry: Effect,
-    inputs: tuple[Parameter, ...],
-    own: int,
-    designs: Array,
-    wanted: frozenset[str],
-    accuracy: Accuracy,
-) -> Columns:
-    assert entry.design_result is not None
-    bare = np.ascontiguousarray(designs[:, :own])
-    return entry.design_result.run(family, bare, _columns(inputs, designs, own), wanted, accuracy)
-
-
-def _poses(
-    family: Family,
-    effects: tuple[Effect, ...],
-    inputs: tuple[Parameter, ...],
-    own: int,
-    designs: Array,
-    angles: Angles,
-    wanted: frozenset[str],
-) -> Columns:
-    """The family's own poses, then each effect with a wanted output; the status is the first that is not OK."""
-    bare = np.ascontiguousarray(designs[:, :own])
-    columns = family.poses(bare, angles, wanted & frozenset(family.pose_names))
-    scene = Scene(family, bare, angles, _columns(inputs, designs, own))
-    status = np.array(columns["status"])
-    for entry in effects:
-        asked = wanted & frozenset(o.name for o in entry.outputs)
-        if asked:
-            found = entry.compute(scene, asked)
-            np.copyto(status, found.pop("status"), where=status == OK)
-            columns |= found
-    return columns | {"status": status}

@@ -34,7 +34,7 @@ class Scene:
     @cached_property
     def motion(self) -> Columns:
         """Pose outputs of the family that the joint records are made of."""
-        return self.family.poses(self.designs, self.angles, frozenset(JOINT_NEEDS))
+        return self.family.poses(self.designs, self.angles, frozenset(self.family.joint_needs))
 
     @cached_property
     def records(self) -> tuple[Array, Array]:
@@ -53,23 +53,54 @@ class Scene:
         """Inputs side by side, (n, len(names))."""
         return np.column_stack([self.inputs[name] for name in names])
 
-    def at(self, phi: Array) -> Scene:
-        """Return the same designs at other crank angles, (1, m): what a whole-turn effect samples."""
-        return Scene(self.family, self.designs, Angles.of(phi), self.inputs)
+    def only(self, rows: Rows) -> Scene:
+        """Some of the designs; the scene itself where these are all."""
+        if rows.size == len(self.designs):
+            return self
+        angles = Angles(*(x[rows] for x in self.angles)) if self.angles.cos.shape[0] > 1 else self.angles
+        return Scene(self.family, self.designs[rows], angles, {name: x[rows] for name, x in self.inputs.items()})
 
+    def on_grid(self, size: int) -> Scene:
+        """The same designs at ``size`` equidistant crank angles of one turn: what a whole-turn effect samples."""
+        return Scene(self.family, self.designs, Angles.of(2.0 * np.pi * np.arange(size)[None] / size), self.inputs)
 
-JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
 
 ComputeFunction: TypeAlias = Callable[[Scene, frozenset[str]], Columns]
+DesignFunction: TypeAlias = Callable[[Family, Array, dict[str, Array], frozenset[str], Accuracy], Columns]
 
 
 @dataclass(frozen=True)
 class DesignResult:
-    """Outputs an effect gives per design instead of per pose: a whole-turn effect's, or a closed form."""
+    """Outputs an effect gives per design instead of per pose: a whole-turn effect's, or a closed form.
+
+    ``run(family, designs, inputs, wanted, accuracy)`` returns the wanted ones, perhaps their ``err_``, and ``status``.
+    """
 
     outputs: tuple[Output, ...]
-    run: Callable[[Family, Array, dict[str, Array], frozenset[str], Accuracy], Columns]
+    run: DesignFunction
     ns_per_design: float
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Whether an effect matters, estimated from a few designs: the quantity that tells, and where it starts to."""
+
+    quantity: str
+    values: Array  # (n,) of the designs that could be estimated
+    threshold: float
+
+    @property
+    def worst(self) -> float:
+        """The value of the design where the effect matters most."""
+        return float(self.values.max())
+
+    @property
+    def negligible(self) -> bool:
+        """Whether it matters for none of the designs."""
+        return self.worst < self.threshold
+
+
+AdviceFunction: TypeAlias = Callable[[Scene], Advice | None]
 
 
 @dataclass(frozen=True)
@@ -77,6 +108,7 @@ class Effect:
     """One row of the register; ``compute(scene, wanted)`` returns the wanted outputs (n, m) and ``status`` (n, m).
 
     ``whole_turn`` effects couple different crank angles: they sample the turn themselves, whatever is asked for.
+    ``advise(scene)`` applies the effect's rule of negligibility to some designs over a turn; None where none turns.
     """
 
     key: str
@@ -93,3 +125,4 @@ class Effect:
     negligible: str
     whole_turn: bool = False
     design_result: DesignResult | None = None
+    advise: AdviceFunction | None = None

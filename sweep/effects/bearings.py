@@ -1,20 +1,28 @@
-"""B1, B2: sliding and rolling bearings of the rocker under the coupler force of a resisting torque."""
+"""B1: sliding and rolling bearings of the rocker under the coupler force of a resisting torque, massless estimate."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
-from kernels.effects import bearings
-from sweep.effects.base import Effect, Scene
+from kernels.effects import bearings, permissible
+from sweep.effects.base import Advice, AdviceFunction, ComputeFunction, Effect, Scene
+from sweep.effects.loads import SPEED
 from sweep.effects.pressure import bearing_directions
-from sweep.families.base import Columns, Output, Parameter, optional_outputs
+from sweep.effects.pressure import compute as compute_pressure
+from sweep.families.base import Array, Columns, Output, Parameter, optional_outputs
 
 EQUATION = "dynamics sheet 4, (15)-(17)"
 
+SUPPORTS = (
+    Parameter("support_d1", "length", "first support along the rocker axis, from D, the plane of C"),
+    Parameter("support_d2", "length", "second support along the rocker axis, from D"),
+)
 _COMMON = (
     Parameter("resisting_torque", "torque", "torque the rocker overcomes", positive=True),
-    Parameter("support_d1", "length", "first support along the rocker axis, rocker plane at zero"),
-    Parameter("support_d2", "length", "second support along the rocker axis"),
+    *SUPPORTS,
 )
 SLIDING_INPUTS = (
     *_COMMON,
@@ -34,8 +42,7 @@ SLIDING_OUTPUTS = (
     Output("journal_pressure2", "pressure", "mean pressure of journal 2", EQUATION),
     Output("collar_pressure", "pressure", "mean pressure of the collar", EQUATION),
 )
-ROLLING_INPUTS = (
-    *_COMMON,
+CATALOGUE = (
     Parameter("rotation_factor", "ratio", "V of the bearing catalogue", default=1.0),
     Parameter("radial_factor", "ratio", "X of the bearing catalogue"),
     Parameter("axial_factor", "ratio", "Y of the bearing catalogue"),
@@ -45,6 +52,7 @@ ROLLING_INPUTS = (
     Parameter("shock_factor", "ratio", "K_b", default=1.0),
     Parameter("axial_support", "choice", "support that takes the axial load", default=1.0, choices=(1.0, 2.0)),
 )
+ROLLING_INPUTS = (*_COMMON, *CATALOGUE)
 ROLLING_OUTPUTS = (
     Output("equivalent_load1", "force", "equivalent load of rolling bearing 1", EQUATION),
     Output("equivalent_load2", "force", "equivalent load of rolling bearing 2", EQUATION),
@@ -53,58 +61,123 @@ ROLLING_OUTPUTS = (
 )
 
 
-def _data(scene: Scene, inputs: tuple[Parameter, ...]) -> np.ndarray:
-    radius = scene.records[1][:, 14]  # c, the radius at which the coupler force acts
-    return np.column_stack([radius, scene.table(tuple(p.name for p in inputs[1:]))])
-
-
-def sliding(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted loads and pressures of the journals and the collar."""
-    cos1, sin1, axial, status = bearing_directions(scene)
-    names = tuple(o.name for o in SLIDING_OUTPUTS)
-    outputs = optional_outputs(names, wanted, scene.shape)
-    torque = np.ascontiguousarray(scene.inputs["resisting_torque"])
-    bearings.sliding_bearings(cos1, sin1, axial, torque, _data(scene, SLIDING_INPUTS), status, *outputs)
-    found: Columns = {name: out for name, out in zip(names, outputs, strict=True) if out is not None}
-    return found | {"status": status}
-
-
-def rolling(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted equivalent loads and lives."""
-    cos1, sin1, axial, status = bearing_directions(scene)
-    names = tuple(o.name for o in ROLLING_OUTPUTS)
-    outputs = optional_outputs(names, wanted, scene.shape)
-    torque = np.ascontiguousarray(scene.inputs["resisting_torque"])
-    bearings.rolling_bearings(cos1, sin1, axial, torque, _data(scene, ROLLING_INPUTS), status, *outputs)
-    found: Columns = {name: out for name, out in zip(names, outputs, strict=True) if out is not None}
-    return found | {"status": status}
-
-
-SLIDING = Effect(
-    key="B1",
-    name="sliding_bearings",
-    title="sliding bearings of the rocker: loads and mean pressures, massless estimate",
-    equation=EQUATION,
-    families=("rssr",),
-    needs=("pressure",),
-    inputs=SLIDING_INPUTS,
-    outputs=SLIDING_OUTPUTS,
-    compute=sliding,
-    ns_per_pose=60.0,
-    called_for="bearing choice while the linkage is being synthesised",
-    negligible="other members govern",
+PERMISSIBLE = (
+    Parameter("permissible_pressure1", "pressure", "permissible mean pressure of journal 1", positive=True),
+    Parameter("permissible_pressure2", "pressure", "permissible mean pressure of journal 2", positive=True),
+    Parameter("permissible_pressure3", "pressure", "permissible mean pressure of the collar", positive=True),
 )
-ROLLING = Effect(
-    key="B1",
-    name="rolling_bearings",
-    title="rolling bearings of the rocker: equivalent loads and lives, massless estimate",
-    equation=EQUATION,
-    families=("rssr",),
-    needs=("pressure",),
-    inputs=ROLLING_INPUTS,
-    outputs=ROLLING_OUTPUTS,
-    compute=rolling,
-    ns_per_pose=60.0,
-    called_for="bearing choice while the linkage is being synthesised",
-    negligible="other members govern",
+LIFE = (
+    Parameter("required_life", "time", "running time that 90 % of the bearings must reach", positive=True),
+    SPEED,
 )
+SLIDING_LIMITS = (
+    Output("sliding_utilisation", "1", "largest bearing pressure over its permissible value", EQUATION),
+    Output("permissible_theta1", "rad", "largest radial pressure angle the sliding bearings permit", EQUATION),
+    Output("theta1_reserve", "rad", "permissible minus actual radial pressure angle, sliding bearings", EQUATION),
+)
+ROLLING_LIMITS = (
+    Output("rolling_utilisation", "1", "larger equivalent load over the permissible one", EQUATION),
+    Output("permissible_theta1_rolling", "rad", "largest radial pressure angle the rolling bearings permit", EQUATION),
+    Output(
+        "theta1_reserve_rolling", "rad", "permissible minus actual radial pressure angle, rolling bearings", EQUATION
+    ),
+)
+
+
+def _data(scene: Scene, inputs: tuple[Parameter, ...]) -> Array:
+    """Columns of the bearing kernels: the radius c at which the coupler force acts, then the inputs but the torque."""
+    return np.column_stack([scene.records[1][:, 14], scene.table(tuple(p.name for p in inputs[1:]))])
+
+
+def _loads(
+    kernel: Callable[..., None], inputs: tuple[Parameter, ...], results: tuple[Output, ...], scene: Scene,
+    wanted: frozenset[str],
+) -> Columns:  # fmt: skip
+    cos1, sin1, axial, status = bearing_directions(scene)
+    names = tuple(o.name for o in results)
+    found = optional_outputs(names, wanted, scene.shape)
+    kernel(cos1, sin1, axial, scene.inputs["resisting_torque"], _data(scene, inputs), status, *found)
+    columns: Columns = {name: out for name, out in zip(names, found, strict=True) if out is not None}
+    return columns | {"status": status}
+
+
+def _limits(
+    kernel: Callable[..., None], inputs: tuple[Parameter, ...], results: tuple[Output, ...],
+    permissible: Callable[[Scene], Array], scene: Scene, wanted: frozenset[str],
+) -> Columns:  # fmt: skip
+    components = compute_pressure(scene, frozenset({"t_tau", "t_rho", "t_k"}))
+    status = components["status"]
+    names = tuple(o.name for o in results)
+    found = optional_outputs(names, wanted, scene.shape)
+    kernel(
+        *(components[name] for name in ("t_tau", "t_rho", "t_k")), scene.inputs["resisting_torque"],
+        _data(scene, inputs), permissible(scene), status, *found,
+    )  # fmt: skip
+    columns: Columns = {name: out for name, out in zip(names, found, strict=True) if out is not None}
+    return columns | {"status": status}
+
+
+def _pressures(scene: Scene) -> Array:
+    return scene.table(tuple(p.name for p in PERMISSIBLE))
+
+
+def permissible_load(scene: Scene) -> Array:
+    """C_dyn (60 n L_h/10^6)^(-1/p) with the turns of the crank, (n, 1)."""
+    given = scene.inputs
+    turns = given["speed"] / (2.0 * np.pi) * given["required_life"]
+    load: Array = given["dynamic_capacity"] * (turns * 1e-6) ** (-1.0 / given["life_exponent"])
+    return load[:, None]
+
+
+def _advise(compute: ComputeFunction, name: str, words: str, scene: Scene) -> Advice | None:
+    found = compute(scene, frozenset({name}))
+    turning = np.isfinite(found[name]).all(axis=1)
+    if not turning.any():
+        return None
+    return Advice(words, found[name][turning].max(axis=1), 0.5)
+
+
+def _effect(
+    name: str, title: str, inputs: tuple[Parameter, ...], results: tuple[Output, ...], compute: ComputeFunction,
+    ns: float, advise: AdviceFunction | None = None,
+) -> Effect:  # fmt: skip
+    return Effect(
+        key="B1",
+        name=name,
+        title=title,
+        equation=EQUATION,
+        families=("rssr",),
+        needs=("pressure",),
+        inputs=inputs,
+        outputs=results,
+        compute=compute,
+        ns_per_pose=ns,
+        called_for="bearing choice while the linkage is being synthesised",
+        negligible="other members govern: utilisation below 0.5",
+        advise=advise,
+    )
+
+
+_SLIDING = partial(_loads, bearings.sliding_bearings, SLIDING_INPUTS, SLIDING_OUTPUTS)
+_ROLLING = partial(_loads, bearings.rolling_bearings, ROLLING_INPUTS, ROLLING_OUTPUTS)
+_SLIDING_LIMITS = partial(_limits, permissible.sliding_limits, SLIDING_INPUTS, SLIDING_LIMITS, _pressures)
+_ROLLING_LIMITS = partial(_limits, permissible.rolling_limits, ROLLING_INPUTS, ROLLING_LIMITS, permissible_load)
+
+SLIDING = _effect(
+    "sliding_bearings", "sliding bearings of the rocker: loads and mean pressures, massless estimate",
+    SLIDING_INPUTS, SLIDING_OUTPUTS, _SLIDING, 100.0,
+)  # fmt: skip
+ROLLING = _effect(
+    "rolling_bearings", "rolling bearings of the rocker: equivalent loads and lives, massless estimate",
+    ROLLING_INPUTS, ROLLING_OUTPUTS, _ROLLING, 100.0,
+)  # fmt: skip
+SLIDING_LIMIT = _effect(
+    "sliding_limits", "utilisation of the sliding bearings and the pressure angle they permit",
+    (*SLIDING_INPUTS, *PERMISSIBLE), SLIDING_LIMITS, _SLIDING_LIMITS, 3000.0,
+    partial(_advise, _SLIDING_LIMITS, "sliding_utilisation", "largest utilisation of the sliding bearings"),
+)  # fmt: skip
+ROLLING_LIMIT = _effect(
+    "rolling_limits", "utilisation of the rolling bearings and the pressure angle they permit",
+    (*ROLLING_INPUTS, *LIFE), ROLLING_LIMITS, _ROLLING_LIMITS, 3000.0,
+    partial(_advise, _ROLLING_LIMITS, "rolling_utilisation", "largest utilisation of the rolling bearings"),
+)  # fmt: skip

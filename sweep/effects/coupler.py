@@ -38,17 +38,16 @@ OUTPUTS = tuple(
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted components; each group of three costs what one of them does."""
     columns: Columns = {}
-    total = scene.status()
-    point = scene.table(("x_point", "y_point", "z_point"))
+    total = np.empty(scene.shape, np.uint8)
     for finger in np.unique(scene.inputs["finger"]):
         rows = np.flatnonzero(scene.inputs["finger"] == finger)
-        per_pose, per_design = (np.ascontiguousarray(record[rows]) for record in scene.records)
-        status = np.ascontiguousarray(total[rows])
+        part = scene.only(rows)
+        status, point = part.status(), part.table(("x_point", "y_point", "z_point"))
         out = [
             np.empty((*status.shape, 3)) if any(name.format(axis=axis) in wanted for axis in "xyz") else None
             for name, _, _ in _GROUPS.values()
         ]
-        coupler_point(per_pose, per_design, point[rows], int(finger), status, *out)
+        coupler_point(*part.records, point, int(finger), status, *out)
         total[rows] = status
         for (name, _, _), values in zip(_GROUPS.values(), out, strict=True):
             for k, axis in enumerate("xyz"):
@@ -62,7 +61,7 @@ EFFECT = Effect(
     name="coupler",
     title="motion of a coupler point, orientation and rates of the coupler",
     equation="spatial sheet 4.1, 4.2",
-    families=("rssr",),
+    families=("rssr", "rssp"),
     needs=(),
     inputs=INPUTS,
     outputs=OUTPUTS,

@@ -6,9 +6,9 @@ import numpy as np
 
 from kernels.effects.friction import friction_loads
 from sweep.effects import loads
-from sweep.effects.base import Effect, Rows, Scene, Status
+from sweep.effects.base import Advice, Effect, Scene, Status
 from sweep.effects.kinetostatics import FORCES, by_construction, force_outputs, needed_vectors, vector_columns
-from sweep.families.base import Columns, Output, Parameter
+from sweep.families.base import Columns, Output, Parameter, optional_outputs
 
 EQUATION = "dynamics sheet 2.1"
 SUFFIX = "_friction"
@@ -37,31 +37,31 @@ _SCALARS = {
 _COUPLES = {"ball_couple_b": "friction couple of the ball joint at B", "ball_couple_c": "the same at C"}
 _SUPPORTS = ("load_support_a1", "load_support_a2", "load_support_d1", "load_support_d2")
 OUTPUTS = (
-    *force_outputs(SUFFIX, _TEXT),
+    *force_outputs("rocker", SUFFIX, _TEXT, EQUATION),
     *(Output(name, unit, text, EQUATION) for name, (unit, text) in _SCALARS.items()),
     *(Output(name, "torque", f"magnitude: {text}", EQUATION) for name, text in _COUPLES.items()),
     *(Output(name, "force", f"radial load of the support {name[-2:]}" + _TEXT, EQUATION) for name in _SUPPORTS),
     Output("friction_passes", "1", "passes of the friction iteration", EQUATION),
+    Output("friction_contraction", "1", "rho(L), bound of its rate; below 1 the solution is unique", EQUATION),
 )
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted quantities with friction; status JAMMED where the iteration does not contract."""
 
-    def run(rows: Rows, finger: int) -> tuple[Columns, Status]:
-        per_pose, per_design = (np.ascontiguousarray(record[rows]) for record in scene.records)
-        status = np.ascontiguousarray(scene.status()[rows])
+    def run(part: Scene, finger: int) -> tuple[Columns, Status]:
+        status = part.status()
         shape = status.shape
         vectors = {name: np.empty((*shape, 3)) for name in needed_vectors(wanted, SUFFIX)}
         scalars = {name: np.empty(shape) for name in _SCALARS if name in wanted}
         couples = {name: np.empty((*shape, 3)) for name in _COUPLES if name in wanted}
         supports = np.empty((*shape, 4)) if wanted & set(_SUPPORTS) else None
-        passes = np.empty(shape) if "friction_passes" in wanted else None
+        passes, contraction = optional_outputs(("friction_passes", "friction_contraction"), wanted, shape)
         friction_loads(
-            per_pose, per_design, scene.table(loads.LOAD_NAMES)[rows], scene.table(DATA_NAMES)[rows], finger, status,
+            *part.records, part.table(loads.ROCKER.columns), part.table(DATA_NAMES), finger, status,
             *[
                 *(vectors.get(name) for name in FORCES), *(scalars.get(name) for name in _SCALARS),
-                *(couples.get(name) for name in _COUPLES), supports, passes,
+                *(couples.get(name) for name in _COUPLES), supports, passes, contraction,
             ],
         )  # fmt: skip
         columns = vector_columns(vectors, wanted, SUFFIX)
@@ -71,9 +71,20 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
             columns |= {name: supports[:, :, k] for k, name in enumerate(_SUPPORTS) if name in wanted}
         if passes is not None:
             columns["friction_passes"] = passes
+        if contraction is not None:
+            columns["friction_contraction"] = contraction
         return columns, status
 
     return by_construction(scene, run)
+
+
+def advise(scene: Scene) -> Advice | None:
+    """Largest bound of the contraction over the turn: it is the share by which friction changes the joint loads."""
+    found = compute(scene, frozenset({"friction_contraction"}))
+    turning = np.isfinite(found["friction_contraction"]).all(axis=1)
+    if not turning.any():
+        return None
+    return Advice("largest contraction rho(L)", found["friction_contraction"][turning].max(axis=1), 0.01)
 
 
 EFFECT = Effect(
@@ -83,10 +94,11 @@ EFFECT = Effect(
     equation=EQUATION,
     families=("rssr",),
     needs=("kinetostatics",),
-    inputs=(*loads.INPUTS, *DATA),
+    inputs=(*loads.ROCKER.parameters, *DATA),
     outputs=OUTPUTS,
     compute=compute,
-    ns_per_pose=2500.0,
+    ns_per_pose=1200.0,
     called_for="losses, drive sizing, a check against jamming",
-    negligible="couples below 1 % of the joint loads' moments (contraction below 0.01)",
+    negligible="contraction rho(L) below 0.01: joint loads change by less than 1 %",
+    advise=advise,
 )

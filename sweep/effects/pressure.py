@@ -4,19 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
+from kernels import status as st
 from kernels.effects.pressure import directions
-from sweep.effects.base import Effect, Scene
+from sweep.effects.base import Advice, Effect, Scene
 from sweep.families.base import Columns, Output, optional_outputs
 
 OUTPUTS = (
     Output("t_tau", "1", "component of the coupler direction along the follower's motion, signed by the branch", "1.1"),
     Output("t_rho", "1", "component of the coupler direction along the follower", "1.1"),
     Output("t_k", "1", "component of the coupler direction along the follower's axis", "1.1"),
-    Output("theta1", "rad", "radial pressure angle at the follower, in its plane of motion", "1.1"),
+    Output("theta1", "rad", "radial pressure angle at the follower, tan = radial/tangential; across the slide", "1.1"),
     Output("theta2", "rad", "axial pressure angle at the follower, tan = axial/radial", "1.1"),
     Output("theta3", "rad", "axial pressure angle at the crank", "1.1"),
 )
 _NAMES = tuple(o.name for o in OUTPUTS)
+
+
+def advise(scene: Scene) -> Advice | None:
+    """Largest axial share of the coupler direction."""
+    found = compute(scene, frozenset({"t_k"}))
+    turning = (found["status"] == st.OK).all(axis=1)
+    if not turning.any():
+        return None
+    return Advice("largest axial component of the coupler direction", np.abs(found["t_k"][turning]).max(axis=1), 0.05)
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
@@ -41,14 +51,15 @@ def bearing_directions(scene: Scene) -> tuple[np.ndarray, ...]:
 EFFECT = Effect(
     key="P2, P3",
     name="pressure",
-    title="radial, axial and crank-side pressure angles",
+    title="direction of the coupler force: radial, axial and crank-side pressure angles",
     equation="dynamics sheet 1.1, (19)-(21)",
-    families=("rssr",),
+    families=("rssr", "rssp"),
     needs=(),
     inputs=(),
     outputs=OUTPUTS,
     compute=compute,
     ns_per_pose=40.0,
     called_for="choice of the follower's and the crank's bearings",
-    negligible="planar linkage: theta2 = theta3 = 0",
+    negligible="axial component of the coupler direction below 0.05 (planar linkage: theta2 = theta3 = 0)",
+    advise=advise,
 )

@@ -1,0 +1,77 @@
+"""B2: loads of the rocker's two rolling bearings from the joint reactions, and the life they allow over the cycle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import kernel
+from kernels.effects.bearings import equivalent_load
+from kernels.effects.friction import supports
+
+Array = NDArray[np.float64]
+Status = NDArray[np.uint8]
+
+
+@kernel
+def bearing_loads(
+    force: Array,
+    moment: Array,
+    axis: Array,
+    bearings: Array,
+    status: Status,
+    radial1: Array | None,
+    radial2: Array | None,
+    axial: Array | None,
+    equivalent1: Array | None,
+    equivalent2: Array | None,
+) -> None:
+    """Loads of two bearings that carry a force and a moment of the frame on the rocker (sheet, sections 2 and 4).
+
+    Parameters
+    ----------
+    force, moment : (n, m, 3), force at D and moment about it;  axis : (n, 3) axis of the rocker
+    bearings : (n, 11) columns of :class:`kernels.effects.bearings.Rolling`; c is not read
+    status : (n, m), in; nan where it is not OK
+    radial1, radial2, axial, equivalent1, equivalent2 : (n, m) or None
+    """
+    for i in range(force.shape[0]):
+        k = (axis[i, 0], axis[i, 1], axis[i, 2])
+        for j in range(force.shape[1]):
+            f = (force[i, j, 0], force[i, j, 1], force[i, j, 2])
+            m = (moment[i, j, 0], moment[i, j, 1], moment[i, j, 2])
+            first, second, along = supports(f, m, k, bearings[i, 1], bearings[i, 2])
+            good = 1.0 if status[i, j] == st.OK else math.nan
+            thrust = abs(along)
+            if radial1 is not None:
+                radial1[i, j] = good * first
+            if radial2 is not None:
+                radial2[i, j] = good * second
+            if axial is not None:
+                axial[i, j] = good * along
+            if equivalent1 is not None:
+                on_first = thrust if bearings[i, 10] == 1.0 else 0.0
+                equivalent1[i, j] = good * equivalent_load(bearings, i, first, on_first)
+            if equivalent2 is not None:
+                on_second = thrust if bearings[i, 10] == 2.0 else 0.0
+                equivalent2[i, j] = good * equivalent_load(bearings, i, second, on_second)
+
+
+@kernel
+def mean_load(load: Array, dpsi: Array, exponent: Array, mean: Array, travel: Array) -> None:
+    """Load of equal effect over the cycle, P_m = (sum P^p |dpsi| / sum |dpsi|)^(1/p), and the travel of the rocker.
+
+    ``load``, ``dpsi`` (n, N) on a uniform grid of one turn; ``mean`` (n,) out; ``travel`` (n,) out, the integral of
+    |dpsi| over the turn [rad].
+    """
+    for i in range(load.shape[0]):
+        total, weight = 0.0, 0.0
+        for j in range(load.shape[1]):
+            way = abs(dpsi[i, j])
+            total += load[i, j] ** exponent[i] * way
+            weight += way
+        mean[i] = (total / weight) ** (1.0 / exponent[i])
+        travel[i] = 2.0 * math.pi * weight / load.shape[1]

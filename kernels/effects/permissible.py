@@ -1,0 +1,152 @@
+"""B1: how far the bearings of the rocker are used, and the radial pressure angle they permit.
+
+Dynamics sheet, section 4: at a given axial angle theta2 the loads grow with the radial angle theta1; the permissible
+one is the first crossing of utilisation = 1.  Utilisation is the largest mean pressure, or equivalent load, over its
+permissible value; it is infinite where friction locks.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.effects.bearings import equivalent_load, sliding_criteria, sliding_data, support_arms
+
+Array = NDArray[np.float64]
+Status = NDArray[np.uint8]
+
+SCAN = 64
+BISECTIONS = 54
+
+
+@inline
+def sliding_utilisation(
+    bearings: Array, limits: Array, i: int, moment: float, cos1: float, sin1: float, axial: float
+) -> float:
+    """Largest mean pressure of journals and collar over its permissible value; inf where friction locks."""
+    r = sliding_criteria(sliding_data(bearings, i), moment, cos1, sin1, axial)
+    worst = max(r.p1 / limits[i, 0], max(r.p2 / limits[i, 1], r.p3 / limits[i, 2]))
+    return worst if r.arm > 0.0 else math.inf
+
+
+@inline
+def rolling_utilisation(
+    bearings: Array, limits: Array, i: int, moment: float, cos1: float, sin1: float, axial: float
+) -> float:
+    """Larger equivalent load of the two bearings over the permissible one; inf where no torque passes."""
+    pi1, pi2 = support_arms(bearings[i, 0], bearings[i, 1], bearings[i, 2], cos1, sin1, axial)
+    force = moment / (bearings[i, 0] * cos1)
+    per_span = force / abs(bearings[i, 2] - bearings[i, 1])
+    thrust = abs(force * axial)
+    first = equivalent_load(bearings, i, pi1 * per_span, thrust if bearings[i, 10] == 1.0 else 0.0)
+    second = equivalent_load(bearings, i, pi2 * per_span, thrust if bearings[i, 10] == 2.0 else 0.0)
+    return max(first, second) / limits[i, 0] if cos1 > 0.0 else math.inf
+
+
+@inline
+def _at(utilisation: Any, bearings: Array, limits: Array, i: int, moment: float, theta1: float, tan2: float) -> float:
+    sin1 = math.sin(theta1)
+    value: float = utilisation(bearings, limits, i, moment, math.cos(theta1), sin1, sin1 * tan2)
+    return value
+
+
+@inline
+def _first_crossing(utilisation: Any, bearings: Array, limits: Array, i: int, moment: float, tan2: float) -> float:
+    """Largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none."""
+    if _at(utilisation, bearings, limits, i, moment, 0.0, tan2) > 1.0:
+        return 0.0
+    low, high = 0.0, 0.5 * math.pi
+    for k in range(1, SCAN + 1):
+        high = 0.5 * math.pi * k / SCAN
+        if _at(utilisation, bearings, limits, i, moment, high, tan2) > 1.0:
+            break
+        low = high
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if _at(utilisation, bearings, limits, i, moment, middle, tan2) > 1.0:
+            high = middle
+        else:
+            low = middle
+    return low
+
+
+@inline
+def _fill(
+    utilisation: Any, t_tau: Array, t_rho: Array, t_k: Array, moment: Array, bearings: Array, limits: Array,
+    status: Status, used: Array | None, permissible: Array | None, reserve: Array | None,
+) -> None:  # fmt: skip
+    for i in range(t_tau.shape[0]):
+        for j in range(t_tau.shape[1]):
+            good = 1.0 if status[i, j] == st.OK else math.nan
+            rho, along = t_rho[i, j], t_k[i, j]
+            in_plane = math.hypot(t_tau[i, j], rho)
+            if used is not None:
+                value = utilisation(
+                    bearings, limits, i, moment[i], abs(t_tau[i, j]) / in_plane, rho / in_plane, along / in_plane
+                )
+                if status[i, j] == st.OK and not value < math.inf:
+                    status[i, j] = st.JAMMED
+                    value = math.nan
+                used[i, j] = good * value
+            if permissible is not None or reserve is not None:
+                # theta2 stands still where there is no radial force; any axial force then permits no radial angle.
+                tan2 = along / rho if rho != 0.0 else math.copysign(1e300, along)
+                limit = _first_crossing(utilisation, bearings, limits, i, moment[i], tan2)
+                if permissible is not None:
+                    permissible[i, j] = good * limit
+                if reserve is not None:
+                    reserve[i, j] = good * (limit - math.atan2(abs(rho), abs(t_tau[i, j])))
+
+
+@kernel
+def sliding_limits(
+    t_tau: Array,
+    t_rho: Array,
+    t_k: Array,
+    moment: Array,
+    bearings: Array,
+    limits: Array,
+    status: Status,
+    used: Array | None,
+    permissible: Array | None,
+    reserve: Array | None,
+) -> None:
+    """Utilisation of sliding bearings and the radial pressure angle they permit.
+
+    Parameters
+    ----------
+    t_tau, t_rho, t_k : (n, m) components of the coupler direction at the rocker
+    moment : (n,) resisting torque;  bearings : (n, 10) columns of :class:`kernels.effects.bearings.Sliding`
+    limits : (n, 3) permissible mean pressures of journal 1, journal 2, collar
+    status : (n, m), in and out; JAMMED where ``used`` is asked for and friction leaves no driving arm
+    used : (n, m) or None; largest pressure over its permissible value
+    permissible : (n, m) or None [rad]; permissible theta1 at the pose's theta2, 0 if even theta1 = 0 is too much
+    reserve : (n, m) or None [rad]; permissible minus actual theta1, negative where a bearing is overloaded
+    """
+    _fill(sliding_utilisation, t_tau, t_rho, t_k, moment, bearings, limits, status, used, permissible, reserve)
+
+
+@kernel
+def rolling_limits(
+    t_tau: Array,
+    t_rho: Array,
+    t_k: Array,
+    moment: Array,
+    bearings: Array,
+    limits: Array,
+    status: Status,
+    used: Array | None,
+    permissible: Array | None,
+    reserve: Array | None,
+) -> None:
+    """Utilisation of rolling bearings and the radial pressure angle they permit.
+
+    As :func:`sliding_limits`, with the (n, 11) columns of :class:`kernels.effects.bearings.Rolling` and the permissible
+    equivalent load as the one column of ``limits``.
+    """
+    _fill(rolling_utilisation, t_tau, t_rho, t_k, moment, bearings, limits, status, used, permissible, reserve)

@@ -1,0 +1,65 @@
+"""Extremes and mean square over a turn of periodic curves known on a uniform odd grid, from their Fourier series."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels._jit import inline, kernel
+from kernels.periodic import coefficients, series, tail
+
+Array = NDArray[np.float64]
+
+FINER = 4  # looks per grid point before a peak is refined
+BISECTIONS = 54
+
+
+@kernel
+def turn_extremes(
+    values: Array, largest: Array, phi_largest: Array, least: Array, phi_least: Array, rms: Array, missed: Array
+) -> None:
+    """Extremes and root mean square of curves over one turn.
+
+    Parameters
+    ----------
+    values : (n, N) samples at phi_j = 2 pi j / N, N odd
+    largest, phi_largest, least, phi_least : (n,) out; extremes and their crank angles [rad]
+    rms : (n,) out, by Parseval's sum
+    missed : (n,) out; size of the two highest harmonics against the largest: what the grid may have missed
+    """
+    n = values.shape[1]
+    half = (n + 1) // 2
+    c, s = np.empty(half), np.empty(half)
+    for i in range(values.shape[0]):
+        coefficients(values[i], c, s)
+        square = c[0] * c[0]
+        for k in range(1, half):
+            square += 0.5 * (c[k] * c[k] + s[k] * s[k])
+        rms[i] = math.sqrt(square)
+        missed[i] = tail(c, s, 0.0)
+        phi_largest[i] = _peak(c, s, n, 1.0)
+        phi_least[i] = _peak(c, s, n, -1.0)
+        largest[i] = series(c, s, phi_largest[i])[0]
+        least[i] = series(c, s, phi_least[i])[0]
+
+
+@inline
+def _peak(c: Array, s: Array, n: int, sign: float) -> float:
+    """Crank angle in [0, 2 pi) where sign times the series is largest: best of the finer looks, then bisection."""
+    step = 2.0 * math.pi / (FINER * n)
+    best, where = -math.inf, 0.0
+    for j in range(FINER * n):
+        value = sign * series(c, s, step * j)[0]
+        if value > best:
+            best, where = value, step * j
+    low, high = where - step, where + step
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if sign * series(c, s, middle)[1] > 0.0:
+            low = middle
+        else:
+            high = middle
+    angle = 0.5 * (low + high)
+    return angle + 2.0 * math.pi if angle < 0.0 else angle

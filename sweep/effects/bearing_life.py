@@ -1,0 +1,98 @@
+"""B2: rolling bearings of the rocker under the joint reactions: loads over the turn, mean load, life."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels import status as st
+from kernels.effects.bearing_life import bearing_loads, mean_load
+from sweep.effects import kinetostatics, loads
+from sweep.effects.base import DesignResult, Effect, Scene
+from sweep.effects.bearings import CATALOGUE, SUPPORTS
+from sweep.effects.turn import chosen
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, optional_outputs
+
+EQUATION = "dynamics sheet 2, 4"
+
+OUTPUTS = (
+    Output("radial_load_d1", "force", "radial load of the rocker's support 1 from the joint reactions", EQUATION),
+    Output("radial_load_d2", "force", "radial load of the rocker's support 2 from the joint reactions", EQUATION),
+    Output("axial_load_d", "force", "axial load of the rocker's bearings", EQUATION),
+    Output("equivalent_load_d1", "force", "equivalent load of rolling bearing 1 from the joint reactions", EQUATION),
+    Output("equivalent_load_d2", "force", "equivalent load of rolling bearing 2 from the joint reactions", EQUATION),
+)
+PER_TURN = tuple(
+    o
+    for k in "12"
+    for o in (
+        Output(f"mean_load_d{k}", "force", f"load of equal effect over the turn, bearing {k}, by travel", EQUATION),
+        Output(
+            f"life_d{k}", "time", f"running time that 90 % of bearings {k} reach; travel counted as turns", EQUATION
+        ),
+    )
+)
+_NAMES = tuple(o.name for o in OUTPUTS)
+_VECTORS = tuple(f"{name}_{axis}" for name in ("force_d", "moment_d") for axis in "xyz")
+# |dpsi| has a kink at each limit position: the error of the sum falls with the square of the number of samples.
+SAMPLES = 720
+
+
+def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Wanted loads of every pose."""
+    found = kinetostatics.compute(loads.ROCKER.columns, scene, frozenset(_VECTORS))
+    force, moment = (
+        np.stack([np.asarray(found[f"{name}_{axis}"], np.float64) for axis in "xyz"], axis=2)
+        for name in ("force_d", "moment_d")
+    )
+    status = np.asarray(found["status"], np.uint8)
+    outputs = optional_outputs(_NAMES, wanted, scene.shape)
+    bearing_loads(force, moment, np.ascontiguousarray(scene.records[1][:, 3:6]), _data(scene), status, *outputs)
+    columns: Columns = {name: out for name, out in zip(_NAMES, outputs, strict=True) if out is not None}
+    return columns | {"status": status}
+
+
+def _data(scene: Scene) -> Array:
+    return np.column_stack([scene.records[1][:, 14], scene.table(tuple(p.name for p in (*SUPPORTS, *CATALOGUE)))])
+
+
+def per_turn(
+    family: Family, designs: Array, inputs: dict[str, Array], wanted: frozenset[str], accuracy: Accuracy
+) -> Columns:
+    """Mean loads and lives; the error is what half the samples would change."""
+    scene = Scene(family, designs, Angles.of(np.zeros((1, 1))), inputs).on_grid(SAMPLES)
+    found = compute(scene, frozenset({"equivalent_load_d1", "equivalent_load_d2"}))
+    status = np.where((found["status"] == st.OK).all(axis=1), st.OK, st.NOT_ROTATABLE).astype(np.uint8)
+    dpsi, exponent = np.ascontiguousarray(scene.records[0][:, :, 22]), scene.inputs["life_exponent"]
+    columns: Columns = {}
+    for k in "12":
+        load = np.asarray(found[f"equivalent_load_d{k}"], np.float64)
+        mean, travel = _mean(load, dpsi, exponent)
+        half, _ = _mean(load[:, ::2], dpsi[:, ::2], exponent)
+        turns = 1e6 * (scene.inputs["dynamic_capacity"] / mean) ** exponent
+        life = turns * (2.0 * np.pi) ** 2 / (travel * scene.inputs["speed"])
+        columns |= {f"mean_load_d{k}": mean, f"err_mean_load_d{k}": np.abs(mean - half)}
+        columns |= {f"life_d{k}": life, f"err_life_d{k}": life * exponent * np.abs(mean - half) / mean}
+    return chosen(columns, wanted, status)
+
+
+def _mean(load: Array, dpsi: Array, exponent: Array) -> tuple[Array, Array]:
+    mean, travel = np.empty(len(load)), np.empty(len(load))
+    mean_load(np.ascontiguousarray(load), np.ascontiguousarray(dpsi), exponent, mean, travel)
+    return mean, travel
+
+
+EFFECT = Effect(
+    key="B2",
+    name="bearing_life",
+    title="rolling bearings of the rocker under the joint reactions: loads, mean load over the turn, life",
+    equation=EQUATION,
+    families=("rssr",),
+    needs=("kinetostatics",),
+    inputs=(*loads.ROCKER.parameters, *SUPPORTS, *CATALOGUE),
+    outputs=OUTPUTS,
+    compute=compute,
+    ns_per_pose=500.0,
+    called_for="life of the rocker's bearings",
+    negligible="sliding bearings; elsewhere never, the life is what is asked for",
+    design_result=DesignResult(PER_TURN, per_turn, 400_000.0),
+)

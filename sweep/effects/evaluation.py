@@ -1,0 +1,147 @@
+"""How effects are computed beside the motion: in blocks whose joint records stay in the cache."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from kernels.status import OK
+from sweep.effects.base import Effect, Scene, Status
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Parameter, Step
+
+# Poses per block: their joint records, 24 numbers each, fill about half a second-level cache.
+BLOCK = 4096
+# Designs per block of an effect that samples the turn itself, some hundred poses of each.
+TURNS = 32
+# Relative step of central differences: error of second order against rounding.
+DIFFERENCE = 1e-5
+
+
+def effect_poses(
+    family: Family,
+    effects: tuple[Effect, ...],
+    inputs: tuple[Parameter, ...],
+    own: int,
+    designs: Array,
+    angles: Angles,
+    wanted: frozenset[str],
+) -> Columns:
+    """The family's own poses, then each effect with a wanted output; the status is the first that is not OK.
+
+    Parameters
+    ----------
+    family : without effects;  own : number of its parameters
+    effects, inputs : what extends it
+    designs : (n, P) with the inputs behind the family's own columns;  angles : (n, m) or (1, m)
+    wanted : pose outputs of family and effects
+    """
+    bare = np.ascontiguousarray(designs[:, :own])
+    columns = family.poses(bare, angles, wanted & frozenset(family.pose_names))
+    if np.iscomplexobj(designs) or np.iscomplexobj(angles.cos):
+        return _differenced(family, effects, inputs, own, designs, angles, wanted) | columns
+    asked = [(entry, wanted & frozenset(o.name for o in entry.outputs)) for entry in effects]
+    asked = [(entry, names) for entry, names in asked if names]
+    if not asked:
+        return columns
+    shape = columns["status"].shape
+    status: Status = np.array(columns["status"], dtype=np.uint8)
+    columns |= {name: np.empty(shape) for _, names in asked for name in names}
+    given = input_columns(inputs, designs, own)
+    pointwise = [pair for pair in asked if not pair[0].whole_turn]
+    whole = [pair for pair in asked if pair[0].whole_turn]
+    # A whole-turn effect solves the turn of a design once, however many poses are asked for.
+    for parts, blocks in ((pointwise, _blocks(shape, BLOCK)), (whole, _row_blocks(shape))):
+        for rows, poses in blocks if parts else ():
+            scene = Scene(family, bare[rows], _part(angles, rows, poses), {n: x[rows] for n, x in given.items()})
+            for entry, names in parts:
+                found = entry.compute(scene, names)
+                block = status[rows, poses]
+                np.copyto(block, found["status"], where=block == OK)
+                for name in names:
+                    columns[name][rows, poses] = found[name]
+    return columns | {"status": status}
+
+
+def _differenced(
+    family: Family,
+    effects: tuple[Effect, ...],
+    inputs: tuple[Parameter, ...],
+    own: int,
+    designs: Array,
+    angles: Angles,
+    wanted: frozenset[str],
+) -> Columns:
+    """Answer a complex step: effects are not analytic (norms, friction), so their derivative is a central difference.
+
+    Along the direction of the imaginary parts; measured, its relative error is about 1e-9.
+    """
+    names = wanted & frozenset(o.name for entry in effects for o in entry.outputs)
+    if not names:
+        return {}
+    steps = [np.abs(x.imag) / np.maximum(np.abs(x.real), 1e-3) for x in (designs, angles.cos, angles.sin)]
+    t = DIFFERENCE / max(max(float(x.max(initial=0.0)) for x in steps), 1e-300)
+
+    def moved(sign: float) -> Columns:
+        x, phi, cos, sin = (np.ascontiguousarray(z.real + sign * t * z.imag) for z in (designs, *angles))
+        return effect_poses(family, effects, inputs, own, x, Angles(phi, cos, sin), names)
+
+    here, ahead, behind = moved(0.0), moved(1.0), moved(-1.0)
+    columns: Columns = {"status": here["status"]}
+    for name in names:
+        slope = (np.asarray(ahead[name], np.float64) - np.asarray(behind[name], np.float64)) / (2.0 * t)
+        columns[name] = np.asarray(here[name], np.float64) + 1j * slope
+    return columns
+
+
+def run_design(
+    family: Family,
+    entry: Effect,
+    inputs: tuple[Parameter, ...],
+    own: int,
+    designs: Array,
+    wanted: frozenset[str],
+    accuracy: Accuracy,
+) -> Columns:
+    """Design outputs of an effect, block by block."""
+    assert entry.design_result is not None
+    bare = np.ascontiguousarray(designs[:, :own])
+    given = input_columns(inputs, designs, own)
+    size = TURNS if entry.whole_turn else BLOCK
+    parts = [
+        entry.design_result.run(family, bare[rows], {n: x[rows] for n, x in given.items()}, wanted, accuracy)
+        for rows in (slice(start, start + size) for start in range(0, max(len(bare), 1), size))
+    ]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def on_own_columns(step: Step, own: int) -> Step:
+    """A family's own step for a design matrix with further columns behind the family's."""
+
+    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+        return step.run(np.ascontiguousarray(designs[:, :own]), wanted, accuracy)
+
+    return replace(step, run=run)
+
+
+def input_columns(inputs: tuple[Parameter, ...], designs: Array, own: int) -> dict[str, Array]:
+    """The inputs of the effects by name, each (n,)."""
+    return {p.name: np.ascontiguousarray(designs[:, own + k]) for k, p in enumerate(inputs)}
+
+
+def _part(angles: Angles, rows: slice, poses: slice) -> Angles:
+    own = rows if angles.cos.shape[0] > 1 else slice(None)
+    return Angles(*(np.ascontiguousarray(x[own, poses]) for x in angles))
+
+
+def _blocks(shape: tuple[int, ...], block: int) -> Iterator[tuple[slice, slice]]:
+    rows, poses = max(1, block // max(shape[1], 1)), min(max(shape[1], 1), block)
+    for i in range(0, shape[0], rows):
+        for j in range(0, shape[1], poses):
+            yield slice(i, i + rows), slice(j, j + poses)
+
+
+def _row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
+    for i in range(0, shape[0], TURNS):
+        yield slice(i, i + TURNS), slice(None)

@@ -1,0 +1,68 @@
+"""P1: every extremum of the pressure angle over the turn, in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.effects.pressure_extrema import pressure_extrema
+from sweep.effects.base import DesignResult, Effect, Scene
+from sweep.families.base import Accuracy, Array, Columns, Family, Output
+
+EQUATION = "dynamics sheet 1.2, 1.3"
+
+_ANGLES = {
+    "pressure_max": "largest pressure angle over the turn",
+    "phi_pressure_max": "crank angle of the largest pressure angle",
+    "pressure_max2": "pressure angle at the other maximum; the largest again where there is one",
+    "phi_pressure_max2": "crank angle of the other maximum",
+    "pressure_min": "smallest pressure angle over the turn",
+    "phi_pressure_min": "crank angle of the smallest pressure angle",
+    "pressure_min2": "pressure angle at the other minimum; the smallest again where there is one",
+    "phi_pressure_min2": "crank angle of the other minimum",
+}
+OUTPUTS = (
+    Output(
+        "pressure_extrema", "1", "number of extrema of the pressure angle: 2 or 4; 0 where it is constant", EQUATION
+    ),
+    *(Output(name, "rad", text, EQUATION) for name, text in _ANGLES.items()),
+)
+# Accepted for pressure angles below 89 degrees: rounding of the components through the arcsine.
+ERROR = 1e-14
+
+
+def extrema(
+    family: Family, designs: Array, inputs: dict[str, Array], wanted: frozenset[str], accuracy: Accuracy
+) -> Columns:
+    """Wanted extrema and status, each (n,)."""
+    if family.ellipse is None:
+        raise TypeError(f"{family.name} has no ellipse of the coupler direction")
+    n = len(designs)
+    status, count = np.empty(n, np.uint8), np.empty(n)
+    phi, theta, highest, lowest = (np.empty((n, 4)) for _ in range(4))
+    pressure_extrema(family.ellipse(designs), status, count, phi, theta, highest, lowest)
+    columns: Columns = {"pressure_extrema": count, "err_pressure_extrema": 0.0 * count}
+    for name, values in zip(_ANGLES, np.hstack([highest, lowest]).T, strict=True):
+        columns |= {name: values, f"err_{name}": ERROR / np.cos(highest[:, 0])}
+    return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
+
+
+def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """The motion's status: there are no outputs per pose."""
+    return {"status": scene.status()}
+
+
+EFFECT = Effect(
+    key="P1",
+    name="pressure_extrema",
+    title="all extrema of the pressure angle over the turn, in closed form",
+    equation=EQUATION,
+    families=("rssr", "rssp"),
+    needs=(),
+    inputs=(),
+    outputs=(),
+    compute=compute,
+    ns_per_pose=0.0,
+    called_for="transmission constraints that need more than the largest pressure angle (margin, max_pressure_angle)",
+    negligible="never as a guard near dead points; the largest angle alone is cheaper from the margin",
+    design_result=DesignResult(OUTPUTS, extrema, 4000.0),
+)
