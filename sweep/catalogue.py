@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from sweep.effects import offered
 from sweep.errors import InputError, nearest
 from sweep.extrema import Mode, Request
 from sweep.families.base import Accuracy, Family, Output, Step
@@ -110,7 +111,10 @@ def output(family: Family, name: str) -> Output:
         names = output_names(family)
         known = "max_abs_x, phi_max_abs_x, max_x, min_x, range_x, rms_x of a pose output x, or one of "
         special = ", ".join(n for n in names if not n.startswith(tuple(f"{r}_" for r in REDUCTIONS)))
-        raise InputError("output", name, f"{known}{special}{nearest(name, names)}", f"design outputs of {family.name}")
+        of_effects = [o.name for o in offered(family)]
+        near = nearest(name, [*names, *of_effects, *(f"{base}_{x}" for x in of_effects for base in REDUCTIONS)])
+        known = f"{known}{special}, and those of effects (sweep effects)" if of_effects else f"{known}{special}"
+        raise InputError("output", name, f"{known}{near}", f"design outputs of {family.name}")
     return way.output
 
 

@@ -8,13 +8,14 @@ import math
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 
 from kernels.status import OK
 from sweep.chunk import BLOCK, cascade, ordered_routes, output_columns, parameter_matrix
-from sweep.families.base import Family
+from sweep.families.base import Family, Unit
+from sweep.study.units import internal_unit
 from sweep.summaries import output
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ SECONDS_AT_LEAST = 0.1
 
 PILOT_RUNS, PILOT_LENGTH = 32, 32
 
-PARAMETER_UNITS = {"length": "mm", "angle": "rad", "ratio": "1", "sign": "1", "count": "1", "none": "1"}
+PARAMETER_UNITS = {word: internal_unit(word) for word in get_args(Unit)}
 
 # Parts of the package that decide no value in a chunk; everything else does.
 NOT_VALUES = frozenset(
@@ -176,7 +177,7 @@ def describe_columns(study: Study) -> tuple[Column, ...]:
 def _output_column(family: Family, name: str, dtype: str) -> Column:
     definition = output(family, name.removeprefix("err_"))
     text = f"absolute error estimate of {definition.name}" if name.startswith("err_") else definition.text
-    return Column(name, dtype, definition.unit.replace("length", "mm"), text, "output")
+    return Column(name, dtype, internal_unit(definition.unit), text, "output")
 
 
 @lru_cache

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sweep.effects import extended, input_names
+from sweep.effects import extended, input_names, offered
 from sweep.errors import InputError, nearest
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Family
@@ -73,6 +73,6 @@ def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:
     for name in wanted:
         if name not in mechanism.pose_names and name != "status":
             known = ", ".join(mechanism.pose_names)
-            guess = nearest(name, mechanism.pose_names)
+            guess = nearest(name, [*mechanism.pose_names, *(o.name for o in offered(mechanism))])
             raise InputError("want", name, f"{known}{guess}", f"pose outputs of {mechanism.name}")
     return [name for name in wanted if name != "status"]

@@ -11,7 +11,7 @@ import click
 if TYPE_CHECKING:
     from sweep.families.base import Family
 
-REDUCTIONS = ("max_abs_", "phi_max_abs_", "max_", "min_", "range_")
+REDUCTIONS = ("max_abs_", "phi_max_abs_", "max_", "min_", "range_", "rms_")
 
 
 def family_names(text: str) -> str | list[str]:

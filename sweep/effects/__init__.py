@@ -71,6 +71,13 @@ def input_names(family: Family) -> frozenset[str]:
     return frozenset(p.name for entry in applicable(family) for p in entry.inputs)
 
 
+def offered(family: Family) -> tuple[Output, ...]:
+    """Pose and design outputs of all effects that can be asked of a family, or of a chain's first stage."""
+    if isinstance(family, Chain):
+        return tuple(replace(o, name=f"{o.name}1") for o in offered(family.stages[0].family))
+    return tuple(o for entry in applicable(family) for o in outputs(entry))
+
+
 def extended(family: Family, wanted: Iterable[str]) -> Family:
     """The family with the effects that ``wanted`` calls for; the family itself where it calls for none.
 

@@ -32,7 +32,7 @@ GRAVITY = tuple(
     Parameter(f"gravity_{axis}", "acceleration", f"gravity along {axis} of the fixed axes", default=0.0)
     for axis in "xyz"
 )
-SPEED = Parameter("speed", "speed", "speed of the crank", positive=True)
+SPEED = Parameter("speed", "speed", "speed of the crank (scene.speed of a study)", positive=True)
 LOAD_TORQUE = Parameter(
     "load_torque", "torque", "torque on the rocker about its axis; a resisting one opposes dpsi", default=0.0
 )

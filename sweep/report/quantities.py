@@ -6,6 +6,8 @@ import math
 import re
 from dataclasses import dataclass
 
+from sweep.study.units import internal_unit
+
 POSITIONS = {"s": "displacement", "psi": "follower angle", "dev": "deviation from the line"}
 DERIVATIVES = ("", "velocity", "acceleration", "jerk")
 SYMBOLS = {"psi": "ψ", "phi": "φ"}
@@ -17,6 +19,7 @@ REDUCTIONS = {
     "range_": ("range of {}", "range of {}"),
     "max_": ("max {}", "largest {}"),
     "min_": ("min {}", "smallest {}"),
+    "rms_": ("rms {}", "root mean square of {}"),
 }
 
 
@@ -70,7 +73,7 @@ def with_unit(text: str, unit: str) -> str:
 
 def quantity(name: str, unit: str) -> Quantity:
     """How the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
-    unit = unit.replace("length", "mm")
+    unit = internal_unit(unit)
     if name.startswith("err_"):
         shown = quantity(name[4:], unit)
         return Quantity(name, f"error of {shown.symbol}", f"error of the {shown.words}", shown.unit, shown.factor)

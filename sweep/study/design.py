@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from sweep.families.base import Family, Parameter
@@ -26,15 +27,23 @@ class _Written:
 
 
 def read_space(
-    family: Family, raw: Mapping[str, Any], faults: Faults, fitted: tuple[str, ...] = ()
+    family: Family,
+    raw: Mapping[str, Any],
+    faults: Faults,
+    fitted: tuple[str, ...] = (),
+    given: Mapping[str, float] = MappingProxyType({}),
 ) -> DesignSpace | None:
     """The designs of a study, or None if a parameter is faulty (all faults are reported).
 
     ``fitted`` parameters are set by [fit]: they must not be given, except lam, which then says where "up" is.
+    ``given`` ones have their value from [scene] and must not be given again.
     """
     before = len(faults.lines)
     sample = read_section(SampleTable, raw["sample"], ("design", "sample"), faults) if "sample" in raw else None
-    _check_names(family, raw, ("design",), faults, extra=("sample",), fitted=fitted)
+    _check_names(family, raw, ("design",), faults, extra=("sample",), fitted=(*fitted, *given))
+    for name in given:
+        if name in raw:
+            faults.value(("design", name), raw[name], "nothing here: [scene] gives it")
     for name in fitted:
         if name in raw and not name.startswith("lam"):
             faults.value(("design", name), raw[name], "nothing here: [fit] finds it")
@@ -46,7 +55,7 @@ def read_space(
             found[name] = entry
     axes = tuple(entry for entry in found.values() if isinstance(entry, Axis))
     fixed = {p.name: p.default for p in family.parameters if p.default is not None and p.name not in found}
-    fixed |= {name: 0.0 for name in fitted if name not in found}
+    fixed |= {name: 0.0 for name in fitted if name not in found} | dict(given)
     fixed |= {name: entry for name, entry in found.items() if not isinstance(entry, Axis)}
     if sample is None and (count := math.prod(axis.count for axis in axes)) > MOST_DESIGNS:
         faults.value(("design",), count, f"at most {MOST_DESIGNS:.0e} designs; take fewer values or design.sample")
@@ -59,11 +68,13 @@ def read_space(
     return DesignSpace(family.parameter_names, axes, fixed, "sobol", sample.n or 0, sample.seed)
 
 
-def read_reference(family: Family, raw: Mapping[str, Any], faults: Faults) -> dict[str, float]:
-    """The parameters of one design, in the order of the family."""
+def read_reference(
+    family: Family, raw: Mapping[str, Any], faults: Faults, given: Mapping[str, float] = MappingProxyType({})
+) -> dict[str, float]:
+    """The parameters of one design, in the order of the family; ``given`` ones need not be repeated."""
     key: Key = ("reference", "design")
-    _check_names(family, raw, key, faults)
-    values = {p.name: p.default for p in family.parameters if p.default is not None}
+    _check_names(family, raw, key, faults, fitted=tuple(given))
+    values = {p.name: p.default for p in family.parameters if p.default is not None} | dict(given)
     for parameter in family.parameters:
         if parameter.name in raw:
             place = (*key, parameter.name)

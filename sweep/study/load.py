@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import copy
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sweep.effects import extended
 from sweep.errors import InputError, StudyError, closest, nearest
 from sweep.families import NAMES
 from sweep.families import family as find_family
@@ -37,6 +39,9 @@ if TYPE_CHECKING:
     from sweep.fit import LineFit
 
 DEFAULT_TARGET = 1e-8
+
+# What scene.speed gives where an effect of a family, or of the first stage of a chain, asks for it.
+SPEED = re.compile("speed1?")
 
 
 def load_study(path: str | Path, smoke: bool = False) -> Study:
@@ -150,9 +155,12 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     if not scene.want and not bounds and goal is None:
         faults.missing(("scene", "want"), "design outputs to compute, here or in [limits] or [objective]")
 
-    family = _family(families, data, faults)
-    if family is None:
+    bare = _family(families, data, faults)
+    if bare is None:
         raise StudyError(str(path), faults.lines)
+    names = [name for _, name in _texts(data, "scene", "want")]
+    family = extended(bare, [*names, *(bounds or {}), *([goal] if goal else [])])
+    given = {} if speed is None else {p: speed for p in family.parameter_names if SPEED.fullmatch(p)}
     for k, name in _texts(data, "scene", "want"):
         read_output_name(family, name, ("scene", "want", k), faults)
     limits = read_limits(family, bounds or {}, faults)
@@ -160,8 +168,11 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         read_output_name(family, goal, ("objective", "minimise"), faults)
     fit = _fit(_section(FitSection, "fit", data, faults), family, faults) if "fit" in data else None
     fitted = fit.parameters(family) if fit is not None else ()
-    space = None if design is None else read_space(family, design, faults, fitted)
-    reference = None if reference_design is None else read_reference(family, reference_design, faults)
+    space = None if design is None else read_space(family, design, faults, fitted, given)
+    # The inputs of effects describe the scene: the reference design has the same unless it says otherwise.
+    if space is not None:
+        given |= {name: x for name, x in space.fixed.items() if name not in bare.parameter_names}
+    reference = None if reference_design is None else read_reference(family, reference_design, faults, given)
     _check_curves(report, [name for name in design or () if name in family.parameter_names], faults)
     if faults.lines or space is None or disk_bytes is None or seconds is None:
         raise StudyError(str(path), faults.lines)

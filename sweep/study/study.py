@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from sweep.effects import extended
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
 from sweep.study.space import DesignSpace
@@ -100,10 +101,10 @@ class Study:
         """The limits that bound a design output."""
         return tuple(limit for limit in self.limits if limit.output not in self.family.parameter_names)
 
-    @property
+    @cached_property
     def family(self) -> Family:
-        """The mechanism: a family, or the chain of several."""
-        return find_family(self.families)
+        """The mechanism, a family or the chain of several, with the effects that what is wanted calls for."""
+        return extended(find_family(self.families), self.want)
 
     @cached_property
     def fingerprint(self) -> str:

@@ -1,4 +1,8 @@
-"""Units of study files: a number and its unit to mm, rad, rad/s, s or bytes."""
+"""Units of study files: a number and its unit to mm, t, s, rad and what follows from them, or bytes.
+
+Forces in N, couples in N mm, pressures in MPa are consistent with lengths in mm, times in s and masses in tonnes: no
+factor stands in any equation of motion.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +32,12 @@ _DEFINITIONS = (
     "millisecond = 1e-3 * second = ms",
     "minute = 60 * second = min",
     "hour = 3600 * second = h",
+    "tonne = [mass] = t",
+    "kilogram = 1e-3 * tonne = kg",
+    "gram = 1e-6 * tonne = g",
+    "newton = tonne * millimetre / second ** 2 = N",
+    "kilonewton = 1e3 * newton = kN",
+    "megapascal = newton / millimetre ** 2 = MPa",
     "revolution_per_minute = revolution / minute = rpm",
     "byte = [information] = B",
     "megabyte = 1e6 * byte = MB",
@@ -40,10 +50,35 @@ SYMBOLS = tuple(line.rsplit(" = ", 1)[1] for line in _DEFINITIONS)
 _EXAMPLES = {
     "mm": "a length, in mm, um, cm, m or in",
     "rad": "an angle, in deg, rad, mrad or rev",
+    "t": "a mass, in kg, g or t",
+    "N": "a force, in N or kN",
+    "N*mm": "a torque, in N*mm or N*m",
+    "t*mm^2": "an inertia, in kg*mm^2, g*mm^2, kg*m^2 or t*mm^2",
+    "MPa": "a pressure, in MPa, N/mm^2 or kN/m^2",
+    "N/mm": "a stiffness, in N/mm, N/m or kN/mm",
+    "N*s/mm": "a damping, in N*s/mm or N*s/m",
+    "mm/s^2": "an acceleration, in m/s^2 or mm/s^2",
+    "rad/s^2": "an angular acceleration, in rad/s^2",
     "rad/s": "a speed of rotation, in rpm, rad/s or deg/s",
     "s": "a time, in s, ms, min or h",
     "B": "a size, in B, MB or GB",
     "1": "a pure number: no unit, or 1 or %",
+}
+
+# Words of parameters and outputs that are not powers of length.
+WORDS = {
+    "angle": "rad",
+    "mass": "t",
+    "inertia": "t*mm^2",
+    "force": "N",
+    "torque": "N*mm",
+    "pressure": "MPa",
+    "stiffness": "N/mm",
+    "damping": "N*s/mm",
+    "speed": "rad/s",
+    "angular_acceleration": "rad/s^2",
+    "acceleration": "mm/s^2",
+    "time": "s",
 }
 
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
@@ -61,7 +96,7 @@ def example(internal: str) -> str:
 
 def internal_unit(word: str) -> str:
     """Internal unit of a parameter's or output's unit word ("length" -> "mm", "length^4" -> "mm^4", "sign" -> "1")."""
-    word = {"angle": "rad"}.get(word, word).replace("length", "mm")
+    word = WORDS.get(word, word).replace("length", "mm")
     names = re.findall(r"[A-Za-z]+", word)
     return word if names and set(names) <= set(SYMBOLS) else "1"
 
