@@ -50,8 +50,8 @@ def careful_maximum(
     phi2: float,
     rho2: float,
     target: float,
-) -> tuple[float, float, float, bool]:
-    """Largest |d^order psi / dphi^order|, its crank angle, a bound of its error, and whether two marches agreed.
+) -> tuple[float, float, float, float, bool]:
+    """Largest |d^order psi / dphi^order|, its crank angle, errors of both, and whether two marches agreed.
 
     Parameters
     ----------
@@ -61,10 +61,10 @@ def careful_maximum(
     target : relative error wanted
     """
     before = -1.0
-    best, place, error = 0.0, 0.0, 0.0
+    best, place, error, reach = 0.0, 0.0, 0.0, 0.0
     fineness = 0.5
     for _ in range(_ATTEMPTS):
-        best, place, error, missed = 0.0, 0.0, 0.0, False
+        best, place, error, reach, missed = 0.0, 0.0, 0.0, 0.0, False
         phi, end = phi1, phi1 + _TURN
         y, dy = _evaluate(order, e, y0, ca, k0, k1, k2, phi)
         while phi < end:
@@ -75,17 +75,20 @@ def careful_maximum(
                 if y * y2 < 0.0:
                     missed = True
                 else:
-                    peak, where, bound = _bracketed(order, e, y0, ca, k0, k1, k2, phi, dy, following, dy2, target)
+                    peak, where, bound, width = _bracketed(
+                        order, e, y0, ca, k0, k1, k2, phi, dy, following, dy2, target
+                    )
                     if peak > best:
-                        best, place, error = peak, where, bound
+                        best, place, error, reach = peak, where, bound, width
             phi, y, dy = following, y2, dy2
-        error += best * rounding(order, e, y0, ca, k0, k1, k2, w_size, math.cos(place), math.sin(place))
+        relative = rounding(order, e, y0, ca, k0, k1, k2, w_size, math.cos(place), math.sin(place))
+        error += best * relative
         change = abs(best - before)
         if not missed and best > 0.0 and change <= 0.1 * target * best + error:
-            return best, place, change + error, True
+            return best, place, change + error, reach + 8.0 * EPS + 4.0 * relative, True
         before = best
         fineness *= 0.5
-    return best, place, math.inf, False
+    return best, place, math.inf, math.inf, False
 
 
 @inline
@@ -110,8 +113,8 @@ def _bracketed(
     hi: float,
     f_hi: float,
     target: float,
-) -> tuple[float, float, float]:
-    """Illinois' regula falsi on the derivative, bisecting every third step: |y|, phi and the error bound |y'| width."""
+) -> tuple[float, float, float, float]:
+    """Illinois' regula falsi on the derivative, bisecting every third step: |y|, phi, error bounds of both."""
     y, mid, bound = 0.0, lo, math.inf
     for step in range(120):
         mid = 0.5 * (lo + hi) if step % 3 == 2 else (lo * f_hi - hi * f_lo) / (f_hi - f_lo)
@@ -125,4 +128,4 @@ def _bracketed(
             lo, f_lo, f_hi = mid, dy, 0.5 * f_hi
         else:
             hi, f_hi, f_lo = mid, dy, 0.5 * f_lo
-    return abs(y), mid, bound
+    return abs(y), mid, bound, hi - lo

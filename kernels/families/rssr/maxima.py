@@ -52,10 +52,29 @@ CAPACITY = (
     BLOCK * MOST_PEAKS + 120
 )  # rows 960 bytes apart modulo 4096, so that they do not evict each other from the cache
 # Rows of the list of maxima under refinement: constants, place, spacing of the samples, results.
-_E, _Y0, _CA, _K0, _K1, _K2, _SIZE, _U, _V, _WIDTH, _LEFT, _PEAK, _RIGHT, _START, _GUESS, _MOVED, _ERROR, _ROUNDING = (
-    k * CAPACITY for k in range(18)
-)
-_ROWS = 18
+(
+    _E,
+    _Y0,
+    _CA,
+    _K0,
+    _K1,
+    _K2,
+    _SIZE,
+    _U,
+    _V,
+    _WIDTH,
+    _LEFT,
+    _PEAK,
+    _RIGHT,
+    _START,
+    _GUESS,
+    _MOVED,
+    _ERROR,
+    _ROUNDING,
+    _REACH,
+) = (k * CAPACITY for k in range(19))
+_ROWS = 19
+_TURNED = 4e-12  # error of an angle that is the sum of a few turns by :func:`rotate`
 _FLOOR, _MARKS = (FEWEST + 2) * BLOCK, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
 _EXPONENT = np.array([0, 0, 1, 13, 2, 16, 14, 6, 3, 8, 17, 12, 15, 5, 7, 11, 4, 10, 9])  # k of 2^k modulo 19
 
@@ -145,7 +164,7 @@ def _finish(count: int, m: Array, order: int, target: float, first: Array | None
         trusted = trusted & (abs(peak - m[i + _GUESS]) <= 0.2 * peak)
         m[i + _PEAK] = peak
         m[i + _ERROR] = rise if trusted else math.inf
-        m[i + _ROUNDING] = rounding(
+        relative = rounding(
             order,
             m[i + _E],
             m[i + _Y0],
@@ -157,6 +176,8 @@ def _finish(count: int, m: Array, order: int, target: float, first: Array | None
             m[i + _U],
             m[i + _V],
         )
+        m[i + _ROUNDING] = relative
+        m[i + _REACH] = 2.0 * abs(dy / d2y) + 4.0 * relative * math.sqrt(abs(y / d2y)) + _TURNED
 
 
 @inline
@@ -219,7 +240,7 @@ def _append(
 
 
 @inline
-def _careful(at: Array, k: int, order: int, target: float) -> tuple[float, float, float, bool]:
+def _careful(at: Array, k: int, order: int, target: float) -> tuple[float, float, float, float, bool]:
     u, v = at[k + COS], at[k + SIN]
     c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2] + 1e-300
     here = point(c1, s1, c2, s2, u, v)
@@ -243,6 +264,7 @@ def true_maxima(
     status: Status,
     phi: Array | None,
     error: Array | None,
+    phi_error: Array | None,
     max_abs_dpsi: Array | None,
     max_abs_d2psi: Array | None,
     max_abs_d3psi: Array | None,
@@ -255,8 +277,8 @@ def true_maxima(
     cos, sin : :func:`sampling_tables`
     target : relative error wanted, 1e-3 ... 1e-12
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_CONVERGED or INVALID_INPUT
-    phi : (n,) out [rad], crank angle in [0, 2 pi) of the maximum
-    error : (n,) out, estimate of the absolute error: last correction and rounding
+    phi : (n,) out, or None [rad], crank angle in [0, 2 pi) of the maximum
+    error, phi_error : (n,) out, or None: estimates of the absolute errors of the maximum and of phi
     max_abs_dpsi, max_abs_d2psi, max_abs_d3psi : (n,) out; exactly one of them, the others None
 
     Notes
@@ -296,7 +318,7 @@ def true_maxima(
         _finish(padded, m, order, target, max_abs_dpsi, max_abs_d2psi)
         for k in range(block):
             i = start + k
-            best, place, bound = math.nan, math.nan, math.nan
+            best, place, bound, reach = math.nan, math.nan, math.nan, math.nan
             if status[i] == st.OK:
                 best, winner, worst = 0.0, 0, 0.0 if first_peak[k + 1] > first_peak[k] else math.inf
                 for peak in range(first_peak[k], first_peak[k + 1]):
@@ -308,15 +330,19 @@ def true_maxima(
                         bound = m[winner + _ERROR] + best * m[winner + _ROUNDING]
                     if phi is not None:
                         place = m[winner + _START] + m[winner + _MOVED]
+                    if phi_error is not None:
+                        reach = m[winner + _REACH]
                 else:
-                    best, place, bound, agreed = _careful(at, k, order, target)
+                    best, place, bound, reach, agreed = _careful(at, k, order, target)
                     if not agreed:
                         status[i] = st.NOT_CONVERGED
-                        best, place, bound = math.nan, math.nan, math.nan
+                        best, place, bound, reach = math.nan, math.nan, math.nan, math.nan
             if phi is not None:
                 phi[i] = place - TURN * math.floor(place / TURN)
             if error is not None:
                 error[i] = bound
+            if phi_error is not None:
+                phi_error[i] = reach
             if max_abs_dpsi is not None:
                 max_abs_dpsi[i] = best
             if max_abs_d2psi is not None:
