@@ -28,9 +28,12 @@ def rssr_arc_ends(requirements: Array, ends: Array) -> None:
         h, ss, q = g * sa, 2.0 * sh * ch, 2.0 * sh * sh
         first = math.atan2(ca * (h * q + e * ca * ss), h * ss - e * ca * q) - phi0
         second = math.atan2(-ca * (h * q - e * ca * ss), h * ss + e * ca * q)
-        level = ((1.0 + ca * ca) * c0 * ss - 2.0 * ca * (1.0 - q) * s0) / (ss * (sa * sa))
-        inner = (1.0 - level) * (1.0 + level)
-        infinite = math.atan2(math.sqrt(inner), level) if inner >= 0.0 else math.nan
+        # det = 0: cos(2 phi1 + phi0) = level/size
+        size, level = ss * (sa * sa), (1.0 + ca * ca) * c0 * ss - 2.0 * ca * (1.0 - q) * s0
+        inner = (size - level) * (size + level)
+        infinite = math.nan
+        if inner >= 0.0 and size != 0.0:
+            infinite = math.atan2(math.sqrt(inner), math.copysign(level, level * size))
         ends[i, 0], ends[i, 1] = first, first + PI
         ends[i, 2], ends[i, 3] = second, second + PI
         ends[i, 4], ends[i, 5] = 0.5 * (infinite - phi0), 0.5 * (infinite - phi0) + PI

@@ -29,7 +29,7 @@ def outputs(design: tuple[float, ...], phi: float) -> dict[str, Any]:
         return result
 
 
-def limit_positions(design: tuple[float, ...], samples: int = 720) -> dict[str, Any]:
+def limit_positions(design: tuple[float, ...], samples: int = 240) -> dict[str, Any]:
     """Extended and folded position: where the slider's motion has its extremes, found on a grid and polished."""
     with mp.workdps(50):
         numbers = [mp.mpf(x) for x in design]
