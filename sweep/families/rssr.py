@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
+from kernels import status as st
 from kernels.families import rssr
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, optional_outputs
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, optional_outputs
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -35,6 +38,36 @@ POSE_OUTPUTS = (
     Output("z_c", "length", "rocker ball, along the rocker axis", "section 1"),
 )
 
+MARGIN_OUTPUTS = (
+    Output("rotatable", "1", "whether the crank turns fully; exact", "(14)"),
+    Output("margin", "1", "smallest cos^2(pressure angle) over the turn; negative if the crank does not turn", "(14)"),
+    Output("max_pressure_angle", "rad", "largest pressure angle over the turn", "(13), (14)"),
+)
+
+LIMIT_OUTPUTS = (
+    Output("psi_ext", "rad", "rocker angle in the extended limit position, in (-pi, pi]", "(8)"),
+    Output("psi_fold", "rad", "rocker angle in the folded limit position, in (-pi, pi]", "(8)"),
+    Output("phi_ext", "rad", "crank angle of the extended limit position, in [0, 2 pi)", "(8)"),
+    Output("phi_fold", "rad", "crank angle of the folded limit position, in [0, 2 pi)", "(8)"),
+    Output("swing", "rad", "psi_fold - psi_ext, signed and unwrapped; its sign is that of -branch", "(16)"),
+    Output("phi0", "rad", "phi_fold - phi_ext modulo 2 pi", "(15)"),
+    Output("stroke_ratio", "1", "phi0/(2 pi - phi0)", "(15)"),
+)
+
+MAXIMA_OUTPUTS = tuple(
+    output
+    for name, text, equation in (
+        ("dpsi", "velocity analogue", "(3)"),
+        ("d2psi", "acceleration analogue", "(4)"),
+        ("d3psi", "jerk analogue", "(5)"),
+    )
+    for output in (
+        Output(f"max_abs_{name}", "1", f"largest magnitude of the {text} over the turn", equation),
+        Output(f"phi_max_abs_{name}", "rad", f"crank angle of the largest magnitude of the {text}", equation),
+    )
+)
+
+ROUNDING = 2.0**-53
 _POSE_NAMES = tuple(o.name for o in POSE_OUTPUTS)
 
 
@@ -64,6 +97,120 @@ def ellipse(designs: Array) -> Array:
     return out
 
 
+def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Rotatability, margin and largest pressure angle from the exact minimum of the discriminant.
+
+    The errors are bounds: of the least Delta, and what it does to the angle.
+    """
+    n = len(designs)
+    status = np.empty(n, np.uint8)
+    with_error = accuracy.target is not None and not wanted <= {"rotatable"}
+    names = ("margin", "rotatable", "max_pressure_angle", "error")
+    needed = wanted | {"margin", "error"} if with_error else wanted
+    least, turns, angle, error = optional_outputs(names, frozenset(needed), (n,))
+    rssr.margin(designs, status, least, turns, angle, None, error)
+    columns: Columns = {"status": status}
+    if turns is not None:
+        columns["rotatable"] = turns == 1.0
+    if least is not None and "margin" in wanted:
+        columns["margin"] = least
+    if angle is not None:
+        columns["max_pressure_angle"] = angle
+    if accuracy.target is not None and "rotatable" in wanted:
+        columns["err_rotatable"] = np.zeros(n)
+    if error is not None and least is not None:
+        columns["err_margin"] = error
+        if angle is not None:
+            # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
+            with np.errstate(divide="ignore"):
+                linear = error / np.abs(np.sin(2.0 * angle))
+            columns["err_max_pressure_angle"] = np.minimum(linear, np.sqrt(error)) + 8.0 * ROUNDING
+    return columns
+
+
+def limits(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Limit positions, swing and stroke ratio to rounding, whatever the accuracy asked; errors are estimates of it."""
+    n = len(designs)
+    status, values = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
+    errors = np.empty_like(values) if accuracy.target is not None else None
+    rssr.limits(designs, status, values, errors)
+    columns: Columns = {"status": status}
+    for k, name in enumerate(rssr.LIMIT_NAMES):
+        if name in wanted:
+            columns[name] = np.ascontiguousarray(values[:, k])
+            if errors is not None:
+                columns[f"err_{name}"] = np.ascontiguousarray(errors[:, k])
+    return columns
+
+
+def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Maxima over the turn refined between samples to ``accuracy.target``, with error estimates."""
+    assert accuracy.target is not None
+    n = len(designs)
+    columns: Columns = {"status": np.zeros(n, np.uint8)}
+    for order, name in enumerate(("dpsi", "d2psi", "d3psi")):
+        if not wanted & {f"max_abs_{name}", f"phi_max_abs_{name}"}:
+            continue
+        status, most, phi, error, phi_error = np.empty(n, np.uint8), *(np.empty(n) for _ in range(4))
+        outputs: list[Array | None] = [None, None, None]
+        outputs[order] = most
+        rssr.true_maxima(designs, *sampling_tables(), accuracy.target, status, phi, error, phi_error, *outputs)
+        for key, value, err in ((f"max_abs_{name}", most, error), (f"phi_max_abs_{name}", phi, phi_error)):
+            if key in wanted:
+                columns |= {key: value, f"err_{key}": err}
+        columns["status"] = np.where(columns["status"] == st.OK, status, columns["status"])
+    return columns
+
+
+sampling_tables = lru_cache(rssr.sampling_tables)
+
+
+def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Maxima over ``accuracy.samples`` equidistant crank angles, the first at phi = 0.
+
+    Whether the crank turns between the samples too is decided by the exact margin, not by the grid.
+    """
+    assert accuracy.samples is not None
+    n = len(designs)
+    status = np.empty(n, np.uint8)
+    rssr.margin(designs, status, None, None, None, None, None)
+    turns, step = status == st.OK, 2.0 * np.pi / accuracy.samples
+    cos, sin = _grid(accuracy.samples)
+    columns: Columns = {}
+    least, values = np.empty(n), np.empty(accuracy.samples)
+    together: list[Array | None] = [
+        np.empty(n) if f"max_abs_{name}" in wanted and f"phi_max_abs_{name}" not in wanted else None
+        for name in ("dpsi", "d2psi", "d3psi")
+    ]
+    if any(out is not None for out in together):
+        rssr.dense_maxima(designs, cos, sin, least, together[0], together[1], together[2])
+    for order, name in enumerate(("dpsi", "d2psi", "d3psi")):
+        most = together[order]
+        if f"phi_max_abs_{name}" in wanted:
+            most, at = np.empty(n), np.empty(n, np.int64)
+            alone: list[Array | None] = [None, None, None]
+            alone[order] = most
+            rssr.dense_maxima(designs, cos, sin, least, alone[0], alone[1], alone[2], at, values)
+            columns[f"phi_max_abs_{name}"] = np.where(turns, at * step, np.nan)
+        if most is not None and f"max_abs_{name}" in wanted:
+            columns[f"max_abs_{name}"] = np.where(turns, most, np.nan)
+    return columns | {"status": status}
+
+
+@lru_cache(maxsize=32)
+def _grid(samples: int) -> tuple[Array, Array]:
+    phi = np.arange(samples) * (2.0 * np.pi / samples)
+    return np.cos(phi), np.sin(phi)
+
+
+def _refined(accuracy: Accuracy) -> bool:
+    return accuracy.target is not None
+
+
+def _sampled(accuracy: Accuracy) -> bool:
+    return accuracy.samples is not None
+
+
 FAMILY = Family(
     name="rssr",
     title="spatial crank-rocker",
@@ -71,6 +218,12 @@ FAMILY = Family(
     position="psi",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
+    steps=(
+        Step("margin", MARGIN_OUTPUTS, margin, 40.0),
+        Step("limit positions", LIMIT_OUTPUTS, limits, 1000.0),
+        Step("true maxima", MAXIMA_OUTPUTS, true_maxima, 250.0, _refined),
+        Step("grid", MAXIMA_OUTPUTS, sampled_maxima, 700.0, _sampled),
+    ),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     uses_phi=False,
     joints=joint_records,

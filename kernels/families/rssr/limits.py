@@ -82,7 +82,8 @@ def _rocker_turns(at: Array, k: int) -> bool:
     """Is the closure solvable for phi at every psi?  Then the rocker has no limit positions; (6*) of the page."""
     e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
     m = minimum(2.0 * (k2 - e * k0), 2.0 * (y0 * k0 - k1 * ca), 0.5 * (1.0 - e * e - ca * ca + y0 * y0), e * y0)
-    return m.value + (k1 * k1 + k2 * k2 - k0 * k0) + 0.5 * (1.0 - e * e + ca * ca - y0 * y0) > 0.0
+    least: float = m.value + (k1 * k1 + k2 * k2 - k0 * k0) + 0.5 * (1.0 - e * e + ca * ca - y0 * y0)
+    return least > 0.0
 
 
 @inline

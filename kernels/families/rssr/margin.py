@@ -23,7 +23,7 @@ from kernels.families.rssr.block import (
     load_block,
     new_block,
 )
-from kernels.families.rssr.closure import Array, Status
+from kernels.families.rssr.closure import EPS, Array, Status
 
 
 @inline
@@ -42,6 +42,7 @@ def margin(
     rotatable: Array | None,
     max_pressure_angle: Array | None,
     phi_min: Array | None,
+    error: Array | None,
 ) -> None:
     """Rotatability, margin and largest pressure angle of every design, exact.
 
@@ -53,6 +54,7 @@ def margin(
     rotatable : (n,) out, 1 or 0; nan where undecidable
     max_pressure_angle : (n,) out [rad]; nan unless rotatable
     phi_min : (n,) out [rad], crank angle in (-pi, pi] of the least Delta
+    error : (n,) out, bound of the rounding error of ``margin``
 
     Notes
     -----
@@ -78,3 +80,6 @@ def margin(
                 max_pressure_angle[i] = angle
             if phi_min is not None:
                 phi_min[i] = math.atan2(at[k + SIN], at[k + COS]) if known else math.nan
+            if error is not None:
+                per_square = 1.0 / (at[k + COUPLER] * at[k + COUPLER])
+                error[i] = (at[k + TOLERANCE] + 4.0 * EPS * abs(delta)) * per_square if known else math.nan
