@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test lint types imports check smoke bench clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: help setup test lint types imports check smoke bench bench-effects docs clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -47,6 +47,12 @@ smoke-%: $(VENV)/ready  ## the tiny version of one study, into results/smoke/<st
 
 bench: $(VENV)/ready  ## ns per sample against numpy and C, one run
 	$(BIN)/python -m tests.bench.kernels
+
+docs: $(VENV)/ready  ## make docs/effects.md from the register
+	$(SWEEP) effects --markdown > docs/effects.md
+
+bench-effects: $(VENV)/ready  ## cost of every effect, and of all of them together
+	$(BIN)/python -m tests.bench.effects
 
 clean:  ## remove results and the environment
 	rm -rf results $(VENV)

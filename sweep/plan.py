@@ -14,7 +14,7 @@ import numpy as np
 
 from kernels.status import OK
 from sweep.chunk import BLOCK, cascade, ordered_routes, output_columns, parameter_matrix
-from sweep.families.base import Family, Unit
+from sweep.families.base import Array, Family, Unit
 from sweep.study.units import internal_unit
 from sweep.summaries import output
 
@@ -156,6 +156,14 @@ def pilot(study: Study) -> Pilot:
     costs = [route.ns_per_design for route in ordered_routes(study)]
     nanoseconds = sum(n * cost for n, cost in zip(found.reached, costs, strict=True))
     return Pilot(1e-9 * nanoseconds / len(designs), float(np.mean(found.status == OK)))
+
+
+def spread_designs(study: Study, number: int) -> Array:
+    """About that many designs spread over the space, (n, P)."""
+    count = study.space.count
+    golden = (math.sqrt(5.0) - 1.0) / 2.0
+    starts = sorted({int((k * golden) % 1.0 * count) for k in range(number)})
+    return np.concatenate([parameter_matrix(study, start, start + 1) for start in starts])
 
 
 def row_bytes(study: Study) -> int:

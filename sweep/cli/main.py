@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from sweep.cli.effects import effects
 from sweep.cli.listing import cache, families
 from sweep.cli.studies import check, report, run
 from sweep.cli.tables import evaluate_table, summarise_table
@@ -42,5 +43,5 @@ def main() -> None:
     """
 
 
-for verb in (run, check, evaluate_table, summarise_table, families, report, cache):
+for verb in (run, check, evaluate_table, summarise_table, families, effects, report, cache):
     main.add_command(verb)

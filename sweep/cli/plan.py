@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from sweep.study.space import Axis
 
 
+# Poses per design that the shares of the effects are counted at, and designs that their rules are tried on.
+POSES = 100.0
+ADVISED = 64
+
+
 def plan_lines(study: Study, cost: Estimate) -> list[str]:
     """The plan of a study, line by line.
 
@@ -59,6 +64,7 @@ def plan_lines(study: Study, cost: Estimate) -> list[str]:
         units = {p.name: PARAMETER_UNITS[p.unit] for p in study.family.parameters}
         words = [f"{x.output} {bound_words(x, quantity(x.output, units[x.output]))}" for x in study.parameter_limits]
         lines += ["", f"limits on parameters: {'; '.join(words)}"]
+    lines += _effects(study)
     left = [name for name in main_outputs(study.family) if name not in study.want]
     lines += ["", "will not be computed, because nothing asks for it", f"  {', '.join(left)}"]
     if study.objective is not None:
@@ -78,6 +84,28 @@ def plan_lines(study: Study, cost: Estimate) -> list[str]:
             ("time", f"{duration(cost.seconds)} with {cost.jobs} workers, allowed {duration(study.budget.seconds)}"),
         ]
     )
+    return lines
+
+
+def _effects(study: Study) -> list[str]:
+    """The effects of the scene: what is computed, what is not, and which rules of negligibility hold."""
+    from sweep.effects.advice import findings, left_out, tree
+    from sweep.families import family as find_family
+    from sweep.plan import spread_designs
+
+    bare = find_family(study.families)
+    out = left_out(bare, study.want)
+    if not out and bare is study.family:
+        return []
+    lines = []
+    if bare is not study.family:
+        lines += ["", "effects, with their share of the cost at equal numbers of poses"]
+        lines += aligned(tree(bare, study.want, POSES))
+    lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(e.name for e in out)}"]
+    found = findings(bare, study.family, spread_designs(study, ADVISED), study.want)
+    if found:
+        lines += ["", f"what matters here, from {ADVISED} designs spread over the space; the choice is yours"]
+        lines += [f"  {finding.words}" for finding in found]
     return lines
 
 

@@ -115,6 +115,7 @@ class Effect:
     name: str
     title: str
     equation: str
+    formulas: tuple[str, ...]
     families: tuple[str, ...]
     needs: tuple[str, ...]
     inputs: tuple[Parameter, ...]

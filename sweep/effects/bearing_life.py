@@ -12,7 +12,13 @@ from sweep.effects.bearings import CATALOGUE, SUPPORTS
 from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, optional_outputs
 
-EQUATION = "dynamics sheet 2, 4"
+EQUATION = "B2 (1)-(3)"
+FORMULAS = (
+    "(1) F2 = (M x k - z1 F_r)/(z2 - z1), F1 = F_r - F2 from force F and moment M of the frame on the rocker;",
+    "    F_r across the axis k",
+    "(2) P_m = (integral of P^p |psi'| d phi/integral of |psi'| d phi)^(1/p), ours",
+    "(3) life = 10^6 (C/P_m)^p turns; the rocker's travel counts in full turns, ours",
+)
 
 OUTPUTS = (
     Output("radial_load_d1", "force", "radial load of the rocker's support 1 from the joint reactions", EQUATION),
@@ -86,6 +92,7 @@ EFFECT = Effect(
     name="bearing_life",
     title="rolling bearings of the rocker under the joint reactions: loads, mean load over the turn, life",
     equation=EQUATION,
+    formulas=FORMULAS,
     families=("rssr",),
     needs=("kinetostatics",),
     inputs=(*loads.ROCKER.parameters, *SUPPORTS, *CATALOGUE),

@@ -14,7 +14,14 @@ from sweep.effects.pressure import bearing_directions
 from sweep.effects.pressure import compute as compute_pressure
 from sweep.families.base import Array, Columns, Output, Parameter, optional_outputs
 
-EQUATION = "dynamics sheet 4, (15)-(17)"
+EQUATION = "B1 (1)-(4)"
+FORMULAS = (
+    "(1) Pi1 = hypot(z2 cos theta1, z2 sin theta1 + c x), Pi2 the same with z1, x = sin theta1 tan theta2",
+    "(2) P = M/h, h = c cos theta1 - mu [k_j d (Pi1 + Pi2)/(2 L) + r_t |x|], L = |z2 - z1|; h <= 0 is self-locking",
+    "(3) journals p_i = P Pi_i/(L d l_i), collar p_3 = 4 P |x|/(pi (d0^2 - d^2));",
+    "    permissible theta1: first crossing of max p_i/p_i,adm = 1",
+    "(4) rolling: P_eq = K V R if F_a <= e V R else K (X V R + Y F_a); permissible P_eq = C (60 n L_h/10^6)^(-1/p)",
+)
 
 SUPPORTS = (
     Parameter("support_d1", "length", "first support along the rocker axis, from D, the plane of C"),
@@ -146,6 +153,7 @@ def _effect(
         name=name,
         title=title,
         equation=EQUATION,
+        formulas=FORMULAS,
         families=("rssr",),
         needs=("pressure",),
         inputs=inputs,

@@ -8,6 +8,13 @@ from kernels.effects.coupler import coupler_point
 from sweep.effects.base import Effect, Scene
 from sweep.families.base import Columns, Output, Parameter
 
+EQUATION = "C0 (1)-(3)"
+FORMULAS = (
+    "(1) m = w x s (times the branch for a driven finger), n = m/|m|; w = rho (driven) or u (driving)",
+    "(2) P = B + x s + y (n x s) + z n",
+    "(3) omega = s x s' + q s, q = -m' . (n x s)/|m|; P' = B' + omega x p, P'' = B'' + eps x p + omega x (omega x p)",
+)
+
 CONSTRUCTION = Parameter(
     "finger", "choice", "which ball joint carries the finger: 0 the driven one (at C), 1 the driving one (at B)",
     default=0.0, choices=(0.0, 1.0),
@@ -29,7 +36,7 @@ _GROUPS = {
     "eps": ("eps_{axis}", "1", "angular acceleration of the coupler along {axis} per unit crank speed squared"),
 }
 OUTPUTS = tuple(
-    Output(name.format(axis=axis), unit, text.format(axis=axis), "spatial sheet 4.1, 4.2")
+    Output(name.format(axis=axis), unit, text.format(axis=axis), EQUATION)
     for name, unit, text in _GROUPS.values()
     for axis in "xyz"
 )
@@ -60,7 +67,8 @@ EFFECT = Effect(
     key="C0",
     name="coupler",
     title="motion of a coupler point, orientation and rates of the coupler",
-    equation="spatial sheet 4.1, 4.2",
+    equation=EQUATION,
+    formulas=FORMULAS,
     families=("rssr", "rssp"),
     needs=(),
     inputs=INPUTS,

@@ -11,7 +11,14 @@ from sweep.effects.loads import SPEED
 from sweep.effects.turn import chosen, reduction_outputs, reductions
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, optional_outputs
 
-EQUATION = "dynamics sheet 5"
+EQUATION = "E1 (1), (2), E2 (3), (4)"
+FORMULAS = (
+    "(1) lag = (M - J omega^2 psi'')/(k p^2), p = c t_tau; elongation = p lag",
+    "(2) frequency ratio nu = sqrt(k/J) |p|/omega",
+    "(3) J omega^2 eta'' + h omega p^2 eta' + (k p^2 + h omega p p') eta = M - J omega^2 psi'', 2 pi periodic,",
+    "    by Fourier collocation",
+    "(4) stable while the largest Floquet multiplier stays below 1",
+)
 
 INPUTS = (
     Parameter("driven_inertia", "inertia", "inertia of rocker and all it drives about its axis", positive=True),
@@ -129,6 +136,7 @@ STATIC = Effect(
     name="elasticity",
     title="quasi-static elasticity of the coupler",
     equation=EQUATION,
+    formulas=FORMULAS,
     families=("rssr",),
     needs=("pressure",),
     inputs=INPUTS,
@@ -144,6 +152,7 @@ DYNAMIC = Effect(
     name="dynamic_elasticity",
     title="periodic steady state of the elastic coupler and its stability",
     equation=EQUATION,
+    formulas=FORMULAS,
     families=("rssr",),
     needs=("elasticity",),
     inputs=INPUTS,

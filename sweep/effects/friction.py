@@ -10,7 +10,13 @@ from sweep.effects.base import Advice, Effect, Scene, Status
 from sweep.effects.kinetostatics import FORCES, by_construction, force_outputs, needed_vectors, vector_columns
 from sweep.families.base import Columns, Output, Parameter, optional_outputs
 
-EQUATION = "dynamics sheet 2.1"
+EQUATION = "D2 (1)-(3)"
+FORMULAS = (
+    "(1) ball joints: E = -mu r |R| w/|w|, w the speed of the coupler relative to crank or rocker",
+    "(2) shafts: t = -sign(speed) mu [r (F1 + F2) + r_t |F_axial|], F1 and F2 the loads of the two supports",
+    "(3) iterated until the couples change by less than 1e-14; L_ij = mu_i r_i |d R_i/d couple_j|,",
+    "    rho(L) < 1 proves one solution",
+)
 SUFFIX = "_friction"
 
 _JOINTS = {"a": "crank bearing", "b": "ball joint at B", "c": "ball joint at C", "d": "rocker bearing"}
@@ -92,6 +98,7 @@ EFFECT = Effect(
     name="friction",
     title="friction of ball joints and shafts by successive approximations",
     equation=EQUATION,
+    formulas=FORMULAS,
     families=("rssr",),
     needs=("kinetostatics",),
     inputs=(*loads.ROCKER.parameters, *DATA),

@@ -13,7 +13,18 @@ from sweep.effects import loads
 from sweep.effects.base import Advice, Effect, Scene, Status
 from sweep.families.base import Array, Columns, Output
 
-EQUATION = "dynamics sheet 2, 3"
+EQUATION = "D1 (1)-(4), D3 (5), (6)"
+FORMULAS = (
+    "(1) F_i = m_i (a_Gi - gravity), T_i = J_i eps_i + omega_i x J_i omega_i; Q = T2 + (d2 - b s) x F2; q = n x w",
+    "(2) finger couple m = Q . s/(q . s); R_B = s x (Q - m q)/b + S s",
+    "(3) S t_tau = K/c - (s x (Q - m q)/b - F2) . tau;",
+    "    rocker: K = (T3 + d3 x F3) . k - load_torque (+ m q . k if driven);",
+    "    slider: K/c becomes F3 . tau - load_force",
+    "(4) R_C = R_B - F2; R_D = F3 - R_C; R_A = F1 + R_B; M_A = T1 + d1 x F1 + a rho_B x R_B (+ m q if driving);",
+    "    drive_torque = M_A . u",
+    "(5) J = J_A + m2 v2^2 + omega2 . J2 omega2 + J_D psi'^2 at unit crank speed (slider: m3 s'^2)",
+    "(6) drive_torque = J eps + J' omega^2/2 - sum m_i gravity . v_Gi - load psi'",
+)
 
 
 def forces(follower: str) -> dict[str, str]:
@@ -133,6 +144,7 @@ def _effect(name: str, follower: str, inputs: loads.LoadInputs) -> Effect:
         name=name,
         title=f"joint reactions of crank, coupler and {follower}, finger couple, driving torque, reduced inertia",
         equation=EQUATION,
+        formulas=FORMULAS,
         families=("rssr",) if follower == "rocker" else ("rssp",),
         needs=("coupler",),
         inputs=inputs.parameters,

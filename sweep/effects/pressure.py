@@ -9,13 +9,24 @@ from kernels.effects.pressure import directions
 from sweep.effects.base import Advice, Effect, Scene
 from sweep.families.base import Columns, Output, optional_outputs
 
+EQUATION = "P2, P3 (1)-(3)"
+FORMULAS = (
+    "(1) s = (C - B)/b; t_tau = s . tau = branch cos(pressure angle), t_rho = s . rho, t_k = s . k",
+    "(2) tan theta1 = |t_rho/t_tau|, tan theta2 = t_k/t_rho",
+    "(3) tan theta3 = (s . u)/(s . rho_B)",
+)
+
 OUTPUTS = (
-    Output("t_tau", "1", "component of the coupler direction along the follower's motion, signed by the branch", "1.1"),
-    Output("t_rho", "1", "component of the coupler direction along the follower", "1.1"),
-    Output("t_k", "1", "component of the coupler direction along the follower's axis", "1.1"),
-    Output("theta1", "rad", "radial pressure angle at the follower, tan = radial/tangential; across the slide", "1.1"),
-    Output("theta2", "rad", "axial pressure angle at the follower, tan = axial/radial", "1.1"),
-    Output("theta3", "rad", "axial pressure angle at the crank", "1.1"),
+    Output(
+        "t_tau", "1", "component of the coupler direction along the follower's motion, signed by the branch", EQUATION
+    ),
+    Output("t_rho", "1", "component of the coupler direction along the follower", EQUATION),
+    Output("t_k", "1", "component of the coupler direction along the follower's axis", EQUATION),
+    Output(
+        "theta1", "rad", "radial pressure angle at the follower, tan = radial/tangential; across the slide", EQUATION
+    ),
+    Output("theta2", "rad", "axial pressure angle at the follower, tan = axial/radial", EQUATION),
+    Output("theta3", "rad", "axial pressure angle at the crank", EQUATION),
 )
 _NAMES = tuple(o.name for o in OUTPUTS)
 
@@ -52,7 +63,8 @@ EFFECT = Effect(
     key="P2, P3",
     name="pressure",
     title="direction of the coupler force: radial, axial and crank-side pressure angles",
-    equation="dynamics sheet 1.1, (19)-(21)",
+    equation=EQUATION,
+    formulas=FORMULAS,
     families=("rssr", "rssp"),
     needs=(),
     inputs=(),

@@ -8,7 +8,15 @@ from kernels.effects.pressure_extrema import pressure_extrema
 from sweep.effects.base import DesignResult, Effect, Scene
 from sweep.families.base import Accuracy, Array, Columns, Family, Output
 
-EQUATION = "dynamics sheet 1.2, 1.3"
+EQUATION = "P1 (1)-(3)"
+FORMULAS = (
+    "(1) sin^2(pressure angle) = t_rho^2 + t_k^2, both of first degree in cos phi,",
+    "    sin phi: r0 + rc cos + rs sin, k0 + kc cos + ks sin",
+    "(2) half its derivative a1 cos phi + b1 sin phi + a2 cos 2phi + b2 sin 2phi = 0, a1 = r0 rs + k0 ks,",
+    "    b1 = -(r0 rc + k0 kc), a2 = rc rs + kc ks, b2 = (rs^2 - rc^2 + ks^2 - kc^2)/2",
+    "(3) four zeros if |u|^(2/3) + |v|^(2/3) < (2W)^(2/3), W = hypot(a2, b2), d = atan2(-a2, b2)/2,",
+    "    u = a1 cos d + b1 sin d, v = b1 cos d - a1 sin d; else two",
+)
 
 _ANGLES = {
     "pressure_max": "largest pressure angle over the turn",
@@ -56,6 +64,7 @@ EFFECT = Effect(
     name="pressure_extrema",
     title="all extrema of the pressure angle over the turn, in closed form",
     equation=EQUATION,
+    formulas=FORMULAS,
     families=("rssr", "rssp"),
     needs=(),
     inputs=(),

@@ -12,7 +12,13 @@ from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status
 from sweep.effects.turn import chosen, reduction_outputs, reductions
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
 
-EQUATION = "dynamics sheet 3"
+EQUATION = "D4 (1)-(3)"
+FORMULAS = (
+    "(1) W(phi) = primitive of drive minus load torque, its mean removed; drive torque constant",
+    "(2) omega = sqrt(2 (E + W)/J), E from 2 pi/omega_mean = integral of d phi/omega; eps = d(omega^2)/d phi/2",
+    "(3) unevenness = (omega_max - omega_min)/omega_mean;",
+    "    estimate [max - min of W - (J - mean J) omega^2/2]/(mean J omega^2)",
+)
 
 FLYWHEEL = Parameter("flywheel", "inertia", "inertia on the crank shaft besides the links", default=0.0)
 OUTPUTS = (
@@ -115,6 +121,7 @@ EFFECT = Effect(
     name="speed_fluctuation",
     title="fluctuation of the crank speed at constant mean speed",
     equation=EQUATION,
+    formulas=FORMULAS,
     families=("rssr",),
     needs=("kinetostatics",),
     inputs=(*loads.ROCKER.parameters, FLYWHEEL),
