@@ -35,7 +35,7 @@ imports: $(VENV)/ready  ## studies -> sweep -> kernels, never back
 
 check: lint types imports test  ## what CI runs first
 
-smoke: $(STUDIES:%=smoke-%)  ## every study's tiny version
+smoke: $(STUDIES:%=smoke-%) smoke-accuracy  ## every study's tiny version
 
 study-%: $(VENV)/ready  ## run or resume one study, into results/<study>
 	$(SWEEP) run studies/$* --out results/$*/designs
@@ -44,6 +44,15 @@ study-%: $(VENV)/ready  ## run or resume one study, into results/<study>
 smoke-%: $(VENV)/ready  ## the tiny version of one study, into results/smoke/<study>
 	$(SWEEP) run studies/$* --smoke --force --out results/smoke/$*/designs
 	$(SWEEP) report results/smoke/$*/designs --out results/smoke/$*
+
+study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accuracy.md, about 10 minutes
+	$(BIN)/python -m studies.accuracy --out results/accuracy
+
+smoke-accuracy: $(VENV)/ready  ## the same on few designs, writes no page
+	$(BIN)/python -m studies.accuracy --smoke --out results/smoke/accuracy
+
+search-worse: $(VENV)/ready  ## look for poses with larger errors than any known; appends to tests/oracle/worst_found.json
+	$(BIN)/python -m tests.search.worse
 
 bench: $(VENV)/ready  ## ns per sample against numpy and C, one run
 	$(BIN)/python -m tests.bench.kernels

@@ -1,0 +1,108 @@
+"""Work and precision: error against the reference and time per design of every method in every region."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.accuracy import reference
+from studies.accuracy.methods import Method, acceleration_methods, swing_methods
+from studies.accuracy.regions import Region
+from studies.accuracy.timing import seconds
+from sweep.families.base import Angles, Array
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SAMPLES = tuple(2**k for k in range(5, 15))
+TARGETS = tuple(10.0**-k for k in range(3, 13))
+SMOKE_SAMPLES, SMOKE_TARGETS = (32, 256, 2048), (1e-3, 1e-6, 1e-10)
+
+
+def extrema_table(regions: Iterable[Region], smoke: bool) -> pd.DataFrame:
+    """One row per quantity, region and method: largest and median relative error, time, share without an answer."""
+    samples, targets = (SMOKE_SAMPLES, SMOKE_TARGETS) if smoke else (SAMPLES, TARGETS)
+    rows = []
+    for region in regions:
+        exact = reference.extremum(region.designs, "d2psi")
+        rows += _rows("max_abs_d2psi", region, region.designs, exact, acceleration_methods(samples, targets))
+        swing = reference.swing(region.designs)
+        swings = np.isfinite(swing)
+        designs = np.ascontiguousarray(region.designs[swings])
+        rows += _rows("swing", region, designs, swing[swings], swing_methods(samples, targets))
+    return _frame(rows)
+
+
+def _rows(
+    quantity: str, region: Region, designs: Array, exact: Array, methods: list[Method]
+) -> list[dict[str, object]]:
+    found = []
+    for method in methods:
+        error = np.abs(method.run(designs) - exact) / exact
+        answered = np.isfinite(error)
+        took = seconds(_call(method.run, designs), repeats=3)
+        found.append(
+            {
+                "quantity": quantity,
+                "region": region.name,
+                "method": method.curve,
+                "setting": method.setting,
+                "largest_error": float(error[answered].max(initial=0.0)),
+                "median_error": float(np.median(error[answered])) if answered.any() else float("nan"),
+                "ns_per_design": 1e9 * took / len(designs),
+                "designs": len(designs),
+                "unanswered": int((~answered).sum()),
+            }
+        )
+    return found
+
+
+def _call(run: Callable[[Array], Array], designs: Array) -> Callable[[], Array]:
+    return lambda: run(designs)
+
+
+def position_table(regions: Iterable[Region], poses: int) -> pd.DataFrame:
+    """Errors of the poses against 60 digits per region and output: largest, and in units of 2^-53 max(cond, |y|)."""
+    rows = []
+    for region in regions:
+        designs = region.designs[:poses]
+        phi = np.random.default_rng(len(region.name)).uniform(0.0, 2.0 * np.pi, len(designs))
+        angles = Angles.of(phi[:, None])
+        columns = reference.RSSR.poses(designs, angles, frozenset(reference.ORDERS))
+        exact = [reference.transfer_functions(*pair) for pair in zip(designs, phi, strict=True)]
+        cond = [reference.condition(*pair) for pair in zip(designs, phi, strict=True)]
+        for order, name in enumerate(reference.ORDERS):
+            got = np.asarray(columns[name], np.float64)[:, 0]
+            errors = [_error(order, g, y[order]) for g, y in zip(got, exact, strict=True)]
+            # One condition number may vanish by accident, so those of the lower derivatives count too.
+            lower = range(min(order, 1), order + 1)
+            sizes = [max(max(c[k], abs(float(y[k]))) for k in lower) for c, y in zip(cond, exact, strict=True)]
+            single = [_error(order, float(np.float32(g)), y[order]) for g, y in zip(got, exact, strict=True)]
+            rows.append(
+                {
+                    "output": name,
+                    "region": region.name,
+                    "poses": len(designs),
+                    "largest_error": max(errors),
+                    "largest_factor": max(e / (2.0**-53 * s) for e, s in zip(errors, sizes, strict=True)),
+                    "largest_error_stored_float32": max(single),
+                }
+            )
+    return _frame(rows)
+
+
+def _error(order: int, got: float, exact: object) -> float:
+    if order == 0:
+        return reference.angle_error(got, exact)
+    import mpmath
+
+    with mpmath.workdps(reference.DIGITS):
+        return float(abs(mpmath.mpf(got) - exact))
+
+
+def _frame(rows: list[dict[str, object]]) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame(rows)

@@ -1,0 +1,195 @@
+"""Largest known error of every oracle table, in units of 2^-53 max(cond, |y|), per quantity and kind of row.
+
+The tables hold 25 digits and the condition number ``cond`` of every value: one rounding of each input moves it by
+2^-53 cond.  For a derivative the condition numbers of the lower ones count too, because a single one may vanish by
+accident.  The tests replay what the page of this study prints.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import sweep
+from kernels import status as st
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+UNIT = 2.0**-53
+FINEST = 1e-14
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Worst:
+    """Largest factor of one quantity over the rows of one kind, and what its sheet allows."""
+
+    table: str
+    quantity: str
+    kind: str
+    rows: int
+    undecidable: int
+    factor: float
+    allowed: float
+
+
+def read(folder: Path, name: str) -> list[dict[str, Any]]:
+    """Rows of one table."""
+    rows: list[dict[str, Any]] = json.loads((folder / f"{name}_open.json").read_text())["rows"]
+    return rows
+
+
+def factors(folder: Path) -> list[Worst]:
+    """Every table that states a tolerance: rssr, rssp, needle208, composite, limits, pressure."""
+    return [worst for judge in (_rssr, _rssp, _needle, _composite, _limits, _pressure) for worst in judge(folder)]
+
+
+def frame(found: Sequence[Worst]) -> pd.DataFrame:
+    """As a table."""
+    import pandas as pd
+
+    return pd.DataFrame([worst.__dict__ for worst in found])
+
+
+def _judge(
+    table: str,
+    rows: Sequence[Row],
+    got: pd.DataFrame,
+    quantities: Mapping[str, tuple[str, Sequence[str]]],
+    allowed: float,
+    angles: Sequence[str] = (),
+    size: Callable[[Row, str], float | None] | None = None,
+) -> list[Worst]:
+    """Compare column by column; ``quantities`` gives per output the row's key and the keys whose sizes count."""
+    from mpmath import mp, mpf, pi
+
+    found = []
+    undecidable = np.isin(got["status"], (st.DEAD_POINT, st.UNDECIDABLE))
+    kinds = [f"{row['kind']} {row['case']}" if "case" in row else row["kind"] for row in rows]
+    for output, (key, lower) in quantities.items():
+        worst: dict[str, list[float]] = {kind: [] for kind in kinds}
+        with mp.workdps(40):
+            for value, row, kind, skip in zip(got[output], rows, kinds, undecidable, strict=True):
+                scales = [_size(row, k) if size is None else size(row, k) for k in lower]
+                if skip or row.get(key) is None or None in scales:
+                    continue
+                exact, error = mpf(row[key]), mpf(float(value)) - mpf(row[key])
+                if output in angles:
+                    error -= 2 * pi * mp.nint(error / (2 * pi))
+                scale = max(abs(exact), *scales)
+                worst[kind].append(float(abs(error) / (UNIT * scale)) if scale else float(abs(error) > 0.0))
+        for kind, values in worst.items():
+            if values:
+                count = sum(bool(u) for u, k in zip(undecidable, kinds, strict=True) if k == kind)
+                # nan must not pass as small: max() would drop it.
+                largest = float(np.max(values))
+                found.append(Worst(table, output, kind, len(values), count, largest, allowed))
+    return found
+
+
+def _size(row: Row, key: str) -> float | None:
+    """The larger of condition number and value; None where they leave float64 (discriminants at scales of 1e+-100)."""
+    from mpmath import mpf
+
+    cond, value = row["cond"].get(key), abs(float(row[key]))
+    return None if cond is None or (value == 0.0 and mpf(row[key]) != 0) else max(float(cond), value)
+
+
+def _column(rows: Sequence[Row], name: str) -> list[float]:
+    return [float(row[name]) for row in rows]
+
+
+def _orders(position: str, name: str) -> dict[str, tuple[str, list[str]]]:
+    """Outputs of a follower named ``name`` against the keys d1, d2, d3 of the tables."""
+    ladder = ["d1", "d2", "d3"]
+    derivatives = {f"{'d' if k == 0 else f'd{k + 1}'}{name}": (ladder[k], ladder[: k + 1]) for k in range(3)}
+    return {name: (position, [position])} | derivatives
+
+
+def _rssr(folder: Path) -> list[Worst]:
+    rows = [row for row in read(folder, "rssr") if row["feasible"]]
+    table = {name: _column(rows, name) for name in ("a", "b", "c", "e", "f", "g", "alpha", "phi")}
+    wanted = _orders("psi", "psi") | {"discriminant": ("D", ["D"])}
+    got = sweep.evaluate("rssr", table | {"branch": _column(rows, "sigma")}, list(wanted))
+    return _judge("rssr", rows, got, wanted, 8.0, ("psi",), lambda row, k: _unit_size(row, k))
+
+
+def _unit_size(row: Row, key: str) -> float | None:
+    """An angle is known to a rounding of one radian at best, however small it happens to be."""
+    size = _size(row, key)
+    return max(size, 1.0) if size is not None and key == "psi" else size
+
+
+def _rssp(folder: Path) -> list[Worst]:
+    rows = [row for row in read(folder, "rssp") if row["feasible"]]
+    table = {name: _column(rows, name) for name in ("a", "b", "e", "f", "alpha", "phi")}
+    wanted = _orders("S", "s") | {"discriminant": ("Q", ["Q"])}
+    return _judge(
+        "rssp", rows, sweep.evaluate("rssp", table | {"branch": _column(rows, "sigma")}, list(wanted)), wanted, 8.0
+    )
+
+
+def _needle(folder: Path) -> list[Worst]:
+    rows = read(folder, "needle208")
+    table: dict[str, Any] = {f"{name}{k}": _column(rows, f"{name}{k}") for name in "abce" for k in (1, 2)}
+    table |= {"f1": 0.0, "g1": 0.0, "alpha1": 0.0, "phi": _column(rows, "phi")}
+    table |= {
+        f"{ours}2": _column(rows, name) for ours, name in (("xi", "xi"), ("eta", "eta"), ("lam", "lam"), ("h", "hl"))
+    }
+    table |= {"branch1": _column(rows, "sigma1"), "branch2": _column(rows, "sigma2")}
+    table |= {"kappa2": _column(rows, "kappa"), "offset2": _column(rows, "theta0")}
+    along, across = ["along_d1", "along_d2", "along_d3"], ["dev_d1", "dev_d2"]
+    wanted = {"s": ("along", ["along"]), "dev": ("dev", ["dev"]), "x_m": ("x", ["x"]), "y_m": ("y", ["y"])}
+    wanted |= {name: (along[k], along[: k + 1]) for k, name in enumerate(("ds", "d2s", "d3s"))}
+    wanted |= {name: (across[k], across[: k + 1]) for k, name in enumerate(("ddev", "d2dev"))}
+    return _judge("needle208", rows, sweep.evaluate(["rssr", "guide"], table, list(wanted)), wanted, 8.0)
+
+
+def _composite(folder: Path) -> list[Worst]:
+    found = []
+    for second, name in (("rssr", "psi"), ("rssp", "s")):
+        rows = [row for row in read(folder, "composite") if row["stage2_type"].lower() == second]
+        table: dict[str, Any] = {
+            f"{key}{k}": _column([row[f"stage{k}"] for row in rows], key)
+            for k in (1, 2)
+            for key in rows[0][f"stage{k}"]
+        }
+        table |= {"branch1": _column(rows, "sigma1"), "branch2": _column(rows, "sigma2")}
+        table |= {"kappa2": _column(rows, "kappa"), "offset2": _column(rows, "theta0"), "phi": _column(rows, "phi")}
+        wanted = _orders("y", name)
+        got = sweep.evaluate(["rssr", second], table, list(wanted))
+        found += _judge(f"composite rssr + {second}", rows, got, wanted, 8.0, ("psi",))
+    return found
+
+
+LIMITS = ("phi_ext", "psi_ext", "phi_fold", "psi_fold", "phi0", "stroke_ratio")
+
+
+def _limits(folder: Path) -> list[Worst]:
+    rows = [row for row in read(folder, "limits") if row.get("rocker") == "oscillates"]
+    table = {name: _column(rows, name) for name in ("a", "b", "c", "e", "f", "g", "alpha")}
+    got = sweep.summarise("rssr", table | {"branch": _column(rows, "sigma")}, [*LIMITS, "swing"], accuracy=FINEST)
+    wanted = {name: (name, [name]) for name in LIMITS} | {"swing": ("psi0", ["psi0"])}
+    return _judge("limits", rows, got, wanted, 16.0, ("phi_ext", "psi_ext", "phi_fold", "psi_fold"))
+
+
+def _pressure(folder: Path) -> list[Worst]:
+    """Pressure angles of crank-rockers, row by row, and the largest over the turn of both families."""
+    rows = [row | row["expected"] for row in read(folder, "pressure") if row["kind"] == "rssr"]
+    names = ("a", "b", "c", "e", "f", "g", "alpha")
+    table = {name: _column([row["inputs"] for row in rows], name) for name in (*names, "phi")}
+    table |= {"branch": _column([row["inputs"] for row in rows], "sigma")}
+    wanted = {
+        "pressure_angle": ("theta", ["theta"]),
+        "theta1": ("theta1", ["theta1"]),
+        "theta2": ("theta2", ["theta2"]),
+        "theta3": ("theta3", ["theta3"]),
+    }
+    got = sweep.evaluate("rssr", table, list(wanted))
+    return _judge("pressure", rows, got, wanted, 64.0, (), lambda row, k: float(row["sens"][k]))

@@ -1,0 +1,107 @@
+"""Random crank-rockers by region: what is easy and what is hard for float64 and for a grid of crank angles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kernels import status as st
+from kernels.families import rssr
+from sweep.families.base import Array
+
+ALPHA, BRANCH = 6, 7
+
+
+@dataclass(frozen=True)
+class Region:
+    """Name as in the tables, and what the designs in it have in common."""
+
+    name: str
+    text: str
+    designs: Array
+
+
+def drawn(n: int, generator: np.random.Generator) -> Array:
+    """Designs of general proportions, crank up to 1, other lengths up to 5, any angle between the axes; n rows."""
+    r = generator
+    lengths = [r.uniform(0.1, 1.0, n), r.uniform(0.5, 5.0, n), r.uniform(0.5, 4.0, n)]
+    offsets = [r.uniform(-3.0, 3.0, n), r.uniform(-2.0, 2.0, n), r.uniform(-2.0, 2.0, n)]
+    return np.column_stack([*lengths, *offsets, r.uniform(0.0, np.pi, n), r.choice([-1.0, 1.0], n)])
+
+
+def margins(designs: Array) -> Array:
+    """Least cos^2 of the pressure angle over the turn; nan for what does not turn fully."""
+    status, margin = np.empty(len(designs), np.uint8), np.empty(len(designs))
+    rssr.margin(designs, status, margin, None, None, None, None)
+    return np.where(status == st.OK, margin, np.nan)
+
+
+def rotatable(n: int, seed: int) -> Array:
+    """The first n of :func:`drawn` whose crank turns fully."""
+    generator = np.random.default_rng(seed)
+    found: list[Array] = []
+    while sum(map(len, found)) < n:
+        designs = drawn(4 * n, generator)
+        found.append(designs[margins(designs) > 0.0])
+    return np.ascontiguousarray(np.concatenate(found)[:n])
+
+
+def regions(n: int, seed: int) -> tuple[Region, ...]:
+    """Seven regions of n rotatable designs each."""
+    plain = rotatable(40 * n, seed)
+    angle = np.degrees(np.arccos(np.sqrt(margins(plain))))
+    found = [
+        Region("ordinary", "pressure angle below 60 degrees", plain[angle < 60.0][:n]),
+        Region("60-75", "largest pressure angle 60 to 75 degrees", plain[(angle >= 60.0) & (angle < 75.0)][:n]),
+        Region("75-84", "largest pressure angle 75 to 84 degrees", plain[(angle >= 75.0) & (angle < 84.0)][:n]),
+        Region("beyond 84", "largest pressure angle 84 to 89.4 degrees", _beyond(plain, angle)[:n]),
+        Region("change point", "coupler within 1e-9 to 1e-5 of one with a dead point", _change_points(plain, n, seed)),
+        Region("parallel axes", "alpha 1e-8 to 1e-3, offsets f and g about 100 cranks", _parallel(n, seed)),
+        Region("long coupler", "one of e, f, g and the coupler 1e2 to 1e5 cranks long", _long(n, seed)),
+    ]
+    for region in found:
+        assert len(region.designs) == n, region.name
+    return tuple(Region(r.name, r.text, np.ascontiguousarray(r.designs)) for r in found)
+
+
+def _beyond(plain: Array, angle: Array) -> Array:
+    return plain[(angle >= 84.0) & (angle < 89.4)]
+
+
+def _change_points(plain: Array, n: int, seed: int) -> Array:
+    """Shorten the coupler to just above the shortest that still lets the crank turn."""
+    generator = np.random.default_rng(seed + 1)
+    designs = plain[: 4 * n].copy()
+    low, high = np.zeros(len(designs)), designs[:, 1].copy()
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        designs[:, 1] = middle
+        turns = margins(designs) > 0.0
+        high, low = np.where(turns, middle, high), np.where(turns, low, middle)
+    designs[:, 1] = high * (1.0 + 10.0 ** generator.uniform(-9.0, -5.0, len(designs)))
+    return designs[margins(designs) > 0.0][:n]
+
+
+def _parallel(n: int, seed: int) -> Array:
+    generator = np.random.default_rng(seed + 2)
+    designs = drawn(40 * n, generator)
+    designs[:, ALPHA] = 10.0 ** generator.uniform(-8.0, -3.0, len(designs))
+    designs[:, 5] += generator.uniform(-100.0, 100.0, len(designs))
+    designs[:, 4] = designs[:, 5] + generator.uniform(-0.5, 0.5, len(designs))
+    return designs[margins(designs) > 0.0][:n]
+
+
+def _long(n: int, seed: int) -> Array:
+    """One offset is made long and the coupler is measured between joints that are placed first."""
+    generator = np.random.default_rng(seed + 3)
+    designs = drawn(60 * n, generator)
+    rows, which = np.arange(len(designs)), generator.integers(3, 6, len(designs))
+    designs[rows, which] = np.copysign(10.0 ** generator.uniform(2.0, 5.0, len(designs)), designs[rows, which])
+    a, _, c, e, f, g, alpha, _ = designs.T
+    phi, psi = generator.uniform(0.0, 2.0 * np.pi, (2, len(designs)))
+    x = e + c * np.cos(psi) - a * np.cos(phi)
+    y = c * np.sin(psi) - f * np.sin(alpha) - a * np.cos(alpha) * np.sin(phi)
+    z = g - f * np.cos(alpha) + a * np.sin(alpha) * np.sin(phi)
+    designs[:, 1] = np.sqrt(x * x + y * y + z * z)
+    return designs[margins(designs) > 1e-12][:n]
