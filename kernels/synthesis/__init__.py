@@ -11,3 +11,4 @@ from kernels.synthesis.rssp_locus import rssp_at_place as rssp_at_place
 from kernels.synthesis.rssp_locus import rssp_on_locus as rssp_on_locus
 from kernels.synthesis.rssr_locus import rssr_at_direction as rssr_at_direction
 from kernels.synthesis.rssr_locus import rssr_on_locus as rssr_on_locus
+from kernels.synthesis.rssr_locus import rssr_points as rssr_points

@@ -48,6 +48,32 @@ def _read(requirements: Array, i: int) -> _Requirement:
     return _Requirement(e, f, g * sa, g * ca, sa, ca, sh, ch, 2.0 * sh * ch, 2.0 * sh * sh, s0, c0, branch, valid)
 
 
+class _Point(NamedTuple):
+    """A point of the locus: the ball at the extended position, its projections on the crank at both limits."""
+
+    x: float
+    y: float
+    ahead: float
+    back: float
+    exists: bool
+
+
+@inline
+def _point(r: _Requirement, u1: float, v1: float) -> _Point:
+    """Equations (1)-(3): the two linear equations solved, with every difference that vanishes written out."""
+    u2, v2 = u1 * r.cos_phi0 - v1 * r.sin_phi0, v1 * r.cos_phi0 + u1 * r.sin_phi0
+    ss, q, ca = r.sin_swing, r.versed, r.ca
+    along = ca * (1.0 - q) * r.sin_phi0
+    det = along - ss * (v1 * v2 + ca * ca * u1 * u2)
+    exists = abs(det) > 8.0 * EPS * (abs(ss) * (1.0 + ca * ca) + abs(along))
+    per_det = 1.0 / det if exists else math.nan
+    x = (r.e * (ss * v1 * v2 - ca * (r.sin_phi0 + q * v1 * u2)) + r.h * u1 * (ss * v2 - q * ca * u2)) * per_det
+    y = (r.h * (r.sin_phi0 - q * u1 * v2 - ss * ca * u1 * u2) - r.e * v1 * (q * v2 + ss * ca * u2)) * per_det
+    ahead = (r.h * (ss * v2 - q * ca * u2) - r.e * ca * (q * v2 + ss * ca * u2)) * per_det
+    back = (r.h * (ss * v1 + q * ca * u1) + r.e * ca * (q * v1 - ss * ca * u1)) * per_det
+    return _Point(x, y, ahead, back, exists)
+
+
 @inline
 def _finish(
     r: _Requirement, point: bool, x1: float, y1: float, ahead: float, back: float, u1: float, v1: float,
@@ -98,19 +124,31 @@ def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: 
     for i in range(requirements.shape[0]):
         r = _read(requirements, i)
         v1, u1 = sine_cosine(requirements[i, 2])
-        u2, v2 = u1 * r.cos_phi0 - v1 * r.sin_phi0, v1 * r.cos_phi0 + u1 * r.sin_phi0
-        ss, q, ca = r.sin_swing, r.versed, r.ca
-        across, along = -ss * (v1 * v2 + ca * ca * u1 * u2), ca * (1.0 - q) * r.sin_phi0
-        det = across + along
-        per_det = 1.0 / det
-        x1 = (r.e * (ss * v1 * v2 - ca * (r.sin_phi0 + q * v1 * u2)) + r.h * u1 * (ss * v2 - q * ca * u2)) * per_det
-        y1 = (r.h * (r.sin_phi0 - q * u1 * v2 - ss * ca * u1 * u2) - r.e * v1 * (q * v2 + ss * ca * u2)) * per_det
-        ahead = (r.h * (ss * v2 - q * ca * u2) - r.e * ca * (q * v2 + ss * ca * u2)) * per_det
-        back = (r.h * (ss * v1 + q * ca * u1) + r.e * ca * (q * v1 - ss * ca * u1)) * per_det
-        point = abs(det) > 8.0 * EPS * (abs(ss) * (1.0 + ca * ca) + abs(along))
-        _finish(r, point, x1, y1, ahead, back, u1, v1, i, status, failed, designs, requirements)
+        p = _point(r, u1, v1)
+        _finish(r, p.exists, p.x, p.y, p.ahead, p.back, u1, v1, i, status, failed, designs, requirements)
         if psi1 is not None:
-            psi1[i] = math.atan2(y1, x1) if status[i] == 0 else math.nan
+            psi1[i] = math.atan2(p.y, p.x) if status[i] == 0 else math.nan
+
+
+@kernel
+def rssr_points(requirements: Array, points: Array) -> None:
+    """Points of the locus alone, before any link is chosen: they do not depend on f.
+
+    Parameters
+    ----------
+    requirements : (n, 7) columns of :func:`rssr_on_locus`; f is not used
+    points : (n, 4) out [length]: X1, Y1 of the rocker ball about the rocker axis at the extended position, and its
+        distances from the crank axis at the extended and at the folded position, negative where the side condition
+        fails; all nan where the requirement is invalid or the point lies at infinity
+    """
+    for i in range(requirements.shape[0]):
+        r = _read(requirements, i)
+        v1, u1 = sine_cosine(requirements[i, 2])
+        p = _point(r, u1, v1)
+        points[i, 0] = p.x if r.valid else math.nan
+        points[i, 1] = p.y if r.valid else math.nan
+        points[i, 2] = p.ahead if r.valid else math.nan
+        points[i, 3] = -p.back if r.valid else math.nan
 
 
 @kernel

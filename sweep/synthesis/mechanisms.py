@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kernels import status as st
-from kernels.families import rssp, rssr
 from kernels.synthesis import acceptance
 from sweep.errors import InputError
 from sweep.families import family as find_family
-from sweep.families.base import Array
+from sweep.families.base import Accuracy, Array
+from sweep.summaries import design_outputs
 from sweep.synthesis.locus import TWO_PI, Found, locus
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from sweep.tables import Table
 
-_MARGIN = {"rssr": rssr.margin, "rssp": rssp.margin}
+_EXACT = Accuracy(target=1e-12)
 
 
 def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = None) -> pd.DataFrame:
@@ -92,10 +92,9 @@ def _verdict(family: str, found: Found, limit: float | None) -> dict[str, object
     status, failed = found.status.copy(), found.failed.copy()
     alive = np.flatnonzero(status == st.OK)
     margin, angle = np.full(len(status), np.nan), np.full(len(status), np.nan)
-    turning = np.empty(alive.size, np.uint8)
-    least, largest = np.empty(alive.size), np.empty(alive.size)
-    _MARGIN[family](found.designs[alive], turning, least, None, largest, None)
-    margin[alive], angle[alive], status[alive] = least, largest, turning
+    turn = design_outputs(find_family(family), found.designs[alive], ["margin", "max_pressure_angle"], _EXACT)
+    turning = turn["status"].astype(np.uint8)
+    margin[alive], angle[alive], status[alive] = turn["margin"], turn["max_pressure_angle"], turning
     failed[alive[turning != st.OK]] = acceptance.ROTATION
     if limit is not None:
         steep = (status == st.OK) & (angle > limit)
