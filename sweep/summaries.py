@@ -169,10 +169,11 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
 def _jobs(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> list[_Job]:
     steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
     groups: dict[Group, list[str]] = {}
-    for name in dict.fromkeys(wanted):
-        own = applying_step(family, name, accuracy)
-        way = general_way(family, name)
-        if own is not None:
+    ways = {name: (applying_step(family, name, accuracy), general_way(family, name)) for name in dict.fromkeys(wanted)}
+    # Margins of several stages belong together: a first stage judged by itself would take its designs from the others.
+    together = any(own is None and way is not None and way.kind == "margin" for own, way in ways.values())
+    for name, (own, way) in ways.items():
+        if own is not None and not (together and way is not None and way.kind == "margin"):
             step, stage = own
             steps.setdefault((step.name, stage.number if stage else 0), (step, stage, []))[2].append(name)
         elif way is not None:
