@@ -28,7 +28,10 @@ def poses(designs, phi=PHI):
     return RSSR.poses(np.atleast_2d(designs), Angles.of(phi), frozenset(POSES))
 
 
-def summary(designs, accuracy=Accuracy(target=1e-8)):
+FINE = Accuracy(target=1e-8)
+
+
+def summary(designs, accuracy=FINE):
     return design_outputs(RSSR, np.atleast_2d(designs), TURN, accuracy)
 
 
