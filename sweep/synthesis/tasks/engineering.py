@@ -1,0 +1,75 @@
+"""The engineering method: of all crank-rockers with a given swing and phi0 the one with the least acceleration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from sweep.families.base import Array
+from sweep.synthesis.tasks.crank_rocker import (
+    designs_on_locus,
+    least_cos2,
+    motion,
+    named,
+    pressure_limit,
+    size_limits,
+    size_names,
+    turn,
+)
+from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
+
+
+@dataclass(frozen=True)
+class EngineeringMethod:
+    """Given swing, phi0, e, g, alpha; to be found: the place phi1 on the locus and the offset f of the crank plane.
+
+    Parameters
+    ----------
+    swing, phi0 : rocker angle (signed) and crank angle from the extended to the folded position [rad]
+    e, g, alpha : position of the rocker axis and of the rocker's plane on it [length, rad]
+    f_range : where f is looked for [length]; two equal numbers fix it.  With alpha = 0 only f - g matters.
+    max_pressure_angle : limit over the whole turn [rad]; pi/2 asks for a full turn only
+    objective : "acceleration", max |d2psi|, or "pressure_angle", the largest over the turn
+    bounds : of the lengths found, by name (a, b, c)
+    """
+
+    swing: float
+    phi0: float
+    e: float
+    g: float
+    alpha: float
+    f_range: tuple[float, float]
+    max_pressure_angle: float = 0.5 * np.pi
+    objective: Literal["acceleration", "pressure_angle"] = "acceleration"
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """phi1, and f where it is free."""
+        place = Unknown("phi1", 0.0, 2.0 * np.pi, periodic=True)
+        low, high = self.f_range
+        return (place,) if low == high else (place, Unknown("f", low, high))
+
+    equations: tuple[str, ...] = field(default=(), init=False)
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """Pressure angle (the full turn with it) and bounds of the lengths."""
+        return ("pressure angle", *size_names(self.bounds))
+
+    def evaluate(self, x: Array) -> Candidates:
+        """See `Problem`."""
+        f = x[:, 1] if x.shape[1] > 1 else np.full(len(x), self.f_range[0])
+        swing, phi0 = np.full(len(x), self.swing), np.full(len(x), self.phi0)
+        e, g, alpha = (np.full(len(x), value) for value in (self.e, self.g, self.alpha))
+        designs, _ = designs_on_locus(swing, phi0, x[:, 0], e, f, g, alpha)
+        columns = named(designs)
+        limits = [pressure_limit(designs, self.max_pressure_angle), *size_limits(columns, self.bounds)]
+        if self.objective == "acceleration":
+            curve = np.asarray(motion(designs, turn(), "d2psi")["d2psi"], np.float64)
+        else:
+            curve = np.sqrt(1.0 - least_cos2(designs))[:, None]  # sine of the largest pressure angle
+        return Candidates(np.empty((len(x), 0)), stacked(len(x), limits), curve, columns)

@@ -1,0 +1,259 @@
+"""Solves a task: candidates from a low-discrepancy sequence, equations by least squares, the objective on its epigraph.
+
+The objective, a largest magnitude over many poses, has kinks; minimising t under -t <= curve <= t has none.  Gradients
+are central differences, all rows in one call of the problem, whose kernels are vectorised.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.families.base import Array
+from sweep.synthesis.tasks.problem import Problem, Solution
+
+BLOCK = 1024
+STEP = 3e-6  # of a central difference, in units of the box
+SHARE = 0.8  # poses with less than this part of the largest magnitude do not bound t
+ROUNDS = 8
+MET = 1e-9  # largest residual and violation of a feasible solution
+
+
+class _Value(NamedTuple):
+    equations: Array
+    limits: Array
+    curve: Array
+
+
+class _Scaled:
+    """A problem in the unit box; remembers its last point and gradient."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.low = np.array([u.low for u in problem.unknowns])
+        self.span = np.array([u.high for u in problem.unknowns]) - self.low
+        self.periodic = np.array([u.periodic for u in problem.unknowns])
+
+    def real(self, z: Array) -> Array:
+        """Unknowns of points of the unit box."""
+        turned = np.where(self.periodic, z % 1.0, z)
+        return self.low + self.span * turned
+
+    def rows(self, z: Array) -> _Value:
+        """Values of points (n, k)."""
+        found = self.problem.evaluate(self.real(np.atleast_2d(z)))
+        return _Value(found.equations, found.limits, found.curve)
+
+    def with_gradient(self, z: Array) -> tuple[_Value, _Value]:
+        """Values at z and their derivatives, (k, ...) each; one-sided where a neighbour has no mechanism."""
+        k = z.size
+        steps = STEP * np.eye(k)
+        both = self.rows(np.vstack([z[None, :], z + steps, z - steps]))
+        here, slopes = [], []
+        for values in both:
+            centre, ahead, behind = values[0], values[1 : k + 1], values[k + 1 :]
+            slope = (ahead - behind) / (2.0 * STEP)
+            slope = np.where(np.isnan(slope), (ahead - centre) / STEP, slope)
+            slope = np.where(np.isnan(slope), (centre - behind) / STEP, slope)
+            here.append(centre)
+            slopes.append(np.nan_to_num(slope))
+        return _Value(*here), _Value(*slopes)
+
+
+def solve(problem: Problem, *, candidates: int = 4096, starts: int = 6, seed: int = 0) -> list[Solution]:
+    """Mechanisms that do a task, the best first.
+
+    Parameters
+    ----------
+    problem : one of the tasks
+    candidates : points of the box tried first
+    starts : of them refined, kept apart from each other
+    seed : of the sequence; the same seed gives the same answer
+
+    Returns
+    -------
+    list of Solution
+        different local solutions, feasible ones first, each group by its objective.  Empty if no candidate gave a
+        mechanism at all.
+
+    Notes
+    -----
+    Local solutions from many starts: no proof that the best one found is the best there is.
+    """
+    scaled = _Scaled(problem)
+    begun = _starts(scaled, candidates, starts, seed)
+    ended = [_refined(scaled, z) for z in begun]
+    solutions = [_solution(problem, scaled, z) for z in _distinct(scaled, ended)]
+    return sorted(solutions, key=lambda s: (not s.feasible, s.objective if s.feasible else _miss(s)))
+
+
+def _miss(solution: Solution) -> float:
+    worst = max((abs(r) for r in solution.equations.values()), default=0.0)
+    return max(worst, max((-s for s in solution.limits.values()), default=0.0))
+
+
+def _starts(scaled: _Scaled, candidates: int, starts: int, seed: int) -> list[Array]:
+    from scipy.stats import qmc
+
+    k = scaled.low.size
+    power = int(np.ceil(np.log2(candidates)))
+    points = qmc.Sobol(k, seed=seed).random_base2(power)
+    miss, height = np.empty(len(points)), np.empty(len(points))
+    for start in range(0, len(points), BLOCK):
+        rows = slice(start, start + BLOCK)
+        value = scaled.rows(points[rows])
+        miss[rows] = _violation(value)
+        height[rows] = np.abs(value.curve).max(axis=1)
+    alive = np.isfinite(miss) & np.isfinite(height)
+    if not alive.any():
+        return []
+    points, miss, height = points[alive], miss[alive], height[alive]
+    # Candidates miss equations anyway: what counts is being near a solution, then a low objective.
+    rank = np.log(np.maximum(miss, 1e-3)) + np.log(height / np.median(height) + 1e-12)
+    chosen: list[Array] = []
+    apart = 0.5 * starts ** (-1.0 / k) * 0.5
+    for index in np.argsort(rank, kind="stable"):
+        z = points[index]
+        if all(_distance(scaled, z, other) > apart for other in chosen):
+            chosen.append(z)
+        if len(chosen) == starts:
+            break
+    return chosen
+
+
+def _distance(scaled: _Scaled, one: Array, other: Array) -> float:
+    gap = np.abs(one - other)
+    return float(np.where(scaled.periodic, np.minimum(gap % 1.0, 1.0 - gap % 1.0), gap).max())
+
+
+def _violation(value: _Value) -> Array:
+    rows = [np.abs(value.equations), np.maximum(-value.limits, 0.0)]
+    worst: Array = np.concatenate(rows, axis=1).max(axis=1, initial=0.0)
+    return worst
+
+
+def _bounds(scaled: _Scaled, z: Array) -> tuple[Array, Array]:
+    return np.where(scaled.periodic, z - 0.5, 0.0), np.where(scaled.periodic, z + 0.5, 1.0)
+
+
+def _refined(scaled: _Scaled, z: Array) -> Array:
+    z = _restored(scaled, z)
+    best, before = z, np.inf
+    for _ in range(ROUNDS):
+        following = _restored(scaled, _descended(scaled, z))
+        value = scaled.rows(following)
+        height = float(np.abs(value.curve).max())
+        if not np.isfinite(height) or _violation(value)[0] > MET:
+            break
+        if height < before:
+            best = following
+        if height > before * (1.0 - 1e-9):
+            break
+        z, before = following, height
+    return best
+
+
+def _restored(scaled: _Scaled, z: Array) -> Array:
+    """Equations and violated limits brought to zero: least squares, then Gauss-Newton steps of least length."""
+    from scipy.optimize import least_squares
+
+    if _violation(scaled.rows(z))[0] <= 0.0:
+        return z
+    low, high = _bounds(scaled, z)
+    inside = np.clip(z, low + 1e-12, high - 1e-12)
+
+    def residuals(point: Array) -> Array:
+        value = scaled.rows(point)
+        both = np.concatenate([value.equations[0], np.minimum(value.limits[0] - 1e-10, 0.0)])
+        return np.where(np.isfinite(both), both, 1e3)
+
+    def jacobian(point: Array) -> Array:
+        value, slope = scaled.with_gradient(point)
+        active = value.limits < 1e-10
+        return np.concatenate([slope.equations, np.where(active, slope.limits, 0.0)], axis=1).T
+
+    run: Any = least_squares
+    if not np.isfinite(scaled.rows(inside).equations).all():
+        return z
+    found = run(residuals, inside, jac=jacobian, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
+    point: Array = found.x
+    for _ in range(4):
+        step = np.linalg.lstsq(jacobian(point), -residuals(point), rcond=1e-12)[0]
+        following = np.clip(point + step, low, high)
+        if not np.linalg.norm(residuals(following)) < np.linalg.norm(residuals(point)):
+            break
+        point = following
+    return point
+
+
+def _descended(scaled: _Scaled, z: Array) -> Array:
+    """SLSQP on the epigraph: t and the unknowns, t bounding the poses that come near the largest magnitude."""
+    from scipy.optimize import minimize
+
+    start = scaled.rows(z).curve[0]
+    top = float(np.abs(start).max())
+    if not top > 0.0 or not np.isfinite(top):
+        return z
+    used = np.abs(start) >= SHARE * top
+    memory: dict[bytes, tuple[Array, Array, Array, Array]] = {}
+
+    def parts(point: Array) -> tuple[Array, Array, Array, Array]:
+        key = point.tobytes()
+        if key not in memory:
+            memory.clear()
+            value, slope = scaled.with_gradient(point[:-1])
+            curve = value.curve[used] / top
+            below = np.concatenate([point[-1] - curve, point[-1] + curve, value.limits])
+            rows = np.concatenate([-slope.curve[:, used] / top, slope.curve[:, used] / top, slope.limits], axis=1).T
+            last = np.concatenate([np.ones(2 * curve.size), np.zeros(value.limits.size)])
+            # Outside all mechanisms: a value that makes the line search come back.
+            kept = np.where(np.isfinite(below), below, -1e3)
+            equal = np.where(np.isfinite(value.equations), value.equations, 1e3)
+            memory[key] = (kept, np.column_stack([rows, last]), equal,
+                           np.column_stack([slope.equations.T, np.zeros(equal.size)]))  # fmt: skip
+        return memory[key]
+
+    gradient = np.append(np.zeros(z.size), 1.0)
+    constraints = [{"type": "ineq", "fun": lambda p: parts(p)[0], "jac": lambda p: parts(p)[1]}]
+    if scaled.problem.equations:
+        constraints.append({"type": "eq", "fun": lambda p: parts(p)[2], "jac": lambda p: parts(p)[3]})
+    low, high = _bounds(scaled, z)
+    radius = 0.15
+    bounds = [*zip(np.maximum(low, z - radius), np.minimum(high, z + radius), strict=True), (0.0, None)]
+    run: Any = minimize
+    found = run(
+        lambda p: p[-1], np.append(z, 1.0), jac=lambda p: gradient, method="SLSQP", bounds=bounds,
+        constraints=constraints, options={"maxiter": 60, "ftol": 1e-12},
+    )  # fmt: skip
+    point: Array = np.clip(found.x[:-1], low, high)
+    return point if np.isfinite(point).all() else z
+
+
+def _distinct(scaled: _Scaled, points: list[Array]) -> list[Array]:
+    kept: list[Array] = []
+    for z in points:
+        if all(_distance(scaled, z, other) > 1e-5 for other in kept):
+            kept.append(z)
+    return kept
+
+
+def _solution(problem: Problem, scaled: _Scaled, z: Array) -> Solution:
+    x = scaled.real(z)
+    found = problem.evaluate(x[None, :])
+    value = _Value(found.equations, found.limits, found.curve)
+    height = float(np.abs(found.curve).max())
+    feasible = bool(np.isfinite(height) and _violation(value)[0] <= MET)
+    return Solution(
+        feasible,
+        height,
+        _named([u.name for u in problem.unknowns], x),
+        {name: float(column[0]) for name, column in found.results.items()},
+        _named(problem.equations, found.equations[0]),
+        _named(problem.limits, found.limits[0]),
+    )
+
+
+def _named(names: Any, values: NDArray[np.float64]) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(names, values, strict=True)}
