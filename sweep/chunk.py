@@ -68,19 +68,32 @@ def output_columns(study: Study) -> dict[str, str]:
     return columns
 
 
-def parameter_matrix(study: Study, start: int, stop: int) -> Array:
-    """Checked (n, P) design matrix of the designs start, ..., stop - 1 of the study's space."""
-    matrix, _ = design_matrix(study.family, study.space.columns(start, stop))
-    return matrix
+def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
+    """Checked (n, P) design matrix of the designs start, ..., stop - 1 of the study's space, and their status (n,).
+
+    The status is OK unless [locus] found no mechanism for a design; its links are nan then.
+    """
+    columns = study.space.columns(start, stop)
+    if study.locus is None:
+        matrix, _ = design_matrix(study.family, columns)
+        return matrix, np.zeros(len(matrix), np.uint8)
+    made, status = study.locus.links(columns)
+    # What has no mechanism is marked, not refused.
+    given = {name: values for name, values in columns.items() if name in study.family.parameter_names}
+    matrix, _ = design_matrix(study.family, given | {name: np.ones(stop - start) for name in made})
+    for name, values in made.items():
+        matrix[:, study.family.parameter_names.index(name)] = values
+    return matrix, status
 
 
-def cascade(study: Study, designs: Array) -> Cascade:
+def cascade(study: Study, designs: Array, status: NDArray[np.uint8]) -> Cascade:
     """Compute the wanted outputs route by route; only designs that meet all limits known so far go on.
 
     Parameters
     ----------
     study : whose family, wanted outputs, limits and accuracy apply
     designs : (n, P) design matrix [mm, rad]
+    status : (n,) only designs that are OK are looked at, the others keep theirs
 
     Returns
     -------
@@ -91,8 +104,8 @@ def cascade(study: Study, designs: Array) -> Cascade:
     n = len(designs)
     designs = designs.copy()
     outputs = {name: np.full(n, np.nan) for name in output_columns(study)}
-    status = np.zeros(n, np.uint8)
-    alive = np.arange(n)
+    status = status.copy()
+    alive = np.flatnonzero(status == codes.OK)
     finished = False
     go_on = (codes.OK,) if study.output.keep == "feasible" else (codes.OK, *PARTIAL)
     reached = []
@@ -106,7 +119,7 @@ def cascade(study: Study, designs: Array) -> Cascade:
         for name in outputs.keys() & found.keys():
             outputs[name][alive] = found[name]
         fate = np.where(status[alive] == codes.OK, found["status"], status[alive])
-        for limit in study.output_limits:
+        for limit in study.tested_limits:
             if limit.output in found:
                 fate[(fate == codes.OK) & ~meets(limit, found[limit.output])] = codes.LIMIT_EXCEEDED
         status[alive] = fate
@@ -148,7 +161,9 @@ def warm(study: Study) -> None:
     """Compile or load every kernel the study needs, on a few designs spread over its space."""
     count = study.space.count
     starts = sorted({k * (count - 1) // 7 for k in range(8)})
-    designs = np.concatenate([parameter_matrix(study, start, start + 1) for start in starts])
+    blocks = [parameter_matrix(study, start, start + 1) for start in starts]
+    # Any numbers will do, also for a design that [locus] cannot make: it compiles the same.
+    designs = np.nan_to_num(np.concatenate([matrix for matrix, _ in blocks]), nan=1.0)
     if study.fit is not None:
         designs, _ = fit_line(study.family, designs, study.fit, study.window)
     for route in ordered_routes(study):
@@ -209,8 +224,8 @@ def compute_chunk(study: Study, start: int, stop: int, should_stop: Callable[[],
 
 
 def _block(study: Study, start: int, stop: int, counts: NDArray[np.int64]) -> Columns:
-    matrix = parameter_matrix(study, start, stop)
-    result = cascade(study, matrix)
+    matrix, status = parameter_matrix(study, start, stop)
+    result = cascade(study, matrix, status)
     counts += np.bincount(result.status, minlength=counts.size)
     rows = np.arange(len(matrix))
     if study.output.keep == "feasible":

@@ -119,8 +119,8 @@ def make_plan(study: Study, chunk_size: int | None = None) -> Plan:
 def _repetitive(study: Study) -> tuple[str, ...]:
     """Parameters whose values recur from design to design: what the store writes as a dictionary."""
     names = study.space.fixed if study.space.kind == "sobol" else study.space.names
-    made = () if study.fit is None else (*study.fit.parameters(study.family), *study.fit.rescaled(study.family))
-    return tuple(name for name in names if name not in made)
+    own = study.family.parameter_names
+    return tuple(name for name in names if name in own and name not in (*study.made, *study.rescaled))
 
 
 def designs_fingerprint(study: Study) -> str:
@@ -151,19 +151,21 @@ def pilot(study: Study) -> Pilot:
     length = min(PILOT_LENGTH, count)
     golden = (math.sqrt(5.0) - 1.0) / 2.0
     starts = sorted({int((k * golden) % 1.0 * (count - length + 1)) for k in range(PILOT_RUNS)})
-    designs = np.concatenate([parameter_matrix(study, start, start + length) for start in starts])
-    found = cascade(study, designs)
+    blocks = [parameter_matrix(study, start, start + length) for start in starts]
+    designs, status = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    found = cascade(study, designs, status)
     costs = [route.ns_per_design for route in ordered_routes(study)]
     nanoseconds = sum(n * cost for n, cost in zip(found.reached, costs, strict=True))
     return Pilot(1e-9 * nanoseconds / len(designs), float(np.mean(found.status == OK)))
 
 
 def spread_designs(study: Study, number: int) -> Array:
-    """About that many designs spread over the space, (n, P)."""
+    """About that many designs spread over the space, (n, P); fewer where [locus] finds no mechanism for some."""
     count = study.space.count
     golden = (math.sqrt(5.0) - 1.0) / 2.0
     starts = sorted({int((k * golden) % 1.0 * count) for k in range(number)})
-    return np.concatenate([parameter_matrix(study, start, start + 1) for start in starts])
+    blocks = [parameter_matrix(study, start, start + 1) for start in starts]
+    return np.concatenate([matrix[status == OK] for matrix, status in blocks])
 
 
 def row_bytes(study: Study) -> int:

@@ -98,7 +98,7 @@ def test_cascade_runs_a_route_only_on_survivors(
     tiny = replace(study, want=("x", "y", "z"), limits=limits, output=OutputSettings(keep))
     matrix = parameter_matrix(tiny, 0, tiny.space.count)
     a, b = matrix[:, 0], matrix[:, 1]
-    found = cascade(tiny, matrix)
+    found = cascade(tiny, matrix, made)
 
     after_x = (a >= 20.0) & (a <= 50.0)
     expected = np.select(

@@ -78,15 +78,16 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
 
 
 def drawn(study: Study, count: int, seed: int) -> Array:
-    """Designs of a study's space at random, finished by its [fit] if it has one: for datasets without feasible rows."""
+    """Designs of a study's space at random, finished by its [locus] and [fit]: for datasets without feasible rows."""
     from sweep.chunk import parameter_matrix
     from sweep.fit import fit_line
 
     length = min(64, study.space.count)
     blocks = max(1, SCREENED * count // length)
     begins = np.random.default_rng(seed).integers(0, study.space.count - length + 1, blocks)
-    designs = np.concatenate([parameter_matrix(study, int(k), int(k) + length) for k in begins])
-    if study.fit is None:
+    drawn_blocks = [parameter_matrix(study, int(k), int(k) + length) for k in begins]
+    designs = np.concatenate([matrix[made == st.OK] for matrix, made in drawn_blocks])
+    if study.fit is None or not len(designs):
         return designs
     fitted, status = fit_line(study.family, designs, study.fit, study.window)
     return np.asarray(fitted[status == st.OK], np.float64)

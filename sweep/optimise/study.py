@@ -45,9 +45,9 @@ TEXTS = {
 def problem_of(study: Study, designs: Array) -> Problem:
     """The optimisation problem of a study.
 
-    Swept steady parameters vary between the ends of their axes, those that [fit] sets or scales as far as ``designs``
-    (k, P) reach and half their size beyond; limits on parameters narrow both.  An angle swept over a whole turn may go
-    on for half a turn.
+    Swept steady parameters vary between the ends of their axes, those that [locus] or [fit] sets or scales as far as
+    ``designs`` (k, P) reach and half their size beyond; limits on parameters narrow both.  An angle swept over a whole
+    turn may go on for half a turn.  What [locus] prescribes becomes limits: equations where it is fixed.
 
     Raises
     ------
@@ -56,10 +56,10 @@ def problem_of(study: Study, designs: Array) -> Problem:
     """
     if study.objective is None:
         raise InputError("objective", None, "[objective] minimise = an output", str(study.path))
-    made = () if study.fit is None else (*study.fit.parameters(study.family), *study.fit.rescaled(study.family))
+    made = (*study.made, *study.rescaled)
     bounds: dict[str, tuple[float, float]] = {}
     for column, parameter in enumerate(study.family.parameters):
-        if parameter.name in made:
+        if parameter.name in made and parameter.choices is None:
             low, high = (float(end) for end in np.percentile(designs[:, column], TAILS))
             reach = 0.5 * max(abs(low), abs(high)) if parameter.unit == "length" else 0.5
             low, high = (0.2 * low if parameter.positive else low - reach), high + reach
@@ -76,9 +76,10 @@ def problem_of(study: Study, designs: Array) -> Problem:
         bounds[parameter.name] = (low, high)
     held = {name: ends[0] for name, ends in bounds.items() if ends[0] == ends[1]}
     names = tuple(name for name in bounds if name not in held)
+    fixed = {name: value for name, value in study.space.fixed.items() if name in study.family.parameter_names}
     return Problem(
         study.family, names, np.array([bounds[n][0] for n in names]), np.array([bounds[n][1] for n in names]),
-        dict(study.space.fixed) | held, study.objective.output, study.output_limits, study.window, study.accuracy,
+        fixed | held, study.objective.output, study.output_limits, study.window, study.accuracy,
     )  # fmt: skip
 
 
@@ -94,7 +95,10 @@ def problem_and_starts(study: Study, folder: Path) -> tuple[OptimiseSettings, Pr
         designs = drawn(study, count, study.optimise.seed)
         if not len(designs):
             raise InputError(
-                "design space", study.space.count, "at least one design that [fit] can finish", str(study.path)
+                "design space",
+                study.space.count,
+                "at least one design that [locus] and [fit] can make",
+                str(study.path),
             )
         problem = problem_of(study, designs)
         merit = ranking(problem, designs)

@@ -164,10 +164,3 @@ def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str
             if b"definition" in about:
                 definitions.setdefault(column.name, about[b"definition"].decode())
     return units, definitions
-
-
-def made_by_fit(study: Study) -> tuple[set[str], set[str]]:
-    """Parameters that [fit] sets, and those it scales, so that their values in the study are proportions only."""
-    if study.fit is None:
-        return set(), set()
-    return set(study.fit.parameters(study.family)), set(study.fit.rescaled(study.family))

@@ -12,7 +12,7 @@ from kernels import status as codes
 from sweep.errors import StoreError
 from sweep.report import answer, tables
 from sweep.report.curves import motion_caption, motion_figure
-from sweep.report.dataset import Dataset, made_by_fit, read_dataset
+from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.drawing import COORDINATE, mechanism_figure
 from sweep.report.figures import TEMPLATES, Saved, house_style, save
 from sweep.report.files import copy_tables, write_survivors
@@ -69,11 +69,11 @@ def divided_axes(study: Study, feasible: int) -> list[Cells]:
     """The swept axes, divided into cells: finely if a single map shows them all, else coarsely.
 
     Axes of a sample are divided so that a cell holds some of the ``feasible`` designs on average.  Left out are signs,
-    which make no map, and what [fit] changes afterwards.
+    which make no map, and what [locus] or [fit] makes.
     """
     signs = {p.name for p in study.family.parameters if p.choices is not None}
-    fitted, scaled = made_by_fit(study)
-    swept = [axis for axis in study.space.axes if axis.high > axis.low and axis.name not in signs | fitted | scaled]
+    left_out = signs.union(study.made, study.rescaled)
+    swept = [axis for axis in study.space.axes if axis.high > axis.low and axis.name not in left_out]
     most = CELLS_OF_PAIR if len(swept) <= 2 else CELLS_OF_MANY
     if study.space.kind == "sobol":
         # A power of two: a Sobol sequence puts equally many points into such cells.

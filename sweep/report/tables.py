@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
-from sweep.report.dataset import made_by_fit
 from sweep.report.quantities import Quantity, number, percent_change, quantity
 
 if TYPE_CHECKING:
@@ -88,22 +87,22 @@ def change(shown: Quantity, value: float, other: float) -> str:
 def parameter_rows(data: Dataset) -> list[ParameterRow]:
     """All parameters of the mechanism with what was searched."""
     study, rows = data.study, []
-    fitted, scaled = made_by_fit(study)
+    links = () if study.locus is None else study.locus.made
     for p in study.family.parameters:
         shown = quantity(p.name, data.units.get(p.name, {"length": "mm", "angle": "rad"}.get(p.unit, "1")))
         value, other = _number(data.result, p.name), _number(data.reference, p.name)
         space, edge = "fixed", ""
         low, high = study.space.bounds.get(p.name, (math.nan, math.nan))
-        if p.name in fitted:
-            space = "fitted"
+        if p.name in study.made:
+            space = "follows from the limit positions" if p.name in links else "fitted"
         elif p.choices is not None and high > low:
             space = " or ".join(number(choice) for choice in p.choices)
         elif high > low:
             space = f"{number(low * shown.factor)} to {shown.show(high)}"
             near = 1e-9 * (high - low)
-            if p.name not in scaled:
+            if p.name not in study.rescaled:
                 edge = "lower edge" if value - low <= near else "upper edge" if high - value <= near else ""
-        space += ", then scaled" if p.name in scaled else ""
+        space += ", then scaled" if p.name in study.rescaled else ""
         rows.append(ParameterRow(p.name, p.text, shown.show(value, 6), shown.show(other, 6), space, edge))
     return rows
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 from sweep.families.base import Family, Parameter
 from sweep.study import units
@@ -16,6 +16,8 @@ from sweep.study.sobol import DIMENSIONS
 from sweep.study.space import Axis, DesignSpace
 
 MOST_DESIGNS = 10**12
+
+Entry: TypeAlias = Axis | float
 
 
 @dataclass(frozen=True)
@@ -32,29 +34,36 @@ def read_space(
     faults: Faults,
     fitted: tuple[str, ...] = (),
     given: Mapping[str, float] = MappingProxyType({}),
+    made: tuple[str, ...] = (),
+    prescribed: Mapping[str, Entry] = MappingProxyType({}),
 ) -> DesignSpace | None:
     """The designs of a study, or None if a parameter is faulty (all faults are reported).
 
     ``fitted`` parameters are set by [fit]: they must not be given, except lam, which then says where "up" is.
-    ``given`` ones have their value from [scene] and must not be given again.
+    ``given`` ones have their value from [scene] and must not be given again.  ``made`` ones follow from [locus], whose
+    ``prescribed`` outputs take their place in the space.
     """
     before = len(faults.lines)
     sample = read_section(SampleTable, raw["sample"], ("design", "sample"), faults) if "sample" in raw else None
-    _check_names(family, raw, ("design",), faults, extra=("sample",), fitted=(*fitted, *given))
+    _check_names(family, raw, ("design",), faults, extra=("sample",), fitted=(*fitted, *given, *made))
     for name in given:
         if name in raw:
             faults.value(("design", name), raw[name], "nothing here: [scene] gives it")
     for name in fitted:
         if name in raw and not name.startswith("lam"):
             faults.value(("design", name), raw[name], "nothing here: [fit] finds it")
-    found: dict[str, Axis | float] = {}
+    for name in made:
+        if name in raw:
+            faults.value(("design", name), raw[name], "nothing here: it follows from [locus]")
+    found: dict[str, Entry] = dict(prescribed)
     for name in [name for name in raw if name in family.parameter_names]:
         parameter = next(p for p in family.parameters if p.name == name)
-        entry = _read_entry(parameter, raw[name], ("design", name), faults, sampled=sample is not None)
+        entry = read_entry(parameter, raw[name], ("design", name), faults, sampled=sample is not None)
         if entry is not None:
             found[name] = entry
     axes = tuple(entry for entry in found.values() if isinstance(entry, Axis))
-    fixed = {p.name: p.default for p in family.parameters if p.default is not None and p.name not in found}
+    own = [p for p in family.parameters if p.name not in made]
+    fixed = {p.name: p.default for p in own if p.default is not None and p.name not in found}
     fixed |= {name: 0.0 for name in fitted if name not in found} | dict(given)
     fixed |= {name: entry for name, entry in found.items() if not isinstance(entry, Axis)}
     if sample is None and (count := math.prod(axis.count for axis in axes)) > MOST_DESIGNS:
@@ -63,9 +72,10 @@ def read_space(
         faults.value(("design", "sample"), f"{len(axes)} swept parameters", f"1 to {DIMENSIONS} with from and to")
     if len(faults.lines) > before:
         return None
+    names = (*prescribed, *(p.name for p in own))
     if sample is None:
-        return DesignSpace(family.parameter_names, axes, fixed)
-    return DesignSpace(family.parameter_names, axes, fixed, "sobol", sample.n or 0, sample.seed)
+        return DesignSpace(names, axes, fixed)
+    return DesignSpace(names, axes, fixed, "sobol", sample.n or 0, sample.seed)
 
 
 def read_reference(
@@ -82,7 +92,7 @@ def read_reference(
             if isinstance(entry, dict) and "value" not in entry:
                 faults.value(place, entry, f"one value: {_forms(parameter)}")
                 continue
-            value = _read_entry(parameter, entry, place, faults, sampled=False)
+            value = read_entry(parameter, entry, place, faults, sampled=False)
             if isinstance(value, float):
                 values[parameter.name] = value
     return {name: values[name] for name in family.parameter_names if name in values}
@@ -105,13 +115,19 @@ def _check_names(
             )
     for p in family.parameters:
         if p.name not in raw and p.default is None and p.name not in fitted:
-            axis = "" if key[0] == "reference" else f", or an axis {_axis_form(p)}"
-            faults.missing((*key, p.name), f"{p.text}: {_forms(p)}{axis}")
+            needed = f"{p.text}: {_forms(p)}" if key[0] == "reference" else missing_parameter(p)
+            faults.missing((*key, p.name), needed)
 
 
-def _read_entry(p: Parameter, raw: object, key: Key, faults: Faults, sampled: bool) -> Axis | float | None:
+def missing_parameter(p: Parameter) -> str:
+    """What is needed where a parameter is missing: its meaning and the right ways to write it."""
+    return f"{p.text}: {_forms(p)}, or an axis {_axis_form(p)}"
+
+
+def read_entry(p: Parameter, raw: object, key: Key, faults: Faults, sampled: bool) -> Entry | None:
+    """A parameter as written: a value [mm, rad], an axis, or None if it is faulty."""
     before = len(faults.lines)
-    entry: Axis | float | None
+    entry: Entry | None
     if not isinstance(raw, dict):
         entry = _read_plain(p, raw, key, faults)
     elif "values" in raw:

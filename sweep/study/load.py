@@ -33,6 +33,7 @@ from sweep.study.model import (
     SceneSection,
     StudySection,
 )
+from sweep.study.prescribed import prescribed_limits, read_locus, read_prescribed
 from sweep.study.study import Budget, Objective, OptimiseSettings, OutputSettings, Study
 
 if TYPE_CHECKING:
@@ -141,6 +142,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     goal = _section(ObjectiveSection, "objective", data, faults).minimise
     accuracy = _accuracy(_section(AccuracySection, "accuracy", data, faults), faults)
     design = _free_table("design", data, faults)
+    prescribed_table = _free_table("locus", data, faults)
     bounds = _free_table("limits", data, faults)
     reference_design = _section(ReferenceSection, "reference", data, faults).design
     families = _families(_section(MechanismSection, "mechanism", data, faults), data, faults)
@@ -163,21 +165,27 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     given = {} if speed is None else {p: speed for p in family.parameter_names if SPEED.fullmatch(p)}
     for k, name in _texts(data, "scene", "want"):
         read_output_name(family, name, ("scene", "want", k), faults)
-    limits = read_limits(family, bounds or {}, faults)
+    locus = read_locus(bare, faults) if prescribed_table is not None else None
+    sampled = isinstance(design, dict) and "sample" in design
+    prescribed = {} if locus is None else read_prescribed(locus, prescribed_table or {}, faults, sampled)
+    for name in [name for name in bounds or () if name in prescribed]:
+        faults.value(("limits", name), (bounds or {})[name], "nothing here: [locus] prescribes it")
+    limits = (*prescribed_limits(prescribed), *read_limits(family, bounds or {}, faults))
     if goal is not None:
         read_output_name(family, goal, ("objective", "minimise"), faults)
     fit = _fit(_section(FitSection, "fit", data, faults), family, faults) if "fit" in data else None
     fitted = fit.parameters(family) if fit is not None else ()
-    space = None if design is None else read_space(family, design, faults, fitted, given)
+    made = () if locus is None else locus.made
+    space = None if design is None else read_space(family, design, faults, fitted, given, made, prescribed)
     # The inputs of effects describe the scene: the reference design has the same unless it says otherwise.
     if space is not None:
-        given |= {name: x for name, x in space.fixed.items() if name not in bare.parameter_names}
+        given |= {name: x for name, x in space.fixed.items() if name not in (*bare.parameter_names, *prescribed)}
     reference = None if reference_design is None else read_reference(family, reference_design, faults, given)
-    _check_curves(report, [name for name in design or () if name in family.parameter_names], faults)
+    _check_curves(report, [*prescribed, *(name for name in design or () if name in family.parameter_names)], faults)
     if faults.lines or space is None or disk_bytes is None or seconds is None:
         raise StudyError(str(path), faults.lines)
 
-    wanted = [*scene.want, *(limit.output for limit in limits), *([goal] if goal else [])]
+    wanted = [*scene.want, *prescribed, *(limit.output for limit in limits), *([goal] if goal else [])]
     defaults = {"accuracy": _without_none(accuracy.__dict__), "output": output.model_dump()}
     return Study(
         name=about.name or "",
@@ -188,6 +196,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         speed=speed,
         want=tuple(name for name in dict.fromkeys(wanted) if name not in family.parameter_names),
         space=space,
+        locus=locus,
         fit=fit,
         limits=limits,
         objective=Objective(goal) if goal else None,

@@ -175,6 +175,7 @@ TABLES = (
     "mechanism",
     "scene",
     "design",
+    "locus",
     "fit",
     "limits",
     "objective",

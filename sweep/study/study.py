@@ -17,6 +17,7 @@ from sweep.study.space import DesignSpace
 
 if TYPE_CHECKING:
     from sweep.fit import LineFit
+    from sweep.locus import OnLocus
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,7 @@ class Study:
     speed: float | None
     want: tuple[str, ...]
     space: DesignSpace
+    locus: OnLocus | None
     fit: LineFit | None
     limits: tuple[Limit, ...]
     objective: Objective | None
@@ -101,6 +103,27 @@ class Study:
         """The limits that bound a design output."""
         return tuple(limit for limit in self.limits if limit.output not in self.family.parameter_names)
 
+    @property
+    def prescribed(self) -> tuple[str, ...]:
+        """Design outputs that [locus] prescribes."""
+        return () if self.locus is None else tuple(p.name for p in self.locus.prescribed)
+
+    @property
+    def tested_limits(self) -> tuple[Limit, ...]:
+        """The limits that a design of the sweep may miss: those of prescribed outputs are met by construction."""
+        return tuple(limit for limit in self.output_limits if limit.output not in self.prescribed)
+
+    @property
+    def made(self) -> tuple[str, ...]:
+        """Parameters that [locus] or [fit] sets."""
+        links = () if self.locus is None else self.locus.made
+        return links if self.fit is None else (*links, *self.fit.parameters(self.family))
+
+    @property
+    def rescaled(self) -> tuple[str, ...]:
+        """Parameters whose values in the study are proportions only: [fit] scales them."""
+        return () if self.fit is None else self.fit.rescaled(self.family)
+
     @cached_property
     def family(self) -> Family:
         """The mechanism, a family or the chain of several, with the effects that what is wanted calls for."""
@@ -117,6 +140,7 @@ class Study:
             "speed": self.speed,
             "want": self.want,
             "space": _space_content(self.space),
+            "locus": self.prescribed,
             "fit": self.fit and asdict(self.fit),
             "limits": sorted((limit.output, limit.minimum, limit.maximum) for limit in self.limits),
             "objective": self.objective and self.objective.output,

@@ -1,0 +1,68 @@
+"""[locus]: the limit positions of the first stage as values or axes, each given once, in its unit, within its range."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sweep.families.base import Family
+from sweep.families.chain import Chain
+from sweep.locus import OnLocus
+from sweep.study.design import Entry, missing_parameter, read_entry
+from sweep.study.faults import Faults
+from sweep.study.space import Axis
+from sweep.study.study import Limit
+from sweep.synthesis import LOCI
+
+WHOLE_TURN = 2.0 * np.pi * (1.0 - 1e-12)
+
+
+def read_locus(family: Family, faults: Faults) -> OnLocus | None:
+    """The stage that [locus] is about, or None with a fault if it has no locus."""
+    first = family.stages[0].family.name if isinstance(family, Chain) else family.name
+    known = tuple(dict.fromkeys(way.family for way in LOCI))
+    if first not in known:
+        faults.value(("locus",), first, f"a mechanism that is or begins with {' or '.join(known)}")
+        return None
+    return OnLocus(first, "1" if isinstance(family, Chain) else "")
+
+
+def read_prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled: bool) -> dict[str, Entry]:
+    """The prescribed outputs as fixed values or axes; faulty ones are reported and left out."""
+    known = [p.name for p in locus.prescribed]
+    for name in raw:
+        if name not in known:
+            faults.unknown(("locus", name), [k for k in known if k not in raw] or known)
+    found: dict[str, Entry] = {}
+    for p in locus.prescribed:
+        if p.name not in raw:
+            faults.missing(("locus", p.name), missing_parameter(p))
+            continue
+        entry = read_entry(p, raw[p.name], ("locus", p.name), faults, sampled)
+        if entry is None:
+            continue
+        wrong = locus.allowed(p.name, _values(entry))
+        if wrong is not None:
+            faults.value(("locus", p.name), raw[p.name], wrong)
+        found[p.name] = entry
+    return found
+
+
+def prescribed_limits(entries: Mapping[str, Entry]) -> tuple[Limit, ...]:
+    """What is prescribed, as limits: values as equations, axes as bounds; what is swept over a whole turn has none."""
+    found = []
+    for name, entry in entries.items():
+        ends = _values(entry)
+        if isinstance(entry, Axis) and float(np.ptp(ends)) >= WHOLE_TURN:
+            continue
+        sizes = np.abs(ends)
+        found.append(Limit(name, float(sizes.min()), float(sizes.max())))
+    return tuple(found)
+
+
+def _values(entry: Entry) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    if not isinstance(entry, Axis):
+        return np.array([entry])
+    return np.array([entry.low, entry.high]) if entry.values is None else np.asarray(entry.values)
