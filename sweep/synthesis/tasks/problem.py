@@ -1,4 +1,4 @@
-"""What a task is to the solver: unknowns in a box, equations, limits, and a curve whose largest magnitude is minimised."""
+"""What a task is to the solver: unknowns in a box, equations, limits, a curve whose largest magnitude is minimised."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class Unknown(NamedTuple):
 class Candidates(NamedTuple):
     """What n candidates are worth; all nan in a row where there is no mechanism.
 
-    ``equations`` (n, p) vanish at a solution, ``limits`` (n, q) are kept where they are not negative, both scaled so that
-    1 is a large violation.  The objective of a candidate is the largest magnitude in its row of ``curve`` (n, m).
+    ``equations`` (n, p) vanish at a solution, ``limits`` (n, q) are kept where they are not negative, both scaled so
+    that 1 is a large violation.  The objective of a candidate is the largest magnitude in its row of ``curve`` (n, m).
     ``results`` holds the mechanisms: columns of (n,), named as the families name their parameters.
     """
 
