@@ -8,6 +8,7 @@ from pathlib import Path
 
 from studies.accuracy import costs, oracle
 from studies.accuracy.diagrams import extrema_table, position_table
+from studies.accuracy.exact import exact_table
 from studies.accuracy.figures import draw
 from studies.accuracy.machine import description
 from studies.accuracy.marks import marks
@@ -41,6 +42,7 @@ def main() -> None:
         regions=tuple((area.name, area.text) for area in areas),
         marks=pd.DataFrame([mark.__dict__ for mark in marks(*((500, 50) if smoke else (100_000, 2000)))]),
         positions=position_table(areas, 15 if smoke else 400),
+        exact=exact_table(areas, 15 if smoke else 400),
         extrema=extrema_table(areas, smoke),
         outputs=costs.output_costs(areas[0].designs, smoke),
         storage=costs.storage_costs(20_000 if smoke else 500_000),

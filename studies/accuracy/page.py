@@ -28,6 +28,7 @@ class Measured:
     regions: tuple[tuple[str, str], ...]
     marks: pd.DataFrame
     positions: pd.DataFrame
+    exact: pd.DataFrame
     extrema: pd.DataFrame
     outputs: pd.DataFrame
     storage: pd.DataFrame
@@ -192,6 +193,26 @@ def _positions(m: Measured) -> list[str]:
         "## Positions and derivatives against 60 digits",
         "",
         "Random crank angles. cond is the sum over all inputs of abs(x dy/dx): what one rounding of each input does.",
+        "",
+        *pipe_table(head, rows),
+        *_exact(m),
+    ]
+
+
+def _exact(m: Measured) -> list[str]:
+    rows = [
+        [r.region, r.constant, sig(r.psi), sig(r.dpsi), sig(r.d2psi), sig(r.d3psi), f"{r.ns_per_design:.0f}"]
+        for r in m.exact.itertuples()
+    ]
+    head = ["region", "closure constant", "psi [rad]", "dpsi", "d2psi", "d3psi", "more ns per design"]
+    return [
+        "",
+        "## Doubles meant to the last bit",
+        "",
+        "A long coupler multiplies the rounding of its own length; that is in cond, and a drawing loses nothing by it.",
+        "Where the given doubles are exact (a comparison with exact arithmetic), the closure constant can be summed in",
+        "twice the working precision, once per design: `kernels.families.rssr.exact`. Largest errors, of the derivatives",
+        "relative to their own size plus that of the velocity:",
         "",
         *pipe_table(head, rows),
     ]
