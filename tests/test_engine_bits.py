@@ -96,7 +96,7 @@ def test_cascade_runs_a_route_only_on_survivors(
     monkeypatch.setattr("sweep.chunk.design_outputs", recorder.design_outputs)
     limits = (Limit("x", 20.0, None), Limit("y", None, 100.0))
     tiny = replace(study, want=("x", "y", "z"), limits=limits, output=OutputSettings(keep))
-    matrix = parameter_matrix(tiny, 0, tiny.space.count)
+    matrix, made = parameter_matrix(tiny, 0, tiny.space.count)
     a, b = matrix[:, 0], matrix[:, 1]
     found = cascade(tiny, matrix, made)
 
