@@ -36,7 +36,7 @@ class Multipliers:
     residual: float
 
 
-def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array) -> Multipliers:
+def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, within: float = ACTIVE) -> Multipliers:
     """Multipliers of the active rows and bounds by non-negative least squares (equations are free in sign).
 
     Parameters
@@ -45,11 +45,12 @@ def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array) -> M
     rows : (R,) its rows there
     jacobian : (R, n) their gradients by the scaled variables
     fractions : (n,) scaled variables
+    within : scaled distance from its bound at which a row may carry a multiplier
     """
     from scipy.optimize import nnls
 
     n = len(fractions)
-    active = np.flatnonzero((rows <= ACTIVE) | form.equal)
+    active = np.flatnonzero((rows <= within) | form.equal)
     lower, upper = np.flatnonzero(fractions <= 1e-10), np.flatnonzero(fractions >= 1.0 - 1e-10)
     if not np.isfinite(jacobian[active]).all():
         return Multipliers(np.zeros(len(rows)), np.zeros(n), np.zeros(n, np.bool_), math.nan)

@@ -16,7 +16,8 @@ from sweep.optimise.model import FEASIBLE, Model, State
 from sweep.optimise.points import STATIC, Points
 from sweep.optimise.problem import Problem
 
-ROUNDS = 60
+ROUNDS, CYCLES = 60, 3
+KKT = 1e-6  # residual of a converged result
 NEAR_ANGLE = 0.1  # a followed point reaches this far by itself [rad]
 NEAR = 1e-3  # scaled violation from which the objective is looked at
 Propose: TypeAlias = Callable[[Model, State, Form, float, float, float | None], tuple[Array, float]]
@@ -44,8 +45,11 @@ class Descent:
             if not self.best.feasible:
                 self._restore()
             if math.isfinite(self.best.objective) and self.best.violation < NEAR:
-                self._rounds(slsqp.propose, relaxed=False, enough=1e-4)
-                self._rounds(newton.propose, relaxed=False, enough=1e-13)
+                for _ in range(CYCLES):
+                    self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=4)
+                    self._rounds(newton.propose, relaxed=False, enough=1e-13)
+                    if self.model.certificate(self.best).residual <= KKT:
+                        break
                 self.best = newton.polish(self.model, newton.repair(self.model, self.best))
             if self._verified():
                 break
@@ -64,13 +68,13 @@ class Descent:
         if not self.best.feasible and self.best.form.complete:
             self._rounds(newton.propose, relaxed=True, enough=1e-13)
 
-    def _rounds(self, propose: Propose, relaxed: bool, enough: float) -> None:
+    def _rounds(self, propose: Propose, relaxed: bool, enough: float, rounds: int = ROUNDS) -> None:
         """Let ``propose`` find the next design, keep it if its true extrema are better, until it gains too little.
 
         A refused design shortens the next step, and its extrema that the rows did not know are added to them.
         """
         radius, extra, refused = 0.25, Points.of([]), False
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             at = self.best
             form, t, floor = self.model.with_points(at, extra), at.objective, None
             if not refused:

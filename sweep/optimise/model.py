@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sweep.families.base import Array
-from sweep.optimise.certificate import Multipliers, multipliers
+from sweep.optimise.certificate import ACTIVE, Multipliers, multipliers
 from sweep.optimise.form import Form, Program
 from sweep.optimise.gradients import gradients, scalar_gradient
 from sweep.optimise.points import Curves, Points
@@ -128,9 +128,11 @@ class Model:
 
         A higher price than needed forbids steps along curved limits that a later step would bring back.
         """
+        if state.violation > ACTIVE:
+            return  # the rows that hold are not at their bounds: their multipliers mean nothing
         weights = self.certificate(state).weights
         limits = [abs(w) for w, label in zip(weights, state.form.labels, strict=True) if label.side != "objective"]
-        self.price = max(2.0 * float(sum(limits)), 0.1)
+        self.price = max(2.0 * float(sum(limits)), 0.5 * self.price, 1.0)
 
     def _scalar(self, name: str, fractions: Array) -> Array:
         from sweep.summaries import design_outputs

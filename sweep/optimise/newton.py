@@ -9,14 +9,15 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.families.base import Array
-from sweep.optimise.certificate import Multipliers, multipliers
+from sweep.optimise.certificate import ACTIVE, Multipliers, multipliers
 from sweep.optimise.form import Form
-from sweep.optimise.model import Model, State
+from sweep.optimise.model import FEASIBLE, Model, State
 from sweep.optimise.points import Index
-from sweep.optimise.slsqp import minimise_last
 
+CORRECTIONS = 8  # of a step along curved limits, each two or three milliseconds
 DIFFERENCE = 1e-5  # of the scaled variables; gradients are good to 1e-12, so the Hessian is to 1e-5
-QUADRATIC_ITERATIONS = 60
+FLAT = 1e-6  # smallest curvature of the quadratic model: the objective is about 1, the variables run from 0 to 1
+BEND = 1e-4  # curvature lent to t and to the violation, which have none; it changes multipliers by 1e-4 of the step
 
 
 def propose(model: Model, at: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:
@@ -27,25 +28,27 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
     points = form.points
     jacobian = np.nan_to_num(model.jacobian(at.fractions, form, points))
     rows = form.rows(model.atoms(at.fractions, form, points), t)
-    found = multipliers(form, rows, jacobian, at.fractions)
+    # Of a design that misses its limits a little, the rows that will hold are not all at their bounds.
+    found = multipliers(form, rows, jacobian, at.fractions, max(ACTIVE, 10.0 * min(at.violation, 1e-3)))
     curvature = hessian(model, at, form, found, np.arange(len(at.fractions)))
     full = np.column_stack([jacobian, form.slack])
     low, high = np.maximum(-radius, -at.fractions), np.minimum(radius, 1.0 - at.fractions)
-    bounds = [*zip(low, high, strict=True), (None if floor is None else floor - t, None)]
-    step = _quadratic(curvature, full, rows, form, bounds)
+    box = (low, high, -np.inf if floor is None else floor - t)
+    step = _quadratic(curvature, full, rows, form, box, model.price)
     best, value = step, np.inf
-    for _ in range(2):
+    for _ in range(CORRECTIONS):
         there = np.clip(at.fractions + step[:-1], 0.0, 1.0)
         _, atoms = model.moved(there, form, points)
         true = form.rows(atoms, t + step[-1])
-        merit = step[-1] + model.price * float(
-            np.maximum(np.where(form.equal, np.abs(true), -true), 0.0).max(initial=0.0)
-        )
-        if not merit < value - 1e-14:
+        missed = float(np.maximum(np.where(form.equal, np.abs(true), -true), 0.0).max(initial=0.0))
+        merit = step[-1] + model.price * missed
+        if not merit < value:
             break
         best, value = step, merit
+        if missed <= FEASIBLE:
+            break
         # The rows bend away from their tangents: aim beside by what was missed.
-        step = _quadratic(curvature, full, true - full @ step, form, bounds)
+        step = _quadratic(curvature, full, true - full @ step, form, box, model.price)
     return np.clip(at.fractions + best[:-1], 0.0, 1.0), t + float(best[-1])
 
 
@@ -63,29 +66,64 @@ def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index
     return np.asarray(0.5 * (square + square.T), np.float64)
 
 
-def _quadratic(curvature: Array, full: Array, rows: Array, form: Form, bounds: list[tuple[object, object]]) -> Array:
-    """Step (n + 1,) that makes t + half the curvature small under linear rows within bounds."""
+def _quadratic(
+    curvature: Array, full: Array, rows: Array, form: Form, box: tuple[Array, Array, float], price: float
+) -> Array:
+    """Step (d, t) that makes t + d'Hd/2 + price v small; every limit's linear row may be missed by v.
+
+    A least-distance problem, solved by non-negative least squares (Lawson and Hanson 1974, chapter 23): in the axes of
+    the curvature the objective is the distance from a point.  Negative curvature counts as positive of the same size,
+    so the step always leads downwards and the box keeps it short.
+    """
+    from scipy.optimize import nnls
+
     n = len(curvature)
-
-    def model(z: Array) -> tuple[float, Array]:
-        bent = curvature @ z[:n]
-        return float(z[n] + 0.5 * z[:n] @ bent), np.concatenate([bent, [1.0]])
-
-    return minimise_last(
-        np.zeros(n + 1), bounds, form.equal, lambda z: rows + full @ z, lambda z: full, QUADRATIC_ITERATIONS, model
-    )
+    values, axes = np.linalg.eigh(curvature)
+    stiffness = np.concatenate([np.maximum(np.abs(values), FLAT), [BEND, BEND]])
+    back = np.zeros((n + 2, n + 2))
+    back[:n, :n], back[n, n], back[n + 1, n + 1] = axes, 1.0, 1.0
+    back /= np.sqrt(stiffness)
+    centre = back.T @ np.concatenate([np.zeros(n), [1.0, price]])
+    gives = np.array([label.side != "objective" for label in form.labels], dtype=np.float64)
+    linear = np.column_stack([full, gives])
+    twice = np.column_stack([-full, gives])[form.equal]
+    low, high, floor = box
+    unit = np.eye(n + 2)
+    sides = np.concatenate([linear, twice, unit[:n], -unit[:n], unit[n:]])
+    bounds = np.concatenate([rows, -rows[form.equal], -low, high, [-floor, 0.0]])
+    known = np.isfinite(bounds)
+    original, bounds = sides[known], bounds[known]
+    sides = original @ back
+    # sides @ (y - centre) + bounds >= 0, |y| smallest
+    size = np.linalg.norm(sides, axis=1)
+    size[size == 0.0] = 1.0
+    sides, needs = sides / size[:, None], (sides @ centre - bounds) / size
+    target = np.zeros(n + 3)
+    target[-1] = 1.0
+    matrix = np.concatenate([sides.T, needs[None, :]])
+    held = nnls(matrix, target)[0]
+    left = matrix @ held - target
+    if not abs(left[-1]) > 1e-300:
+        return np.zeros(n + 1)
+    step = back @ (-left[:-1] / left[-1] - centre)
+    # A straightness of 0.01 mm on links of 100 mm has slopes of 1e4: the rows that hold must hold to the last digit.
+    original, offsets = original[held > 0.0], bounds[held > 0.0]
+    for _ in range(2):
+        step -= np.linalg.lstsq(original, original @ step + offsets, rcond=1e-13)[0]
+    return np.asarray(step[: n + 1], np.float64)
 
 
 def repair(model: Model, state: State) -> State:
-    """Bring a nearly feasible design back within its limits by the smallest steps that meet the violated rows."""
+    """Bring a nearly feasible design within its limits by small steps that mend violated rows and keep close ones."""
     for _ in range(5):
         if state.feasible or not state.violation < 1e-2:
             break
         c = state.form.rows(state.atoms, state.objective)
         limits = np.array([label.side != "objective" for label in state.form.labels], dtype=np.bool_)
-        missed = limits & ((c < 0.0) | state.form.equal)
-        jacobian = np.nan_to_num(model.jacobian(state.fractions, state.form, state.form.points))[missed]
-        step = np.linalg.lstsq(jacobian, -c[missed], rcond=1e-12)[0]
+        close = limits & ((c <= ACTIVE) | state.form.equal)
+        wanted = np.where(state.form.equal, -c, np.maximum(-c, 0.0))[close]
+        jacobian = np.nan_to_num(model.jacobian(state.fractions, state.form, state.form.points))[close]
+        step = np.linalg.lstsq(jacobian, wanted, rcond=1e-12)[0]
         new = model.state(np.clip(state.fractions + step, 0.0, 1.0))
         if not new.violation < state.violation:
             break

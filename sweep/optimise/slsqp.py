@@ -10,7 +10,7 @@ from sweep.families.base import Array
 from sweep.optimise.form import Form
 from sweep.optimise.model import Model, State
 
-ITERATIONS = 60
+ITERATIONS = 20
 
 
 def propose(model: Model, at: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:
@@ -28,32 +28,27 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
     -------
     The scaled variables (n,) and the t reached with these rows.
     """
+    from scipy.optimize import minimize
+
     trail = _Trail(model, form)
     low, high = np.maximum(at.fractions - radius, 0.0), np.minimum(at.fractions + radius, 1.0)
     begin = np.concatenate([at.fractions, [t]])
     bounds = [*zip(low, high, strict=True), (floor, None)]
-    z = minimise_last(begin, bounds, form.equal, trail.rows, trail.jacobian, ITERATIONS)
-    return np.clip(z[:-1], low, high), float(z[-1])
-
-
-def minimise_last(
-    begin: Array, bounds: Any, equal: Any, rows: Any, jacobian: Any, iterations: int, objective: Any = None
-) -> Array:
-    """Run SLSQP; the objective is the last variable unless another (value and gradient) is given."""
-    from scipy.optimize import minimize
-
     gradient = np.zeros(len(begin))
     gradient[-1] = 1.0
-    last = (lambda z: (z[-1], gradient)) if objective is None else objective
     constraints = [
-        {"type": kind, "fun": lambda z, own=own: rows(z)[own], "jac": lambda z, own=own: jacobian(z)[own]}
-        for kind, own in (("ineq", ~equal), ("eq", equal))
+        {"type": kind, "fun": lambda z, own=own: trail.rows(z)[own], "jac": lambda z, own=own: trail.jacobian(z)[own]}
+        for kind, own in (("ineq", ~form.equal), ("eq", form.equal))
         if own.any()
     ]
     run: Any = minimize
-    options = {"maxiter": iterations, "ftol": 1e-13}
-    found = run(last, begin, jac=True, method="SLSQP", bounds=bounds, constraints=constraints, options=options)
-    return np.asarray(found.x, np.float64) if np.isfinite(found.x).all() else begin
+    options = {"maxiter": ITERATIONS, "ftol": 1e-13}
+    found = run(
+        lambda z: (z[-1], gradient), begin, jac=True, method="SLSQP", bounds=bounds, constraints=constraints,
+        options=options,
+    )  # fmt: skip
+    z = found.x if np.isfinite(found.x).all() else begin
+    return np.clip(z[:-1], low, high), float(z[-1])
 
 
 class _Trail:

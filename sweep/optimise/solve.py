@@ -14,15 +14,13 @@ from kernels import status as st
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.optimise.certificate import AGREE, Result, in_words
-from sweep.optimise.descent import Descent
+from sweep.optimise.descent import KKT, Descent
 from sweep.optimise.form import Program
 from sweep.optimise.model import State, Stopped
 from sweep.optimise.problem import PLACE, Problem
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings
-
-KKT = 1e-6  # residual of a converged result
 
 
 def minimise(
