@@ -10,7 +10,9 @@ STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
-	@echo "studies: $(STUDIES)"
+	@printf 'study-NAME            run or resume one study, into results/NAME\n'
+	@printf 'smoke-NAME            its tiny version, into results/smoke/NAME\n'
+	@echo "NAME is one of: $(STUDIES)"
 
 $(VENV)/ready: pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit("linksweep needs Python 3.11 or later") if sys.version_info < (3, 11) else None'
@@ -37,11 +39,11 @@ check: lint types imports test  ## what CI runs first
 
 smoke: $(STUDIES:%=smoke-%) smoke-accuracy  ## every study's tiny version
 
-study-%: $(VENV)/ready  ## run or resume one study, into results/<study>
+$(STUDIES:%=study-%): study-%: $(VENV)/ready
 	$(SWEEP) run studies/$* --out results/$*/designs
 	$(SWEEP) report results/$*/designs --out results/$*
 
-smoke-%: $(VENV)/ready  ## the tiny version of one study, into results/smoke/<study>
+$(STUDIES:%=smoke-%): smoke-%: $(VENV)/ready
 	$(SWEEP) run studies/$* --smoke --force --out results/smoke/$*/designs
 	$(SWEEP) report results/smoke/$*/designs --out results/smoke/$*
 
