@@ -21,7 +21,8 @@ _EXACT = Accuracy(target=1e-10)
 @lru_cache(maxsize=8)
 def turn(poses: int = POSES) -> Angles:
     """Equidistant crank angles of one turn, (1, poses)."""
-    return Angles.of(np.arange(poses)[None, :] * (2.0 * np.pi / poses))
+    phi: Array = np.arange(poses, dtype=np.float64)[None, :] * (2.0 * np.pi / poses)
+    return Angles.of(phi)
 
 
 def designs_on_locus(
@@ -76,7 +77,8 @@ def least_cos2(designs: Array) -> Array:
 
 def pressure_limit(designs: Array, largest: float) -> Array:
     """Slack of the limit on the pressure angle, cos^2 - cos^2[largest]; pi/2 asks for a full turn only."""
-    return least_cos2(designs) - np.cos(largest) ** 2
+    slack: Array = least_cos2(designs) - np.cos(largest) ** 2
+    return slack
 
 
 def named(designs: Array, suffix: str = "") -> dict[str, Array]:

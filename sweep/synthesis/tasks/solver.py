@@ -17,7 +17,8 @@ from sweep.synthesis.tasks.problem import Problem, Solution
 BLOCK = 1024
 STEP = 3e-6  # of a central difference, in units of the box
 SHARE = 0.8  # poses with less than this part of the largest magnitude do not bound t
-ROUNDS = 8
+ROUNDS = 24
+WIDEST = 0.15  # first radius of a step, in units of the box
 MET = 1e-9  # largest residual and violation of a feasible solution
 
 
@@ -38,8 +39,8 @@ class _Scaled:
 
     def real(self, z: Array) -> Array:
         """Unknowns of points of the unit box."""
-        turned = np.where(self.periodic, z % 1.0, z)
-        return self.low + self.span * turned
+        x: Array = self.low + self.span * np.where(self.periodic, z % 1.0, z)
+        return x
 
     def rows(self, z: Array) -> _Value:
         """Values of points (n, k)."""
@@ -140,19 +141,27 @@ def _bounds(scaled: _Scaled, z: Array) -> tuple[Array, Array]:
 
 def _refined(scaled: _Scaled, z: Array) -> Array:
     z = _restored(scaled, z)
-    best, before = z, np.inf
+    value = scaled.rows(z)
+    best = float(np.abs(value.curve).max())
+    if not np.isfinite(best) or _violation(value)[0] > MET:
+        return z
+    # Poses that have once been near the largest magnitude stay in the program, so a step cannot overlook them twice.
+    used, radius = np.zeros(value.curve.shape[1], np.bool_), WIDEST
     for _ in range(ROUNDS):
-        following = _restored(scaled, _descended(scaled, z))
+        used |= np.abs(value.curve[0]) >= SHARE * np.abs(value.curve[0]).max()
+        following = _restored(scaled, _descended(scaled, z, best, used, radius))
         value = scaled.rows(following)
         height = float(np.abs(value.curve).max())
-        if not np.isfinite(height) or _violation(value)[0] > MET:
+        kept = np.isfinite(height) and _violation(value)[0] <= MET
+        gain = best - height if kept else -np.inf
+        if gain > 0.0:
+            z, best = following, height
+        else:
+            radius *= 0.25
+            value = value if np.isfinite(height) else scaled.rows(z)
+        if abs(gain) <= 1e-10 * best:
             break
-        if height < before:
-            best = following
-        if height > before * (1.0 - 1e-9):
-            break
-        z, before = following, height
-    return best
+    return z
 
 
 def _restored(scaled: _Scaled, z: Array) -> Array:
@@ -188,15 +197,12 @@ def _restored(scaled: _Scaled, z: Array) -> Array:
     return point
 
 
-def _descended(scaled: _Scaled, z: Array) -> Array:
-    """SLSQP on the epigraph: t and the unknowns, t bounding the poses that come near the largest magnitude."""
+def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], radius: float) -> Array:
+    """SLSQP on the epigraph: t and the unknowns, t bounding the ``used`` poses, at most ``radius`` away."""
     from scipy.optimize import minimize
 
-    start = scaled.rows(z).curve[0]
-    top = float(np.abs(start).max())
-    if not top > 0.0 or not np.isfinite(top):
+    if not top > 0.0:
         return z
-    used = np.abs(start) >= SHARE * top
     memory: dict[bytes, tuple[Array, Array, Array, Array]] = {}
 
     def parts(point: Array) -> tuple[Array, Array, Array, Array]:
@@ -220,7 +226,6 @@ def _descended(scaled: _Scaled, z: Array) -> Array:
     if scaled.problem.equations:
         constraints.append({"type": "eq", "fun": lambda p: parts(p)[2], "jac": lambda p: parts(p)[3]})
     low, high = _bounds(scaled, z)
-    radius = 0.15
     bounds = [*zip(np.maximum(low, z - radius), np.minimum(high, z + radius), strict=True), (0.0, None)]
     run: Any = minimize
     found = run(

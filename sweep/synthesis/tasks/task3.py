@@ -102,9 +102,9 @@ class Task3:
         alive = np.flatnonzero((second[:, :3] > 0.0).all(axis=1))
         limits = design_outputs(RSSR, second[alive], ["swing", "phi0"], _EXACT)
         equations = np.full((len(x), len(self.equations)), np.nan)
-        equations[alive, 0] = limits["swing"] - self.second_swing
+        equations[alive, 0] = np.asarray(limits["swing"], np.float64) - self.second_swing
         if self.second_phi0 is not None:
-            equations[alive, 1] = limits["phi0"] - self.second_phi0
+            equations[alive, 1] = np.asarray(limits["phi0"], np.float64) - self.second_phi0
         slacks = [pressure_limit(d, self.max_pressure_angle) for d in (first, second)]
         curves = [np.asarray(motion(d, turn(), "d2psi")["d2psi"], np.float64) for d in (first, second)]
         columns = named(first)
@@ -140,7 +140,8 @@ def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
     if found["status"][0] != 0:
         raise InputError("design", dict(design), "a crank-rocker that turns fully and oscillates", "adjustments")
     rates = np.empty((1, len(PARAMETERS), 4))
-    kernels.limit_sensitivities(matrix, *(np.asarray(found[name], np.float64) for name in names), rates)
+    arguments = [matrix, *(np.asarray(found[name], np.float64) for name in names), rates]
+    kernels.limit_sensitivities(*arguments)
     psi_ext, phi_ext, psi_fold, phi_fold = rates[0].T
     swing, phi0 = psi_fold - psi_ext, phi_fold - phi_ext
     units = np.where(np.array(PARAMETERS) == "alpha", 1.0, matrix[0, 2])  # lengths by the rocker

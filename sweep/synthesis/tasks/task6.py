@@ -71,7 +71,8 @@ class Task6:
         four_bar = np.column_stack([ones, *x[:, :5].T, 0.0 * ones, 0.0 * ones, self.branch * ones])
         angles = Angles.of(np.column_stack([theta, theta + self.kappa * first.swing]))
         path = GUIDE.poses(four_bar, angles, frozenset(("s", "dev", "ds", "ddev")))
-        point, moving = (np.asarray(path[s]) + 1j * np.asarray(path[d]) for s, d in (("s", "dev"), ("ds", "ddev")))
+        s, dev, ds, ddev = (np.asarray(path[name], np.float64) for name in ("s", "dev", "ds", "ddev"))
+        point, moving = s + 1j * dev, ds + 1j * ddev
         chord = complex(*self.end) - complex(*self.start)
         with np.errstate(divide="ignore", invalid="ignore"):
             similarity = chord / (point[:, 1] - point[:, 0])

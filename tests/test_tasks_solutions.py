@@ -1,0 +1,272 @@
+"""Tasks 1 to 8: each solved once, the mechanism then checked by the families alone, without the task's own formulas."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import sweep
+from kernels import status as st
+from sweep.synthesis.tasks import (
+    EngineeringMethod,
+    Position,
+    SlotPosition,
+    Task1,
+    Task2,
+    Task3,
+    Task4,
+    Task5,
+    Task6,
+    Task7,
+    Task8,
+    adjustments,
+    solve,
+)
+
+RSSR = ("a", "b", "c", "e", "f", "g", "alpha", "branch")
+SPACE = {"e": 1.0, "g": 1.0, "alpha": 1.3}
+DRIVE = {"a": 0.4, "b": 1.8, "c": 1.2, "e": 1.5, "f": 1.2, "g": 1.0, "alpha": 1.3, "branch": -1.0}
+BOUNDS = {"b": (0.3, 8.0), "c": (0.3, 5.0)}
+STAGE_BOUNDS = {"b1": (0.3, 8.0), "c1": (0.3, 5.0)}
+
+
+@cache
+def best(problem):
+    """The best solution; problems are frozen, so each is solved once."""
+    solutions = solve(problem.build(), candidates=2048, starts=4)
+    assert solutions
+    assert solutions[0].feasible, str(solutions[0])
+    return solutions[0]
+
+
+class Case:
+    """A problem by name, hashable."""
+
+    def __init__(self, kind, **numbers):
+        self.kind, self.numbers = kind, numbers
+
+    def build(self):
+        return self.kind(**self.numbers)
+
+
+TASK1 = Case(
+    Task1, swing=0.9, phi0=3.3, **SPACE, positions=(Position(1.0, 0.25),), bounds=BOUNDS, max_pressure_angle=1.2
+)
+TASK2 = Case(Task2, swing_range=(0.5, 1.2), phi0_range=(2.9, 3.5), **SPACE, max_pressure_angle=1.2, bounds=BOUNDS,
+             positions=(Position(1.0, 0.2), Position(2.0, 0.6)))  # fmt: skip
+TASK3 = Case(Task3, swing=0.8, phi0=3.2, second_swing=0.6, second_phi0=3.2, adjusted="f", adjusted_range=(-4.0, 4.0),
+             **SPACE, f_range=(-3.0, 3.0), max_pressure_angle=1.3, bounds=BOUNDS)  # fmt: skip
+TASK4 = Case(Task4, swing=np.radians(45.0), phi0=np.radians(165.0), e=1.0, objective="pressure_angle")
+TASK5 = Case(Task5, swing=0.8, phi0=3.2, **SPACE, f_range=(-3.0, 3.0), rho0=0.5, bounds=STAGE_BOUNDS,
+             max_pressure_angle=1.2, positions=(SlotPosition(1.0, 0.1), SlotPosition(2.0, 0.38)))  # fmt: skip
+TASK6 = Case(Task6, drive=DRIVE, start=(0.0, 0.0), end=(1.0, 0.2), start_direction=0.5, end_direction=-0.1)
+TASK7 = Case(Task7, drive=DRIVE, stroke=1.0, start_acceleration=0.6, end_acceleration=-0.5)
+TASK8 = Case(Task8, swing=0.8, phi0=3.2, **SPACE, f_range=(-3.0, 3.0), stroke=1.0, dwell=1.0, tolerance=0.004,
+             limit="folded", bounds=STAGE_BOUNDS)  # fmt: skip
+
+
+def chain_columns(solution, second):
+    names = sweep.families.family(["rssr", second]).parameter_names
+    return {name: [solution.mechanism[name]] for name in names}
+
+
+def rocker(solution):
+    return {name: [solution.mechanism[name]] for name in RSSR}
+
+
+def check_limits(table, swing, phi0, largest_pressure):
+    wanted = ["swing", "phi0", "max_pressure_angle", "phi_ext", "psi_ext"]
+    turn = sweep.summarise("rssr", table, wanted, accuracy=1e-12).iloc[0]
+    assert turn["status"] == st.OK
+    assert turn["swing"] == pytest.approx(swing, abs=1e-9)
+    assert turn["phi0"] == pytest.approx(phi0, abs=1e-9)
+    assert turn["max_pressure_angle"] <= largest_pressure + 1e-7
+    return turn
+
+
+def check_position(table, turn, position):
+    psi = sweep.evaluate("rssr", table, "psi", phi=[turn["phi_ext"] + position.dphi])["psi"][0]
+    error = psi - turn["psi_ext"] - position.dpsi
+    assert abs(error - 2.0 * np.pi * np.round(error / (2.0 * np.pi))) < 1e-9
+
+
+def test_task1_one_position():
+    table = rocker(best(TASK1))
+    turn = check_limits(table, 0.9, 3.3, 1.2)
+    check_position(table, turn, Position(1.0, 0.25))
+    assert BOUNDS["b"][0] - 1e-9 <= table["b"][0] <= BOUNDS["b"][1] + 1e-9
+
+
+def test_task1_one_position_is_the_best_of_a_dense_search():
+    problem = TASK1.build()
+    found = problem.evaluate(np.linspace(0.0, 2.0 * np.pi, 20001)[:, None])
+    kept = (found.limits >= 0.0).all(axis=1)
+    assert kept.sum() > 100
+    dense = np.abs(found.curve[kept]).max(axis=1).min()
+    assert best(TASK1).objective <= dense
+    assert best(TASK1).objective == pytest.approx(dense, rel=1e-3)
+
+
+def test_task1_two_positions():
+    second = best(TASK2)  # its swing and phi0 have a mechanism through both positions
+    swing, phi0 = second.unknowns["swing"], second.unknowns["phi0"]
+    positions = TASK2.numbers["positions"]
+    hits = [s for s in solve(Task1(swing, phi0, **SPACE, positions=positions)) if s.feasible]
+    assert any(s.mechanism["a"] == pytest.approx(second.mechanism["a"], rel=1e-5) for s in hits)
+    for solution in hits:
+        turn = check_limits(rocker(solution), swing, phi0, np.pi / 2)
+        for position in positions:
+            check_position(rocker(solution), turn, position)
+
+
+def test_task2_swing_and_phi0_are_found_with_the_least_acceleration():
+    solution = best(TASK2)
+    table = rocker(solution)
+    turn = check_limits(table, solution.unknowns["swing"], solution.unknowns["phi0"], 1.2)
+    for position in (Position(1.0, 0.2), Position(2.0, 0.6)):
+        check_position(table, turn, position)
+    assert 0.5 <= solution.unknowns["swing"] <= 1.2
+    true = sweep.summarise("rssr", table, "max_abs_d2psi")["max_abs_d2psi"][0]
+    assert true == pytest.approx(solution.objective, rel=2e-3)  # the task looks at 180 poses
+    # Fixing swing and phi0 elsewhere costs acceleration.
+    for swing in (0.7, 0.85):
+        others = solve(Task1(swing, 3.1, **SPACE, positions=TASK2.numbers["positions"], bounds=BOUNDS,
+                             max_pressure_angle=1.2), candidates=512, starts=4)  # fmt: skip
+        assert all(o.objective > solution.objective for o in others if o.feasible)
+
+
+def test_task3_one_dimension_makes_the_second_setting():
+    solution = best(TASK3)
+    table = rocker(solution)
+    check_limits(table, 0.8, 3.2, 1.3)
+    check_limits(table | {"f": [solution.mechanism["second_f"]]}, 0.6, 3.2, 1.3)
+
+
+def test_task3_adjustments_are_the_derivatives():
+    table = adjustments(DRIVE)
+    step = 1e-5
+    for name in table.index:
+        pair = [DRIVE | {name: DRIVE[name] + s * step} for s in (1.0, -1.0)]
+        found = sweep.summarise("rssr", pd.DataFrame(pair), ["swing", "phi0"], accuracy=1e-13)
+        slopes = (found.iloc[0] - found.iloc[1]) / (2.0 * step)
+        assert slopes["swing"] == pytest.approx(table["dswing"][name], abs=2e-8)
+        assert slopes["phi0"] == pytest.approx(table["dphi0"][name], abs=2e-8)
+    assert (table["dpsi_fold"] - table["dpsi_ext"] - table["dswing"]).abs().max() < 1e-12
+
+
+def test_task3_in_the_plane_only_the_difference_of_the_offsets_counts():
+    planar = DRIVE | {"alpha": 0.0, "f": 0.3, "g": 0.3, "a": 0.4, "b": 1.2, "c": 1.1, "e": 1.3}
+    table = adjustments(planar)
+    assert list(table["adjusts"][["f", "g"]]) == ["nothing", "nothing"]
+    # Making the whole four-bar larger changes no angle (Euler's theorem on homogeneous functions).
+    scaled = sum(planar[name] * table["dswing"][name] for name in "abce")
+    assert abs(scaled) < 1e-12
+    assert table["adjusts"]["a"] == "both"
+
+
+def test_task4_is_the_best_transmission_of_freudenstein_and_primrose():
+    """Swing 45 deg over 165 deg: Q^3 + 2 Q^2 - t^2 Q - (t^2/u^2)(1 + t^2) = 0, coupler/crank = |t|/sqrt(Q)."""
+    t, u = np.tan(np.radians(165.0) / 2), np.tan(np.radians(120.0) / 2)
+    q = max(np.roots([1.0, 2.0, -t * t, -(t * t / u**2) * (1.0 + t * t)]).real)
+    solution = best(TASK4)
+    m = solution.mechanism
+    assert m["b"] / m["a"] == pytest.approx(abs(t) / np.sqrt(q), abs=1e-6)
+    assert m["b"] / m["a"] == pytest.approx(2.238114, abs=1e-6)
+    assert [m["a"], m["b"], m["c"]] == pytest.approx([0.270443, 0.605283, 0.730439], abs=1e-6)
+    assert 90.0 - np.degrees(np.arcsin(solution.objective)) == pytest.approx(36.13782, abs=1e-5)
+    check_limits(rocker(solution), np.radians(45.0), np.radians(165.0), np.pi / 2)
+
+
+def test_engineering_method_beats_every_mechanism_of_a_dense_search():
+    problem = EngineeringMethod(0.8, 3.2, **SPACE, f_range=(-3.0, 3.0), max_pressure_angle=1.2, bounds=BOUNDS)
+    solution = solve(problem)[0]
+    assert solution.feasible
+    phi1, f = (grid.ravel() for grid in np.meshgrid(np.linspace(0, 2 * np.pi, 240), np.linspace(-3, 3, 61)))
+    table = {"swing": 0.8, "phi0": 3.2, "phi1": phi1, "f": f, **SPACE}
+    frame = sweep.synthesise("rssr", table, max_pressure_angle=1.2)
+    frame = frame[(frame["status"] == st.OK) & frame["b"].between(*BOUNDS["b"]) & frame["c"].between(*BOUNDS["c"])]
+    dense = sweep.summarise("rssr", frame[list(RSSR)], "max_abs_d2psi", samples=180)["max_abs_d2psi"]
+    assert len(dense) > 200
+    assert solution.objective <= dense.min() * (1.0 + 1e-9)
+
+
+def test_task5_pin_goes_as_prescribed():
+    m = best(TASK5).mechanism
+    table = {name: [m[f"{name}1"]] for name in RSSR}
+    turn = check_limits(table, 0.8, 3.2, 1.2)
+    dphi = np.array([0.0, 1.0, 2.0, 3.2])
+    psi = sweep.evaluate("rssr", table, "psi", phi=turn["phi_ext"] + dphi)["psi"].to_numpy() - turn["psi_ext"]
+    angle = m["t1"] + m["kappa"] * psi
+    pin = m["a2"] * np.exp(1j * angle)  # the pin on the rocker and the pivot at distance e2
+    rho = np.abs(pin - m["e2"])
+    np.testing.assert_allclose(rho - rho[0], [0.0, 0.1, 0.38, 0.5], atol=1e-9)
+    grid = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
+    law = sweep.evaluate("rssr", table, "psi", phi=grid)["psi"].to_numpy() - turn["psi_ext"]
+    rho = np.abs(m["a2"] * np.exp(1j * (m["t1"] + m["kappa"] * law)) - m["e2"])
+    assert rho.max() - rho.min() == pytest.approx(0.5, abs=1e-4)  # no way back beyond the limits
+    second = (np.roll(rho, 1) - 2.0 * rho + np.roll(rho, -1)) / (grid[1] ** 2)
+    assert np.abs(second).max() == pytest.approx(best(TASK5).objective, rel=5e-3)
+
+
+def test_task6_point_goes_between_the_places_along_the_tangents():
+    solution = best(TASK6)
+    m = solution.mechanism
+    limits = sweep.summarise("rssr", DRIVE, ["phi_ext", "phi_fold"], accuracy=1e-12).iloc[0]
+    phi = np.array([limits["phi_ext"], limits["phi_fold"]])
+    near = np.concatenate([phi, phi + np.array([2e-3, -2e-3])])  # just after the start, just before the end
+    poses = sweep.evaluate(["rssr", "guide"], chain_columns(solution, "guide"), ["x_m", "y_m"], phi=near)
+    assert (poses["status"] == st.OK).all()
+    point = m["x0"] + 1j * m["y0"] + np.exp(1j * m["beta0"]) * (poses["x_m"] + 1j * poses["y_m"]).to_numpy()
+    assert abs(point[0]) < 1e-9
+    assert abs(point[1] - (1.0 + 0.2j)) < 1e-9
+    assert np.angle(point[2] - point[0]) == pytest.approx(0.5, abs=1e-4)
+    assert np.angle(point[1] - point[3]) == pytest.approx(-0.1, abs=1e-4)
+    turn = sweep.summarise(["rssr", "guide"], chain_columns(solution, "guide"), ["max_abs_d2s", "max_pressure_angle2"])
+    assert turn["status"][0] == st.OK
+    assert turn["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=5e-3)
+    assert turn["max_pressure_angle2"][0] < np.radians(60.5)
+
+
+def test_task7_stroke_and_accelerations_at_its_ends():
+    solution = best(TASK7)
+    columns = chain_columns(solution, "rssp")
+    limits = sweep.summarise("rssr", DRIVE, ["phi_ext", "phi_fold"], accuracy=1e-12).iloc[0]
+    ends = sweep.evaluate(
+        ["rssr", "rssp"], columns, ["s", "ds", "d2s"], phi=limits[["phi_ext", "phi_fold"]].to_numpy(float)
+    )
+    assert ends["s"][1] - ends["s"][0] == pytest.approx(1.0, abs=1e-9)
+    assert ends["ds"].abs().max() < 1e-9
+    assert ends["d2s"].tolist() == pytest.approx([0.6, -0.5], abs=1e-9)
+    turn = sweep.summarise(["rssr", "rssp"], columns, ["stroke", "max_abs_d2s"])
+    assert turn["stroke"][0] == pytest.approx(1.0, abs=1e-7)
+    # The whole turn is looked at, not only the ends.
+    assert turn["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=2e-3)
+    assert turn["max_abs_d2s"][0] >= 0.6 - 1e-9
+
+
+def test_task8_dwells_within_its_tolerance():
+    solution = best(TASK8)
+    columns = chain_columns(solution, "rssp")
+    table = {name: [solution.mechanism[f"{name}1"]] for name in RSSR}
+    turn = check_limits(table, 0.8, 3.2, np.radians(60.0))
+    phi = turn["phi_ext"] + np.linspace(-0.5, 0.5, 2001)
+    s = sweep.evaluate(["rssr", "rssp"], columns, "s", phi=phi)["s"].to_numpy()
+    deviation = np.abs(s - s[1000]).max()
+    assert deviation <= 0.004 * (1.0 + 1e-8)
+    assert deviation == pytest.approx(solution.mechanism["dwell_deviation"], rel=1e-6)
+    whole = sweep.summarise(["rssr", "rssp"], columns, ["stroke", "max_abs_d2s"])
+    assert whole["stroke"][0] == pytest.approx(1.0, abs=1e-7)
+    assert whole["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=2e-3)
+    # Fourth order: velocity to jerk vanish in the middle, and a tenth of the angle leaves a ten-thousandth.
+    middle = sweep.evaluate(["rssr", "rssp"], columns, ["ds", "d2s", "d3s"], phi=[turn["phi_ext"]]).iloc[0]
+    assert middle[["ds", "d2s", "d3s"]].abs().max() < 1e-7
+    tenth = np.abs(s[950:1051] - s[1000]).max()
+    assert tenth < 3e-4 * deviation
+    # Without its limit the dwell is missed: the tolerance is what shapes the mechanism.
+    free = solve(Task8(**(TASK8.numbers | {"tolerance": 1.0})), candidates=1024, starts=3)[0]
+    assert free.feasible
+    assert free.mechanism["dwell_deviation"] > 0.004
+    assert free.objective < solution.objective

@@ -1,0 +1,105 @@
+"""The solver of the tasks on problems with known answers, and what it says where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from sweep.errors import InputError
+from sweep.synthesis.tasks import EngineeringMethod, Position, Task1, Task2, Task3, Task4, Task7, solve
+from sweep.synthesis.tasks.problem import Candidates, Unknown
+
+DRIVE = {"a": 0.4, "b": 1.8, "c": 1.2, "e": 1.5, "f": 1.2, "g": 1.0, "alpha": 1.3, "branch": -1.0}
+
+
+@dataclass(frozen=True)
+class Chebyshev:
+    """The cubic x^3 + p x + q that is least in magnitude on [-1, 1]: p = -3/4, q = 0, largest value 1/4."""
+
+    equations: tuple[str, ...] = ()
+    limits: tuple[str, ...] = ()
+    objective: str = "largest value"
+    unknowns: tuple[Unknown, ...] = (Unknown("p", -2.0, 2.0), Unknown("q", -1.0, 1.0))
+
+    def evaluate(self, x):
+        t = np.cos(np.linspace(0.0, np.pi, 721))[None, :]  # holds -1, -1/2, 1/2, 1
+        curve = t**3 + x[:, [0]] * t + x[:, [1]]
+        none = np.empty((len(x), 0))
+        return Candidates(none, none, curve, {"p": x[:, 0]})
+
+
+@dataclass(frozen=True)
+class OnACircle(Chebyshev):
+    """The point of the unit circle, in the half plane y >= 1/2, nearest to (0.1, 0) by the larger coordinate."""
+
+    equations: tuple[str, ...] = ("circle",)
+    limits: tuple[str, ...] = ("half plane",)
+    unknowns: tuple[Unknown, ...] = field(default=(Unknown("x", -2.0, 2.0), Unknown("y", -2.0, 2.0)))
+    lowest: float = 0.5
+
+    def evaluate(self, x):
+        circle = (x**2).sum(axis=1, keepdims=True) - 1.0
+        return Candidates(circle, x[:, [1]] - self.lowest, x - [0.1, 0.0], {"x": x[:, 0], "y": x[:, 1]})
+
+
+def test_minimax_with_kinks_is_found_to_rounding():
+    solution = solve(Chebyshev())[0]
+    assert solution.feasible
+    assert solution.objective == pytest.approx(0.25, abs=1e-9)
+    assert solution.unknowns["p"] == pytest.approx(-0.75, abs=1e-8)
+
+
+def test_equations_and_limits_are_met():
+    # On the circle with x - 0.1 = y: 2 y^2 + 0.2 y - 0.99 = 0
+    y = (-0.2 + np.sqrt(0.04 + 8.0 * 0.99)) / 4.0
+    solution = solve(OnACircle())[0]
+    assert solution.feasible
+    assert solution.objective == pytest.approx(y, abs=1e-9)
+    assert abs(solution.equations["circle"]) < 1e-12
+
+
+def test_what_cannot_be_met_is_infeasible_with_the_smallest_miss():
+    solution = solve(OnACircle(lowest=1.5))[0]
+    assert not solution.feasible
+    assert solution.limits["half plane"] < -0.1
+    assert solve(EngineeringMethod(0.9, 3.3, 1.0, 1.0, 1.3, (-3.0, 3.0), 0.3))[0].feasible is False
+
+
+def test_same_seed_same_answer():
+    one, two = (solve(Task4(0.7, 3.0, 1.0), candidates=256, starts=3) for _ in range(2))
+    assert [s.unknowns for s in one] == [s.unknowns for s in two]
+
+
+def test_no_candidate_gives_no_solution():
+    class Nowhere(Chebyshev):
+        def evaluate(self, x):
+            return super().evaluate(np.full_like(x, np.nan))
+
+    assert solve(Nowhere(), candidates=64) == []
+
+
+def test_solution_reads_as_text():
+    text = str(solve(Task4(0.7, 3.0, 1.0), candidates=256, starts=3)[0])
+    assert text.startswith("feasible, objective ")
+    assert "pressure angle" in text
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (
+            lambda: Task1(0.9, 3.3, 1.0, 0.0, 0.0, (Position(1, 0.2), Position(2, 0.6))),
+            "positions = 2; allowed: 1 to 1",
+        ),
+        (lambda: Task1(0.9, 3.3, 1.0, 0.0, 1.0, ()), "positions"),
+        (lambda: Task2((0.5, 1.0), (3.0, 3.5), 1.0, 0.0, 0.0, (Position(1, 0.2), Position(2, 0.6))), "alpha"),
+        (lambda: Task3(0.8, 3.2, 0.8, None, "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), "second_swing"),
+        (lambda: Task7(DRIVE, 1.0, -0.6, -0.5), "start_acceleration"),
+        (lambda: Task7(DRIVE | {"a": 5.0}, 1.0, 0.6, -0.5), "drive"),
+    ],
+)
+def test_ill_posed_tasks_are_refused(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
