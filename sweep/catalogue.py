@@ -88,7 +88,7 @@ def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | Non
 def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
     """The cheapest own route to an output that serves this accuracy."""
     able = [(step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy)]
-    return min(able, key=lambda pair: pair[0].ns_per_design, default=None)
+    return min(able, key=lambda pair: pair[0].cost(accuracy), default=None)
 
 
 def general_way(family: Family, name: str) -> Way | None:

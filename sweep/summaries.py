@@ -187,7 +187,7 @@ def _jobs(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> list[_Jo
             )
             raise InputError("output", name, allowed, f"design outputs of {family.name}")
     jobs = [
-        _Job(f"stage 1: {step.name}" if stage else step.name, step, stage, tuple(names), step.ns_per_design)
+        _Job(f"stage 1: {step.name}" if stage else step.name, step, stage, tuple(names), step.cost(accuracy))
         for step, stage, names in steps.values()
     ]
     jobs += [

@@ -9,7 +9,7 @@ import pytest
 
 from sweep.errors import BudgetError
 from sweep.study import Budget, Study, load_study
-from sweep.study.estimate import check_budget, estimate
+from sweep.study.estimate import check_budget, estimate, other_accuracies
 
 TEXT = """
 [study]
@@ -88,3 +88,33 @@ def test_the_default_budget_refuses_10_to_the_12_designs(tmp_path: Path) -> None
     question = load_study(tmp_path)
     with pytest.raises(BudgetError, match="1000000000000 designs on 2 workers"):
         check_budget(question, estimate(question, 2))
+
+
+def with_accuracy(folder: Path, accuracy: str) -> Study:
+    text = (
+        TEXT.replace("COUNT", "40").replace("KEEP", "feasible").replace('"margin",', '"max_abs_d2psi", "max_abs_psi",')
+    )
+    (folder / "study.toml").write_text(f"{text}[accuracy]\n{accuracy}\n")
+    return load_study(folder)
+
+
+def test_one_digit_more_costs_more_and_one_less_costs_less(tmp_path: Path) -> None:
+    model = with_accuracy(tmp_path, "target = 1e-8")
+    found = dict(other_accuracies(model, 2))
+    assert list(found) == ["one digit less", "one digit more"]
+    assert found["one digit less"] < estimate(model, 2).seconds < found["one digit more"]
+
+
+def test_twice_the_samples_cost_nearly_twice(tmp_path: Path) -> None:
+    model = with_accuracy(tmp_path, "samples = 1440")
+    found, now = dict(other_accuracies(model, 2)), estimate(model, 2).seconds
+    assert list(found) == ["half the samples", "twice the samples"]
+    assert 1.6 < found["twice the samples"] / now < 2.0
+    assert 0.5 < found["half the samples"] / now < 0.65
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "left"), [("target = 1e-14", "one digit less"), ("samples = 8", "twice the samples")]
+)
+def test_no_price_is_named_for_what_cannot_be_asked(tmp_path: Path, accuracy: str, left: str) -> None:
+    assert [words for words, _ in other_accuracies(with_accuracy(tmp_path, accuracy), 1)] == [left]

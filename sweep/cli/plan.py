@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sweep.cli.listing import aligned, main_outputs
@@ -18,13 +19,14 @@ POSES = 100.0
 ADVISED = 64
 
 
-def plan_lines(study: Study, cost: Estimate) -> list[str]:
+def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]) -> list[str]:
     """The plan of a study, line by line.
 
     Parameters
     ----------
     study : checked study
     cost : its estimate
+    others : what other accuracies would take [s], in words
     """
     from sweep.chunk import ordered_routes
     from sweep.plan import PARAMETER_UNITS
@@ -82,6 +84,7 @@ def plan_lines(study: Study, cost: Estimate) -> list[str]:
             ("memory", size(cost.memory_bytes)),
             ("disk", f"{size(cost.disk_bytes)}, allowed {size(study.budget.disk_bytes)}"),
             ("time", f"{duration(cost.seconds)} with {cost.jobs} workers, allowed {duration(study.budget.seconds)}"),
+            *((words, f"{duration(seconds)}, {seconds / cost.seconds:.3g} times that") for words, seconds in others),
         ]
     )
     return lines

@@ -51,11 +51,11 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
     """
     from sweep.cli.plan import plan_lines
     from sweep.study import load_study
-    from sweep.study.estimate import check_budget, estimate
+    from sweep.study.estimate import check_budget, estimate, other_accuracies
 
     model = load_study(study, smoke=smoke)
     cost = estimate(model, jobs)
-    for line in plan_lines(model, cost):
+    for line in plan_lines(model, cost, other_accuracies(model, jobs)):
         click.echo(line)
     check_budget(model, cost)
 

@@ -72,7 +72,7 @@ class Step:
     """A family's own route to some design outputs: exact, or faster than the general reductions over sampled poses.
 
     ``run(designs, wanted, accuracy)`` returns the wanted ones of ``provides`` and ``status``, each of shape (n,).
-    ``condition`` says for which accuracy it applies (a dense kernel does not serve ``accuracy=``).
+    ``applies`` says for which accuracy it serves (a dense kernel does not serve ``accuracy=``).
     """
 
     name: str
@@ -80,6 +80,11 @@ class Step:
     run: StepFunction
     ns_per_design: float
     applies: Callable[[Accuracy], bool] = field(default=lambda accuracy: True)
+    ns_per_sample: float = 0.0
+
+    def cost(self, accuracy: Accuracy) -> float:
+        """Estimated time [ns per design]; a step that works through the samples says what each one costs."""
+        return self.ns_per_design + self.ns_per_sample * (accuracy.samples or 0)
 
 
 @dataclass(frozen=True)

@@ -222,7 +222,7 @@ FAMILY = Family(
         Step("margin", MARGIN_OUTPUTS, margin, 40.0),
         Step("limit positions", LIMIT_OUTPUTS, limits, 1000.0),
         Step("true maxima", MAXIMA_OUTPUTS, true_maxima, 250.0, _refined),
-        Step("grid", MAXIMA_OUTPUTS, sampled_maxima, 700.0, _sampled),
+        Step("grid", MAXIMA_OUTPUTS, sampled_maxima, 50.0, _sampled, ns_per_sample=1.7),
     ),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     uses_phi=False,

@@ -11,6 +11,7 @@ from sweep.study.study import Study
 
 # With no survivor in the pilot, this share is assumed.
 LEAST_KEPT = 1e-3
+COARSEST_TARGET = 0.1
 # Measured: the parameter values of a design take 100 ns, writing its row 120 ns.
 SPACE_SECONDS = 100e-9
 WRITE_SECONDS_PER_ROW = 120e-9
@@ -82,6 +83,32 @@ def estimate(study: Study, jobs: int) -> Estimate:
         disk_bytes=designs * kept * (OTHER_BYTES_PER_ROW + sampled + results),
         seconds=work / (1.0 if jobs == 1 else jobs * THREAD_EFFICIENCY),
         optimise_seconds=None if study.optimise is None else study.optimise.time_budget,
+    )
+
+
+def other_accuracies(study: Study, jobs: int) -> tuple[tuple[str, float], ...]:
+    """What the same sweep would take with one digit less and one more, or with half and twice the samples.
+
+    Returns
+    -------
+    tuple
+        the accuracy in words and the estimated seconds of the sweep, from the same figures as :func:`estimate`; an
+        accuracy outside the range of `sweep.summarise` is left out
+    """
+    from sweep.study.load import study_from_data
+    from sweep.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
+
+    target, samples = study.accuracy.target, study.accuracy.samples
+    settings: list[tuple[str, dict[str, float]]] = []
+    if target is not None:
+        digits = (("one digit less", 10.0 * target), ("one digit more", 0.1 * target))
+        settings = [(words, {"target": t}) for words, t in digits if FINEST_TARGET <= t <= COARSEST_TARGET]
+    elif samples is not None:
+        counts = (("half the samples", samples // 2), ("twice the samples", 2 * samples))
+        settings = [(words, {"samples": n}) for words, n in counts if FEWEST_SAMPLES <= n <= MOST_SAMPLES]
+    return tuple(
+        (words, estimate(study_from_data(study.data | {"accuracy": setting}, study.path), jobs).seconds)
+        for words, setting in settings
     )
 
 
