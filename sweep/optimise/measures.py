@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -90,7 +89,7 @@ def margins(family: Family, stage: str = "") -> tuple[Series, ...]:
     return (numbered[stage],) if stage in numbered else ()
 
 
-def measure(family: Family, name: str, window: tuple[float, float] | None = None, extra: Sequence[str] = ()) -> Measure:
+def measure(family: Family, name: str, window: tuple[float, float] | None = None) -> Measure:
     """The measure of a design output.
 
     Parameters
@@ -101,7 +100,6 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
         of any pose output x; chains: with a stage number.  What only a step of the family computes is taken as a number
         without inner structure.
     window : see :class:`sweep.optimise.problem.Problem`
-    extra : further design outputs that exist as plain numbers
 
     Raises
     ------
@@ -131,7 +129,7 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
         if x != name and x in family.pose_names:
             inside = window if x == "dev" and kind in ("max_abs", "phi_max_abs") else None
             return Measure(name, kind, (curve(family, x, inside),))
-    if name in {output.name for step in family.steps for output in step.provides} or name in extra:
+    if name in {output.name for step in family.steps for output in step.provides}:
         return Measure(name, "scalar", ())
     known = (
         "margin, rotatable, max_pressure_angle, swing or stroke, phi0, stroke_ratio, max_abs_x, max_x, min_x, range_x"
