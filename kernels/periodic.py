@@ -15,6 +15,8 @@ from kernels._jit import inline
 
 Array = NDArray[np.float64]
 
+NOTHING = 1e-14
+
 
 @inline
 def coefficients(values: Array, cosines: Array, sines: Array) -> None:
@@ -43,6 +45,18 @@ def series(cosines: Array, sines: Array, phi: float) -> tuple[float, float]:
         slope += k * (sines[k] * c - cosines[k] * s)
         c, s = c * step_c - s * step_s, s * step_c + c * step_s
     return value, slope
+
+
+@inline
+def significant(cosines: Array, sines: Array) -> int:
+    """Number of leading coefficients beyond which there is only rounding (1e-14 of the largest), which costs time."""
+    largest = 0.0
+    for k in range(cosines.size):
+        largest = max(largest, math.hypot(cosines[k], sines[k]))
+    count = cosines.size
+    while count > 1 and math.hypot(cosines[count - 1], sines[count - 1]) <= NOTHING * largest:
+        count -= 1
+    return count
 
 
 @inline

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels._jit import inline, kernel
-from kernels.periodic import coefficients, series, tail
+from kernels.periodic import coefficients, series, significant, tail
 
 Array = NDArray[np.float64]
 
-FINER = 4  # looks per grid point before a peak is refined
+FINER = 8  # looks per harmonic before a peak is refined
 BISECTIONS = 54
 
 
@@ -39,18 +39,21 @@ def turn_extremes(
             square += 0.5 * (c[k] * c[k] + s[k] * s[k])
         rms[i] = math.sqrt(square)
         missed[i] = tail(c, s, 0.0)
-        phi_largest[i] = _peak(c, s, n, 1.0)
-        phi_least[i] = _peak(c, s, n, -1.0)
-        largest[i] = series(c, s, phi_largest[i])[0]
-        least[i] = series(c, s, phi_least[i])[0]
+        count = significant(c, s)
+        short_c, short_s = c[:count], s[:count]
+        phi_largest[i] = _peak(short_c, short_s, 1.0)
+        phi_least[i] = _peak(short_c, short_s, -1.0)
+        largest[i] = series(short_c, short_s, phi_largest[i])[0]
+        least[i] = series(short_c, short_s, phi_least[i])[0]
 
 
 @inline
-def _peak(c: Array, s: Array, n: int, sign: float) -> float:
+def _peak(c: Array, s: Array, sign: float) -> float:
     """Crank angle in [0, 2 pi) where sign times the series is largest: best of the finer looks, then bisection."""
-    step = 2.0 * math.pi / (FINER * n)
+    looks = FINER * c.size
+    step = 2.0 * math.pi / looks
     best, where = -math.inf, 0.0
-    for j in range(FINER * n):
+    for j in range(looks):
         value = sign * series(c, s, step * j)[0]
         if value > best:
             best, where = value, step * j

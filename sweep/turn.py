@@ -103,9 +103,9 @@ NS_SEARCH = 800.0
 NS_PEAK = 2200.0
 NS_MARGIN = 1600.0
 # Poses per design on average: of a mean, of a search without its peaks, per refined extremum.
-POSES_MEAN = 130.0
-POSES_SEARCH = 50.0
-POSES_PEAK = 20.0
+POSES_MEAN = 110.0
+POSES_SEARCH = 180.0
+POSES_PEAK = 30.0
 
 
 def _ways(family: Family, names: Sequence[str]) -> list[Way]:

@@ -223,7 +223,7 @@ def test_elastic_lag_equals_oracle():
         p, d2psi = elastic_inputs(given, grid)
         turn = np.empty(1, np.uint8)
         eta, elongation, floquet = np.empty(phi.shape), np.empty(phi.shape), np.empty(1)
-        elasticity.steady_state(p, d2psi, c, data, phi, turn, eta, elongation, floquet)
+        elasticity.steady_state(p, d2psi, c, data, phi, True, turn, eta, elongation, floquet)
         assert turn[0] in (st.OK, st.NOT_LINEAR)
         dynamic = np.array(expected["eta_dynamic"], float)
         np.testing.assert_allclose(eta[0], dynamic, atol=1e-10 * abs(dynamic).max())

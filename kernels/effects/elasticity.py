@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.periodic import coefficients, series, tail
+from kernels.periodic import coefficients, series, significant, tail
 
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
@@ -68,8 +68,8 @@ def quasi_static(
 
 @kernel
 def steady_state(
-    p: Array, d2psi: Array, c: Array, data: Array, phi: Array, status: Status, eta: Array, elongation: Array,
-    floquet: Array,
+    p: Array, d2psi: Array, c: Array, data: Array, phi: Array, last: bool, status: Status, eta: Array,
+    elongation: Array, floquet: Array,
 ) -> None:  # fmt: skip
     """Periodic steady state of the lag and the largest Floquet multiplier.
 
@@ -77,9 +77,10 @@ def steady_state(
     ----------
     p, d2psi : (n, N) on the grid phi_j = 2 pi j / N, N odd;  c : (n,);  data : (n, 5), see COLUMNS
     phi : (n, m) or (1, m), where eta and elongation are wanted
+    last : whether no finer grid follows
     status : (n,) out; NOT_CONVERGED where N does not resolve the solution (tail above 1e-9) or a multiplier reaches 1,
         NOT_LINEAR where |eta| > 0.1 cos(pressure angle) somewhere (the numbers stay), NOT_ROTATABLE where p is nan
-    eta, elongation : (n, m) out [rad], [length];  floquet : (n,) out, largest modulus
+    eta, elongation : (n, m) out [rad], [length];  floquet : (n,) out, largest modulus or nan
     """
     n = p.shape[1]
     first = np.empty((n, n))
@@ -89,7 +90,7 @@ def steady_state(
             first[j, k] = 0.0 if j == k else 0.5 * sign / math.sin(math.pi * (j - k) / n)
     second = first @ first
     half = (n + 1) // 2
-    pc, ps, ec, es = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
+    all_pc, all_ps, all_ec, all_es = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
     matrix, right = np.empty((n, n)), np.empty(n)
     for i in range(p.shape[0]):
         inertia, stiffness, damping, speed, torque = data[i, 0], data[i, 1], data[i, 2], data[i, 3], data[i, 4]
@@ -101,7 +102,9 @@ def steady_state(
             status[i], floquet[i] = st.NOT_ROTATABLE, math.nan
             eta[i, :], elongation[i, :] = math.nan, math.nan
             continue
-        coefficients(p[i], pc, ps)
+        coefficients(p[i], all_pc, all_ps)
+        count = significant(all_pc, all_ps)
+        pc, ps = all_pc[:count], all_ps[:count]
         mass = inertia * speed * speed
         for j in range(n):
             slope = series(pc, ps, 2.0 * math.pi * j / n)[1]
@@ -111,11 +114,15 @@ def steady_state(
             matrix[j, j] += (stiffness * square + damping * speed * p[i, j] * slope) / mass
             right[j] = torque / mass - d2psi[i, j]
         lag = np.linalg.solve(matrix, right)
-        coefficients(lag, ec, es)  # type: ignore[arg-type]
-        floquet[i] = _largest_multiplier(pc, ps, stiffness / mass, damping * speed / mass)
-        status[i] = st.OK
-        if not tail(ec, es, 0.0) < RESOLVED or not floquet[i] < 1.0:
-            status[i] = st.NOT_CONVERGED
+        coefficients(lag, all_ec, all_es)  # type: ignore[arg-type]
+        count = significant(all_ec, all_es)
+        ec, es = all_ec[:count], all_es[:count]
+        resolved = tail(all_ec, all_es, 0.0) < RESOLVED
+        # The multiplier asks only that p be resolved; a grid that is too coarse for the lag is left before it.
+        floquet[i] = math.nan
+        if resolved or last:
+            floquet[i] = _largest_multiplier(pc, ps, stiffness / mass, damping * speed / mass)
+        status[i] = st.OK if resolved and floquet[i] < 1.0 else st.NOT_CONVERGED
         for j in range(n):
             if status[i] == st.OK and not abs(lag[j]) <= LINEAR * abs(p[i, j]) / c[i]:
                 status[i] = st.NOT_LINEAR

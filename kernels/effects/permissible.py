@@ -20,8 +20,11 @@ from kernels.effects.bearings import equivalent_load, sliding_criteria, sliding_
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
 
-SCAN = 64
-BISECTIONS = 54
+EPS = 2.0**-53
+# Looks for the first crossing.  Mean pressures rise with theta1 all the way (R/cos, thrust/cos rise, the arm over cos
+# falls), so one bracket holds; an equivalent load may step down once, where it changes to its second formula.
+SLIDING_LOOKS, ROLLING_LOOKS = 1, 16
+STEPS = 100
 
 
 @inline
@@ -56,28 +59,46 @@ def _at(utilisation: Any, bearings: Array, limits: Array, i: int, moment: float,
 
 
 @inline
-def _first_crossing(utilisation: Any, bearings: Array, limits: Array, i: int, moment: float, tan2: float) -> float:
+def _first_crossing(
+    utilisation: Any, looks: int, bearings: Array, limits: Array, i: int, moment: float, tan2: float
+) -> float:
     """Largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none."""
-    if _at(utilisation, bearings, limits, i, moment, 0.0, tan2) > 1.0:
+    # 1/utilisation - 1 is near to linear, finite where friction locks, and falls through zero at the crossing.
+    low, high, at_high = 0.0, 0.5 * math.pi, -1.0
+    at_low = 1.0 / _at(utilisation, bearings, limits, i, moment, 0.0, tan2) - 1.0
+    if at_low < 0.0:
         return 0.0
-    low, high = 0.0, 0.5 * math.pi
-    for k in range(1, SCAN + 1):
-        high = 0.5 * math.pi * k / SCAN
-        if _at(utilisation, bearings, limits, i, moment, high, tan2) > 1.0:
+    for k in range(1, looks):
+        theta = 0.5 * math.pi * k / looks
+        value = 1.0 / _at(utilisation, bearings, limits, i, moment, theta, tan2) - 1.0
+        if value < 0.0:
+            high, at_high = theta, value
             break
-        low = high
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        if _at(utilisation, bearings, limits, i, moment, middle, tan2) > 1.0:
-            high = middle
+        low, at_low = theta, value
+    side, before = 0, math.inf
+    for _ in range(STEPS):
+        # Regula falsi that halves the value of an end which stays (Illinois), in the bracket always.
+        theta = (low * at_high - high * at_low) / (at_high - at_low)
+        if not low < theta < high:
+            theta = 0.5 * (low + high)
+        value = 1.0 / _at(utilisation, bearings, limits, i, moment, theta, tan2) - 1.0
+        if value < 0.0:
+            high, at_high = theta, value
+            at_low = 0.5 * at_low if side == -1 else at_low
+            side = -1
         else:
-            low = middle
+            low, at_low = theta, value
+            at_high = 0.5 * at_high if side == 1 else at_high
+            side = 1
+        if abs(theta - before) <= 2.0 * EPS * theta or value == 0.0:
+            return theta
+        before = theta
     return low
 
 
 @inline
 def _fill(
-    utilisation: Any, t_tau: Array, t_rho: Array, t_k: Array, moment: Array, bearings: Array, limits: Array,
+    utilisation: Any, looks: int, t_tau: Array, t_rho: Array, t_k: Array, moment: Array, bearings: Array, limits: Array,
     status: Status, used: Array | None, permissible: Array | None, reserve: Array | None,
 ) -> None:  # fmt: skip
     for i in range(t_tau.shape[0]):
@@ -96,7 +117,7 @@ def _fill(
             if permissible is not None or reserve is not None:
                 # theta2 stands still where there is no radial force; any axial force then permits no radial angle.
                 tan2 = along / rho if rho != 0.0 else math.copysign(1e300, along)
-                limit = _first_crossing(utilisation, bearings, limits, i, moment[i], tan2)
+                limit = _first_crossing(utilisation, looks, bearings, limits, i, moment[i], tan2)
                 if permissible is not None:
                     permissible[i, j] = good * limit
                 if reserve is not None:
@@ -128,7 +149,20 @@ def sliding_limits(
     permissible : (n, m) or None [rad]; permissible theta1 at the pose's theta2, 0 if even theta1 = 0 is too much
     reserve : (n, m) or None [rad]; permissible minus actual theta1, negative where a bearing is overloaded
     """
-    _fill(sliding_utilisation, t_tau, t_rho, t_k, moment, bearings, limits, status, used, permissible, reserve)
+    _fill(
+        sliding_utilisation,
+        SLIDING_LOOKS,
+        t_tau,
+        t_rho,
+        t_k,
+        moment,
+        bearings,
+        limits,
+        status,
+        used,
+        permissible,
+        reserve,
+    )
 
 
 @kernel
@@ -149,4 +183,17 @@ def rolling_limits(
     As :func:`sliding_limits`, with the (n, 11) columns of :class:`kernels.effects.bearings.Rolling` and the permissible
     equivalent load as the one column of ``limits``.
     """
-    _fill(rolling_utilisation, t_tau, t_rho, t_k, moment, bearings, limits, status, used, permissible, reserve)
+    _fill(
+        rolling_utilisation,
+        ROLLING_LOOKS,
+        t_tau,
+        t_rho,
+        t_k,
+        moment,
+        bearings,
+        limits,
+        status,
+        used,
+        permissible,
+        reserve,
+    )

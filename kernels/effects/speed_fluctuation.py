@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.periodic import coefficients, series, tail
+from kernels.periodic import coefficients, series, significant, tail
 
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
@@ -52,20 +52,24 @@ def speed_fluctuation(
     """
     n = inertia.shape[1]
     half = (n + 1) // 2
-    jc, js, wc, ws = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
+    all_jc, all_js, all_wc, all_ws = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
     work = np.empty(n)
     for i in range(inertia.shape[0]):
         row = i if phi.shape[0] > 1 else 0
-        coefficients(inertia[i], jc, js)
-        coefficients(excess[i], wc, ws)
-        code = st.OK if math.isfinite(jc[0] + wc[0]) else st.NOT_ROTATABLE
+        coefficients(inertia[i], all_jc, all_js)
+        coefficients(excess[i], all_wc, all_ws)
+        code = st.OK if math.isfinite(all_jc[0] + all_wc[0]) else st.NOT_ROTATABLE
         # A torque excess far below the inertia torque moves no speed: its noise need not be resolved.
-        energy_scale = jc[0] * mean_speed[i] * mean_speed[i]
-        if code == st.OK and (tail(jc, js, 0.0) > RESOLVED or tail(wc, ws, energy_scale) > RESOLVED):
+        energy_scale = all_jc[0] * mean_speed[i] * mean_speed[i]
+        if code == st.OK and (tail(all_jc, all_js, 0.0) > RESOLVED or tail(all_wc, all_ws, energy_scale) > RESOLVED):
             code = st.NOT_CONVERGED
-        wc[0], ws[0] = 0.0, 0.0
+        all_wc[0], all_ws[0] = 0.0, 0.0
         for k in range(1, half):
-            wc[k], ws[k] = -ws[k] / k, wc[k] / k
+            all_wc[k], all_ws[k] = -all_ws[k] / k, all_wc[k] / k
+        count = significant(all_jc, all_js)
+        jc, js = all_jc[:count], all_js[:count]
+        count = significant(all_wc, all_ws)
+        wc, ws = all_wc[:count], all_ws[:count]
         least = math.inf
         for j in range(n):
             work[j] = series(wc, ws, 2.0 * math.pi * j / n)[0]

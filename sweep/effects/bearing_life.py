@@ -98,8 +98,8 @@ EFFECT = Effect(
     inputs=(*loads.ROCKER.parameters, *SUPPORTS, *CATALOGUE),
     outputs=OUTPUTS,
     compute=compute,
-    ns_per_pose=500.0,
+    ns_per_pose=300.0,
     called_for="life of the rocker's bearings",
     negligible="sliding bearings; elsewhere never, the life is what is asked for",
-    design_result=DesignResult(PER_TURN, per_turn, 400_000.0),
+    design_result=DesignResult(PER_TURN, per_turn, 330_000.0),
 )

@@ -173,19 +173,19 @@ _ROLLING_LIMITS = partial(_limits, permissible.rolling_limits, ROLLING_INPUTS, R
 
 SLIDING = _effect(
     "sliding_bearings", "sliding bearings of the rocker: loads and mean pressures, massless estimate",
-    SLIDING_INPUTS, SLIDING_OUTPUTS, _SLIDING, 100.0,
+    SLIDING_INPUTS, SLIDING_OUTPUTS, _SLIDING, 60.0,
 )  # fmt: skip
 ROLLING = _effect(
     "rolling_bearings", "rolling bearings of the rocker: equivalent loads and lives, massless estimate",
-    ROLLING_INPUTS, ROLLING_OUTPUTS, _ROLLING, 100.0,
+    ROLLING_INPUTS, ROLLING_OUTPUTS, _ROLLING, 75.0,
 )  # fmt: skip
 SLIDING_LIMIT = _effect(
     "sliding_limits", "utilisation of the sliding bearings and the pressure angle they permit",
-    (*SLIDING_INPUTS, *PERMISSIBLE), SLIDING_LIMITS, _SLIDING_LIMITS, 3000.0,
+    (*SLIDING_INPUTS, *PERMISSIBLE), SLIDING_LIMITS, _SLIDING_LIMITS, 1900.0,
     partial(_advise, _SLIDING_LIMITS, "sliding_utilisation", "largest utilisation of the sliding bearings"),
 )  # fmt: skip
 ROLLING_LIMIT = _effect(
     "rolling_limits", "utilisation of the rolling bearings and the pressure angle they permit",
-    (*ROLLING_INPUTS, *LIFE), ROLLING_LIMITS, _ROLLING_LIMITS, 3000.0,
+    (*ROLLING_INPUTS, *LIFE), ROLLING_LIMITS, _ROLLING_LIMITS, 2700.0,
     partial(_advise, _ROLLING_LIMITS, "rolling_utilisation", "largest utilisation of the rolling bearings"),
 )  # fmt: skip

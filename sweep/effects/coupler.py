@@ -74,7 +74,7 @@ EFFECT = Effect(
     inputs=INPUTS,
     outputs=OUTPUTS,
     compute=compute,
-    ns_per_pose=90.0,
+    ns_per_pose=60.0,
     called_for="a tool on the coupler, a coupler whose centre of mass is off the line B-C",
     negligible="coupler mass much below the rocker's inertia over c^2, and balanced",
 )

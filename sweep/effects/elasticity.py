@@ -83,7 +83,7 @@ def _steady(scene: Scene, phi: Array) -> tuple[Array, Array, Array, Status]:
         own = np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi)
         parts = np.empty((rows.size, phi.shape[1])), np.empty((rows.size, phi.shape[1])), np.empty(rows.size)
         found = np.empty(rows.size, np.uint8)
-        steady_state(*_lever(grid), grid.table(_NAMES), own, found, *parts)
+        steady_state(*_lever(grid), grid.table(_NAMES), own, size == GRIDS[-1], found, *parts)
         eta[rows], elongation[rows], floquet[rows], status[rows] = *parts, found
         rows = rows[found == st.NOT_CONVERGED]
         if rows.size == 0:
@@ -96,7 +96,8 @@ def per_turn(
 ) -> Columns:
     """Floquet multiplier and the reductions of lag and elongation."""
     scene = Scene(family, designs, Angles.of(np.zeros((1, 1))), inputs)
-    eta, elongation, floquet, status = _steady(scene, scene.on_grid(GRIDS[-1]).angles.phi)
+    curves = wanted != {"floquet"}
+    eta, elongation, floquet, status = _steady(scene, scene.on_grid(GRIDS[-1] if curves else 1).angles.phi)
     columns: Columns = {"floquet": floquet, "err_floquet": np.full(len(designs), MULTIPLIER_ERROR)}
     if wanted == {"floquet"}:
         # A multiplier is known even where the forced solution is not resolved or not linear.
@@ -142,7 +143,7 @@ STATIC = Effect(
     inputs=INPUTS,
     outputs=STATIC_OUTPUTS,
     compute=compute_static,
-    ns_per_pose=15.0,
+    ns_per_pose=30.0,
     called_for="a fast machine, a precise meeting of hook and needle",
     negligible="largest lag times the lever of the working point below the tolerance (1e-4 rad: 0.01 mm at 100 mm)",
     advise=advise_static,
@@ -158,10 +159,10 @@ DYNAMIC = Effect(
     inputs=INPUTS,
     outputs=DYNAMIC_OUTPUTS,
     compute=compute_dynamic,
-    ns_per_pose=1500.0,
+    ns_per_pose=1260.0,
     called_for="max|lag''/nu^2|/max|lag| above a third of the tolerance",
     negligible="max|lag''/nu^2|/max|lag| below 1/300 for a tolerance of 1 %; as a rule nu above 10 times the harmonics",
     whole_turn=True,
-    design_result=DesignResult((FLOQUET, *reduction_outputs(DYNAMIC_OUTPUTS)), per_turn, 600_000.0),
+    design_result=DesignResult((FLOQUET, *reduction_outputs(DYNAMIC_OUTPUTS)), per_turn, 930_000.0),
     advise=advise_dynamic,
 )

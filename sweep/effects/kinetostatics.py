@@ -150,7 +150,7 @@ def _effect(name: str, follower: str, inputs: loads.LoadInputs) -> Effect:
         inputs=inputs.parameters,
         outputs=_outputs(follower),
         compute=partial(compute, inputs.columns),
-        ns_per_pose=350.0,
+        ns_per_pose=160.0,
         called_for="joint loads, drive torque, shaking force, balancing",
         negligible="inertia and weight make less than 10 % of the joint load (low speed): then statics, pressure",
         advise=partial(advise, inputs.columns, inputs.load),

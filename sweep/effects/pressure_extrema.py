@@ -73,5 +73,5 @@ EFFECT = Effect(
     ns_per_pose=0.0,
     called_for="transmission constraints that need more than the largest pressure angle (margin, max_pressure_angle)",
     negligible="never as a guard near dead points; the largest angle alone is cheaper from the margin",
-    design_result=DesignResult(OUTPUTS, extrema, 4000.0),
+    design_result=DesignResult(OUTPUTS, extrema, 2100.0),
 )

@@ -127,10 +127,10 @@ EFFECT = Effect(
     inputs=(*loads.ROCKER.parameters, FLYWHEEL),
     outputs=OUTPUTS,
     compute=compute,
-    ns_per_pose=300.0,
+    ns_per_pose=1050.0,
     called_for="unevenness of the speed asked for, a light drive",
     negligible="estimated unevenness below 1 %",
     whole_turn=True,
-    design_result=DesignResult((*_PER_TURN, *reduction_outputs(OUTPUTS)), per_turn, 150_000.0),
+    design_result=DesignResult((*_PER_TURN, *reduction_outputs(OUTPUTS)), per_turn, 940_000.0),
     advise=advise,
 )
