@@ -36,6 +36,8 @@ MARGIN_TEXTS = {
     "max_pressure_angle": ("rad", "largest pressure angle over one turn"),
 }
 
+STAY = Output("window_angle", "rad", "crank angle over which the position lies in the window of the stroke: its dwell")
+
 
 @dataclass(frozen=True)
 class Way:
@@ -93,6 +95,8 @@ def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, 
 
 def general_way(family: Family, name: str) -> Way | None:
     """How the name is computed from poses alone, or None if it names nothing."""
+    if name == STAY.name:
+        return Way(STAY, "limits", STAY.name, family.position)
     return _margin_way(family, name) or _limit_way(family, name) or _reduction_way(family, name)
 
 
@@ -127,7 +131,7 @@ def output_names(family: Family) -> tuple[str, ...]:
     if isinstance(family, Chain):
         names += [f"{o.name}1" for step in family.stages[0].family.steps for o in step.provides]
         names += [f"{base}{suffix}" for suffix in suffixes for base in MARGIN_TEXTS]
-    names += limit_names(family, family.position, "")
+    names += [*limit_names(family, family.position, ""), STAY.name]
     if isinstance(family, Chain):
         for stage in family.stages:
             names += limit_names(family, f"{stage.family.position}{stage.number}", str(stage.number))

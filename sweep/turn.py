@@ -9,7 +9,9 @@ import numpy as np
 
 from kernels import scan
 from kernels import status as st
-from sweep.catalogue import Way, general_way
+from sweep.catalogue import STAY, Way, general_way
+from sweep.dwell import window_angle
+from sweep.errors import InputError
 from sweep.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.chain import Chain
@@ -70,9 +72,23 @@ def limits_and_reductions(
     more, now = _extrema(family, designs, requests, accuracy, locate, window)
     columns: Columns = {"status": np.where(status == st.OK, now, status).astype(np.uint8)}
     for name, way in zip(names, ways, strict=True):
+        if way.base == STAY.name:
+            columns[name], columns[f"err_{name}"] = _stay(family, designs, way, found | more, accuracy, part)
+            continue
         value, err_value = _value(family, designs, way, found | more, windowed)
         columns[name], columns[f"err_{name}"] = value, err_value
     return columns
+
+
+def _stay(
+    family: Family, designs: Array, way: Way, found: Found, accuracy: Accuracy, part: tuple[float, float] | None
+) -> tuple[Array, Array]:
+    if part is None:
+        raise InputError("window", None, f"two fractions of the stroke, as {STAY.name} is wanted", "design outputs")
+    most, least = (found[r] for r in way.requests(False))
+    err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(len(designs))
+    err = np.where(np.isfinite(most.value), err, np.nan)
+    return window_angle(family, designs, Window.of_stroke(least.value, most.value, err, part))
 
 
 def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from kernels import scan
 from sweep.families.base import Array, Family
 from sweep.refine import EPS
-from sweep.sampling import Index, Mask, pose_columns
+from sweep.sampling import TWO_PI, Index, Mask, is_angle_of_follower, pose_columns
 
 PASSES = 60
 
@@ -86,6 +86,8 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
         phi[a] = right[a] - f_right[a] * (right[a] - left[a]) / (f_right[a] - f_left[a])
         poses, _ = pose_columns(family, designs[rows[row[a]]], phi[a, None], names)
         here, now = poses[pose][:, 0], poses[family.position][:, 0] - level[a]
+        if is_angle_of_follower(family.position):
+            now -= TWO_PI * np.round(now / TWO_PI)
         moved = np.abs(now - f[a])
         tells = (moved > 1e-7 * size[a]) & np.isfinite(values[a])
         slope[a] = np.where(tells, np.abs(here - values[a]) / np.where(tells, moved, 1.0), slope[a])

@@ -12,6 +12,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from sweep.catalogue import STAY
 from sweep.errors import InputError
 from sweep.families.base import Family
 
@@ -129,7 +130,7 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
         if x != name and x in family.pose_names:
             inside = window if x == "dev" and kind in ("max_abs", "phi_max_abs") else None
             return Measure(name, kind, (curve(family, x, inside),))
-    if name in {output.name for step in family.steps for output in step.provides}:
+    if name == STAY.name or name in {output.name for step in family.steps for output in step.provides}:
         return Measure(name, "scalar", ())
     known = (
         "margin, rotatable, max_pressure_angle, swing or stroke, phi0, stroke_ratio, max_abs_x, max_x, min_x, range_x"
