@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from kernels._jit import inline, kernel
 from kernels.synthesis.acceptance import EPS, Array, Status, design_status, first_failure
 from kernels.synthesis.angles import PI, sine_cosine
@@ -20,12 +22,13 @@ def _finish(
     i: int, status: Status, failed: Status, designs: Array,
 ) -> None:  # fmt: skip
     """Crank and coupler of (11), (12), the tests (i)-(iii), and the row; ``middle`` = (s1 + s2)/2, v = sin phi."""
-    branch = -1.0 if stroke > 0.0 else 1.0
+    branch = -1.0 if stroke.real > 0.0 else 1.0
     a = stroke * (f * sa - middle) / (ahead - back)
     radial, axial = ahead - a, s1 * sa - f
-    b = math.sqrt(radial * radial + axial * axial)
+    b = np.sqrt(radial * radial + axial * axial)
     t1, t2 = s1 - (f * sa + a * ca * v1), s2 - (f * sa + a * ca * v2)
-    test = first_failure(point and 0.0 < b < math.inf, ahead, back, a, t1, t2, branch)
+    finite = point and 0.0 < b.real < math.inf
+    test = first_failure(finite, ahead.real, back.real, a.real, t1.real, t2.real, branch)
     failed[i] = test
     status[i] = design_status(valid, test)
     good = valid and test == 0
@@ -37,7 +40,8 @@ def _finish(
 
 @inline
 def _valid(stroke: float, place: float, f: float, alpha: float) -> bool:
-    return 0.0 < abs(stroke) < 1e150 and abs(place) < 1e150 and abs(f) < 1e150 and abs(alpha) < 1e5
+    size = max(abs(place.real), abs(f.real))
+    return 0.0 < abs(stroke.real) < 1e150 and size < 1e150 and abs(alpha.real) < 1e5
 
 
 @kernel
@@ -53,6 +57,10 @@ def rssp_on_locus(requirements: Array, status: Status, failed: Status, designs: 
     failed : (n,) out, number of the first acceptance test failed, see :mod:`kernels.synthesis.acceptance`
     designs : (n, 6) out, columns a, b, e, f, alpha, branch; lengths found nan where the status is not OK
     s1 : (n,) out [length], slider at the extended position, or None
+
+    Notes
+    -----
+    Requirements may be complex128, with designs and s1 of that type: exact gradients by the complex step.
     """
     for i in range(requirements.shape[0]):
         stroke, phi0, phi1 = requirements[i, 0], requirements[i, 1], requirements[i, 2]
@@ -64,8 +72,8 @@ def rssp_on_locus(requirements: Array, status: Status, failed: Status, designs: 
         per = stroke / s0
         e, start, end = per * ca * u1 * u2, per * v1 * u2, per * v2 * u1
         middle = 0.5 * per * (v1 * u2 + v2 * u1)
-        valid = _valid(stroke, phi1, f, alpha) and abs(phi1) < 1e5 and 0.0 < phi0 < 2.0 * PI
-        point = abs(s0) > 4.0 * EPS
+        valid = _valid(stroke, phi1, f, alpha) and abs(phi1.real) < 1e5 and 0.0 < phi0.real < 2.0 * PI
+        point = abs(s0.real) > 4.0 * EPS
         _finish(
             stroke, start, end, middle, e, f, alpha, sa, ca, per * ca * u2, per * ca * u1, v1, v2, point, valid,
             i, status, failed, designs,

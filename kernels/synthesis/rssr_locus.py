@@ -11,7 +11,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from kernels._jit import inline, kernel
+from kernels.complex_step import arctan2
 from kernels.synthesis.acceptance import EPS, Array, Status, design_status, first_failure
 from kernels.synthesis.angles import PI, sine_cosine
 
@@ -42,9 +45,9 @@ def _read(requirements: Array, i: int) -> _Requirement:
     sh, ch = sine_cosine(0.5 * swing)
     s0, c0 = sine_cosine(phi0)
     sa, ca = sine_cosine(alpha)
-    valid = 0.0 < abs(swing) < 2.0 * PI and 0.0 < phi0 < 2.0 * PI and abs(alpha) < 1e5
-    valid = valid and abs(requirements[i, 2]) < 1e5 and abs(e) + abs(f) + abs(g) < 1e150
-    branch = -1.0 if swing > 0.0 else 1.0  # sheet (3-sgn)
+    valid = 0.0 < abs(swing.real) < 2.0 * PI and 0.0 < phi0.real < 2.0 * PI and abs(alpha.real) < 1e5
+    valid = valid and abs(requirements[i, 2].real) < 1e5 and abs(e.real) + abs(f.real) + abs(g.real) < 1e150
+    branch = -1.0 if swing.real > 0.0 else 1.0  # sheet (3-sgn)
     return _Requirement(e, f, g * sa, g * ca, sa, ca, sh, ch, 2.0 * sh * ch, 2.0 * sh * sh, s0, c0, branch, valid)
 
 
@@ -65,7 +68,7 @@ def _point(r: _Requirement, u1: float, v1: float) -> _Point:
     ss, q, ca = r.sin_swing, r.versed, r.ca
     along = ca * (1.0 - q) * r.sin_phi0
     det = along - ss * (v1 * v2 + ca * ca * u1 * u2)
-    exists = abs(det) > 8.0 * EPS * (abs(ss) * (1.0 + ca * ca) + abs(along))
+    exists = abs(det.real) > 8.0 * EPS * (abs(ss.real) * (1.0 + (ca * ca).real) + abs(along.real))
     per_det = 1.0 / det if exists else math.nan
     x = (r.e * (ss * v1 * v2 - ca * (r.sin_phi0 + q * v1 * u2)) + r.h * u1 * (ss * v2 - q * ca * u2)) * per_det
     y = (r.h * (r.sin_phi0 - q * u1 * v2 - ss * ca * u1 * u2) - r.e * v1 * (q * v2 + ss * ca * u2)) * per_det
@@ -80,18 +83,18 @@ def _finish(
     i: int, status: Status, failed: Status, designs: Array, requirements: Array,
 ) -> None:  # fmt: skip
     """Crank and coupler of (6), (7), the tests (i)-(iii), and the row of the design matrix."""
-    c = math.sqrt(x1 * x1 + y1 * y1)
+    c = np.sqrt(x1 * x1 + y1 * y1)
     x_mid, y_mid = x1 * r.cos_half - y1 * r.sin_half, y1 * r.cos_half + x1 * r.sin_half
     a = 2.0 * r.sin_half * (r.e * y_mid + r.f * r.sa * x_mid) / (ahead - back)
     axial, radial = r.g_axial + y1 * r.sa - r.f, ahead - a
-    b = math.sqrt(axial * axial + radial * radial)
+    b = np.sqrt(axial * axial + radial * radial)
     # c dF/dpsi/(2 c) = -X sin psi - Y cos psi at both limits
     x2, y2 = x_mid * r.cos_half - y_mid * r.sin_half, y_mid * r.cos_half + x_mid * r.sin_half
     u2, v2 = u1 * r.cos_phi0 - v1 * r.sin_phi0, v1 * r.cos_phi0 + u1 * r.sin_phi0
     t1 = -(r.e - a * u1) * y1 - (r.f * r.sa + a * r.ca * v1) * x1
     t2 = -(r.e - a * u2) * y2 - (r.f * r.sa + a * r.ca * v2) * x2
-    finite = point and 0.0 < c < math.inf and 0.0 < b < math.inf
-    test = first_failure(finite, ahead, back, a, t1, t2, r.branch)
+    finite = point and 0.0 < c.real < math.inf and 0.0 < b.real < math.inf
+    test = first_failure(finite, ahead.real, back.real, a.real, t1.real, t2.real, r.branch)
     failed[i] = test
     status[i] = design_status(r.valid, test)
     good = r.valid and test == 0
@@ -119,6 +122,7 @@ def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: 
 
     Notes
     -----
+    Requirements may be complex128, with designs and psi1 of that type: exact gradients by the complex step.
     Only the tests (i)-(iii) are made here; rotatability and pressure angles are the family's own exact margin.
     """
     for i in range(requirements.shape[0]):
@@ -127,7 +131,7 @@ def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: 
         p = _point(r, u1, v1)
         _finish(r, p.exists, p.x, p.y, p.ahead, p.back, u1, v1, i, status, failed, designs, requirements)
         if psi1 is not None:
-            psi1[i] = math.atan2(p.y, p.x) if status[i] == 0 else math.nan
+            psi1[i] = arctan2(p.y, p.x) if status[i] == 0 else math.nan
 
 
 @kernel

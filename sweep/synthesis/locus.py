@@ -42,7 +42,7 @@ class Locus:
     """One way to state what a follower has to do.
 
     ``chosen_by`` is the column that tells this way from the others of its family; ``solve`` takes the (n, P) matrix
-    with the columns of ``parameters``.
+    with the columns of ``parameters``; by phi1 it may be complex128, for gradients by the complex step.
     """
 
     family: str
@@ -91,40 +91,48 @@ class Locus:
         return ranges
 
 
-def _outputs(n: int, parameters: int) -> tuple[Status, Status, Array, Array]:
-    return np.empty(n, np.uint8), np.empty(n, np.uint8), np.empty((n, parameters)), np.empty(n)
+def _outputs(matrix: Array, parameters: int) -> tuple[Status, Status, Array, Array]:
+    n = len(matrix)
+    designs, other = np.empty((n, parameters), matrix.dtype), np.empty(n, matrix.dtype)
+    return np.empty(n, np.uint8), np.empty(n, np.uint8), designs, other
+
+
+def _in_turn(angle: Array) -> Array:
+    """The angle in [0, 2 pi); complex ones keep their imaginary part."""
+    turned: Array = angle - TWO_PI * np.floor(angle.real / TWO_PI)
+    return turned
 
 
 def _rssr_on_locus(matrix: Array) -> Found:
-    status, failed, designs, psi1 = _outputs(len(matrix), 8)
+    status, failed, designs, psi1 = _outputs(matrix, 8)
     kernels.rssr_on_locus(matrix, status, failed, designs, psi1)
-    return Found(designs, status, failed, matrix[:, 2] % TWO_PI, psi1, matrix[:, 1])
+    return Found(designs, status, failed, _in_turn(matrix[:, 2]), psi1, matrix[:, 1])
 
 
 def _rssr_at_direction(matrix: Array) -> Found:
-    status, failed, designs, phi1 = _outputs(len(matrix), 8)
+    status, failed, designs, phi1 = _outputs(matrix, 8)
     kernels.rssr_at_direction(matrix, np.ascontiguousarray(matrix[:, 7]), status, failed, designs, phi1)
-    return Found(designs, status, failed, phi1 % TWO_PI, matrix[:, 2], matrix[:, 1])
+    return Found(designs, status, failed, _in_turn(phi1), matrix[:, 2], matrix[:, 1])
 
 
 def _rssp_on_locus(matrix: Array) -> Found:
-    status, failed, designs, start = _outputs(len(matrix), 6)
+    status, failed, designs, start = _outputs(matrix, 6)
     kernels.rssp_on_locus(matrix, status, failed, designs, start)
-    return Found(designs, status, failed, matrix[:, 2] % TWO_PI, start, matrix[:, 1])
+    return Found(designs, status, failed, _in_turn(matrix[:, 2]), start, matrix[:, 1])
 
 
 def _rssp_at_offset(matrix: Array) -> Found:
-    status, failed, designs, start = _outputs(len(matrix), 6)
+    status, failed, designs, start = _outputs(matrix, 6)
     phi1 = np.empty(len(matrix))
     kernels.rssp_at_offset(matrix, np.ascontiguousarray(matrix[:, 5]), status, failed, designs, start, phi1)
-    return Found(designs, status, failed, phi1 % TWO_PI, start, matrix[:, 1])
+    return Found(designs, status, failed, _in_turn(phi1), start, matrix[:, 1])
 
 
 def _rssp_at_place(matrix: Array) -> Found:
-    status, failed, designs, phi0 = _outputs(len(matrix), 6)
+    status, failed, designs, phi0 = _outputs(matrix, 6)
     phi1 = np.empty(len(matrix))
     kernels.rssp_at_place(matrix, status, failed, designs, phi0, phi1)
-    return Found(designs, status, failed, phi1 % TWO_PI, matrix[:, 1], phi0)
+    return Found(designs, status, failed, _in_turn(phi1), matrix[:, 1], phi0)
 
 
 _SWING = Parameter("swing", "angle", "rocker angle from the extended to the folded position, with its sign")
