@@ -18,7 +18,7 @@ from studies.accuracy import oracle
 
 FOLDER = Path(__file__).parent / "oracle"
 ROWS = {"rssr": 412, "rssp": 140, "needle208": 46, "composite rssr + rssr": 36, "composite rssr + rssp": 36}
-ROWS |= {"limits": 106, "pressure": 71}
+ROWS |= {"limits": 106, "pressure": 71, "geared_dwell": 123}
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from studies.accuracy.page import Measured, html, markdown
 from studies.accuracy.regions import regions
 
 ROOT = Path(__file__).resolve().parents[2]
+TABLES = ROOT / "tests" / "oracle"
 SEED = 1
 
 
@@ -34,7 +36,7 @@ def main() -> None:
 
     import pandas as pd
 
-    areas = regions(60 if smoke else 1000, SEED)
+    areas = regions(60 if smoke else 500, SEED)
     done("regions")
     found = Measured(
         machine=description(),
@@ -47,7 +49,10 @@ def main() -> None:
         outputs=costs.output_costs(areas[0].designs, smoke),
         storage=costs.storage_costs(20_000 if smoke else 500_000),
         optimiser=costs.optimiser_costs((1e-4, 1e-8) if smoke else (1e-3, 1e-4, 1e-6, 1e-8, 1e-10), 1 if smoke else 8),
-        oracle=oracle.frame(oracle.factors(ROOT / "tests" / "oracle")),
+        oracle=oracle.frame(oracle.factors(TABLES)),
+        worst=pd.DataFrame(json.loads((TABLES / "worst_found.json").read_text())["rows"])[
+            ["region", "output", "factor"]
+        ],
     )
     done("measured")
     out.mkdir(parents=True, exist_ok=True)

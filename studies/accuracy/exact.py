@@ -17,7 +17,6 @@ from sweep.families.base import Array
 if TYPE_CHECKING:
     import pandas as pd
 
-OTHERS = 10  # pose outputs of the kernel after the four of the motion
 COPIES = 50
 
 
@@ -26,8 +25,11 @@ def motion(designs: Array, phi: Array, k0: Array | None) -> Array:
     n = len(designs)
     status = np.empty((n, 1), np.uint8)
     p, d1, d2, d3 = (np.empty((n, 1)) for _ in range(4))
-    others = [None] * OTHERS
-    rssr.poses(designs, np.cos(phi)[:, None], np.sin(phi)[:, None], status, p, d1, d2, d3, *others, k0=k0)
+    cos, sin = np.cos(phi)[:, None], np.sin(phi)[:, None]
+    rssr.poses(
+        designs, cos, sin, status, p, d1, d2, d3,
+        None, None, None, None, None, None, None, None, None, None, k0,
+    )  # fmt: skip
     return np.concatenate([p, d1, d2, d3], axis=1).T
 
 

@@ -20,6 +20,7 @@ from sweep.sampling import Index, Status, turn
 TARGET = 1e-8
 WRONG_PEAK = 1e-4  # relative difference in height that no refinement of the right peak leaves
 GRID = 360
+REPEATS = 15  # of a timing; the shortest counts, and other work on the machine disturbs most of them
 
 
 @dataclass(frozen=True)
@@ -54,16 +55,16 @@ def _maxima(designs: Array) -> list[Mark]:
     found, error, status = _true_maxima(designs, TARGET)()
     exact = even_reference(designs)
     off = np.abs(found - exact) / exact
-    # Where they differ the even samples may be the ones that missed: the slower reference decides.
-    doubtful = np.flatnonzero(~(off <= TARGET))
-    exact[doubtful] = reference.extremum(np.ascontiguousarray(designs[doubtful]), "d2psi")
+    # Where they differ the even samples may be the ones that missed, or their rounding: the slower reference decides.
+    doubtful = np.flatnonzero(~((off <= TARGET) & (off * exact <= error)))
+    exact[doubtful] = reference.largest_acceleration(np.ascontiguousarray(designs[doubtful]))
     off = np.abs(found - exact) / exact
     answered = status == st.OK
     worst, wrong = float(off[answered].max()), int((off[answered] > WRONG_PEAK).sum())
-    held = int((np.abs(found - exact)[answered] > error[answered] + 2.0**-50 * exact[answered]).sum())
+    held = int((np.abs(found - exact)[answered] > error[answered]).sum())
     angles, least, grid = turn(GRID), np.empty(len(designs)), np.empty(len(designs))
-    dense = seconds(lambda: rssr.dense_maxima(designs, angles.cos[0], angles.sin[0], least, None, grid, None), 3)
-    true = seconds(_true_maxima(designs, TARGET), 3)
+    dense = seconds(lambda: rssr.dense_maxima(designs, angles.cos[0], angles.sin[0], least, None, grid, None), REPEATS)
+    true = seconds(_true_maxima(designs, TARGET), REPEATS)
     n = len(designs)
     return [
         Mark(
@@ -94,7 +95,7 @@ def even_reference(designs: Array) -> Array:
         least, grid, at = np.empty(len(part)), np.empty(len(part)), np.empty(len(part), np.int64)
         rssr.dense_maxima(part, angles.cos[0], angles.sin[0], least, None, grid, None, at, own)
         gaps = np.full(len(part), step)
-        exact[rows] = np.fmax(grid, reference.refined(part, "d2psi", 0, angles.phi[0, at], gaps, gaps))
+        exact[rows] = np.fmax(grid, reference.refined(part, "d2psi", 0, angles.phi[0, at], gaps, gaps)[0])
 
     _together(work, [(half, np.empty(reference.SAMPLES)) for half in halves])
     return exact
@@ -112,7 +113,7 @@ def _together(work: Callable[[Any, Any], None], parts: Sequence[tuple[Any, Any]]
 def _margin(designs: Array) -> list[Mark]:
     n = len(designs)
     status, margin, turns = np.empty(n, np.uint8), np.empty(n), np.empty(n)
-    took = 1e9 * seconds(lambda: rssr.margin(designs, status, margin, turns, None, None, None)) / n
+    took = 1e9 * seconds(lambda: rssr.margin(designs, status, margin, turns, None, None, None), REPEATS) / n
     return [Mark("exact margin with rotatability [ns per design]", "25", f"{took:.0f}", took <= 25.0)]
 
 
@@ -191,7 +192,7 @@ def _two_threads(designs: Array) -> Mark:
         rssr.margin(part, status, out[0], out[1], None, None, None)
         rssr.true_maxima(part, cos, sin, TARGET, status, None, None, None, None, out[2], None)
 
-    took = seconds(lambda: _together(work, list(zip(halves, statuses, strict=True))), 5)
+    took = seconds(lambda: _together(work, list(zip(halves, statuses, strict=True))), REPEATS)
     each, turning = 1e9 * took / len(designs), float(np.mean(np.concatenate(statuses) == st.OK))
     text = f"{each:.0f} of wall time; {100 * turning:.0f} % of the designs turn and have their maximum found"
     assert set(np.unique(designs[:, BRANCH])) <= {-1.0, 1.0}

@@ -46,8 +46,9 @@ def read(folder: Path, name: str) -> list[dict[str, Any]]:
 
 
 def factors(folder: Path) -> list[Worst]:
-    """Every table that states a tolerance: rssr, rssp, needle208, composite, limits, pressure."""
-    return [worst for judge in (_rssr, _rssp, _needle, _composite, _limits, _pressure) for worst in judge(folder)]
+    """Every table whose sheet states a tolerance for motions, limit positions, pressure angles and dwells."""
+    judges = (_rssr, _rssp, _needle, _composite, _limits, _pressure, _geared_dwell)
+    return [worst for judge in judges for worst in judge(folder)]
 
 
 def frame(found: Sequence[Worst]) -> pd.DataFrame:
@@ -193,3 +194,30 @@ def _pressure(folder: Path) -> list[Worst]:
     }
     got = sweep.evaluate("rssr", table, list(wanted))
     return _judge("pressure", rows, got, wanted, 64.0, (), lambda row, k: float(row["sens"][k]))
+
+
+def _geared_dwell(folder: Path) -> list[Worst]:
+    """Poses, dwell measures and maxima; the table has no condition numbers (its sheet: 16 roundings of the size)."""
+    everything = [row | row["out"] | row["in"] for row in read(folder, "geared_dwell")]
+    points = [row for row in everything if row["kind"] == "point"]
+    ladder = ["phi", "dphi", "d2phi", "d3phi"]
+    wanted = {name: (ladder[k], ladder[min(k, 1) : k + 1]) for k, name in enumerate(("psi", "dpsi", "d2psi"))}
+    table = {"k": _column(points, "k"), "a": _column(points, "a"), "phi": _column(points, "alpha")}
+
+    def size(row: Row, key: str) -> float:
+        # one rounding of the carrier angle moves y by |alpha y'|
+        following = ladder[ladder.index(key) + 1]
+        return max(abs(float(row[key])), abs(float(row["alpha"]) * float(row[following])))
+
+    points = [row | {"kind": "point"} for row in points]
+    found = _judge("geared_dwell", points, sweep.evaluate("geared_dwell", table, list(wanted)), wanted, 16.0, (), size)
+    for kind, names in (
+        ("dwell", {"dwell_angle": "alpha0", "dwell_deviation": "delta", "dwell_band": "band_dwell"}),
+        ("turn", {"max_abs_d2psi": "max_abs_d2phi", "phi_max_abs_d2psi": "alpha_of_max_in_0_pi"}),
+    ):
+        rows = [row for row in everything if row["kind"] == kind]
+        table = {"k": _column(rows, "k"), "a": _column(rows, "a")}
+        got = sweep.summarise("geared_dwell", table, list(names), accuracy=FINEST)
+        keys = {ours: (key, [key]) for ours, key in names.items()}
+        found += _judge("geared_dwell", rows, got, keys, 16.0, (), lambda row, key: abs(float(row[key])))
+    return found

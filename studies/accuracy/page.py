@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from studies.accuracy.reference import ORDERS
 from studies.accuracy.tables import pipe_table, reached_table
 from studies.accuracy.tables import significant as sig
 
@@ -34,6 +35,7 @@ class Measured:
     storage: pd.DataFrame
     optimiser: pd.DataFrame
     oracle: pd.DataFrame
+    worst: pd.DataFrame
 
     def tables(self) -> Iterator[tuple[str, pd.DataFrame]]:
         """The tables by name."""
@@ -130,8 +132,8 @@ def _extrema(m: Measured) -> list[str]:
         "Error: largest relative error over the designs of a region against 65 536 samples, a quarter of them",
         "crowded about the least discriminant, and halving. Time: one thread, shortest of three. Each cell: the",
         "cheapest setting whose largest error is below the bound, its time per design, and the ratio to",
-        "`accuracy=`; - where no setting reaches it. At change points the reference itself is only good to the",
-        "rounding of the discriminant, about 1e-6.",
+        "`accuracy=`; - where no setting reaches it. The reference's height of the acceleration is computed in 60",
+        "digits; at change points the rounding of the discriminant alone leaves 1e-6 to any method in float64.",
     ]
     for quantity, title in (("max_abs_d2psi", "Largest acceleration over the turn"), ("swing", "Swing")):
         for bound in (1e-3, 1e-6, 1e-9):
@@ -210,28 +212,37 @@ def _exact(m: Measured) -> list[str]:
         "## Doubles meant to the last bit",
         "",
         "A long coupler multiplies the rounding of its own length; that is in cond, and a drawing loses nothing by it.",
-        "Where the given doubles are exact (a comparison with exact arithmetic), the closure constant can be summed in",
-        "twice the working precision, once per design: `kernels.families.rssr.exact`. Largest errors, of the derivatives",
-        "relative to their own size plus that of the velocity:",
+        "Where the given doubles are exact (a comparison with exact arithmetic), the closure constant can be summed",
+        "in twice the working precision, once per design: `kernels.families.rssr.exact`. Largest errors, of the",
+        "derivatives relative to their own size plus that of the velocity:",
         "",
         *pipe_table(head, rows),
     ]
 
 
 def _oracle(m: Measured) -> list[str]:
-    rows = [
-        [r.table, r.quantity, r.kind, str(r.rows), str(r.undecidable), sig(r.factor), f"{r.allowed:g}"]
-        for r in m.oracle.itertuples()
-    ]
-    head = ["table", "quantity", "kind of rows", "rows", "undecidable", "largest factor", "allowed"]
-    return [
+    lines = [
         "",
         "## Largest known factors",
         "",
-        "Every row of the 25-digit tables, in units of 2^-53 max(cond, abs y). `make search-worse` looks for worse.",
-        "",
-        *pipe_table(head, rows),
+        "Every row of the 25-digit tables, in units of 2^-53 max(cond, abs y); for the geared dwell drive, whose",
+        "table has no cond, of abs y, its lower derivatives and what one rounding of phi does. Rows declared",
+        f"undecidable: {int(m.oracle['undecidable'].sum())}. `make search-worse` looks for worse; what it found is below.",
     ]
+    for table, part in m.oracle.groupby("table", sort=False):
+        quantities = list(dict.fromkeys(part["quantity"]))
+        rows = []
+        for kind, cells in part.groupby("kind", sort=False):
+            known = dict(zip(cells["quantity"], cells["factor"], strict=True))
+            count = str(int(cells["rows"].max()))
+            rows.append([str(kind).replace("_", " "), count, *(sig(known.get(q, np.nan)) for q in quantities)])
+        lines += ["", f"### {table}, allowed {part['allowed'].iloc[0]:g}", ""]
+        lines += pipe_table(["kind of rows", "rows", *quantities], rows)
+    worst = [
+        [str(region), *(sig(part.loc[part["output"] == name, "factor"].max()) for name in ORDERS)]
+        for region, part in m.worst.groupby("region", sort=False)
+    ]
+    return [*lines, "", "### Largest found by search", "", *pipe_table(["region", *ORDERS], worst)]
 
 
 def html(page: str, figures: list[Saved]) -> str:
