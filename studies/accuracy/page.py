@@ -226,8 +226,8 @@ def _oracle(m: Measured) -> list[str]:
         "## Largest known factors",
         "",
         "Every row of the 25-digit tables, in units of 2^-53 max(cond, abs y); for the geared dwell drive, whose",
-        "table has no cond, of abs y, its lower derivatives and what one rounding of phi does. Rows declared",
-        f"undecidable: {int(m.oracle['undecidable'].sum())}. `make search-worse` looks for worse; what it found is below.",
+        "table has no cond, of abs y, its lower derivatives and what one rounding of phi does.",
+        f"Rows declared undecidable: {int(m.oracle['undecidable'].sum())}. `make search-worse` looks for worse poses.",
     ]
     for table, part in m.oracle.groupby("table", sort=False):
         quantities = list(dict.fromkeys(part["quantity"]))
