@@ -81,7 +81,7 @@ def chain(families: tuple[Family, ...]) -> Chain:
         parameters=parameters,
         position=last.position,
         pose_outputs=tuple(outputs),
-        poses=partial(_poses, stages),
+        poses=partial(_poses, stages, {}),
         derivative_of=dict(last.derivative_of) | own,
         uses_phi=families[0].uses_phi,
         dear={
@@ -170,9 +170,20 @@ def _psi_derivatives(family: Family, order: int) -> list[str]:
     return names[1:]
 
 
-def _poses(stages: tuple[Stage, ...], designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status, computed in blocks so that the intermediate arrays stay in the cache."""
-    plan = _plan(stages, wanted)
+def _poses(
+    stages: tuple[Stage, ...],
+    plans: dict[frozenset[str], _Plan],
+    designs: Array,
+    angles: Angles,
+    wanted: frozenset[str],
+) -> Columns:
+    """Wanted pose outputs and status, computed in blocks so that the intermediate arrays stay in the cache.
+
+    ``plans`` keeps what was planned before: the optimiser asks the same of one design at a time.
+    """
+    plan = plans.get(wanted)
+    if plan is None:
+        plan = plans[wanted] = _plan(stages, wanted)
     shape = (designs.shape[0], angles.cos.shape[1])
     if shape[0] * shape[1] <= BLOCK:
         return _block(stages, plan, designs, angles)
