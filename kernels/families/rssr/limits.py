@@ -173,7 +173,7 @@ def limits(designs: Array, status: Status, out: Array, error: Array | None) -> N
 
     Notes
     -----
-    Where the status is not OK all are nan.  Largest error over the 122 oracle rows: see docs/rssr.md.
+    Where the status is not OK all are nan.  Largest error over the 122 oracle rows: 3.0 x 2^-53 x max(cond, |y|).
     """
     at, marks, begin = new_block(), np.empty(BLOCK), np.empty(3)
     cos, sin = np.empty(FEWEST), np.empty(FEWEST)
