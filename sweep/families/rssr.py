@@ -220,7 +220,7 @@ FAMILY = Family(
     poses=poses,
     steps=(
         Step("margin", MARGIN_OUTPUTS, margin, 40.0),
-        Step("limit positions", LIMIT_OUTPUTS, limits, 1000.0),
+        Step("limit positions", LIMIT_OUTPUTS, limits, 700.0),
         Step("true maxima", MAXIMA_OUTPUTS, true_maxima, 250.0, _refined),
         Step("grid", MAXIMA_OUTPUTS, sampled_maxima, 50.0, _sampled, ns_per_sample=1.7),
     ),
