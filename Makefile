@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test lint types imports check smoke bench bench-effects docs clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: help setup test lint types imports check smoke bench bench-effects bench-peers study-accuracy smoke-accuracy search-worse docs clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -54,6 +54,11 @@ study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accur
 
 smoke-accuracy: $(VENV)/ready  ## the same on few designs, writes no page
 	$(BIN)/python -m studies.accuracy --smoke --out results/smoke/accuracy
+
+bench-peers: $(VENV)/ready  ## the planar case next to pylinkage, which gets an environment of its own
+	$(PYTHON) -m venv .venv-peers
+	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable . 'pylinkage[numba]'
+	.venv-peers/bin/python -m studies.accuracy.peers --out results/accuracy
 
 search-worse: $(VENV)/ready  ## look for poses with larger errors than any known; appends to tests/oracle/worst_found.json
 	$(BIN)/python -m tests.search.worse

@@ -53,6 +53,7 @@ def main() -> None:
         worst=pd.DataFrame(json.loads((TABLES / "worst_found.json").read_text())["rows"])[
             ["region", "output", "factor"]
         ],
+        peers=pd.read_parquet(out / "peers.parquet") if (out / "peers.parquet").exists() else None,
     )
     done("measured")
     out.mkdir(parents=True, exist_ok=True)

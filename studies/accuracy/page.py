@@ -36,10 +36,11 @@ class Measured:
     optimiser: pd.DataFrame
     oracle: pd.DataFrame
     worst: pd.DataFrame
+    peers: pd.DataFrame | None
 
     def tables(self) -> Iterator[tuple[str, pd.DataFrame]]:
         """The tables by name."""
-        names = [field.name for field in fields(self)][3:]
+        names = [field.name for field in fields(self)][3:-1]  # the peers have been written by their own command
         return ((name, getattr(self, name)) for name in names)
 
 
@@ -57,6 +58,7 @@ def markdown(m: Measured) -> str:
         *_extrema(m),
         *_outputs(m),
         *_positions(m),
+        *_peers(m),
         *_oracle(m),
     ]
     return "\n".join(parts) + "\n"
@@ -217,6 +219,21 @@ def _exact(m: Measured) -> list[str]:
         "derivatives relative to their own size plus that of the velocity:",
         "",
         *pipe_table(head, rows),
+    ]
+
+
+def _peers(m: Measured) -> list[str]:
+    lines = ["", "## The planar case next to another tool", ""]
+    if m.peers is None:
+        return [*lines, "Not measured in this results folder: `make bench-peers` first."]
+    rows = [[r.what, sig(r.ns_per_angle), sig(r.ratio)] for r in m.peers.itertuples()]
+    distance = sig(m.peers["distance_of_rocker_pins"].max())
+    return [
+        *lines,
+        "One planar four-bar, rocker at evenly spaced crank angles, each tool by its fastest way, on this machine",
+        f"(`make bench-peers`); their rocker pins differ by at most {distance} cranks.",
+        "",
+        *pipe_table(["what", "ns per crank angle", "times as fast"], rows),
     ]
 
 
