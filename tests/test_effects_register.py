@@ -1,0 +1,63 @@
+"""The register itself: complete, printed, and its page current."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from sweep.cli import main
+from sweep.cli.effects import page
+from sweep.effects import NAMES, applicable, effect, outputs
+from sweep.effects.advice import closure
+from sweep.families import NAMES as FAMILIES
+from sweep.families import family
+from sweep.study.units import factor, internal_unit
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def test_the_page_is_current():
+    """`make docs` writes it; after a change of the register it must be run."""
+    assert (ROOT / "docs" / "effects.md").read_text() == page()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_entry_is_complete(name):
+    entry = effect(name)
+    assert entry.name == name
+    assert entry.title and entry.formulas and entry.called_for and entry.negligible
+    assert entry.ns_per_pose > 0.0 or entry.design_result is not None
+    for o in outputs(entry):
+        assert o.text and o.equation, o.name
+    for item in (*outputs(entry), *entry.inputs):
+        assert factor(internal_unit(item.unit), internal_unit(item.unit)) == 1.0
+    for needed in entry.needs:
+        assert needed in NAMES
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_no_two_outputs_of_a_family_share_a_name(name):
+    found = family(name)
+    names = [*found.pose_names, *found.parameter_names, *(o.name for step in found.steps for o in step.provides)]
+    of_effects = [o.name for entry in applicable(found) for o in outputs(entry)]
+    assert len(set(of_effects)) == len(of_effects)
+    assert not set(of_effects) & set(names)
+    assert (found.joints is None) == (not of_effects)
+
+
+def test_an_effect_comes_after_what_it_needs():
+    order = [entry.name for entry in closure([effect("bearing_life"), effect("dynamic_elasticity")])]
+    assert order == ["coupler", "kinetostatics", "bearing_life", "pressure", "elasticity", "dynamic_elasticity"]
+
+
+def test_the_command_lists_and_explains():
+    listing = CliRunner().invoke(main, ["effects"])
+    assert listing.exit_code == 0
+    assert all(name in listing.output for name in NAMES)
+    one = CliRunner().invoke(main, ["effects", "friction"])
+    assert "rho(L)" in one.output and "mu_a" in one.output and "kinetostatics" in one.output
+    wrong = CliRunner().invoke(main, ["effects", "frction"])
+    assert wrong.exit_code == 2
+    assert "did you mean 'friction'?" in wrong.output
