@@ -82,7 +82,7 @@ def run(
         try:
             computed = _sweep(model, folder, jobs, backend, force, progress)
             if model.optimise is not None:
-                _optimise(model, folder)
+                _optimise(model, folder, jobs)
         except Exception as error:
             if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
                 store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
@@ -211,7 +211,7 @@ def _raise_if_signalled(stop: Stop, folder: Path) -> None:
         raise Interrupted(stop.signal_number, text)
 
 
-def _optimise(study: Study, folder: Path) -> None:
+def _optimise(study: Study, folder: Path, jobs: int) -> None:
     """Run the optimiser unless its result for these very sources is there already."""
     from sweep.optimise import optimise_study
     from sweep.plan import optimiser_hash
@@ -223,7 +223,7 @@ def _optimise(study: Study, folder: Path) -> None:
     store.write_plan(folder, note | {"optimised": None})
     with stop_on_signal() as stop:
         try:
-            optimise_study(study, folder, lambda: bool(stop))
+            optimise_study(study, folder, lambda: bool(stop), jobs)
         except KeyboardInterrupt:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"

@@ -26,7 +26,7 @@ class Optimiser:
         self.calls: list[OptimiseSettings | None] = []
         self.begin: Callable[[], None] = lambda: None
 
-    def __call__(self, study: Study, folder: Path, stop: Callable[[], bool]) -> Path:
+    def __call__(self, study: Study, folder: Path, stop: Callable[[], bool], jobs: int) -> Path:
         self.calls.append(study.optimise)
         self.begin()
         path = folder / OPTIMUM

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,18 +15,25 @@ import numpy as np
 from kernels import status as st
 from sweep.errors import InputError
 from sweep.families.base import Array
-from sweep.optimise.certificate import AGREE, Result, in_words
-from sweep.optimise.descent import KKT, Descent
+from sweep.optimise.certificate import AGREE, Result
 from sweep.optimise.form import Program
-from sweep.optimise.model import State, Stopped
+from sweep.optimise.parallel import in_processes
 from sweep.optimise.problem import PLACE, Problem
+from sweep.optimise.search import search
+from sweep.signals import Stop, stop_on_signal
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings
 
+SERIAL_SECONDS = 1.0  # of search before processes are worth their start
+
 
 def minimise(
-    problem: Problem, starts: Array, settings: OptimiseSettings, stop: Callable[[], bool] | None = None
+    problem: Problem,
+    starts: Array,
+    settings: OptimiseSettings,
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
 ) -> list[Result]:
     """Smallest objective under the limits, from each start; one result per start that was begun, best first.
 
@@ -34,6 +43,8 @@ def minimise(
     starts : (k, P) designs; their signs are kept, their variables are the starting points
     settings : ``time_budget`` [s] or None is honoured; a start in progress then ends with its best design so far
     stop : asked often; when it answers true, or at Ctrl-C, the search ends as if the time were used up
+    jobs : processes the starts are spread over, once the search turns out to take more than a second; the results are
+        those of one process, to the bit
 
     Returns
     -------
@@ -42,32 +53,62 @@ def minimise(
     Raises
     ------
     InputError
-        if there is no start, or a name of the problem is unknown.
+        if there is no start, or a name of the problem is unknown
+    WorkerDied
+        if a worker process was killed.
     """
     starts = np.atleast_2d(np.asarray(starts, dtype=np.float64))
     if starts.size == 0 or starts.shape[1] != len(problem.family.parameters):
         raise InputError("starts", starts.shape, f"at least one row of {len(problem.family.parameters)} values", PLACE)
-    program = Program(problem)
-    asked = _deadline(settings.time_budget, stop)
+    Program(problem)  # an unknown name is refused here, not in a worker
+    end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
+    with _signals() as own:
+
+        def asked() -> bool:
+            return time.monotonic() >= end or bool(own) or (stop is not None and stop())
+
+        results = _serial(problem, starts, asked, math.inf if jobs == 1 else SERIAL_SECONDS)
+        done = {r.start for r in results}
+        rest = [k for k in range(len(starts)) if k not in done]
+        stopped = any(r.ended == "interrupted" for r in results) or (bool(results) and asked())
+        if rest and not stopped:
+            results += in_processes(problem, starts, rest, asked, jobs, answered=bool(results))
+    if own.signal_number is not None:
+        results = [replace(r, ended="interrupted") if r.ended == "time" else r for r in results]
+        if own.signal_number == signal.SIGTERM:
+            signal.raise_signal(signal.SIGTERM)
+    return ranked(results)
+
+
+@contextmanager
+def _signals() -> Iterator[Stop]:
+    """Ctrl-C sets a flag, so that every process ends with its best design; a caller's own handler is left alone."""
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield Stop()
+        return
+    with stop_on_signal() as stop:
+        yield stop
+
+
+def _serial(problem: Problem, starts: Array, asked: Callable[[], bool], seconds: float) -> list[Result]:
+    """The starts one after the other; what has not ended after so many seconds is left to the workers."""
     results: list[Result] = []
+    late = time.monotonic() + seconds
     for number, start in enumerate(starts):
         if results and asked():
             break
-        # The first start always gets to its first design, so that there is an answer.
-        ask = asked if results else _after_first(asked)
-        descent = Descent(problem, program, start, ask)
-        ended = ""
-        try:
-            descent.run()
-        except Stopped:
-            ended = "time"
-        except KeyboardInterrupt:
-            ended = "interrupted"
-        descent.model.stop = lambda: False
-        results.append(_result(number, problem, program, descent, ended))
-        if ended == "interrupted":
+        last = number == len(starts) - 1  # a worker would do it no faster
+
+        def ask(last: bool = last) -> bool:
+            return asked() or (not last and time.monotonic() >= late)
+
+        found = search(number, problem, start, ask, first=not results)
+        if found.ended == "time" and not asked():
             break
-    return ranked(results)
+        results.append(found)
+        if found.ended == "interrupted":
+            break
+    return results
 
 
 def ranked(results: list[Result]) -> list[Result]:
@@ -93,49 +134,3 @@ def _deadline(seconds: float | None, stop: Callable[[], bool] | None) -> Callabl
     """A question to ask often: is the time used up, or does the caller want to stop?"""
     end = math.inf if seconds is None else time.monotonic() + seconds
     return lambda: time.monotonic() >= end or (stop is not None and stop())
-
-
-def _after_first(asked: Callable[[], bool]) -> Callable[[], bool]:
-    calls = iter(range(3))
-    return lambda: next(calls, None) is None and asked()
-
-
-def _result(number: int, problem: Problem, program: Program, descent: Descent, ended: str) -> Result:
-    state = descent.best
-    exists = math.isfinite(state.objective) and math.isfinite(state.violation)
-    value = program.value(program.objective, state.form, descent.model.curves, state.design, state.atoms)
-    residual, words = math.nan, {}
-    if exists:
-        found = descent.model.certificate(state)
-        residual = found.residual
-        words = in_words(state.form.labels, found, problem.variables)
-    values = {
-        r.measure.name: program.value(r.measure, state.form, descent.model.curves, state.design, state.atoms)
-        for r in program.requirements
-    }
-    if not state.feasible:
-        status, how = st.LIMIT_EXCEEDED, "infeasible"
-    elif residual <= KKT:
-        status, how = st.OK, "converged"
-    else:
-        status, how = st.NOT_CONVERGED, "stalled"
-    return Result(
-        start=number, design=state.design, objective=value, gap=descent.gap, violation=state.violation,
-        kkt_residual=residual, active=tuple(words), multipliers=words, relaxation=_relaxation(program, values, state),
-        values=values, status=status, ended=ended or how,
-    )  # fmt: skip
-
-
-def _relaxation(program: Program, values: dict[str, float], state: State) -> dict[str, float]:
-    """By how much each violated limit has to give way, in the unit of its output."""
-    if state.feasible:
-        return {}
-    out: dict[str, float] = {}
-    for r in program.requirements:
-        value = values[r.measure.name]
-        low = -math.inf if r.minimum is None else r.measure.from_inner(r.minimum)
-        high = math.inf if r.maximum is None else r.measure.from_inner(r.maximum)
-        short = max(low - value, value - high)
-        if math.isnan(value) or short > 0.0:
-            out[r.measure.name] = short
-    return out

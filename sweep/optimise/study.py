@@ -105,7 +105,7 @@ def problem_and_starts(study: Study, folder: Path) -> tuple[OptimiseSettings, Pr
     return study.optimise, problem, diverse(problem, designs, merit, count)
 
 
-def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | None = None) -> Path:
+def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | None = None, jobs: int = 1) -> Path:
     """Search from diverse best designs of the dataset and write the result beside it.
 
     Parameters
@@ -113,6 +113,7 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     study : with an objective and [optimise]
     folder : its dataset; where it has no feasible row, the starts come from a sample of the same bounds
     stop : asked often; true ends the search as Ctrl-C does
+    jobs : processes the starts are spread over; the result does not depend on it
 
     Returns
     -------
@@ -129,7 +130,7 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     """
     place = Path(folder)
     settings, problem, starts = problem_and_starts(study, place)
-    results = minimise(problem, starts, settings, stop)
+    results = minimise(problem, starts, settings, stop, jobs)
     frame = _table(study, problem, results)
     _write(place / store.OPTIMUM, frame, study)
     _write(place / store.CURVES, _curves(study, frame), study)

@@ -1,0 +1,88 @@
+"""One start, wherever it runs: the search, and what is known about the design it ends at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from kernels import status as st
+from sweep.families.base import Array
+from sweep.optimise.certificate import Result, in_words
+from sweep.optimise.descent import KKT, Descent
+from sweep.optimise.form import Program
+from sweep.optimise.model import State, Stopped
+from sweep.optimise.problem import Problem
+
+
+def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool], first: bool) -> Result:
+    """Search from one start, on one BLAS thread: the systems are small, and the bits stay those of any other process.
+
+    Parameters
+    ----------
+    number : of the start, for the result
+    problem : what to minimise
+    start : (P,) design
+    asked : true ends the search with the best checked design so far
+    first : this start gets to its first design whatever is asked, so that there is an answer
+    """
+    import scipy.optimize  # noqa: F401  (brings its own BLAS, which has to be there to be limited)
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, user_api="blas"):
+        program = Program(problem)
+        descent = Descent(problem, program, start, _after_first(asked) if first else asked)
+        ended = ""
+        try:
+            descent.run()
+        except Stopped:
+            ended = "time"
+        except KeyboardInterrupt:
+            ended = "interrupted"
+        descent.model.stop = lambda: False
+        return _result(number, problem, program, descent, ended)
+
+
+def _after_first(asked: Callable[[], bool]) -> Callable[[], bool]:
+    calls = iter(range(3))
+    return lambda: next(calls, None) is None and asked()
+
+
+def _result(number: int, problem: Problem, program: Program, descent: Descent, ended: str) -> Result:
+    state = descent.best
+    exists = math.isfinite(state.objective) and math.isfinite(state.violation)
+    value = program.value(program.objective, state.form, descent.model.curves, state.design, state.atoms)
+    residual, words = math.nan, {}
+    if exists:
+        found = descent.model.certificate(state)
+        residual = found.residual
+        words = in_words(state.form.labels, found, problem.variables)
+    values = {
+        r.measure.name: program.value(r.measure, state.form, descent.model.curves, state.design, state.atoms)
+        for r in program.requirements
+    }
+    if not state.feasible:
+        status, how = st.LIMIT_EXCEEDED, "infeasible"
+    elif residual <= KKT:
+        status, how = st.OK, "converged"
+    else:
+        status, how = st.NOT_CONVERGED, "stalled"
+    return Result(
+        start=number, design=state.design, objective=value, gap=descent.gap, violation=state.violation,
+        kkt_residual=residual, active=tuple(words), multipliers=words, relaxation=_relaxation(program, values, state),
+        values=values, status=status, ended=ended or how,
+    )  # fmt: skip
+
+
+def _relaxation(program: Program, values: dict[str, float], state: State) -> dict[str, float]:
+    """By how much each violated limit has to give way, in the unit of its output."""
+    if state.feasible:
+        return {}
+    out: dict[str, float] = {}
+    for r in program.requirements:
+        value = values[r.measure.name]
+        low = -math.inf if r.minimum is None else r.measure.from_inner(r.minimum)
+        high = math.inf if r.maximum is None else r.measure.from_inner(r.maximum)
+        short = max(low - value, value - high)
+        if math.isnan(value) or short > 0.0:
+            out[r.measure.name] = short
+    return out

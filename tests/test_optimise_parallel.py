@@ -1,0 +1,84 @@
+"""Starts in processes: the results of one process, stop and deadline, a killed worker."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sweep.optimise.solve
+from sweep.errors import WorkerDied
+from sweep.families import family
+from sweep.families.base import Angles
+from sweep.optimise import Problem, minimise
+from sweep.optimise.parallel import in_processes
+from sweep.study import Limit, OptimiseSettings
+from tests.optimise_family import FAMILY, poses
+
+ONCE = OptimiseSettings(starts=1)
+LOW, HIGH = np.array([0.2, 1, 0.8, 0, -2, -2, 0]), np.array([1.5, 5, 3, 3, 2, 2, 1.5])
+STARTS = LOW + np.array([[0.3, 0.5, 0.4, 0.3, 0.6, 0.5, 0.3], [0.4, 0.6, 0.5, 0.5, 0.5, 0.4, 0.6]] * 2) * (HIGH - LOW)
+
+
+@pytest.fixture
+def problem() -> Problem:
+    limits = (Limit("swing", 0.8, 0.9), Limit("max_pressure_angle", None, 0.8))
+    names = ("a", "b", "c", "e", "f", "g", "alpha")
+    return Problem(family("rssr"), names, LOW, HIGH, {"branch": 1.0}, "max_abs_d2psi", limits)
+
+
+def test_processes_find_the_bits_of_one_process(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    starts = problem.rows(STARTS[:3] + np.array([[0.0], [0.0], [0.05]]))
+    alone = minimise(problem, starts, ONCE)
+    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_SECONDS", 0.0)
+    together = minimise(problem, starts, ONCE, jobs=2)
+    assert [r.start for r in together] == [r.start for r in alone]
+    for ours, theirs in zip(together, alone, strict=True):
+        np.testing.assert_array_equal(ours.design, theirs.design)
+        assert (ours.objective, ours.kkt_residual, ours.active) == (
+            theirs.objective,
+            theirs.kkt_residual,
+            theirs.active,
+        )
+
+
+def test_stop_at_once_keeps_an_answer(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_SECONDS", 0.0)
+    results = minimise(problem, problem.rows(np.repeat(STARTS, 50, axis=0)), ONCE, stop=lambda: True, jobs=2)
+    assert len(results) == 1 and results[0].ended == "time" and np.isfinite(results[0].design).all()
+
+
+def test_deadline_ends_workers_within_a_second(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_SECONDS", 0.0)
+    starts = problem.rows(np.repeat(STARTS, 500, axis=0))
+    minimise(problem, starts[:4], ONCE, jobs=2)  # the workers are up and have read their kernels
+    begin = time.monotonic()
+    results = minimise(problem, starts, OptimiseSettings(starts=1, time_budget=1.0), jobs=2)
+    assert 0 < len(results) < len(starts)
+    assert time.monotonic() - begin < 5.0  # the machine may be busy
+
+
+def test_killed_worker_is_reported() -> None:
+    fatal = replace(FAMILY, poses=partial(_die_outside, os.getpid()))
+    problem = Problem(fatal, ("p", "q"), -4 * np.ones(2), 4 * np.ones(2), {}, "max_abs_wave")
+    with pytest.raises(WorkerDied, match="optimiser"):
+        in_processes(problem, problem.rows(np.ones((2, 2))), [0, 1], lambda: False, 2, True)
+
+
+def _die_outside(parent: int, designs: Any, angles: Angles, wanted: frozenset[str]) -> dict[str, Any]:
+    if os.getpid() != parent:
+        os._exit(9)
+    return poses(designs, angles, wanted)
+
+
+def test_no_flag_file_is_left(problem: Problem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    found = in_processes(problem, problem.rows(STARTS), [1, 2], lambda: True, 2, True)
+    assert found == [] or all(r.ended == "time" for r in found)
+    assert not list(tmp_path.glob("linksweep-*"))
