@@ -8,9 +8,14 @@ from dataclasses import dataclass
 
 from sweep.study.units import internal_unit
 
-POSITIONS = {"s": "displacement", "psi": "follower angle", "dev": "deviation from the line"}
+POSITIONS = {
+    "s": "displacement",
+    "psi": "follower angle",
+    "dev": "deviation from the line",
+    "phi0": "crank angle between the limit positions",
+}
 DERIVATIVES = ("", "velocity", "acceleration", "jerk")
-SYMBOLS = {"psi": "ψ", "phi": "φ"}
+SYMBOLS = {"psi": "ψ", "phi": "φ", "phi0": "φ₀"}
 PRIMES = ("", "′", "″", "‴")
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
 REDUCTIONS = {
@@ -116,7 +121,8 @@ def _derivative(base: str) -> tuple[int, str, str]:
     if match:
         mark, root, stage = match.groups()
         return (0 if mark is None else int(mark[1:] or 1)), root, stage
-    root, stage = re.fullmatch(r"(.*?)(\d*)", base, re.DOTALL).groups()  # type: ignore[union-attr]
+    # phi0 is no phi of a stage 0.
+    root, stage = re.fullmatch(r"(phi0|.*?)(\d*)", base, re.DOTALL).groups()  # type: ignore[union-attr]
     return 0, root, stage
 
 
