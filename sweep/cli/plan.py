@@ -58,6 +58,9 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
             for k, route in enumerate(found, 1)
         ]
     )
+    if study.locus is not None:
+        made, given = ", ".join(study.locus.made), ", ".join(study.prescribed)
+        lines += ["", f"made before all that from {given}: {made}"]
     if study.fit is not None:
         aim = "" if study.fit.stroke is None else f", scaled to a stroke of {study.fit.stroke:g} mm"
         names = ", ".join(study.fit.parameters(study.family))
