@@ -148,7 +148,7 @@ def _open_plan(study: Study, folder: Path, force: bool) -> Plan:
             raise store.foreign(folder, known, plan)
     plan = make_plan(study)
     if force:
-        _set_foreign_aside(folder, plan, (store.PLAN, store.OPTIMUM, store.CURVES))
+        _set_foreign_aside(folder, plan, (store.PLAN, store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE))
     store.finished_chunks(folder, plan)  # refuses foreign chunks before the plan is written
     store.write_plan(folder, _plan_note(study, folder, plan))
     return plan

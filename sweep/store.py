@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 PLAN, RUNS, LOCK, BAD, OLD = "_plan.json", "_runs.jsonl", "_lock", "_bad", "_old"
 OPTIMUM, CURVES = "_optimum.parquet", "_curves.parquet"
+SENSITIVITY, TOLERANCE = "_sensitivity.parquet", "_tolerance.parquet"
 TEMPORARY = "_tmp-"
 PLAN_KEYS = {"identity", "chunks", "chunk_size", "name", "chunk_data", "optimise"}
 METADATA = b"linksweep"

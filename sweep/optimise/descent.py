@@ -46,7 +46,7 @@ class Descent:
                 self._restore()
             if math.isfinite(self.best.objective) and self.best.violation < NEAR:
                 for _ in range(CYCLES):
-                    self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=4)
+                    self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=8)
                     self._rounds(newton.propose, relaxed=False, enough=1e-13)
                     if self.model.certificate(self.best).residual <= KKT:
                         break

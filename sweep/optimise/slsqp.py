@@ -10,7 +10,7 @@ from sweep.families.base import Array
 from sweep.optimise.form import Form
 from sweep.optimise.model import Model, State
 
-ITERATIONS = 20
+ITERATIONS = 30
 
 
 def propose(model: Model, at: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:

@@ -17,8 +17,10 @@ from sweep.optimise.certificate import CAVEAT, Result
 from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
+from sweep.optimise.sensitivity import sensitivities
 from sweep.optimise.solve import minimise
 from sweep.optimise.starts import best_rows, diverse, drawn, ranking
+from sweep.optimise.tolerance import tolerance_rows
 from sweep.tables import design_matrix
 
 if TYPE_CHECKING:
@@ -39,6 +41,17 @@ TEXTS = {
     "agree": ("", "number of starts whose objective is within 1e-4 of the best; 1 for those that are not"),
     "ended": ("", "converged, stalled, infeasible, time or interrupted"),
     "status": ("", "see kernels.status"),
+    "parameter": ("", "dimension that changes"),
+    "output": ("", "design output; its unit is that of _optimum.parquet"),
+    "value": ("unit of the output", "its value; swing and stroke by magnitude"),
+    "growing": ("unit of the output per mm or rad", "its derivative where the dimension grows"),
+    "shrinking": ("unit of the output per mm or rad", "its derivative where the dimension shrinks"),
+    "nominal": ("unit of the output", "value of the exact design"),
+    "mean": ("unit of the output", "mean under the tolerances, three standard deviations each"),
+    "low": ("unit of the output", "2.5 % of the designs are below"),
+    "high": ("unit of the output", "2.5 % of the designs are above"),
+    "missing": ("1", "share of designs without this output"),
+    "within": ("1", "share of designs that keep the limits of this output; of all of them in the last row"),
 }
 
 
@@ -117,7 +130,8 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
 
     Returns
     -------
-    Path of ``_optimum.parquet``; ``_curves.parquet`` stands beside it.  Both are written as a whole or not at all.
+    Path of ``_optimum.parquet``; ``_curves.parquet``, ``_sensitivity.parquet`` and, where the study has tolerances,
+    ``_tolerance.parquet`` stand beside it.  Each is written as a whole or not at all.
 
     Raises
     ------
@@ -134,6 +148,11 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     frame = _table(study, problem, results)
     _write(place / store.OPTIMUM, frame, study)
     _write(place / store.CURVES, _curves(study, frame), study)
+    _write(place / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
+    if study.tolerance is None:
+        (place / store.TOLERANCE).unlink(missing_ok=True)
+    else:
+        _write(place / store.TOLERANCE, _by_role(study, frame, _tolerance), study)
     if any(result.ended == "interrupted" for result in results) or (stop is not None and stop()):
         raise KeyboardInterrupt
     return place / store.OPTIMUM
@@ -194,6 +213,31 @@ def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
     )
     head = {"role": np.repeat([table["role"][k] for k in shown], POSES), "phi": np.tile(phi, len(shown))}
     return head | {name: columns[name].ravel() for name in [*wanted, "status"]}
+
+
+def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Array], dict[str, list[Any]]]) -> Any:
+    """Rows about the optimum and about the reference, one below the other."""
+    rows: dict[str, list[Any]] = {"role": []}
+    for k, role in enumerate(table["role"]):
+        if role in ("optimum", "reference"):
+            own = rows_of(study, np.array([table[name][k] for name in study.family.parameter_names], np.float64))
+            rows["role"] += [role] * len(own["output"])
+            for name, values in own.items():
+                rows.setdefault(name, []).extend(values)
+    return rows
+
+
+def _sensitivity(study: Study, design: Array) -> dict[str, list[Any]]:
+    return sensitivities(study.family, design, study.want, study.window)
+
+
+def _tolerance(study: Study, design: Array) -> dict[str, list[Any]]:
+    if study.tolerance is None or study.optimise is None:
+        return {}
+    return tolerance_rows(
+        study.family, design, study.want, study.output_limits, study.tolerance, study.optimise.seed, study.accuracy,
+        study.window,
+    )  # fmt: skip
 
 
 def _write(path: Path, columns: dict[str, Any], study: Study) -> None:

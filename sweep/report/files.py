@@ -8,8 +8,8 @@ from pathlib import Path
 
 
 def copy_tables(folder: Path, out: Path) -> None:
-    """The optimum and its curves, where the study has them."""
-    for name in ("optimum.parquet", "curves.parquet"):
+    """The optimum with its curves, sensitivities and tolerances, where the study has them."""
+    for name in ("optimum.parquet", "curves.parquet", "sensitivity.parquet", "tolerance.parquet"):
         source, target = folder / f"_{name}", out / name
         if source.exists():
             shutil.copyfile(source, target)

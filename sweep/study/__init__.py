@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from sweep.study.space import Axis, DesignSpace
-from sweep.study.study import Budget, Limit, Objective, OptimiseSettings, OutputSettings, Study
+from sweep.study.study import Budget, Limit, Objective, OptimiseSettings, OutputSettings, Study, Tolerance
 
 if TYPE_CHECKING:
     from sweep.study.load import load_study, study_from_data, with_accuracy
@@ -19,6 +19,7 @@ __all__ = [
     "OptimiseSettings",
     "OutputSettings",
     "Study",
+    "Tolerance",
     "load_study",
     "study_from_data",
     "with_accuracy",

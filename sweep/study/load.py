@@ -32,9 +32,10 @@ from sweep.study.model import (
     ReportSection,
     SceneSection,
     StudySection,
+    ToleranceSection,
 )
 from sweep.study.prescribed import prescribed_limits, read_locus, read_prescribed
-from sweep.study.study import Budget, Objective, OptimiseSettings, OutputSettings, Study
+from sweep.study.study import Budget, Objective, OptimiseSettings, OutputSettings, Study, Tolerance
 
 if TYPE_CHECKING:
     from sweep.fit import LineFit
@@ -150,6 +151,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     speed = _quantity(scene.speed, "rad/s", ("scene", "speed"), faults)
     window = _window(scene, faults)
     time_budget = _quantity(search.time_budget, "s", ("optimise", "time_budget"), faults)
+    tolerance = _tolerance(_section(ToleranceSection, "tolerance", data, faults), data, faults)
     disk_bytes = _quantity(budget.disk, "B", ("budget", "disk"), faults)
     seconds = _quantity(budget.time, "s", ("budget", "time"), faults)
     if "optimise" in data and "objective" not in data:
@@ -203,6 +205,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         accuracy=accuracy,
         window=window,
         optimise=OptimiseSettings(search.starts, search.seed, time_budget) if "optimise" in data else None,
+        tolerance=tolerance,
         reference=reference,
         output=OutputSettings(output.keep, output.dtype, output.curves),
         budget=Budget(disk_bytes, seconds),
@@ -241,6 +244,18 @@ def _quantity(text: str | None, internal: str, key: Key, faults: Faults) -> floa
     if not value > 0.0:
         faults.value(key, text, f"a positive number; {units.example(internal)}")
     return value
+
+
+def _tolerance(section: ToleranceSection, data: Mapping[str, Any], faults: Faults) -> Tolerance | None:
+    if "tolerance" not in data:
+        return None
+    if "optimise" not in data:
+        faults.missing(("optimise",), "a table [optimise], as [tolerance] is about the optimum")
+    if section.lengths is None and section.angles is None:
+        faults.missing(("tolerance", "lengths"), 'a length as "0.02 mm"; or angles, as "0.05 deg"', instead="angles")
+    lengths = _quantity(section.lengths, "mm", ("tolerance", "lengths"), faults)
+    angles = _quantity(section.angles, "rad", ("tolerance", "angles"), faults)
+    return Tolerance(lengths or 0.0, angles or 0.0)
 
 
 def _window(scene: SceneSection, faults: Faults) -> tuple[float, float] | None:

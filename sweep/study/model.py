@@ -128,6 +128,13 @@ class OptimiseSection(Section):
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
 
 
+class ToleranceSection(Section):
+    """[tolerance]"""
+
+    lengths: str | None = Field(None, description='a length as a text, as "0.02 mm"')
+    angles: str | None = Field(None, description='an angle as a text, as "0.05 deg"')
+
+
 class ReferenceSection(Section):
     """[reference]"""
 
@@ -181,6 +188,7 @@ TABLES = (
     "objective",
     "accuracy",
     "optimise",
+    "tolerance",
     "reference",
     "output",
     "budget",

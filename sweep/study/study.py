@@ -49,6 +49,14 @@ class OptimiseSettings:
 
 
 @dataclass(frozen=True)
+class Tolerance:
+    """Manufacturing tolerances: +- of every length [mm] and of every angle [rad]; zero is exact."""
+
+    lengths: float = 0.0
+    angles: float = 0.0
+
+
+@dataclass(frozen=True)
 class OutputSettings:
     """Which designs become rows, how results are stored, for which designs curves over a turn are written."""
 
@@ -88,6 +96,7 @@ class Study:
     accuracy: Accuracy
     window: tuple[float, float] | None
     optimise: OptimiseSettings | None
+    tolerance: Tolerance | None
     reference: dict[str, float] | None
     output: OutputSettings
     budget: Budget
@@ -150,6 +159,8 @@ class Study:
             "reference": self.reference,
             "output": asdict(self.output),
         }
+        if self.tolerance is not None:
+            content["tolerance"] = asdict(self.tolerance)
         return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
 
