@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
+from sweep.families import family as find_family
 from sweep.report.quantities import Quantity, number, percent_change, quantity
 
 if TYPE_CHECKING:
@@ -88,7 +89,10 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
     """All parameters of the mechanism with what was searched."""
     study, rows = data.study, []
     links = () if study.locus is None else study.locus.made
+    own = find_family(study.families).parameter_names
     for p in study.family.parameters:
+        if p.name not in own and study.space.fixed.get(p.name) == p.default:
+            continue  # an input of an effect that the study left out
         shown = quantity(p.name, data.units.get(p.name, {"length": "mm", "angle": "rad"}.get(p.unit, "1")))
         value, other = _number(data.result, p.name), _number(data.reference, p.name)
         space, edge = "fixed", ""
