@@ -1,0 +1,72 @@
+"""The study needle208: its size, its accepted optimum and reference against what the kernels say of their dimensions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.study import load_study
+
+FOLDER = Path(__file__).parents[1] / "studies" / "needle208"
+EXPECTED = json.loads((FOLDER / "expected.json").read_text())
+
+
+def outputs_of(design):
+    names = list(EXPECTED["optimum"]["outputs"])
+    table = {name: [value] for name, value in design.items()}
+    row = sweep.summarise(["rssr", "guide"], table, names, accuracy=1e-10).iloc[0]
+    assert row.status == 0
+    return row
+
+
+def test_full_study_sweeps_ten_million_designs_and_asks_for_the_documented_requirements():
+    study = load_study(FOLDER)
+    assert study.space.count >= 10**7
+    limits = {limit.output: limit for limit in study.limits}
+    assert limits["max_abs_dev"].maximum <= 0.05
+    for name in ("max_pressure_angle1", "max_pressure_angle2"):
+        assert limits[name].maximum == pytest.approx(np.radians(45.0))
+    assert limits["stroke"].minimum <= 24.5 <= limits["stroke"].maximum
+    assert study.speed == pytest.approx(7000.0 * 2.0 * np.pi / 60.0)
+
+
+def test_accepted_optimum_has_the_accepted_figures_and_keeps_every_limit():
+    study = load_study(FOLDER)
+    row = outputs_of(EXPECTED["optimum"]["design"])
+    for name, value in EXPECTED["optimum"]["outputs"].items():
+        assert row[name] == pytest.approx(value, rel=EXPECTED["relative_tolerance"])
+    # Active limits are met to the optimiser's feasibility tolerance.
+    for limit in study.output_limits:
+        if limit.output in row.index:
+            value = abs(row[limit.output]) if limit.output in ("swing1", "stroke") else row[limit.output]
+            assert limit.maximum is None or value <= limit.maximum * (1.0 + 1e-8)
+            assert limit.minimum is None or value >= limit.minimum * (1.0 - 1e-8)
+
+
+def test_reference_is_the_textbook_design_and_has_the_accepted_figures():
+    design = load_study(FOLDER).reference
+    row = outputs_of(design)
+    for name, value in EXPECTED["reference"]["outputs"].items():
+        assert row[name] == pytest.approx(value, rel=EXPECTED["relative_tolerance"])
+    # Brodell and Soni: swing 50 degrees, transmission angle at least 50 degrees, equal times; dimensions to 1e-4 mm.
+    swing, mu = np.radians(50.0), np.radians(50.0)
+    b = np.sqrt((1.0 - np.cos(swing)) / (2.0 * np.cos(mu) ** 2))
+    c = np.sqrt((1.0 - b**2) / (1.0 - b**2 * np.cos(mu) ** 2))
+    a = np.sqrt(b**2 + c**2 - 1.0)
+    for name, ratio in (("a1", a), ("b1", b), ("c1", c)):
+        assert design[name] == pytest.approx(ratio * design["e1"], abs=6e-5)
+    # Chebyshev's lambda linkage 1 : 2 : 2.5 : 2.5 with the tracer at twice the coupler.
+    for name, ratio in (("b2", 2.5), ("c2", 2.5), ("e2", 2.0), ("xi2", 5.0)):
+        assert design[name] == pytest.approx(ratio * design["a2"], abs=2e-4)
+
+
+def test_optimum_beats_the_marks_of_the_source():
+    best, old = EXPECTED["optimum"]["outputs"], EXPECTED["reference"]["outputs"]
+    assert best["max_abs_dev"] <= old["max_abs_dev"] / 3.0
+    assert best["max_abs_d2s"] <= 0.85 * old["max_abs_d2s"]
+    # No motion of this stroke with equal times there and back has less than constant acceleration.
+    assert best["max_abs_d2s"] > 4.0 * best["stroke"] / np.pi**2
