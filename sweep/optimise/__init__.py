@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from sweep.optimise.certificate import Result
+from sweep.optimise.pareto import pareto
 from sweep.optimise.problem import Problem
 from sweep.optimise.solve import minimise
 from sweep.optimise.study import optimise_study
 
-__all__ = ["Problem", "Result", "minimise", "optimise_study"]
+__all__ = ["Problem", "Result", "minimise", "optimise_study", "pareto"]
