@@ -1,4 +1,4 @@
-"""The study needle208: its size, its accepted optimum and reference against what the kernels say of their dimensions."""
+"""The study needle208: its size; accepted optimum and reference against what the kernels say of their dimensions."""
 
 from __future__ import annotations
 
@@ -68,5 +68,5 @@ def test_optimum_beats_the_marks_of_the_source():
     best, old = EXPECTED["optimum"]["outputs"], EXPECTED["reference"]["outputs"]
     assert best["max_abs_dev"] <= old["max_abs_dev"] / 3.0
     assert best["max_abs_d2s"] <= 0.85 * old["max_abs_d2s"]
-    # No motion of this stroke with equal times there and back has less than constant acceleration.
+    # Rest to rest over S within |a| <= A takes at least 2 sqrt(S/A), twice per turn: A >= 4 S/pi^2.
     assert best["max_abs_d2s"] > 4.0 * best["stroke"] / np.pi**2
