@@ -126,6 +126,22 @@ def test_everything_else_keeps_its_bits_whatever_is_wanted_beside_it():
     assert np.array_equal(own["d2psi"], beside["d2psi"])
 
 
+def test_a_complex_step_gives_the_derivative():
+    """What the optimiser asks for: effects answer with a central difference along the imaginary direction."""
+    full = extended(family("rssr"), ["force_c", "lag_dynamic"])
+    matrix, angles = bench_designs(full, 2), Angles.of(PHI[None] + 0j)
+    names = frozenset(["force_c", "lag_dynamic", "d2psi"])
+    step = 1e-30
+    direction = np.zeros_like(matrix)
+    direction[:, 1] = 1.0
+    got = full.poses(matrix + 1j * step * direction, angles, names)
+    real = Angles.of(PHI[None])
+    ahead, behind = (full.poses(matrix + h * direction, real, names) for h in (1e-3, -1e-3))
+    for name in names:
+        slope = (ahead[name] - behind[name]) / 2e-3
+        np.testing.assert_allclose(got[name].imag / step, slope, atol=1e-6 * np.abs(slope).max(), err_msg=name)
+
+
 def test_blocks_change_no_bit(monkeypatch):
     full = extended(family("rssr"), ["drive_torque", "lag_dynamic"])
     matrix = bench_designs(full, 9)

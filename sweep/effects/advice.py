@@ -70,7 +70,8 @@ def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str,
     total = poses * MOTION_NS + sum(costs.values())
     rows = [("motion", "K0", f"{MOTION_NS:.3g} ns per pose", f"{100.0 * poses * MOTION_NS / total:.0f} %")]
     for entry in own:
-        unit = f"{costs[entry.name] / poses:.3g} ns per pose"
+        whole = costs[entry.name] > poses * entry.ns_per_pose
+        unit = f"{costs[entry.name] / 1e3:.3g} us per design" if whole else f"{entry.ns_per_pose:.0f} ns per pose"
         rows.append((entry.name, entry.key, unit, f"{100.0 * costs[entry.name] / total:.0f} %"))
         for depth, need in _needs(entry, 1):
             rows.append(("  " * depth + need.name, need.key, "part of it", ""))

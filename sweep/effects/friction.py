@@ -105,7 +105,7 @@ EFFECT = Effect(
     outputs=OUTPUTS,
     compute=compute,
     ns_per_pose=850.0,
-    called_for="losses, drive sizing, a check against jamming",
+    called_for="losses, drive sizing, a check against jamming; on samples, as it jumps where the rocker reverses",
     negligible="contraction rho(L) below 0.01: joint loads change by less than 1 %",
     advise=advise,
 )
