@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.errors import StoreError
-from sweep.report import answer, tables
+from sweep.report import answer, robust, tables
 from sweep.report.curves import motion_caption, motion_figure
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.drawing import COORDINATE, mechanism_figure
@@ -174,6 +174,9 @@ def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Sa
         fates=tables.fates(data, found),
         errors=tables.error_rows(data, found),
         provenance=tables.provenance(data),
+        tolerances=robust.tolerance_rows(data),
+        tolerance=robust.tolerance_words(data),
+        slopes=robust.slope_rows(data),
         motion=""
         if data.curves is None
         else motion_caption(data.curves, data.study.family.position, answer.rpm(data.study.speed), data.study.window),

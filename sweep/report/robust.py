@@ -1,0 +1,98 @@
+"""Two small tables: what manufacturing tolerances do to the result, and which dimension changes the objective most."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from sweep import store
+from sweep.report.quantities import number, quantity
+
+if TYPE_CHECKING:
+    from sweep.report.dataset import Dataset
+
+
+@dataclass(frozen=True)
+class ToleranceRow:
+    """One output of the optimum as it is made; ``within`` is the share that keeps the limit."""
+
+    name: str
+    symbol: str
+    nominal: str
+    mean: str
+    band: str
+    within: str
+
+
+@dataclass(frozen=True)
+class SlopeRow:
+    """One dimension: change of the objective in percent where it grows, and where it shrinks, by 0.1 mm or 0.1 deg."""
+
+    name: str
+    text: str
+    step: str
+    growing: str
+    shrinking: str
+
+
+def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
+    """Distribution of the outputs of the optimum; empty where the study names no tolerances."""
+    rows = []
+    for row in _rows(data, store.TOLERANCE):
+        name = str(row["output"])
+        within = "" if math.isnan(row["within"]) else f"{number(100.0 * row['within'], 3)}\u00a0%"
+        if name == "all limits":
+            rows.append(ToleranceRow("", "all limits", "", "", "", within))
+        elif name.rstrip("0123456789") != "rotatable":
+            shown = quantity(name, data.units.get(name, ""))
+            band = f"{number(row['low'] * shown.factor)} to {shown.show(row['high'])}"
+            rows.append(
+                ToleranceRow(name, shown.symbol, shown.show(row["nominal"]), shown.show(row["mean"]), band, within)
+            )
+    return rows
+
+
+def tolerance_words(data: Dataset) -> str:
+    """The tolerances as they are meant."""
+    tolerance = data.study.tolerance
+    if tolerance is None:
+        return ""
+    parts = [f"lengths ±{number(tolerance.lengths)}\u00a0mm"] if tolerance.lengths else []
+    parts += [f"angles ±{number(math.degrees(tolerance.angles))}°"] if tolerance.angles else []
+    return " and ".join(parts)
+
+
+def slope_rows(data: Dataset) -> list[SlopeRow]:
+    """Dimensions by how much they change the objective, the most telling first."""
+    if data.study.objective is None:
+        return []
+    units = {p.name: p.unit for p in data.study.family.parameters}
+    texts = {p.name: p.text for p in data.study.family.parameters}
+    own = [row for row in _rows(data, store.SENSITIVITY) if row["output"] == data.study.objective.output]
+    ranked = []
+    for row in own:
+        name, value = str(row["parameter"]), abs(float(row["value"]))
+        angle = units.get(name) == "angle"
+        step = math.radians(0.1) if angle else 0.1
+        if not value > 0.0 or math.isnan(row["growing"]):
+            continue
+        up, down = (100.0 * step * x / value for x in (row["growing"], -row["shrinking"]))
+        shown = SlopeRow(name, texts.get(name, ""), "0.1°" if angle else "0.1\u00a0mm", _percent(up), _percent(down))
+        ranked.append((max(abs(up), abs(down)), shown))
+    return [shown for _, shown in sorted(ranked, key=lambda pair: -pair[0])]
+
+
+def _percent(value: float) -> str:
+    # What is below a billionth is the rounding of the gradients.
+    return "0" if abs(value) < 1e-9 else f"{'+' if value > 0.0 else ''}{number(value, 3)}\u00a0%"
+
+
+def _rows(data: Dataset, file: str) -> list[dict[str, Any]]:
+    import pandas as pd
+
+    path = data.folder / file
+    if not path.exists():
+        return []
+    frame = pd.read_parquet(path)
+    return [{str(k): v for k, v in row.items()} for row in frame[frame["role"] == "optimum"].to_dict("records")]
