@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 KEPT = 100_000  # best rows of a dataset that are looked at
-SCREENED = 256  # sample designs per start where a dataset gives none
+SCREENED = 256  # designs of a study's space per start where a dataset gives none
+SAMPLED = 4096  # designs between plain bounds per start: these cost a microsecond each
+NEARLY = 0.03  # a search mends so small a violation in passing: the objective tells more
 
 
 def diverse(problem: Problem, designs: Array, merit: Array, count: int) -> Array:
@@ -96,7 +98,7 @@ def drawn(study: Study, count: int, seed: int) -> Array:
 def from_sample(problem: Problem, signs: list[dict[str, float]], count: int, seed: int) -> Array:
     """Diverse best designs of a Sobol sample between the bounds; the signs take turns.
 
-    Ranked by how far the limits are missed, then by the objective, on 64 poses per turn.
+    Ranked by :func:`ranking`.
 
     Parameters
     ----------
@@ -107,7 +109,7 @@ def from_sample(problem: Problem, signs: list[dict[str, float]], count: int, see
     """
     from scipy.stats import qmc
 
-    size = 1 << int(np.ceil(np.log2(SCREENED * count)))
+    size = 1 << int(np.ceil(np.log2(SAMPLED * count)))
     sample = qmc.Sobol(len(problem.variables), seed=seed).random(size)
     values = problem.lower + sample * problem.span
     blocks = [problem.rows(values[k :: len(signs)], **choice) for k, choice in enumerate(signs)]
@@ -116,7 +118,7 @@ def from_sample(problem: Problem, signs: list[dict[str, float]], count: int, see
 
 
 def ranking(problem: Problem, designs: Array) -> Array:
-    """Objective where all limits are kept; far above it the largest scaled violation; above that what does not turn."""
+    """Objective where all limits are nearly kept; far above it the largest scaled violation; then what does not turn."""
     from sweep.summaries import design_outputs
 
     turning = ["margin"] if margins(problem.family) else []
@@ -133,7 +135,7 @@ def ranking(problem: Problem, designs: Array) -> Array:
                 violation = np.fmax(violation, sense * (bound - value) / (abs(bound) or 1.0))
     objective = np.asarray(columns[problem.objective], np.float64)
     spread = 1.0 + np.abs(objective[np.isfinite(objective)]).max(initial=0.0)
-    merit = np.where(violation > 0.0, spread * (1.0 + violation), objective)
+    merit = np.where(violation > NEARLY, spread * (1.0 + violation), objective)
     for name in turning:
         margin = np.asarray(columns[name], np.float64)
         merit = np.where(margin < ROTATABLE_MARGIN, spread * 1e6 - margin, merit)
