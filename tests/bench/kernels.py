@@ -1,9 +1,9 @@
 """Speed of the sweep kernels on this machine: ``python -m tests.bench.kernels``.
 
-One table: ns per (design, crank angle) of the dense loops next to numpy and, where gcc exists, C with
--O3 -march=native -ffast-math on the same designs in the same run; two threads against one; ns per design of the exact
-margin, the limit positions and the true maxima, and their ratio to the dense loop of 360 angles.  All variants take
-turns, and each counts with its fastest round, so that a busy machine disturbs all of them alike.
+One table: ns per (design, crank angle) of the dense loops, reductions included, next to numpy and, where gcc exists, C
+with -O3 -march=native -ffast-math on the same designs in the same run; two threads against one; ns per design of the
+exact margin, the limit positions and the true maxima, and their ratio to the dense loop of 360 angles.  All variants
+take turns, and each counts with its fastest round, so that a busy machine disturbs all of them alike.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numba
@@ -25,7 +26,7 @@ import numpy as np
 from kernels.families import geared_dwell, rssr
 from sweep.families.geared_dwell import half_turn
 from tests.bench.position import range_of_sine
-from tests.bench.rivals import C_SOURCE, numpy_maxima
+from tests.bench.rivals import C_SOURCE, LEVELS, geared_in_numpy, in_numpy
 from tests.rssr_designs import random_designs
 
 DESIGNS, SAMPLES, ROUNDS = 4096, 360, 25
@@ -62,7 +63,7 @@ def in_threads(run: Callable[[slice], object], count: int) -> Run:
 
 
 def variants() -> dict[str, tuple[Run, float]]:
-    """What is timed: name -> (run, how many units one run makes)."""
+    """What is timed: name -> (run, how many units one run makes); "level: rival" beside each level."""
     designs = random_designs(DESIGNS, 1, rotatable=True)
     phi = np.arange(SAMPLES) * (2.0 * np.pi / SAMPLES)
     cos, sin = np.cos(phi), np.sin(phi)
@@ -70,43 +71,65 @@ def variants() -> dict[str, tuple[Run, float]]:
     poses = float(DESIGNS * SAMPLES)
 
     def dense(order: int) -> Callable[[slice], object]:
-        def run(part: slice) -> None:
-            out = [values[part] if k < order else None for k, values in enumerate(most)]
+        def run(part: slice) -> np.ndarray:  # type: ignore[type-arg]
+            out = [values[part] if k == order - 1 else None for k, values in enumerate(most)]
             rssr.dense_maxima(designs[part], cos, sin, least[part], out[0], out[1], out[2])
+            return most[order - 1] if order else least * (designs[:, 1] / designs[:, 0]) ** 2 * designs[:, 0] ** 2
 
         return run
 
-    def position() -> None:
+    def position() -> np.ndarray:  # type: ignore[type-arg]
         range_of_sine(designs, cos, sin, most[0], most[1])
+        return np.where(designs[:, 7] > 0.0, most[1], -most[0])
 
-    runs: dict[str, tuple[Run, float]] = {
-        "discriminant only": (in_threads(dense(0), 1), poses),
-        "position (range of sin psi)": (position, poses),
-        "+ velocity": (in_threads(dense(1), 1), poses),
-        "+ acceleration": (in_threads(dense(2), 1), poses),
-        "+ jerk": (in_threads(dense(3), 1), poses),
-        "+ acceleration, two threads": (in_threads(dense(2), 2), poses),
-    }
-    k_and_a = np.random.default_rng(1).uniform((2.0, 0.1), (6.0, 1.5), (DESIGNS, 2))
-    status, table = np.empty(DESIGNS, np.uint8), half_turn(SAMPLES)
-    runs["geared dwell, acceleration"] = (
-        lambda: geared_dwell.dense_maxima(k_and_a, table[0], table[1], status, None, most[0], None),
-        poses,
-    )
-    few = designs[:256]
-    runs["numpy, to acceleration"] = (lambda: numpy_maxima(few, cos, sin), float(len(few) * SAMPLES))
     library = compiled_rival()
+    few = designs[:256]
+    runs: dict[str, tuple[Run, float]] = {}
+    for level in LEVELS:
+        own = position if level == "position" else in_threads(dense(max(LEVELS.index(level) - 1, 0)), 1)
+        runs[level] = (own, poses)
+        runs[f"{level}: numpy"] = (partial(in_numpy, level, few, cos, sin), float(len(few) * SAMPLES))
+        if library is not None:
+            runs[f"{level}: C"] = (_in_c(library, level, designs, cos, sin), poses)
     if library is not None:
-        pointers = [x.ctypes.data_as(ctypes.c_void_p) for x in (designs, cos, sin, least, most[0], most[1])]
-        for name, function in (
-            ("C, to acceleration, our algebra", library.ours),
-            ("C, sheet's formulas", library.sheet),
-        ):
-            runs[name] = (
-                lambda function=function: function(DESIGNS, SAMPLES, *pointers),  # type: ignore[misc]
-                poses,
-            )
+        runs["acceleration: C, our algebra"] = (_in_c(library, "ours", designs, cos, sin), poses)
+    runs["acceleration: two threads"] = (in_threads(dense(2), 2), poses)
+
+    k_and_a = np.random.default_rng(1).uniform((1.05, 0.1), (1.8, 2.0), (DESIGNS, 2))
+    status, front_back, half = np.empty(DESIGNS, np.uint8), half_turn(SAMPLES), SAMPLES // 2 + 1
+    c, s = np.ascontiguousarray(cos[:half]), np.ascontiguousarray(sin[:half])
+
+    def geared() -> np.ndarray:  # type: ignore[type-arg]
+        geared_dwell.dense_maxima(k_and_a, *front_back, status, None, most[2], None)
+        return most[2]
+
+    runs["geared dwell"] = (geared, float(DESIGNS * half))
+    runs["geared dwell: numpy"] = (partial(geared_in_numpy, k_and_a[:256], c, s), 256.0 * half)
+    if library is not None:
+        runs["geared dwell: C"] = (_in_c(library, "geared", k_and_a, c, s), float(DESIGNS * half))
+    _agree(runs)
     return runs | _per_design(designs, status)
+
+
+def _in_c(library: ctypes.CDLL, name: str, designs: np.ndarray, cos: np.ndarray, sin: np.ndarray) -> Run:  # type: ignore[type-arg]
+    out = np.empty(len(designs))
+    pointers = [x.ctypes.data_as(ctypes.c_void_p) for x in (designs, cos, sin, out)]
+    sizes = ctypes.c_long(len(designs)), ctypes.c_long(cos.size)
+
+    def run() -> np.ndarray:  # type: ignore[type-arg]
+        getattr(library, name)(*sizes, *pointers)
+        return out
+
+    return run
+
+
+def _agree(runs: dict[str, tuple[Run, float]]) -> None:
+    """All rivals of a level must find the same numbers, or the race means nothing."""
+    for name, (run, _) in runs.items():
+        level, _, rival = name.partition(": ")
+        if rival and rival != "two threads":
+            theirs, own = np.asarray(run()), np.asarray(runs[level][0]())
+            np.testing.assert_allclose(theirs, own[: len(theirs)], rtol=1e-6, atol=1e-9, err_msg=name)
 
 
 def _per_design(designs: np.ndarray, status: np.ndarray) -> dict[str, tuple[Run, float]]:  # type: ignore[type-arg]
@@ -145,23 +168,25 @@ def measure(runs: dict[str, tuple[Run, float]], rounds: int) -> dict[str, float]
 
 
 def table(best: dict[str, float]) -> str:
-    """The measured figures with the ratios that matter."""
-    dense, grid = best["+ acceleration"], best["+ acceleration"] * SAMPLES
-    lines = [f"{'':36}{'ns':>9}   ratio"]
+    """The measured figures with the ratios that matter: how many times longer the rivals take."""
+    lines = [
+        f"{'ns per (design, angle)':24}{'linksweep':>10}{'numpy':>9}{'C':>9}{'C, our algebra':>16}   times as long"
+    ]
+    for level in (*LEVELS, "geared dwell"):
+        own = best[level]
+        cells = [best.get(f"{level}: {rival}", np.nan) / own for rival in ("numpy", "C", "C, our algebra")]
+        shown = ["-" if np.isnan(x) else f"{x:.2f}" for x in cells]
+        lines.append(f"{level:24}{own:10.2f}{shown[0]:>9}{shown[1]:>9}{shown[2]:>16}")
+    dense, grid = best["acceleration"], best["acceleration"] * SAMPLES
+    lines += [
+        "",
+        f"two threads, acceleration: {dense / best['acceleration: two threads']:.2f} times as fast as one",
+        "",
+    ]
+    lines.append(f"{'per design':24}{'ns':>10}   of the grid of {SAMPLES} (acceleration)")
     for name, ns in best.items():
-        if name.startswith(("numpy", "C,")):
-            note = f"{ns / dense:6.2f} x the house"
-        elif "threads" in name:
-            note = f"{dense / ns:6.2f} x one thread"
-        elif name.startswith("true"):
-            order = name.count("'")
-            own = best[("+ velocity", "+ acceleration", "+ jerk")[order - 1]] * SAMPLES
-            note = f"{ns / own:6.2f} x dense {SAMPLES} of that order, {ns / grid:.2f} x of acceleration; per design"
-        elif name.startswith(("margin", "+ largest", "limit")):
-            note = f"{ns / grid:6.3f} x dense {SAMPLES}; per design"
-        else:
-            note = "        per (design, angle)"
-        lines.append(f"{name:36}{ns:9.2f}   {note}")
+        if name.startswith(("margin", "+ largest", "limit", "true")):
+            lines.append(f"{name:24}{ns:10.1f}   {ns / grid:.3f}")
     return "\n".join(lines)
 
 
