@@ -18,6 +18,7 @@ from sweep.families import family
 from sweep.families.base import Angles
 from sweep.optimise import Problem, minimise
 from sweep.optimise.parallel import in_processes
+from sweep.optimise.search import search
 from sweep.study import Limit, OptimiseSettings
 from tests.optimise_family import FAMILY, poses
 
@@ -52,6 +53,18 @@ def test_stop_at_once_keeps_an_answer(problem: Problem, monkeypatch: pytest.Monk
     monkeypatch.setattr(sweep.optimise.solve, "SERIAL_SECONDS", 0.0)
     results = minimise(problem, problem.rows(np.repeat(STARTS, 50, axis=0)), ONCE, stop=lambda: True, jobs=2)
     assert len(results) == 1 and results[0].ended == "time" and np.isfinite(results[0].design).all()
+
+
+def test_start_that_is_to_stop_at_once_still_has_its_first_design(problem: Problem) -> None:
+    start = problem.rows(STARTS[:1])[0]
+    result = search(7, problem, start, lambda: True)
+    assert result.start == 7 and result.ended == "time"
+    np.testing.assert_allclose(result.design, start, rtol=1e-14)
+
+
+def test_work_left_to_the_processes_may_be_left_at_any_time(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_SECONDS", 0.3)  # in the middle of the second or third start
+    assert len(minimise(problem, problem.rows(STARTS), ONCE, jobs=2)) == 4
 
 
 def test_deadline_ends_workers_within_a_second(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,7 +65,7 @@ def _task(number: int, problem: Problem, start: Array, flag: Path, parent: int, 
     # A parent that was killed leaves no folder to look into, but then this process ends as well.
     if flag.exists() and not first:
         return None
-    return search(number, problem, start, flag.exists, first)
+    return search(number, problem, start, flag.exists)
 
 
 @contextmanager

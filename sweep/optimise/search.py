@@ -14,7 +14,7 @@ from sweep.optimise.model import State, Stopped
 from sweep.optimise.problem import Problem
 
 
-def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool], first: bool) -> Result:
+def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool]) -> Result:
     """Search from one start, on one BLAS thread: the systems are small, and the bits stay those of any other process.
 
     Parameters
@@ -22,15 +22,14 @@ def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool
     number : of the start, for the result
     problem : what to minimise
     start : (P,) design
-    asked : true ends the search with the best checked design so far
-    first : this start gets to its first design whatever is asked, so that there is an answer
+    asked : true ends the search with the best checked design so far; the first one is reached in any case
     """
     import scipy.optimize  # noqa: F401  (brings its own BLAS, which has to be there to be limited)
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, user_api="blas"):
         program = Program(problem)
-        descent = Descent(problem, program, start, _after_first(asked) if first else asked)
+        descent = Descent(problem, program, start, _after_first(asked))
         ended = ""
         try:
             descent.run()

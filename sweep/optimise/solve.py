@@ -102,7 +102,7 @@ def _serial(problem: Problem, starts: Array, asked: Callable[[], bool], seconds:
         def ask(last: bool = last) -> bool:
             return asked() or (not last and time.monotonic() >= late)
 
-        found = search(number, problem, start, ask, first=not results)
+        found = search(number, problem, start, ask)
         if found.ended == "time" and not asked():
             break
         results.append(found)

@@ -118,7 +118,7 @@ def from_sample(problem: Problem, signs: list[dict[str, float]], count: int, see
 
 
 def ranking(problem: Problem, designs: Array) -> Array:
-    """Objective where all limits are nearly kept; far above it the largest scaled violation; then what does not turn."""
+    """Objective where all limits are nearly kept; far above it the largest violation; then what does not turn."""
     from sweep.summaries import design_outputs
 
     turning = ["margin"] if margins(problem.family) else []
