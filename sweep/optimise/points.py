@@ -167,6 +167,8 @@ class Curves:
 
     def values(self, designs: Any, points: Points) -> Any:
         """Curves (n, K) of designs (n, P) at the points' crank angles."""
+        if not self.wanted:  # an output of a step alone follows no curve
+            return np.empty((len(designs), len(points)), dtype=np.result_type(designs))
         columns = self.poses(designs, self._angles(points))
         out = np.empty((len(designs), len(points)), dtype=columns[next(iter(self.wanted))].dtype)
         for n, s in enumerate(self.series):

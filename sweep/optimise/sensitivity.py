@@ -15,13 +15,14 @@ from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
 
 TIE = 1e-6  # extrema this near to the largest one (relative) share it
+DIMENSIONS = ("length", "angle", "ratio")  # a geared drive's dimensions are in planet radii
 REACH = 0.1  # step outputs are differentiated over a thousandth of this part of the dimension
 
 
 def sensitivities(
     family: Family, design: Array, outputs: Sequence[str], window: tuple[float, float] | None = None
 ) -> dict[str, list[Any]]:
-    """Derivatives of design outputs by the lengths and angles of a design, dx/dp = dx/dy dy/dp with the inner value y.
+    """Derivatives of design outputs by lengths, angles and ratios of a design: dx/dp = dx/dy dy/dp, y the inner value.
 
     A maximum that several extrema share has two: the largest of their gradients where the dimension grows, the smallest
     where it shrinks.  A corner optimum has them of opposite signs.
@@ -35,13 +36,15 @@ def sensitivities(
 
     Returns
     -------
-    Rows ``parameter``, ``output``, ``value``, ``growing`` and ``shrinking`` (per internal unit of the parameter: mm or
-    rad), nan where the output does not exist.  Derivatives are exact to rounding (docs/optimiser.md, Gradients).
+    Rows ``parameter``, ``output``, ``value``, ``growing`` and ``shrinking`` (per internal unit of the parameter: mm,
+    rad or 1), nan where the output does not exist.  Derivatives are exact to rounding (docs/optimiser.md, Gradients).
     """
-    varied = [k for k, p in enumerate(family.parameters) if p.unit in ("length", "angle") and p.choices is None]
-    lengths = [abs(design[k]) for k in varied if family.parameters[k].unit == "length"]
-    unit = {"length": REACH * max(lengths, default=1.0), "angle": REACH}
-    span = np.array([unit[family.parameters[k].unit] for k in varied])
+    varied = [k for k, p in enumerate(family.parameters) if p.unit in DIMENSIONS and p.choices is None]
+    sizes = {
+        unit: max((abs(design[k]) for k in varied if family.parameters[k].unit == unit), default=1.0) or 1.0
+        for unit in ("length", "ratio")
+    }
+    span = np.array([REACH * sizes.get(family.parameters[k].unit, 1.0) for k in varied])
     names = tuple(family.parameters[k].name for k in varied)
     fixed = {n: float(x) for n, x in zip(family.parameter_names, design, strict=True) if n not in names}
     rows: dict[str, list[Any]] = {name: [] for name in ("parameter", "output", "value", "growing", "shrinking")}
