@@ -30,7 +30,7 @@ from tests.bench.rivals import C_SOURCE, LEVELS, geared_in_numpy, in_numpy
 from tests.rssr_designs import random_designs
 
 DESIGNS, SAMPLES, ROUNDS = 4096, 360, 25
-TILES = 32  # how many times the designs the race of threads takes
+TILES = 256  # how many times the designs the race of threads takes: a call of joblib alone costs 10 ms
 FLAGS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC")
 Run = Callable[[], object]
 
@@ -48,7 +48,7 @@ def compiled_rival() -> ctypes.CDLL | None:
 
 def threaded(designs: np.ndarray, cos: np.ndarray, sin: np.ndarray, workers: int) -> Run:  # type: ignore[type-arg]
     """Accelerations of many designs by joblib's threads, as the engine spreads its chunks: tasks of about 10 ms."""
-    parts = np.array_split(np.concatenate([designs] * TILES), 2 * TILES)
+    parts = np.array_split(np.concatenate([designs] * TILES), TILES // 8)
 
     def task(part: np.ndarray) -> None:  # type: ignore[type-arg]
         rssr.dense_maxima(part, cos, sin, np.empty(len(part)), None, np.empty(len(part)), None)
