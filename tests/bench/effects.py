@@ -9,7 +9,7 @@ from __future__ import annotations
 import resource
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -56,11 +56,11 @@ def best(run: Callable[[], object], repeats: int = 5) -> float:
     return min(times)
 
 
-def costs(n: int = 64) -> list[tuple[str, str, str, float]]:
-    """Rows of (effect, output, unit of cost, cost): all pose outputs together, each alone, design outputs."""
+def costs(n: int = 64, *, names: Sequence[str] = NAMES, each: bool = True) -> list[tuple[str, str, str, float]]:
+    """Rows of (effect, output, unit of cost, cost): all pose outputs together, with ``each`` alone too, design outputs."""
     angles = Angles.of(2.0 * np.pi * np.arange(POSES)[None] / POSES)
     rows = []
-    for name in NAMES:
+    for name in names:
         entry = effect(name)
         bare = family(entry.families[0])
         full = with_effects(bare, (entry,))
@@ -74,7 +74,7 @@ def costs(n: int = 64) -> list[tuple[str, str, str, float]]:
         singles = [o.name for o in entry.outputs if not o.name.endswith(("_x", "_y", "_z"))]
         if entry.outputs:
             rows.append((name, "all", "ns/pose", poses(frozenset(o.name for o in entry.outputs))))
-            rows += [(name, single, "ns/pose", poses(frozenset({single}))) for single in singles]
+            rows += [(name, single, "ns/pose", poses(frozenset({single}))) for single in singles if each]
         if entry.design_result is not None:
             step = full.steps[-1]
             wanted = frozenset(o.name for o in entry.design_result.outputs)
