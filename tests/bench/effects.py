@@ -57,7 +57,7 @@ def best(run: Callable[[], object], repeats: int = 5) -> float:
 
 
 def costs(n: int = 64, *, names: Sequence[str] = NAMES, each: bool = True) -> list[tuple[str, str, str, float]]:
-    """Rows of (effect, output, unit of cost, cost): all pose outputs together, with ``each`` alone too, design outputs."""
+    """Rows of (effect, output, unit of cost, cost): all pose outputs together, each alone if wanted, design outputs."""
     angles = Angles.of(2.0 * np.pi * np.arange(POSES)[None] / POSES)
     rows = []
     for name in names:
