@@ -13,7 +13,7 @@ from kernels import status as st
 from sweep import store
 from sweep.errors import InputError
 from sweep.families.base import Angles, Array
-from sweep.optimise.certificate import CAVEAT, Result
+from sweep.optimise.certificate import Result
 from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
@@ -21,6 +21,7 @@ from sweep.optimise.sensitivity import sensitivities
 from sweep.optimise.solve import minimise
 from sweep.optimise.starts import best_rows, diverse, drawn, ranking
 from sweep.optimise.tolerance import tolerance_rows
+from sweep.optimise.written import certificates, outputs, write
 from sweep.tables import design_matrix
 
 if TYPE_CHECKING:
@@ -29,30 +30,6 @@ if TYPE_CHECKING:
 POSES = 720
 TAILS = (2.0, 98.0)  # percent; beyond are needles that hardly moved and were scaled up to the stroke
 _DRAWN = re.compile(r"(pressure_angle|[xyz]_[a-z])\d*")
-
-TEXTS = {
-    "role": ("", "optimum (the best start's result), start (another start's), or reference"),
-    "start": ("", "number of the start, best candidate first; -1 for the reference"),
-    "violation": ("1", "largest violation of a limit, relative to the limit; cos^2 for pressure angles"),
-    "kkt_residual": ("1", "residual of the optimality conditions, variables scaled to their bounds"),
-    "gap": ("1", "difference of the maximum the search worked with and the verified one, relative"),
-    "active": ("", "limits and bounds that hold the result back"),
-    "relaxation": ("", "where infeasible: by how much each limit would have to give way, in its internal unit"),
-    "agree": ("", "number of starts whose objective is within 1e-4 of the best; 1 for those that are not"),
-    "ended": ("", "converged, stalled, infeasible, time or interrupted"),
-    "status": ("", "see kernels.status"),
-    "parameter": ("", "dimension that changes"),
-    "output": ("", "design output; its unit is that of _optimum.parquet"),
-    "value": ("unit of the output", "its value; swing and stroke by magnitude"),
-    "growing": ("unit of the output per mm or rad", "its derivative where the dimension grows"),
-    "shrinking": ("unit of the output per mm or rad", "its derivative where the dimension shrinks"),
-    "nominal": ("unit of the output", "value of the exact design"),
-    "mean": ("unit of the output", "mean under the tolerances, three standard deviations each"),
-    "low": ("unit of the output", "2.5 % of the designs are below"),
-    "high": ("unit of the output", "2.5 % of the designs are above"),
-    "missing": ("1", "share of designs without this output"),
-    "within": ("1", "share of designs that keep the limits of this output; of all of them in the last row"),
-}
 
 
 def problem_of(study: Study, designs: Array) -> Problem:
@@ -146,13 +123,13 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     settings, problem, starts = problem_and_starts(study, place)
     results = minimise(problem, starts, settings, stop, jobs)
     frame = _table(study, problem, results)
-    _write(place / store.OPTIMUM, frame, study)
-    _write(place / store.CURVES, _curves(study, frame), study)
-    _write(place / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
+    write(place / store.OPTIMUM, frame, study)
+    write(place / store.CURVES, _curves(study, frame), study)
+    write(place / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
     if study.tolerance is None:
         (place / store.TOLERANCE).unlink(missing_ok=True)
     else:
-        _write(place / store.TOLERANCE, _by_role(study, frame, _tolerance), study)
+        write(place / store.TOLERANCE, _by_role(study, frame, _tolerance), study)
     if any(result.ended == "interrupted" for result in results) or (stop is not None and stop()):
         raise KeyboardInterrupt
     return place / store.OPTIMUM
@@ -161,18 +138,8 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
 def _table(study: Study, problem: Problem, results: list[Result]) -> dict[str, Any]:
     """One row per start, best first, then the reference."""
     designs = np.array([r.design for r in results])
-    rows: dict[str, list[Any]] = {
-        "role": ["optimum", *("start" for _ in results[1:])],
-        "start": [r.start for r in results],
-        "violation": [r.violation for r in results],
-        "kkt_residual": [r.kkt_residual for r in results],
-        "gap": [r.gap for r in results],
-        "active": ["; ".join(r.active) for r in results],
-        "relaxation": ["; ".join(f"{k} by {v:.6g}" for k, v in r.relaxation.items()) for r in results],
-        "agree": [r.agree for r in results],
-        "ended": [r.ended for r in results],
-        "status": [r.status for r in results],
-    }
+    rows: dict[str, list[Any]] = {"role": ["optimum", *("start" for _ in results[1:])]}
+    rows |= {"start": [r.start for r in results]} | certificates(results)
     if study.reference is not None:
         reference, violation = _reference(study, problem)
         designs = np.concatenate([designs, reference])
@@ -181,7 +148,7 @@ def _table(study: Study, problem: Problem, results: list[Result]) -> dict[str, A
         for name, value in zip(rows, last, strict=True):
             rows[name].append(value)
     columns: dict[str, Any] = {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}
-    return {"role": rows.pop("role"), "start": rows.pop("start")} | columns | _outputs(study, designs) | rows
+    return {"role": rows.pop("role"), "start": rows.pop("start")} | columns | outputs(study, designs) | rows
 
 
 def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
@@ -189,13 +156,6 @@ def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
     design, _ = design_matrix(study.family, study.reference or {})
     model = Model(problem, Program(problem), design[0], lambda: False)
     return design, model.state(problem.scaled(design)[0]).violation
-
-
-def _outputs(study: Study, designs: Array) -> dict[str, Any]:
-    from sweep.summaries import design_outputs
-
-    columns = design_outputs(study.family, designs, study.want, study.accuracy, study.window)
-    return {name: values for name, values in columns.items() if name != "status"}
 
 
 def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
@@ -238,36 +198,3 @@ def _tolerance(study: Study, design: Array) -> dict[str, list[Any]]:
         study.family, design, study.want, study.output_limits, study.tolerance, study.optimise.seed, study.accuracy,
         study.window,
     )  # fmt: skip
-
-
-def _write(path: Path, columns: dict[str, Any], study: Study) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    from sweep.plan import PARAMETER_UNITS
-    from sweep.summaries import output
-
-    family = study.family
-    texts = (
-        {p.name: (PARAMETER_UNITS[p.unit], p.text) for p in family.parameters} | TEXTS | {"phi": ("rad", "crank angle")}
-    )
-    texts |= {o.name: (o.unit.replace("length", "mm"), o.text) for o in family.pose_outputs}
-    for name in columns:
-        if name not in texts:
-            wanted = output(family, name.removeprefix("err_"))
-            text = f"error estimate of {wanted.text}" if name.startswith("err_") else wanted.text
-            texts[name] = (wanted.unit.replace("length", "mm"), text)
-    arrays = {name: pa.array(_plain(values)) for name, values in columns.items()}
-    fields = [
-        pa.field(name, array.type, metadata={"unit": texts[name][0], "definition": texts[name][1]})
-        for name, array in arrays.items()
-    ]
-    schema = pa.schema(fields, metadata={"study": study.name, "fingerprint": study.fingerprint, "caveat": CAVEAT})
-    sink = pa.BufferOutputStream()
-    pq.write_table(pa.Table.from_arrays(list(arrays.values()), schema=schema), sink, compression="zstd")
-    store.write_atomically(path, bytes(sink.getvalue()))
-
-
-def _plain(values: Any) -> Any:
-    array = np.asarray(values)
-    return array.tolist() if array.dtype.kind == "U" else array
