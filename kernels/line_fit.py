@@ -226,7 +226,8 @@ def line_fit(
 
     Notes
     -----
-    Which positions belong to the working part depends on the point, so fit and window are repeated three times.
+    Which positions belong to the working part depends on the point, so fit and window are repeated until they are the
+    same as before, three times at most.
     """
     m = b_x.shape[1]
     bx, by, dx, dy = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
@@ -267,11 +268,15 @@ def line_fit(
             for j in range(m):
                 along[j] = c * bx[j] + s * by[j] + x[0] * dx[j] - x[1] * dy[j]
                 low, high = min(low, along[j]), max(high, along[j])
-            worst = 0.0
+            worst, settled = 0.0, True
             for j in range(m):
                 fraction = (along[j] - low) / (high - low)
-                inside[j] = window[0] <= fraction <= window[1]
-                if inside[j]:
+                counts = window[0] <= fraction <= window[1]
+                settled = settled and counts == inside[j]
+                inside[j] = counts
+                if counts:
                     worst = max(worst, abs(target[j] + x[0] * dy[j] + x[1] * dx[j] - x[2]))
+            if settled:
+                break
         xi[i], eta[i] = c * x[0] - s * x[1], s * x[0] + c * x[1]
         h[i], deviation[i], travel[i], status[i] = x[2], worst, high - low, code

@@ -27,6 +27,8 @@ SCALED = ("a", "b", "c", "e", "xi", "eta", "h")
 # what the optimiser moves afterwards.
 SAMPLES = 48
 SWING_ACCURACY = Accuracy(target=1e-6)
+# Measured on one core of a Zen 4 [ns per design], the limit positions of the driving stage included.
+NS_FIT = 7000.0
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 import numpy as np
 
 from kernels.status import OK
-from sweep.chunk import BLOCK, cascade, ordered_routes, output_columns, parameter_matrix
+from sweep.cascade import Cascade, levels
+from sweep.chunk import output_columns, parameter_matrix
 from sweep.families.base import Array, Family, Unit
 from sweep.study.units import internal_unit
 from sweep.summaries import output
@@ -29,6 +30,7 @@ CHUNK_SECONDS = 2.0
 CHUNK_BYTES = 64 * 2**20
 CHUNKS_AT_LEAST = 16
 SECONDS_AT_LEAST = 0.1
+CHUNK_STEP = 512
 
 PILOT_RUNS, PILOT_LENGTH = 32, 32
 
@@ -130,7 +132,7 @@ def designs_fingerprint(study: Study) -> str:
 
 
 def choose_chunk_size(study: Study) -> int:
-    """Designs per chunk: a multiple of the block length from the routes' cost, the memory and the number of designs.
+    """Designs per chunk: a multiple of 512 from the routes' cost, the memory and the number of designs.
 
     Neither the number of workers nor the clock of the machine enters.
     """
@@ -138,7 +140,7 @@ def choose_chunk_size(study: Study) -> int:
     by_time = CHUNK_SECONDS / seconds
     by_memory = CHUNK_BYTES / row_bytes(study)
     by_count = max(study.space.count / CHUNKS_AT_LEAST, SECONDS_AT_LEAST / seconds)
-    return BLOCK * max(1, math.floor(min(by_time, by_memory, by_count) / BLOCK))
+    return CHUNK_STEP * max(1, math.floor(min(by_time, by_memory, by_count) / CHUNK_STEP))
 
 
 def pilot(study: Study) -> Pilot:
@@ -153,10 +155,11 @@ def pilot(study: Study) -> Pilot:
     starts = sorted({int((k * golden) % 1.0 * (count - length + 1)) for k in range(PILOT_RUNS)})
     blocks = [parameter_matrix(study, start, start + length) for start in starts]
     designs, status = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-    found = cascade(study, designs, status)
-    costs = [route.ns_per_design for route in ordered_routes(study)]
-    nanoseconds = sum(n * cost for n, cost in zip(found.reached, costs, strict=True))
-    return Pilot(1e-9 * nanoseconds / len(designs), float(np.mean(found.status == OK)))
+    cascade = Cascade(study)
+    cascade.feed(np.arange(len(designs)), designs, status)
+    cascade.end(())
+    nanoseconds = sum(n * level.ns_per_design for n, level in zip(cascade.reached, levels(study), strict=True))
+    return Pilot(1e-9 * nanoseconds / len(designs), float(cascade.counts[OK] / len(designs)))
 
 
 def spread_designs(study: Study, number: int) -> Array:

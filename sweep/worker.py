@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sweep.chunk import Dropped, compute_chunk
+from sweep.cascade import Dropped
+from sweep.chunk import compute_chunk
 from sweep.errors import LinksweepError
 from sweep.signals import depend_on_parent
 from sweep.store import write_chunk

@@ -15,6 +15,10 @@ from sweep.errors import LinksweepError
 # Plan and log are smaller than this, chunks larger.
 SMALL = 6000
 
+# What to set in `sweep.plan` for chunks of so many designs, whatever they cost.
+CHUNK = 4096
+SMALL_CHUNKS = {"CHUNK_SECONDS": 1e-9, "CHUNK_STEP": CHUNK}
+
 ROOT = Path(__file__).resolve().parents[1]
 
 STUDY = """
@@ -46,7 +50,7 @@ dtype = "{dtype}"
 
 
 def write_study(folder: Path, *, keep: str = "all", dtype: str = "float64", count: int = 100, limits: str = "") -> Path:
-    """A study of 512 * count designs, in chunks of 4096 once :func:`small_chunks` has been called."""
+    """A study of 512 * count designs."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "study.toml"
     path.write_text(STUDY.format(keep=keep, dtype=dtype, count=count, limits=limits))
@@ -69,7 +73,7 @@ def main(study: str, out: str, jobs: str, backend: str, pause: str) -> None:
         sync(descriptor)
 
     os.fsync = slow_sync  # type: ignore[assignment]
-    sweep.plan.CHUNK_SECONDS = 1e-9
+    vars(sweep.plan).update(SMALL_CHUNKS)
     try:
         run(study, out, int(jobs), backend)  # type: ignore[arg-type]
     except LinksweepError as error:

@@ -12,7 +12,8 @@ import pytest
 
 import sweep.plan
 from kernels import status as codes
-from sweep.chunk import BLOCK, cascade, compute_chunk, meets, parameter_matrix
+from sweep.cascade import Batch, Cascade, Level, levels, meets
+from sweep.chunk import compute_chunk, output_columns, parameter_matrix
 from sweep.engine import run
 from sweep.errors import InputError
 from sweep.families.base import Array, Columns
@@ -21,12 +22,13 @@ from sweep.store import is_complete, load, read_plan, read_runs
 from sweep.study import Limit, OutputSettings, Study, load_study
 from sweep.summaries import Route, design_outputs
 from sweep.tables import design_matrix
-from tests.engine_study import chunk_bytes, write_study
+from tests.engine_study import CHUNK, SMALL_CHUNKS, chunk_bytes, write_study
 
 
 @pytest.fixture(autouse=True)
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep.plan, "CHUNK_SECONDS", 1e-9)
+    for name, value in SMALL_CHUNKS.items():
+        monkeypatch.setattr(sweep.plan, name, value)
 
 
 @pytest.fixture
@@ -38,7 +40,7 @@ def test_chunks_have_same_bytes_with_one_and_two_threads_and_processes(study: St
     one = run(study, tmp_path / "one", jobs=1)
     threads = run(study, tmp_path / "threads", jobs=2)
     processes = run(study, tmp_path / "processes", jobs=2, backend="loky")
-    assert len(chunk_bytes(one)) == -(-study.space.count // BLOCK) > 10
+    assert len(chunk_bytes(one)) == -(-study.space.count // CHUNK) > 10
     assert chunk_bytes(threads) == chunk_bytes(one)
     assert chunk_bytes(processes) == chunk_bytes(one)
     assert (threads / "_plan.json").read_bytes() == (one / "_plan.json").read_bytes()
@@ -68,7 +70,7 @@ class Recorder:
     """Stands for a family with three routes: outputs x (the design's a), y (its b), z (1); a > 50 does not turn."""
 
     def __init__(self) -> None:
-        self.ran: dict[str, int] = {}
+        self.ran: dict[str, list[int]] = {}
 
     def routes(self, family: object, want: object, accuracy: object) -> tuple[Route, ...]:
         return tuple(Route(name, (name,), 1.0) for name in "xyz")
@@ -76,7 +78,7 @@ class Recorder:
     def design_outputs(
         self, family: object, designs: Array, wanted: tuple[str, ...], accuracy: object, window: object
     ) -> Columns:
-        self.ran[wanted[0]] = len(designs)
+        self.ran.setdefault(wanted[0], []).append(len(designs))
         status = np.zeros(len(designs), np.uint8)
         if wanted == ("x",):
             status[designs[:, 0] > 50.0] = codes.NOT_ROTATABLE
@@ -87,18 +89,26 @@ class Recorder:
         }
 
 
+def fed(cascade: Cascade, matrix: Array, status: np.ndarray, pieces: int) -> Batch:
+    for low in range(0, len(matrix), pieces):
+        part = slice(low, low + pieces)
+        cascade.feed(np.arange(len(matrix))[part], matrix[part], status[part])
+    return cascade.end(tuple(output_columns(cascade.study)))
+
+
 @pytest.mark.parametrize("keep", ["all", "feasible"])
 def test_cascade_runs_a_route_only_on_survivors(
     study: Study, monkeypatch: pytest.MonkeyPatch, keep: Literal["all", "feasible"]
 ) -> None:
     recorder = Recorder()
-    monkeypatch.setattr("sweep.chunk.routes", recorder.routes)
-    monkeypatch.setattr("sweep.chunk.design_outputs", recorder.design_outputs)
+    monkeypatch.setattr("sweep.cascade.routes", recorder.routes)
+    monkeypatch.setattr("sweep.cascade.design_outputs", recorder.design_outputs)
     limits = (Limit("x", 20.0, None), Limit("y", None, 100.0))
     tiny = replace(study, want=("x", "y", "z"), limits=limits, output=OutputSettings(keep))
     matrix, made = parameter_matrix(tiny, 0, tiny.space.count)
     a, b = matrix[:, 0], matrix[:, 1]
-    found = cascade(tiny, matrix, made)
+    cascade = Cascade(tiny)
+    found = fed(cascade, matrix, made, len(matrix))
 
     after_x = (a >= 20.0) & (a <= 50.0)
     expected = np.select(
@@ -109,11 +119,40 @@ def test_cascade_runs_a_route_only_on_survivors(
     go_on = after_x | (a < 15.0) if keep == "all" else after_x
     last = (after_x & (b <= 100.0)) | ((a < 15.0) & (keep == "all"))
     np.testing.assert_array_equal(found.status, expected)
-    assert recorder.ran == {"x": len(a), "y": int(go_on.sum()), "z": int(last.sum())}
-    assert found.reached == tuple(recorder.ran.values())
+    ran = {name: sum(sizes) for name, sizes in recorder.ran.items()}
+    assert ran == {"x": len(a), "y": int(go_on.sum()), "z": int(last.sum())}
+    assert cascade.reached == list(ran.values())
+    assert cascade.counts.tolist() == np.bincount(expected, minlength=256).tolist()
     assert 0 < last.sum() < go_on.sum() < len(a), "every route must lose some designs"
     np.testing.assert_array_equal(np.isnan(found.outputs["y"]), ~go_on)
     np.testing.assert_array_equal(np.isnan(found.outputs["z"]), ~last)
+
+
+def test_survivors_wait_until_they_are_enough(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twenty pieces, but each route is called with full batches and once with what is left over."""
+    recorder = Recorder()
+    monkeypatch.setattr("sweep.cascade.routes", recorder.routes)
+    monkeypatch.setattr("sweep.cascade.design_outputs", recorder.design_outputs)
+    monkeypatch.setattr(Level, "batch", 1000)
+    tiny = replace(study, want=("x", "y", "z"), limits=(Limit("y", None, 80.0),), output=OutputSettings("feasible"))
+    matrix, made = parameter_matrix(tiny, 0, 20_000)
+    at_once = fed(Cascade(tiny), matrix, made, 20_000)
+    recorder.ran.clear()
+    in_pieces = fed(Cascade(tiny), matrix, made, 990)
+    swings = matrix[:, 0] >= 15.0
+    first, second = int(swings.sum()), int((swings & (matrix[:, 1] <= 80.0)).sum())
+    assert 2000 < second < first < 20_000
+    assert recorder.ran["x"] == [1000] * 20
+    assert recorder.ran["y"] == [1000] * (first // 1000) + [first % 1000]
+    assert recorder.ran["z"] == [1000] * (second // 1000) + [second % 1000]
+    assert in_pieces.index.tolist() == list(range(20_000)), "order in = order out"
+    for name in at_once.outputs:
+        np.testing.assert_array_equal(in_pieces.outputs[name], at_once.outputs[name])
+
+
+def test_dear_routes_get_small_batches_and_cheap_ones_no_more_than_the_caches_hold(study: Study) -> None:
+    assert [Level(None, ns).batch for ns in (0.0, 40.0, 1e5, 1e9)] == [16384, 16384, 1000, 64]
+    assert all(level.batch == 16384 for level in levels(study))
 
 
 def test_no_nan_without_a_status(study: Study, tmp_path: Path) -> None:
@@ -190,7 +229,7 @@ def test_chunk_size_follows_cost_and_memory(study: Study, monkeypatch: pytest.Mo
     monkeypatch.setattr(sweep.plan, "CHUNKS_AT_LEAST", 1e-9)
     size = make_plan(study).chunk_size
     row = sweep.plan.row_bytes(study)
-    assert sweep.plan.CHUNK_BYTES - BLOCK * row < size * row <= sweep.plan.CHUNK_BYTES
+    assert sweep.plan.CHUNK_BYTES - CHUNK * row < size * row <= sweep.plan.CHUNK_BYTES
 
 
 @pytest.mark.parametrize("name", ["swing", "stroke", "swing1", "stroke2"])

@@ -16,7 +16,8 @@ import pandas as pd
 import pytest
 
 import sweep
-from sweep.chunk import compute_chunk, meets
+from sweep.cascade import meets
+from sweep.chunk import compute_chunk
 from sweep.optimise import minimise
 from sweep.optimise.study import problem_of
 from sweep.study import OptimiseSettings, load_study, study_from_data

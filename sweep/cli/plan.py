@@ -28,7 +28,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     cost : its estimate
     others : what other accuracies would take [s], in words
     """
-    from sweep.chunk import ordered_routes
+    from sweep.cascade import ordered_routes
     from sweep.plan import PARAMETER_UNITS
     from sweep.report.answer import bound_words
     from sweep.report.quantities import quantity

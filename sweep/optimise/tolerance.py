@@ -68,7 +68,7 @@ def tolerance_rows(
     ``missing`` (share without it), ``within`` (share that keeps its limits; nan without a limit); a last row
     "all limits" has only ``within``.  The share of 2048 designs is good to about 1 %.
     """
-    from sweep.chunk import meets
+    from sweep.cascade import meets
     from sweep.summaries import design_outputs
 
     designs = np.concatenate([design[None, :], deviating(family, design, tolerance, seed)])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as codes
-from sweep.chunk import MAGNITUDES, meets
+from sweep.cascade import MAGNITUDES, meets
 from sweep.report.quantities import Quantity, number, percent_change, quantity
 from sweep.report.tables import parameter_rows
 

@@ -1,0 +1,241 @@
+"""Designs through the outputs of a study, cheapest first; only those within every limit so far go on.
+
+Few designs survive the first limits, and the dear routes cost a millisecond or more however few they are given.  So
+survivors wait before each route until there are enough of them, or until no more come.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as codes
+from sweep.families.base import Array
+from sweep.fit import NS_FIT, fit_line
+from sweep.summaries import Route, design_outputs, routes
+
+if TYPE_CHECKING:
+    from sweep.study import Limit, Study
+
+# A route gets at most so many designs at once, so that their tables stay in the caches, and of a dear one at most what
+# it does in this time: a stop is noticed in between.
+BLOCK = 16384
+BATCH_SECONDS = 0.1
+FEWEST = 64
+
+# A clockwise and an anticlockwise follower of the same amplitude meet the same requirement.
+MAGNITUDES = ("swing", "stroke")
+
+# With these one output is missing or rough, the others are worth having where all rows are kept.
+PARTIAL = (codes.NOT_OSCILLATING, codes.NOT_CONVERGED)
+
+
+class Dropped(Exception):
+    """The work was given up half way because the run was asked to stop."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """One stop of the cascade: a route, or without one the fit and the limits on parameters; its cost."""
+
+    route: Route | None
+    ns_per_design: float
+
+    @property
+    def batch(self) -> int:
+        """Designs that are worked on at once."""
+        return int(min(max(1e9 * BATCH_SECONDS / max(self.ns_per_design, 1.0), FEWEST), BLOCK))
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Some designs: their index (k,), parameters (k, P), outputs found so far, each (k,), and status (k,)."""
+
+    index: NDArray[np.int64]
+    designs: Array
+    outputs: dict[str, Array]
+    status: NDArray[np.uint8]
+
+    def only(self, which: NDArray[np.bool_] | slice) -> Batch:
+        """Some of them."""
+        outputs = {name: values[which] for name, values in self.outputs.items()}
+        return Batch(self.index[which], self.designs[which], outputs, self.status[which])
+
+    @classmethod
+    def joined(cls, batches: Sequence[Batch]) -> Batch:
+        """All designs of some batches with the same outputs."""
+        if len(batches) == 1:
+            return batches[0]
+        return cls(
+            np.concatenate([batch.index for batch in batches]),
+            np.concatenate([batch.designs for batch in batches]),
+            {name: np.concatenate([batch.outputs[name] for batch in batches]) for name in batches[0].outputs},
+            np.concatenate([batch.status for batch in batches]),
+        )
+
+
+@dataclass
+class Cascade:
+    """The designs of a study on their way through its levels.
+
+    What a design gets does not depend on those it waits with, so neither on how it is fed.
+
+    Parameters
+    ----------
+    study : whose family, wanted outputs, limits and accuracy apply
+    keep : whether designs that leave half way are among the results; they are counted either way
+    should_stop : asked before every batch; if it answers true, `Dropped` is raised
+    """
+
+    study: Study
+    keep: bool = True
+    should_stop: Callable[[], bool] = lambda: False
+    reached: list[int] = field(init=False)
+    counts: NDArray[np.int64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._levels = levels(self.study)
+        self._waiting: list[list[Batch]] = [[] for _ in self._levels]
+        self._left: list[Batch] = []
+        self._go_on = (codes.OK, *PARTIAL) if self.study.output.keep == "all" else (codes.OK,)
+        self.reached = [0] * len(self._levels)
+        self.counts = np.zeros(256, np.int64)
+
+    def feed(self, index: NDArray[np.int64], designs: Array, status: NDArray[np.uint8]) -> None:
+        """Send designs (k, P) in; those that are not OK (k,) leave at once."""
+        self._sort(Batch(index, designs, {}, status), status == codes.OK, 0)
+        self._work(0, whole=False)
+
+    def end(self, names: Sequence[str]) -> Batch:
+        """Nothing more comes: everything that waits is done.
+
+        Returns
+        -------
+        Batch
+            in the order of the index; the named outputs, nan where not computed; status 0 for designs that meet every
+            limit, LIMIT_EXCEEDED for those that miss one, otherwise the status of the kernel that could not answer.
+        """
+        for number in range(len(self._levels)):
+            self._work(number, whole=True)
+        found = []
+        for batch in self._left:
+            missing = np.full(batch.index.size, np.nan)
+            outputs = {name: batch.outputs.get(name, missing) for name in names}
+            found.append(Batch(batch.index, batch.designs, outputs, batch.status))
+        self._left.clear()
+        nothing = np.empty(0)
+        empty = Batch(
+            np.empty(0, np.int64),
+            np.empty((0, len(self.study.family.parameters))),
+            dict.fromkeys(names, nothing),
+            np.empty(0, np.uint8),
+        )
+        result = Batch.joined([empty, *found])
+        order = np.argsort(result.index, kind="stable")
+        return Batch(
+            result.index[order],
+            result.designs[order],
+            {name: values[order] for name, values in result.outputs.items()},
+            result.status[order],
+        )
+
+    def _work(self, number: int, whole: bool) -> None:
+        """Do what waits at a level, and at those behind it: full batches, or everything."""
+        if number == len(self._levels):
+            return
+        level, waiting = self._levels[number], self._waiting[number]
+        count = sum(batch.index.size for batch in waiting)
+        if not count or (count < level.batch and not whole):
+            return
+        together = Batch.joined(waiting)
+        end = count if whole else count - count % level.batch
+        waiting[:] = [together.only(slice(end, None))] if end < count else []
+        for low in range(0, end, level.batch):
+            if self.should_stop():
+                raise Dropped
+            part = together.only(slice(low, min(low + level.batch, end)))
+            self.reached[number] += part.index.size
+            done, goes_on = _fitted(self.study, part) if level.route is None else self._computed(level.route, part)
+            self._sort(done, goes_on, number + 1)
+            self._work(number + 1, whole=False)
+
+    def _computed(self, route: Route, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
+        """A batch with the outputs of a route, and which of its designs go on."""
+        study = self.study
+        found = design_outputs(study.family, batch.designs, route.outputs, study.accuracy, study.window)
+        status = np.where(batch.status == codes.OK, found["status"], batch.status)
+        for limit in study.tested_limits:
+            if limit.output in found:
+                status[(status == codes.OK) & ~meets(limit, found[limit.output])] = codes.LIMIT_EXCEEDED
+        more = {name: np.asarray(values, np.float64) for name, values in found.items() if name != "status"}
+        return Batch(batch.index, batch.designs, batch.outputs | more, status), np.isin(status, self._go_on)
+
+    def _sort(self, batch: Batch, goes_on: NDArray[np.bool_], number: int) -> None:
+        """Designs that go on wait at a level, if there is one more; the others leave."""
+        if number == len(self._levels):
+            goes_on = np.zeros(batch.index.size, np.bool_)
+        elif goes_on.any():
+            self._waiting[number].append(batch if goes_on.all() else batch.only(goes_on))
+        leaves = ~goes_on
+        self.counts += np.bincount(batch.status[leaves], minlength=self.counts.size)
+        if not self.keep:
+            leaves &= batch.status == codes.OK
+        if leaves.any():
+            self._left.append(batch if leaves.all() else batch.only(leaves))
+
+
+def levels(study: Study) -> tuple[Level, ...]:
+    """The cascade of a study: its routes, cheapest first, those that must wait for [fit] behind it."""
+    found = [Level(route, route.ns_per_design) for route in ordered_routes(study)]
+    if study.fit is not None or study.parameter_limits:
+        before = sum(_before_fit(study, route) for route in ordered_routes(study))
+        found.insert(before, Level(None, NS_FIT if study.fit is not None else 0.0))
+    return tuple(found)
+
+
+def ordered_routes(study: Study) -> tuple[Route, ...]:
+    """The routes of a study, cheapest first, those that must wait for [fit] behind the others."""
+    found = routes(study.family, study.want, study.accuracy)
+    return tuple(sorted(found, key=lambda route: not _before_fit(study, route)))
+
+
+def _before_fit(study: Study, route: Route) -> bool:
+    """Whether the route concerns only stages before the one that [fit] finishes."""
+    if study.fit is None:
+        return False
+    last = len(study.families)
+    numbers = [re.search(r"(\d+)$", name) for name in route.outputs]
+    return all(number is not None and int(number[1]) < last for number in numbers)
+
+
+def _fitted(study: Study, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
+    """A batch with its fitted parameters, and which of its designs keep the limits on parameters."""
+    designs, status = batch.designs, batch.status.copy()
+    goes_on = np.ones(status.size, np.bool_)
+    if study.fit is not None:
+        designs, fate = fit_line(study.family, designs, study.fit, study.window)
+        status[:] = fate
+        goes_on = fate == codes.OK
+    for limit in study.parameter_limits:
+        exceeds = goes_on & ~meets(limit, designs[:, study.family.parameter_names.index(limit.output)])
+        status[exceeds] = codes.LIMIT_EXCEEDED
+        goes_on &= ~exceeds
+    return Batch(batch.index, designs, batch.outputs, status), goes_on
+
+
+def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:
+    """Whether each value keeps the limit; nan does not.  Swing and stroke are compared by magnitude."""
+    x = np.asarray(values, dtype=np.float64)
+    if limit.output.rstrip("0123456789") in MAGNITUDES:
+        x = np.abs(x)
+    good = np.isfinite(x)
+    if limit.minimum is not None:
+        good &= x >= limit.minimum
+    if limit.maximum is not None:
+        good &= x <= limit.maximum
+    return good
