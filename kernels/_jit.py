@@ -1,4 +1,4 @@
-"""The one place where compile options are decided, and where the compiled code is kept.
+"""The one place where compile options are decided.
 
 Every kernel of the house is made by :func:`kernel`.  The options and why they are these:
 
@@ -9,53 +9,23 @@ Every kernel of the house is made by :func:`kernel`.  The options and why they a
   may contract a product and a sum into one instruction: it gains about 8 % there and costs the promise of equal last
   bits on processors with and without that instruction, which all other kernels keep.  The reductions of
   :mod:`kernels.reduce` carry the two flags they need themselves.
-* ``cache=True`` in a folder whose name is a hash of all kernel sources.  numba compares only the file of the function
-  it loads, not the files of the helpers inlined into it, so a shared folder would serve stale machine code after an
-  edit of a helper.
+* Machine code is kept on disk by :mod:`kernels._cache`.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
-import platformdirs
-from numba.core import config
+
+from kernels._cache import kept
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-SOURCES = Path(__file__).resolve().parent
-
-
-def source_hash() -> str:
-    """Hash of every kernel source file and the numba version: the identity of the compiled code."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(SOURCES.rglob("*.py")):
-        digest.update(path.relative_to(SOURCES).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def cache_root() -> Path:
-    """Folder that holds the compiled kernels of every version (what ``sweep cache clear`` removes)."""
-    return Path(platformdirs.user_cache_dir("linksweep")) / "kernels"
-
-
-CACHE_DIR = cache_root() / source_hash()
-
 
 def _compiled(function: F, **options: Any) -> F:
-    # numba reads the folder when the cache object is made, so the setting is lent for this one call
-    # and other users of numba in the same process keep theirs.
-    before = config.CACHE_DIR  # type: ignore[attr-defined]
-    config.CACHE_DIR = str(CACHE_DIR)  # type: ignore[attr-defined]
-    try:
-        return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function))
-    finally:
-        config.CACHE_DIR = before  # type: ignore[attr-defined]
+    return cast(F, kept(numba.njit(nogil=True, error_model="numpy", **options)(function)))
 
 
 def kernel(function: F) -> F:

@@ -198,7 +198,7 @@ def code_hash() -> str:
     """Hash of the sources and libraries that determine the values in a chunk."""
     import scipy
 
-    from kernels._jit import source_hash
+    from kernels._cache import source_hash
 
     root = Path(__file__).resolve().parent
     paths = [path for path in sorted(root.rglob("*.py")) if path.relative_to(root).parts[0] not in NOT_VALUES]

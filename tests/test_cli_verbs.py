@@ -263,7 +263,7 @@ def test_cache_clear_removes_the_compiled_kernels_only(tmp_path: Path, monkeypat
     for folder in (kernels / "abc", other):
         folder.mkdir(parents=True)
         (folder / "file").write_text("x")
-    monkeypatch.setattr("kernels._jit.cache_root", lambda: kernels)
+    monkeypatch.setattr("kernels._cache.cache_root", lambda: kernels)
     assert call("cache", "clear").output == f"removed {kernels}\n"
     assert not kernels.exists()
     assert (other / "file").exists()

@@ -90,7 +90,7 @@ def clear() -> None:
 
     This is the cure when a damaged file in the cache stops a kernel from loading.
     """
-    from kernels._jit import cache_root
+    from kernels._cache import cache_root
 
     root = cache_root()
     if not root.exists():

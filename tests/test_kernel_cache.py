@@ -1,0 +1,143 @@
+"""Compiled kernels on disk: never those of other sources, whatever is edited when, whoever else compiles."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+SOURCES = Path(__file__).resolve().parents[1] / "kernels"
+HELPER = """
+from kernels._jit import inline
+
+STEP = {step}
+
+
+@inline
+def shifted(x: float) -> float:
+    return x + STEP
+"""
+KERNEL = """
+from kernels._jit import kernel
+from kernels.helper import shifted
+
+
+@kernel
+def run(x):
+    return shifted(x)
+"""
+REPORT = "from kernels.loop import run; print(run(1.0), len(run.stats.cache_hits), type(run._cache).__name__)"
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """A package of two kernels around the house's decorators, with a cache folder of its own."""
+    package = tmp_path / "tree" / "kernels"
+    package.mkdir(parents=True)
+    for name in ("__init__.py", "_jit.py", "_cache.py"):
+        (package / name).write_text((SOURCES / name).read_text())
+    (package / "loop.py").write_text(KERNEL)
+    (package / "helper.py").write_text(HELPER.format(step=1))
+    return package
+
+
+def process(tree: Path, program: str, **environment: str) -> subprocess.Popen[str]:
+    known = os.environ | {"XDG_CACHE_HOME": str(tree.parents[1] / "cache"), "PYTHONPATH": str(tree.parent)}
+    known |= {"PYTHONDONTWRITEBYTECODE": "", "NUMBA_DISABLE_JIT": "0"}
+    return subprocess.Popen([sys.executable, "-c", textwrap.dedent(program)], cwd=tree.parents[1],
+                            env=known | environment, stdout=subprocess.PIPE, text=True)  # fmt: skip
+
+
+def report(tree: Path, program: str = REPORT, **environment: str) -> list[str]:
+    with process(tree, program, **environment) as running:
+        found, _ = running.communicate(timeout=60)
+    assert running.returncode == 0
+    return found.split()
+
+
+def edit(tree: Path, step: int, same_time: bool = False) -> None:
+    helper = tree / "helper.py"
+    before = helper.stat()
+    helper.write_text(HELPER.format(step=step))
+    if same_time:
+        os.utime(helper, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+def test_code_is_compiled_once_and_found_again(tree: Path) -> None:
+    assert report(tree) == ["2.0", "0", "KernelCache"]
+    assert report(tree) == ["2.0", "1", "KernelCache"]
+
+
+def test_an_edit_of_a_helper_gives_its_new_result_and_back_again_the_old(tree: Path) -> None:
+    assert report(tree)[0] == "2.0"
+    edit(tree, 5)
+    assert report(tree)[:2] == ["6.0", "0"]
+    edit(tree, 1)
+    assert report(tree)[:2] == ["2.0", "1"]
+
+
+def test_an_edit_that_python_itself_overlooks_leaves_no_trace(tree: Path) -> None:
+    """Same size, same second: Python runs the old .pyc, which is its affair; the cache must not keep it as the new."""
+    assert report(tree)[0] == "2.0"
+    edit(tree, 7, same_time=True)
+    assert report(tree)[2] == "NullCache", "old code under the new sources' name"
+    assert report(tree, PYTHONPYCACHEPREFIX=str(tree.parent / "none"))[:2] == ["8.0", "0"]
+
+
+def test_sources_edited_while_they_are_imported_are_not_kept(tree: Path) -> None:
+    """The helper changes between the hash and its import; then it changes back."""
+    during = f"""
+    import kernels._jit
+    from pathlib import Path
+    Path({str(tree / "helper.py")!r}).write_text({HELPER.format(step=5)!r})
+    {REPORT}
+    """
+    assert report(tree, during) == ["6.0", "0", "NullCache"]
+    edit(tree, 1)
+    assert report(tree)[:2] == ["2.0", "0"]
+
+
+def test_an_edit_after_the_import_changes_nothing_for_this_process(tree: Path) -> None:
+    after = f"""
+    from kernels.loop import run
+    from pathlib import Path
+    Path({str(tree / "helper.py")!r}).write_text({HELPER.format(step=5)!r})
+    {REPORT}
+    """
+    assert report(tree, after) == ["2.0", "0", "KernelCache"]
+    assert report(tree)[:2] == ["6.0", "0"]
+
+
+def test_copies_of_the_same_sources_share_their_code(tree: Path, tmp_path: Path) -> None:
+    report(tree)
+    copy = tmp_path / "copy" / "kernels"
+    copy.parent.mkdir()
+    subprocess.run(["cp", "-r", str(tree), str(copy)], check=True)
+    assert report(copy)[:2] == ["2.0", "1"]
+
+
+def test_processes_that_compile_at_the_same_time_do_not_mix_their_signatures(tree: Path) -> None:
+    """A slow disk between looking for a free name and taking it; afterwards each signature loads its own code."""
+    slow = """
+    import numpy, time
+    from numba.core.caching import IndexDataCacheFile as File
+    from kernels.loop import run
+    save = File._save_index
+    File._save_index = lambda *given: (time.sleep(2), save(*given))
+    run({value})
+    """
+    both = [process(tree, slow.format(value=value)) for value in ("numpy.float64(1)", "numpy.complex128(1)")]
+    for running in both:
+        with running:
+            assert running.wait(60) == 0
+    again = "import numpy; from kernels.loop import run; print(run(numpy.float64(1)), run(numpy.complex128(1)))"
+    assert report(tree, f"{again}; print(len(run.stats.cache_hits))") == ["2.0", "(2+0j)", "2"]
+
+
+def test_where_nothing_can_be_written_kernels_run_all_the_same(tree: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert report(tree, XDG_CACHE_HOME=str(tmp_path / "file")) == ["2.0", "0", "NullCache"]
