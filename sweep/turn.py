@@ -211,7 +211,7 @@ def _limit(way: Way, most: Extremum, least: Extremum, outward: Mask) -> tuple[Ar
         case "psi_ext":
             return _principal(ext.value), ext.err
         case "psi_fold":
-            return _principal(ext.value) + swing, fold.err
+            return _principal(fold.value), fold.err
         case "s_ext":
             return ext.value, ext.err
         case "s_fold":
@@ -220,5 +220,5 @@ def _limit(way: Way, most: Extremum, least: Extremum, outward: Mask) -> tuple[Ar
 
 
 def _principal(angle: Array) -> Array:
-    """The angle in (-pi, pi]."""
+    """The angle in (-pi, pi], as atan2 has it."""
     return angle - TWO_PI * np.ceil((angle - np.pi) / TWO_PI)

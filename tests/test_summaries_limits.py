@@ -7,13 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import sweep
 from kernels import status as st
+from sweep.families import family as find_family
 from sweep.families.base import Accuracy
 from sweep.summaries import design_outputs
-from tests.turn_designs import RSSR, crank_rockers, slider_cranks
+from tests.turn_designs import RSSR, crank_rockers, guided_four_bars, slider_cranks
 
 ROWS = json.loads((Path(__file__).parent / "oracle" / "limits_open.json").read_text())["rows"]
 PLAIN_RSSR = replace(RSSR, steps=())
@@ -102,6 +104,36 @@ def test_swing_of_a_general_chain_is_unwrapped():
     found = design_outputs(PLAIN_RSSR, designs, ["swing", "psi_ext", "psi_fold", "range_psi"], Accuracy(target=1e-8))
     ok = found["status"] == st.OK
     np.testing.assert_allclose(np.abs(found["swing"][ok]), found["range_psi"][ok], rtol=1e-12)
-    np.testing.assert_allclose(found["psi_fold"][ok] - found["psi_ext"][ok], found["swing"][ok], atol=1e-12)
+    turns = (found["swing"][ok] - (found["psi_fold"][ok] - found["psi_ext"][ok])) / (2.0 * np.pi)
+    np.testing.assert_allclose(turns, np.rint(turns), atol=1e-12)
+    assert set(np.rint(turns)) == {-1.0, 0.0, 1.0}, "some must pass pi, either way"
     assert (np.sign(found["swing"][ok]) == -designs[ok, 7]).all()  # sheet (3-sgn)
-    assert (np.abs(found["psi_ext"][ok]) <= np.pi).all()
+
+
+@pytest.mark.parametrize("own_steps", [True, False])
+@pytest.mark.parametrize("names", [["rssr"], ["rssr", "guide"], ["rssr", "rssr"]])
+def test_limit_angles_are_those_of_the_poses_in_line(names, own_steps, monkeypatch):
+    """In (-pi, pi], as atan2 has it, by the family's own step or from poses, alone or in a chain, in any stage."""
+    n = 400
+    parts = [crank_rockers(n, 5), crank_rockers(n, 6) * ([0.3] + 7 * [1.0])]
+    if names[-1] == "guide":
+        parts[1] = guided_four_bars(n, 6)
+    table = {}
+    for number, name in enumerate(names):
+        suffix = str(number + 1) if len(names) > 1 else ""
+        columns = [f"{p}{suffix}" for p in find_family(name).parameter_names]
+        table |= dict(zip(columns, parts[number].T, strict=True))
+    if not own_steps:
+        monkeypatch.setattr("sweep.catalogue.own_steps", lambda *_: [])
+    stages = [""] if len(names) == 1 else [str(k + 1) for k, name in enumerate(names) if name == "rssr"]
+    for stage in stages:
+        wanted = [f"{limit}{stage}" for limit in ("psi_ext", "phi_ext", "psi_fold", "phi_fold")]
+        frame = sweep.summarise(names, table, wanted)
+        ok = frame["status"] == st.OK
+        assert ok.sum() > 20
+        for angle, phi in (wanted[:2], wanted[2:]):
+            pose = sweep.evaluate(names, pd.DataFrame(table)[ok].assign(phi=frame.loc[ok, phi]), f"psi{stage}")
+            error = np.abs(frame.loc[ok, angle] - pose[f"psi{stage}"])
+            at_pi = np.abs(np.abs(pose[f"psi{stage}"]) - np.pi) < 1e-6
+            assert error[~at_pi].max() < 1e-6
+            assert (frame.loc[ok, angle] > -np.pi).all() and (frame.loc[ok, angle] <= np.pi).all()
