@@ -251,7 +251,9 @@ class _Layout:
         return maxima, minima
 
     def _size(self, r: Requirement, bound: float) -> float:
-        """What a violation is measured in: the bound itself, unless it is tiny against the curve; 1 for cos^2."""
+        """What a violation is measured in: the bound itself, unless it is tiny against the curve; 1 for margins."""
+        if r.measure.inner == "pressure":
+            return 1.0 + bound  # sin^2 of the limit: a few degrees are as hard a limit as forty
         if any(s.pressure for s in r.measure.series):
             return 1.0
         ends = [k for side in self._ends(r.measure.series) for k in side]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 TEXTS = {
     "role": ("", "optimum (the best start's result), start (another start's), or reference"),
     "start": ("", "number of the start, best candidate first; -1 for the reference"),
-    "violation": ("1", "largest violation of a limit, relative to the limit; cos^2 for pressure angles"),
+    "violation": ("1", "largest violation of a limit, relative to the limit; for pressure angles of its sin^2"),
     "kkt_residual": ("1", "residual of the optimality conditions, variables scaled to their bounds"),
     "gap": ("1", "difference of the maximum the search worked with and the verified one, relative"),
     "active": ("", "limits and bounds that hold the result back"),
