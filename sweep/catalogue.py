@@ -13,6 +13,7 @@ from sweep.families.base import Accuracy, Family, Output, Step
 from sweep.families.chain import Chain, Stage
 from sweep.margins import margin_suffixes
 from sweep.sampling import is_angle_of_follower
+from sweep.size import SIZE, lengths, size_step
 
 REDUCTIONS = {
     "max_abs": "largest magnitude over one turn of",
@@ -79,6 +80,8 @@ def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | Non
     found: list[tuple[Step, Output, Stage | None]] = [
         (step, o, None) for step in family.steps for o in step.provides if o.name == name
     ]
+    if name == SIZE.name and (step := size_step(family)) is not None:
+        found.append((step, SIZE, None))
     if isinstance(family, Chain) and name.endswith("1"):
         stage = family.stages[0]
         found += [
@@ -132,6 +135,7 @@ def output_names(family: Family) -> tuple[str, ...]:
         names += [f"{o.name}1" for step in family.stages[0].family.steps for o in step.provides]
         names += [f"{base}{suffix}" for suffix in suffixes for base in MARGIN_TEXTS]
     names += [*limit_names(family, family.position, ""), STAY.name]
+    names += [SIZE.name] if lengths(family) else []
     if isinstance(family, Chain):
         for stage in family.stages:
             names += limit_names(family, f"{stage.family.position}{stage.number}", str(stage.number))

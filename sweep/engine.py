@@ -82,7 +82,8 @@ def run(
         try:
             computed = _sweep(model, folder, jobs, backend, force, progress)
             if model.optimise is not None:
-                _optimise(model, folder, jobs)
+                _optimise(replace(model, pareto=None), folder, jobs)
+            _front(model, folder, jobs)
         except Exception as error:
             if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
                 store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
@@ -148,7 +149,9 @@ def _open_plan(study: Study, folder: Path, force: bool) -> Plan:
             raise store.foreign(folder, known, plan)
     plan = make_plan(study)
     if force:
-        _set_foreign_aside(folder, plan, (store.PLAN, store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE))
+        _set_foreign_aside(
+            folder, plan, (store.PLAN, store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO)
+        )
     store.finished_chunks(folder, plan)  # refuses foreign chunks before the plan is written
     store.write_plan(folder, _plan_note(study, folder, plan))
     return plan
@@ -169,6 +172,7 @@ def _plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
         "data": study.data,
         "optimise": study.optimise is not None,
         "optimised": noted.get("optimised"),
+        "pareto": study.pareto is not None,
         "counts": noted.get("counts"),
         "complete": False,
     }
@@ -229,6 +233,25 @@ def _optimise(study: Study, folder: Path, jobs: int) -> None:
             text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
             raise Interrupted(number, text) from None
     store.write_plan(folder, note | {"optimised": key})
+
+
+def _front(study: Study, folder: Path, jobs: int) -> None:
+    """Search the study's front, from where an earlier run of these very sources left it."""
+    if study.pareto is None:
+        (folder / store.PARETO).unlink(missing_ok=True)
+        return
+    from sweep.optimise import front_study
+    from sweep.plan import optimiser_hash
+
+    note = store.read_plan(folder) or {}
+    key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
+    with stop_on_signal() as stop:
+        try:
+            front_study(study, folder, key, lambda: bool(stop), jobs)
+        except KeyboardInterrupt:
+            number = stop.signal_number or signal.SIGINT
+            text = f"{folder}: stopped by signal {number} while searching the front; run again to continue"
+            raise Interrupted(number, text) from None
 
 
 def _circumstances(jobs: int, backend: str) -> dict[str, Any]:

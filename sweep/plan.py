@@ -42,7 +42,7 @@ NOT_VALUES = frozenset(
 ) | {"signals.py", "poses.py", "compare.py"}
 
 # Sections of the study file that decide no value in a chunk.
-NOT_IN_CHUNKS = ("study", "optimise", "tolerance", "reference", "budget", "report")
+NOT_IN_CHUNKS = ("study", "optimise", "pareto", "tolerance", "reference", "budget", "report")
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def _repetitive(study: Study) -> tuple[str, ...]:
 def designs_fingerprint(study: Study) -> str:
     """The study's fingerprint without what concerns only the optimum, so that a change there keeps the designs."""
     output = replace(study.output, curves="none")
-    return replace(study, optimise=None, tolerance=None, reference=None, output=output).fingerprint
+    return replace(study, optimise=None, pareto=None, tolerance=None, reference=None, output=output).fingerprint
 
 
 def choose_chunk_size(study: Study) -> int:

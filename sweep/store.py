@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 PLAN, RUNS, LOCK, BAD, OLD = "_plan.json", "_runs.jsonl", "_lock", "_bad", "_old"
 OPTIMUM, CURVES = "_optimum.parquet", "_curves.parquet"
-SENSITIVITY, TOLERANCE = "_sensitivity.parquet", "_tolerance.parquet"
+SENSITIVITY, TOLERANCE, PARETO = "_sensitivity.parquet", "_tolerance.parquet", "_pareto.parquet"
 TEMPORARY = "_tmp-"
 PLAN_KEYS = {"identity", "chunks", "chunk_size", "name", "chunk_data", "optimise"}
 METADATA = b"linksweep"
@@ -310,7 +310,14 @@ def is_complete(folder: str | Path) -> bool:
         return False
     whole = {part.index for part in parts(place) if part.identity == plan["identity"] and is_whole(part)}
     optimum = plan.get("optimised") is not None and (place / OPTIMUM).is_file()
-    return whole == set(range(plan["chunks"])) and (optimum or not plan["optimise"])
+    front = not plan.get("pareto") or _front_is_complete(place / PARETO)
+    return whole == set(range(plan["chunks"])) and ((optimum and front) or not plan["optimise"])
+
+
+def _front_is_complete(path: Path) -> bool:
+    import pyarrow.parquet as pq
+
+    return path.is_file() and (pq.read_schema(path).metadata or {}).get(b"complete") == b"true"
 
 
 def load(folder: str | Path) -> pd.DataFrame:

@@ -1,6 +1,9 @@
-"""Fronts by bounds on a second output: a closed form, order, a bound that cannot be kept, the time budget."""
+"""Fronts by bounds on a second output: closed forms, a linkage, order, spreading, going on half way, budget."""
 
 from __future__ import annotations
+
+import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,11 +11,16 @@ import pytest
 from kernels import status as st
 from sweep.errors import InputError
 from sweep.families import family
-from sweep.optimise import Problem, pareto
-from sweep.study import Limit, OptimiseSettings
+from sweep.families.base import Accuracy
+from sweep.optimise import Problem, minimise, pareto
+from sweep.optimise.pareto import Front, advance, bounded, steps
+from sweep.study import Limit, OptimiseSettings, ParetoSettings
+from sweep.summaries import design_outputs
 from tests.optimise_family import FAMILY
 
-ONCE = OptimiseSettings(starts=1)
+
+def settings(output: str, *bounds: float, at_least: bool = False, time_budget: float | None = None) -> ParetoSettings:
+    return ParetoSettings(output, bounds, at_least, 1, time_budget)
 
 
 def bowl(*limits: Limit) -> Problem:
@@ -20,42 +28,106 @@ def bowl(*limits: Limit) -> Problem:
     return Problem(FAMILY, ("p", "q"), np.full(2, -4.0), np.full(2, 4.0), {}, "max_abs_bowl", limits)
 
 
+BOWL_START = bowl().rows(np.array([[3.0, 3.0]]))
+
+
+def linkage() -> tuple[Problem, np.ndarray]:
+    """Crank-rockers of one swing, acceleration against pressure angle, and two designs to start from."""
+    low, high = np.array([0.1, 0.5, 0.5]), np.array([0.9, 2.0, 2.0])
+    fixed = {"e": 1.2, "f": 0.1, "g": 0.2, "alpha": 0.5, "branch": 1.0}
+    held = Limit("swing", 0.8, 0.8)
+    problem = Problem(family("rssr"), ("a", "b", "c"), low, high, fixed, "max_abs_d2psi", (held,))
+    return problem, problem.rows(np.array([[0.4, 1.2, 1.0], [0.3, 0.9, 0.8]]))
+
+
+def angle_of(problem: Problem, design: np.ndarray) -> float:
+    columns = design_outputs(problem.family, design[None, :], ["max_pressure_angle"], Accuracy(target=1e-12))
+    return float(columns["max_pressure_angle"][0])
+
+
 def test_front_of_two_known_outputs() -> None:
-    problem = bowl()
-    bounds = [0.25, 2.0, 0.5, 0.75]
-    results = pareto(problem, "max_abs_swell", bounds, problem.rows(np.array([[3.0, 3.0]])), ONCE)
+    results = pareto(bowl(), settings("max_abs_swell", 0.25, 2.0, 0.5, 0.75), BOWL_START)
     # |p| <= bound costs (1 - bound)^2 below 1 and nothing above.
-    expected = [1.0 + max(0.0, 1.0 - bound) ** 2 for bound in sorted(bounds, reverse=True)]
-    assert [r.objective for r in results] == pytest.approx(expected, abs=1e-9)
+    assert [r.objective for r in results] == pytest.approx([1.0, 1.0625, 1.25, 1.5625], abs=1e-9)
     assert [r.design[0] for r in results] == pytest.approx([1.0, 0.75, 0.5, 0.25], abs=1e-5)
     assert all(r.status == st.OK for r in results)
 
 
-def test_bound_replaces_the_upper_limit_and_keeps_the_lower() -> None:
+def test_lower_bounds_begin_with_the_smallest() -> None:
+    results = pareto(bowl(), settings("max_abs_swell", 2.0, 0.5, 1.5, at_least=True), BOWL_START)
+    assert [r.objective for r in results] == pytest.approx([1.0, 1.25, 2.0], abs=1e-9)
+    assert [r.design[0] for r in results] == pytest.approx([1.0, 1.5, 2.0], abs=1e-5)
+
+
+def test_bound_takes_the_place_of_the_limit_on_its_side_only() -> None:
     problem = bowl(Limit("max_abs_swell", 0.4, 0.5))
-    results = pareto(problem, "max_abs_swell", [0.9, 0.3], problem.rows(np.array([[0.45, 3.0]])), ONCE)
-    assert results[0].objective == pytest.approx(1.01, abs=1e-9)
-    assert results[1].status == st.LIMIT_EXCEEDED
+    loose, tight = pareto(problem, settings("max_abs_swell", 0.9, 0.3), problem.rows(np.array([[0.45, 3.0]])))
+    assert loose.objective == pytest.approx(1.01, abs=1e-9)
+    assert tight.status == st.LIMIT_EXCEEDED
+    assert tight.relaxation["max_abs_swell"] > 0.0
+    (least,) = pareto(problem, settings("max_abs_swell", 0.45, at_least=True), problem.rows(np.array([[0.45, 3.0]])))
+    assert least.design[0] == pytest.approx(0.5, abs=1e-6)
 
 
 def test_linkage_pays_for_a_smaller_pressure_angle() -> None:
-    held = Limit("swing", 0.8, 0.8)
-    low, high = np.array([0.1, 0.5]), np.array([0.9, 2.0])
-    fixed = {"c": 1.0, "e": 1.2, "f": 0.1, "g": 0.2, "alpha": 0.5, "branch": 1.0}
-    problem = Problem(family("rssr"), ("a", "b"), low, high, fixed, "max_abs_d2psi", (held,))
-    free, tight = pareto(problem, "max_pressure_angle", [1.2, 0.5], problem.rows(np.array([[0.4, 1.2]])), ONCE)
-    assert free.status == st.OK and free.kkt_residual <= 1e-6
-    assert tight.status == st.LIMIT_EXCEEDED or tight.objective > free.objective * (1.0 - 1e-9)
+    problem, starts = linkage()
+    free = minimise(problem, starts, OptimiseSettings())[0]
+    widest = angle_of(problem, free.design)
+    bounds = [widest + 0.1, widest - 0.05, widest - 0.1, widest - 0.15]
+    results = pareto(problem, settings("max_pressure_angle", *bounds), starts)
+    assert [r.status for r in results] == [st.OK] * 4
+    # The loosest bound makes no difference; every tighter one is used up and costs something.
+    assert results[0].objective == pytest.approx(free.objective, rel=1e-9)
+    assert all(tight.objective > loose.objective * (1.0 + 1e-4) for loose, tight in itertools.pairwise(results))
+    for bound, result in zip(bounds[1:], results[1:], strict=True):
+        assert angle_of(problem, result.design) == pytest.approx(bound, abs=1e-8)
+        assert "max_pressure_angle at its maximum" in result.active
+        alone = minimise(bounded(problem, settings("max_pressure_angle", bound), bound), starts, OptimiseSettings())[0]
+        assert result.objective <= alone.objective * (1.0 + 1e-9)
+
+
+def test_no_linkage_with_a_pressure_angle_near_zero() -> None:
+    problem, starts = linkage()
+    (result,) = pareto(problem, settings("max_pressure_angle", 0.02), starts)
+    assert result.status == st.LIMIT_EXCEEDED and result.ended == "infeasible"
+    assert result.relaxation["max_pressure_angle"] > 0.1
+
+
+def test_a_tighter_bound_lends_its_better_design_to_a_looser_one() -> None:
+    problem, starts = linkage()
+    asked = settings("max_pressure_angle", 1.2, 0.9)
+    good = minimise(problem, starts, OptimiseSettings())[0]
+    bad = replace(good, design=starts[1], objective=good.objective * 2.0)
+    begun = replace(Front.of(asked), results=(bad, good), found=(0, 1), taken=2)
+    *_, front = advance(problem, asked, begun, starts[:1])
+    loose, tight = (result for _, result in front.known())
+    assert front.complete and front.found[0] == 2
+    assert loose.objective == pytest.approx(good.objective, rel=1e-9)
+    assert tight.objective == pytest.approx(good.objective, rel=1e-9)
+
+
+def test_going_on_half_way_gives_the_same_front() -> None:
+    problem, starts = linkage()
+    asked = settings("max_pressure_angle", 0.9, 0.8, 0.7)
+    states = list(advance(problem, asked, Front.of(asked), starts))
+    assert len(states) == len(steps(3)) and states[-1].complete
+    for state in states[1:4]:
+        *_, again = advance(problem, asked, state, starts)
+        assert again.found == states[-1].found
+        for (_, one), (_, other) in zip(again.known(), states[-1].known(), strict=True):
+            np.testing.assert_array_equal(one.design, other.design)
+            assert one.objective == other.objective and one.kkt_residual == other.kkt_residual
 
 
 def test_budget_and_stop_leave_the_front_so_far() -> None:
-    problem = bowl()
-    starts = problem.rows(np.array([[3.0, 3.0]]))
-    assert len(pareto(problem, "max_abs_swell", [1.0, 0.5], starts, ONCE, stop=lambda: True)) == 1
-    assert len(pareto(problem, "max_abs_swell", [1.0, 0.5], starts, OptimiseSettings(1, 0, 1e-9))) == 1
+    asked = settings("max_abs_swell", 1.0, 0.5)
+    assert len(pareto(bowl(), asked, BOWL_START, stop=lambda: True)) == 1
+    assert len(pareto(bowl(), replace(asked, time_budget=1e-9), BOWL_START)) == 1
+    *_, last = advance(bowl(), asked, Front.of(asked), BOWL_START, stop=lambda: True)
+    assert last.taken == 0 and not last.complete
 
 
-def test_unknown_second_output_is_named() -> None:
-    problem = bowl()
-    with pytest.raises(InputError, match="max_abs_swel"):
-        pareto(problem, "max_abs_swel", [1.0], problem.rows(np.array([[3.0, 3.0]])), ONCE)
+@pytest.mark.parametrize(("output", "message"), [("max_abs_swel", "max_abs_swel"), ("max_abs_bowl", "objective")])
+def test_second_output_that_cannot_be_is_named(output: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        pareto(bowl(), settings(output, 1.0), BOWL_START)

@@ -79,6 +79,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
         lines += [
             f"optimiser: {study.optimise.starts} starts, {'no limit of time' if budget is None else duration(budget)}"
         ]
+    lines += _front(study)
     lines += ["", "estimated cost, without the first compilation of the kernels"]
     lines += aligned(
         [
@@ -91,6 +92,26 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
         ]
     )
     return lines
+
+
+def _front(study: Study) -> list[str]:
+    """The front of [pareto]: what is set against what, from where to where, and how much searching that is."""
+    from sweep.optimise.pareto import searches
+    from sweep.report.quantities import number, quantity
+    from sweep.summaries import output
+
+    if study.pareto is None:
+        return []
+    name, bounds = study.pareto.output, study.pareto.bounds
+    shown = quantity(name, output(study.family, name).unit)
+    ends = f"{number(min(bounds) * shown.factor)} to {shown.show(max(bounds))}"
+    side = "at least" if study.pareto.at_least else "at most"
+    budget = study.pareto.time_budget
+    time = "no limit of time" if budget is None else f"at most {duration(budget)}"
+    return [
+        f"front: the same with {name} {side} {ends}, {len(bounds)} bounds; "
+        f"up to {searches(study.pareto)} searches besides those of the optimiser, {time}"
+    ]
 
 
 def _effects(study: Study) -> list[str]:

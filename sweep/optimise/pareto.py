@@ -4,70 +4,215 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kernels import status as st
+from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.optimise.certificate import Result
-from sweep.optimise.problem import Problem
+from sweep.optimise.problem import PLACE, Problem
 from sweep.optimise.solve import minimise
 
 if TYPE_CHECKING:
-    from sweep.study import OptimiseSettings
+    from sweep.study import ParetoSettings
+
+LEAST_SECONDS = 1e-3  # of a search that only has to certify a design that is known already
+
+
+@dataclass(frozen=True)
+class Front:
+    """Bounds on a second output, the loosest first, with the best result known for each.
+
+    ``results`` holds None where no search has begun; ``found`` says in which step a result was found; ``taken`` counts
+    the steps that are finished.  A front is all that a search interrupted between two steps needs to go on.
+    """
+
+    bounds: tuple[float, ...]
+    results: tuple[Result | None, ...]
+    found: tuple[int, ...]
+    taken: int = 0
+
+    @classmethod
+    def of(cls, settings: ParetoSettings) -> Front:
+        """Nothing known yet."""
+        bounds = tuple(sorted(set(settings.bounds), reverse=not settings.at_least))
+        return cls(bounds, (None,) * len(bounds), (-1,) * len(bounds))
+
+    @property
+    def complete(self) -> bool:
+        """Whether every step is finished."""
+        return self.taken == len(steps(len(self.bounds)))
+
+    def known(self) -> list[tuple[float, Result]]:
+        """The bounds that were begun, with their results."""
+        return [(b, r) for b, r in zip(self.bounds, self.results, strict=True) if r is not None]
+
+
+@dataclass(frozen=True)
+class Step:
+    """Search bound number ``target`` from the result of its neighbour, at first from all other starts as well."""
+
+    target: int
+    neighbour: int
+    first: bool
+
+
+def steps(count: int) -> tuple[Step, ...]:
+    """Towards the tighter bounds, back, and there again: a good design spreads to every bound it serves."""
+    there = [Step(k, k - 1, first=True) for k in range(count)]
+    back = [Step(k, k + 1, first=False) for k in range(count - 2, -1, -1)]
+    again = [Step(k, k - 1, first=False) for k in range(1, count)]
+    return (*there, *back, *again)
+
+
+def searches(settings: ParetoSettings) -> int:
+    """Local searches a front takes at most, from the settings alone."""
+    count = len(Front.of(settings).bounds)
+    # One more start is the optimum itself, one more from the second bound on the result before.
+    return count * (settings.starts + 1) + max(0, 3 * (count - 1))
+
+
+def bounded(problem: Problem, settings: ParetoSettings, bound: float) -> Problem:
+    """The problem with the bound in place of its own limit on that side of the second output."""
+    from sweep.study import Limit
+
+    name = settings.output
+    others = tuple(limit for limit in problem.limits if limit.output != name)
+    own = [limit for limit in problem.limits if limit.output == name]
+    if settings.at_least:
+        highest = min((x.maximum for x in own if x.maximum is not None), default=None)
+        return replace(problem, limits=(*others, Limit(name, float(bound), highest)))
+    lowest = max((x.minimum for x in own if x.minimum is not None), default=None)
+    return replace(problem, limits=(*others, Limit(name, lowest, float(bound))))
 
 
 def pareto(
     problem: Problem,
-    second: str,
-    bounds: Sequence[float],
-    starts: Array,
-    settings: OptimiseSettings,
+    settings: ParetoSettings,
+    starts: Array | Sequence[Array],
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
 ) -> list[Result]:
-    """Least objective with the second output at most each of the bounds, widest bound first.
+    """Least objective with the second output at most (at least) each of the bounds, the loosest bound first.
 
-    Every further bound is searched from ``starts`` and from the result before, which is near where it only tightens a
-    little.  A bound that makes no difference repeats the design.
+    Every bound is searched from its starts and from the result of the next looser one.  Then the results go back from
+    the tighter to the looser bounds, for which they are good designs too, and forth again, so a bound never has a worse
+    design than a tighter one.  A bound that makes no difference repeats the design.
 
     Parameters
     ----------
-    problem : objective and limits; an upper limit on ``second`` gives way to the bound, a lower one stays
-    second : design output to be bounded
-    bounds : in any order
-    starts : (k, P) designs
-    settings : ``time_budget`` is shared out evenly among the bounds still to come
-    stop : as for ``minimise``; the bounds reached by then are returned
+    problem : objective and limits; a limit on the second output gives way to the bound on its side, the other stays
+    settings : second output and bounds; ``time_budget`` is shared out among the steps still to come
+    starts : (k, P) designs for all bounds, or one such array for each bound, the loosest first
+    stop : as for :func:`sweep.optimise.minimise`; the bounds reached by then are returned
     jobs : processes
 
     Returns
     -------
-    One result per bound that was begun; an infeasible one says so in its ``status``.
+    One result per bound that was begun; an infeasible one says so in its ``status``.  Same starts, same results, unless
+    time ran out.
 
     Raises
     ------
     InputError
-        if ``second`` is no design output of the family, or there is no start.
+        if the second output is no design output of the family, or the objective itself, or there is no start.
     """
-    from sweep.study import Limit
+    front = Front.of(settings)
+    for advanced in advance(problem, settings, front, starts, stop, jobs):
+        front = advanced
+    return [result for _, result in front.known()]
 
+
+def advance(
+    problem: Problem,
+    settings: ParetoSettings,
+    front: Front,
+    starts: Array | Sequence[Array],
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+) -> Iterator[Front]:
+    """The front after each further step; parameters as for :func:`pareto`.
+
+    The steps of a front taken up half way are those of one that was never left, to the bit.  A step that ``stop`` cut
+    short leaves the best it found but counts as not taken, and nothing follows it.
+    """
+    if settings.output == problem.objective:
+        raise InputError("second output", settings.output, "another output than the objective", PLACE)
+    own = [np.atleast_2d(s) for s in ([starts] * len(front.bounds) if isinstance(starts, np.ndarray) else starts)]
     end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
-    others = tuple(limit for limit in problem.limits if limit.output != second)
-    lowest = max((x.minimum for x in problem.limits if x.output == second and x.minimum is not None), default=None)
-    begin, found = np.atleast_2d(starts), list[Result]()
-    ordered = sorted(bounds, reverse=True)
-    for number, bound in enumerate(ordered):
-        left = (end - time.monotonic()) / (len(ordered) - number)
-        if found and (left <= 0.0 or found[-1].ended == "interrupted" or (stop is not None and stop())):
-            break
-        bounded = replace(problem, limits=(*others, Limit(second, lowest, float(bound))))
-        shared = replace(settings, time_budget=None if math.isinf(left) else max(left, 1e-3))
-        best = minimise(bounded, begin, shared, stop, jobs)[0]
-        found.append(best)
-        if best.status != st.LIMIT_EXCEEDED:
-            begin = np.concatenate([best.design[None, :], np.atleast_2d(starts)])
-    return found
+    plan = steps(len(front.bounds))
+    for number in range(front.taken, len(plan)):
+        step = plan[number]
+        begin = _begin(front, step, number, own[step.target])
+        if begin is not None:
+            rest = [len(own[s.target]) if s.first else 1 for s in plan[number:]]
+            seconds = max((end - time.monotonic()) * rest[0] / sum(rest), LEAST_SECONDS)
+            if seconds > LEAST_SECONDS or _must(front, step):
+                result = _search(problem, settings, front.bounds[step.target], begin, seconds, stop, jobs)
+                front = _with(front, step, number, result)
+                if result.ended == "interrupted" or (stop is not None and stop()):
+                    yield front
+                    return
+        front = replace(front, taken=number + 1)
+        yield front
+
+
+def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None:
+    """Designs to start from; None where the neighbour has nothing new to offer."""
+    near = front.results[step.neighbour] if 0 <= step.neighbour < len(front.bounds) else None
+    if step.first:
+        designs = starts if near is None else np.concatenate([near.design[None, :], starts])
+        _, places = np.unique(designs, axis=0, return_index=True)
+        return np.asarray(designs[np.sort(places)], np.float64)
+    held = front.results[step.target]
+    if near is None or held is None:
+        return None
+    seen = step.neighbour < step.target and front.found[step.neighbour] < len(front.bounds)
+    worse = near.status == st.LIMIT_EXCEEDED and held.status != st.LIMIT_EXCEEDED
+    offers = not (seen or worse or np.array_equal(near.design, held.design))
+    # A search that did not settle goes on from where it ended.
+    begin = [near.design] * offers + [held.design] * (held.status == st.NOT_CONVERGED)
+    return np.array(begin) if begin else None
+
+
+def _must(front: Front, step: Step) -> bool:
+    """Whether a search begins even when time is up: the first of all, and where a tighter bound has done better."""
+    held, near = front.results[step.target], None if step.first else front.results[step.neighbour]
+    if held is None or near is None:
+        return step.target == 0 and held is None
+    return step.neighbour > step.target and _order(near) < _order(held)
+
+
+def _search(
+    problem: Problem,
+    settings: ParetoSettings,
+    bound: float,
+    begin: Array,
+    seconds: float,
+    stop: Callable[[], bool] | None,
+    jobs: int,
+) -> Result:
+    from sweep.study import OptimiseSettings
+
+    shared = OptimiseSettings(len(begin), 0, None if math.isinf(seconds) else seconds)
+    return minimise(bounded(problem, settings, bound), begin, shared, stop, jobs)[0]
+
+
+def _with(front: Front, step: Step, number: int, result: Result) -> Front:
+    """The front with this result where it is the better one."""
+    held = front.results[step.target]
+    if held is not None and not _order(result) < _order(held):
+        return front
+    results, found = list(front.results), list(front.found)
+    results[step.target], found[step.target] = result, number
+    return replace(front, results=tuple(results), found=tuple(found))
+
+
+def _order(result: Result) -> tuple[bool, float]:
+    missed = result.status == st.LIMIT_EXCEEDED
+    value = result.violation if missed else result.objective
+    return missed, math.inf if math.isnan(value) else value

@@ -11,7 +11,8 @@ import numpy as np
 
 from kernels import status as codes
 from sweep.cascade import MAGNITUDES, meets
-from sweep.report.quantities import Quantity, number, percent_change, quantity
+from sweep.report.front import front_sentence
+from sweep.report.quantities import Quantity, change, number, quantity
 from sweep.report.tables import parameter_rows
 
 if TYPE_CHECKING:
@@ -125,6 +126,7 @@ def answer(data: Dataset, found: Scan) -> list[str]:
     sentences += _limit_sentences(limit_states(data))
     sentences += _edge_sentence(data)
     sentences += _sweep_sentences(data, found)
+    sentences.append(front_sentence(data))
     sentences += _against_reference(data)
     sentences += not_achieved(data, found)
     sentences.append(_proof(data))
@@ -139,8 +141,8 @@ def _headline(data: Dataset, who: str, name: str) -> str:
         return f"{text}."
     if math.isnan(old):
         return f"{text}. The reference design has none: {data.reference_status}."
-    change = percent_change(value, old)
-    than = "the same as" if change == "the same" else f"{change} than"
+    difference = change(shown, value, old)
+    than = "the same as" if difference == "the same" else f"{difference} than"
     return f"{text}, {than} the reference design with {_with_speed(data, shown, old)}."
 
 
@@ -148,8 +150,8 @@ def _comparison(data: Dataset, name: str) -> str:
     shown = quantity(name, data.units.get(name, ""))
     value, old = _value(data.result, name), _value(data.reference, name)
     text = f"Its {shown.words} is {_with_speed(data, shown, value)}"
-    change = percent_change(value, old)
-    return f"{text}; the reference has {shown.show(old)} ({change})." if change else f"{text}."
+    difference = change(shown, value, old)
+    return f"{text}; the reference has {shown.show(old)} ({difference})." if difference else f"{text}."
 
 
 def _with_speed(data: Dataset, shown: Quantity, value: float) -> str:

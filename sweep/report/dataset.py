@@ -22,7 +22,7 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Dataset:
-    """Parts, optimum and curves of one folder, and the study they answer.
+    """Parts, optimum, front and curves of one folder, and the study they answer.
 
     ``units`` and ``definitions`` come from the field metadata of the Parquet files; ``best`` is the best row of the
     sweep once it has been read, None if no design is feasible; ``computed_reference`` the reference where no optimiser
@@ -37,6 +37,7 @@ class Dataset:
     definitions: dict[str, str]
     optima: pd.DataFrame | None
     curves: pd.DataFrame | None
+    front: pd.DataFrame | None
     runs: tuple[dict[str, Any], ...]
     best: Row | None = None
     computed_reference: Row | None = None
@@ -94,7 +95,12 @@ class Dataset:
 
     @cached_property
     def second(self) -> str | None:
-        """The criterion set against the objective: the deviation if there is one, else another maximum."""
+        """The criterion set against the objective: that of [pareto], else a deviation, else another maximum.
+
+        None where more of it is better.
+        """
+        if self.study.pareto is not None:
+            return None if self.study.pareto.at_least else self.study.pareto.output
         objective = self.study.objective
         others = [name for name in self.study.want if objective is None or name != objective.output]
         ranked = [name for name in others if "dev" in name and not name.startswith("phi_")]
@@ -126,9 +132,9 @@ def read_dataset(folder: Path) -> Dataset:
     if not store.is_complete(folder):
         raise InputError("folder", str(folder), "a complete dataset; run the study again to resume it", "report")
     study = study_of(plan, folder)
-    optima, curves = folder / store.OPTIMUM, folder / store.CURVES
+    optima, curves, front = folder / store.OPTIMUM, folder / store.CURVES, folder / store.PARETO
     parts = tuple(part.path for part in store.parts(folder))
-    units, definitions = field_metadata([path for path in (*parts[:1], optima, curves) if path.exists()])
+    units, definitions = field_metadata([path for path in (*parts[:1], optima, curves, front) if path.exists()])
     return Dataset(
         folder=folder,
         plan=plan,
@@ -138,6 +144,7 @@ def read_dataset(folder: Path) -> Dataset:
         definitions={o.name: o.text for o in study.family.pose_outputs} | definitions,
         optima=pd.read_parquet(optima) if optima.exists() else None,
         curves=pd.read_parquet(curves) if curves.exists() else None,
+        front=pd.read_parquet(front) if front.exists() else None,
         runs=tuple(store.read_runs(folder)),
     )
 

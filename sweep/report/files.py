@@ -8,8 +8,8 @@ from pathlib import Path
 
 
 def copy_tables(folder: Path, out: Path) -> None:
-    """The optimum with its curves, sensitivities and tolerances, where the study has them."""
-    for name in ("optimum.parquet", "curves.parquet", "sensitivity.parquet", "tolerance.parquet"):
+    """The optimum with its curves, sensitivities and tolerances, and the front, where the study has them."""
+    for name in ("optimum.parquet", "curves.parquet", "sensitivity.parquet", "tolerance.parquet", "pareto.parquet"):
         source, target = folder / f"_{name}", out / name
         if source.exists():
             shutil.copyfile(source, target)

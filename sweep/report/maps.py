@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -99,32 +99,36 @@ def line_figure(
 
 
 def trade_off_figure(
-    found: Scan, objective: Quantity, second: Quantity, marks: dict[str, tuple[float, float]], limit: float | None
+    found: Scan,
+    objective: Quantity,
+    second: Quantity,
+    marks: dict[str, tuple[float, float]],
+    limit: float | None,
+    front: Callable[[Axes], None] | None = None,
 ) -> Figure:
-    """Feasible designs, objective against a second criterion, with the front that no design beats in both."""
+    """Feasible designs, objective against a second criterion, with those that no other beats in both.
+
+    ``front`` draws what the optimiser made of it.
+    """
     figure = new_figure(WIDTH, 4.4)
     axes = figure.subplots()
     scatter = found.scatter * (objective.factor, second.factor)
-    front = found.front * (objective.factor, second.factor)
-    axes.scatter(
-        scatter[:, 0],
-        scatter[:, 1],
-        s=3 if len(scatter) > 5000 else 9,
-        color=QUIET,
-        alpha=0.35,
-        linewidths=0,
-        rasterized=True,
-        label="feasible designs",
-    )
-    axes.step(*front.T, where="post", color="#2f8f5b", linewidth=1.2, zorder=3)
-    axes.scatter(
-        front[:, 0],
-        front[:, 1],
-        s=14,
-        color="#2f8f5b",
-        zorder=3,
-        label=f"non-dominated designs of the sweep ({len(front)})",
-    )
+    beaten = found.front * (objective.factor, second.factor)
+    if len(scatter):
+        size = 3 if len(scatter) > 5000 else 9
+        look: dict[str, Any] = {"color": QUIET, "alpha": 0.35, "linewidths": 0, "rasterized": True}
+        axes.scatter(scatter[:, 0], scatter[:, 1], s=size, label="feasible designs of the sweep", **look)
+        axes.step(*beaten.T, where="post", color="#2f8f5b", linewidth=1.2, zorder=3)
+        axes.scatter(
+            beaten[:, 0],
+            beaten[:, 1],
+            s=14,
+            color="#2f8f5b",
+            zorder=3,
+            label=f"of these, non-dominated ({len(beaten)})",
+        )
+    if front is not None:
+        front(axes)
     if limit is not None:
         axes.axhline(
             limit * second.factor, color=LIMIT, linewidth=0.9, linestyle=":", label=f"limit of {second.symbol}"
@@ -136,7 +140,7 @@ def trade_off_figure(
             axis("log")
     axes.set_xlabel(objective.title)
     axes.set_ylabel(second.title)
-    axes.legend(loc="best")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.errors import StoreError
-from sweep.report import answer, robust, tables
+from sweep.report import answer, front, robust, tables
 from sweep.report.curves import motion_caption, motion_figure
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.drawing import COORDINATE, mechanism_figure
@@ -109,11 +110,13 @@ def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[s
             found.lines[name], side, data.designs, shown, {r: float(row[name]) for r, row in marks.items()}
         )
         figures["map"] = save(figure, folder / "map.svg")
-    if shown is not None and data.second is not None and len(found.scatter):
-        second = quantity(data.second, data.units.get(data.second, ""))
+    against = study.pareto.output if study.pareto is not None else data.second
+    if shown is not None and against is not None and (len(found.scatter) or data.front is not None):
+        second = quantity(against, data.units.get(against, ""))
         at = {role: (abs(float(row[shown.name])), abs(float(row[second.name]))) for role, row in marks.items()}
         bound = next((limit.maximum for limit in study.limits if limit.output == second.name), None)
-        figures["trade_off"] = save(trade_off_figure(found, shown, second, at, bound), folder / "trade-off.svg")
+        drawn = None if data.front is None else partial(front.draw_front, data=data)
+        figures["trade_off"] = save(trade_off_figure(found, shown, second, at, bound, drawn), folder / "trade-off.svg")
     if data.curves is not None and len(data.curves):
         motion = motion_figure(data.curves, data.units, study.family.position, study.speed, study.limits, study.window)
         figures["motion"] = save(motion, folder / "motion.svg")
@@ -174,6 +177,9 @@ def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Sa
         fates=tables.fates(data, found),
         errors=tables.error_rows(data, found),
         provenance=tables.provenance(data),
+        front=front.front_rows(data),
+        front_names=front.front_names(data),
+        front_note=front.front_note(data),
         tolerances=robust.tolerance_rows(data),
         tolerance=robust.tolerance_words(data),
         slopes=robust.slope_rows(data),

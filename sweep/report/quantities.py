@@ -152,6 +152,20 @@ def number(value: float, digits: int = 5) -> str:
 SUPERSCRIPTS = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
+SIGNED = re.compile(r"(max|min)_(?!abs_)")
+
+
+def change(shown: Quantity, new: float, old: float) -> str:
+    """A value against another: sizes in percent, angles and what changes its sign by their difference."""
+    signed = bool(SIGNED.match(shown.name)) and min(new, old) < 0.0
+    if shown.unit != "°" and not signed:
+        return percent_change(new, old)
+    difference = new - old if signed else abs(new) - abs(old)
+    if not math.isfinite(difference):
+        return ""
+    return f"{shown.show(abs(difference), 3)} {'less' if difference < 0.0 else 'more'}" if difference else "the same"
+
+
 def percent_change(new: float, old: float) -> str:
     """``14.2 % less`` or ``3.1 % more`` than the old magnitude."""
     if not (math.isfinite(new) and math.isfinite(old)) or old == 0.0:

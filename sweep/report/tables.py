@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.families import family as find_family
-from sweep.report.quantities import Quantity, number, percent_change, quantity
+from sweep.report.quantities import change, number, quantity
 
 if TYPE_CHECKING:
     from sweep.report.dataset import Dataset
@@ -73,16 +73,6 @@ def output_rows(data: Dataset) -> list[OutputRow]:
             )
         )
     return rows
-
-
-def change(shown: Quantity, value: float, other: float) -> str:
-    """Against the reference: in percent, for angles in degrees."""
-    if shown.unit != "°":
-        return percent_change(value, other)
-    difference = abs(value) - abs(other)
-    if math.isnan(difference):
-        return ""
-    return f"{shown.show(abs(difference), 3)} {'less' if difference < 0.0 else 'more'}" if difference else "the same"
 
 
 def parameter_rows(data: Dataset) -> list[ParameterRow]:

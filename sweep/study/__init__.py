@@ -5,7 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from sweep.study.space import Axis, DesignSpace
-from sweep.study.study import Budget, Limit, Objective, OptimiseSettings, OutputSettings, Study, Tolerance
+from sweep.study.study import (
+    Budget,
+    Limit,
+    Objective,
+    OptimiseSettings,
+    OutputSettings,
+    ParetoSettings,
+    Study,
+    Tolerance,
+)
 
 if TYPE_CHECKING:
     from sweep.study.load import load_study, study_from_data, with_accuracy
@@ -18,6 +27,7 @@ __all__ = [
     "Objective",
     "OptimiseSettings",
     "OutputSettings",
+    "ParetoSettings",
     "Study",
     "Tolerance",
     "load_study",

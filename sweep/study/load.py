@@ -28,12 +28,14 @@ from sweep.study.model import (
     ObjectiveSection,
     OptimiseSection,
     OutputSection,
+    ParetoSection,
     ReferenceSection,
     ReportSection,
     SceneSection,
     StudySection,
     ToleranceSection,
 )
+from sweep.study.pareto import read_pareto
 from sweep.study.prescribed import prescribed_limits, read_locus, read_prescribed
 from sweep.study.study import Budget, Objective, OptimiseSettings, OutputSettings, Study, Tolerance
 
@@ -154,6 +156,10 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     tolerance = _tolerance(_section(ToleranceSection, "tolerance", data, faults), data, faults)
     disk_bytes = _quantity(budget.disk, "B", ("budget", "disk"), faults)
     seconds = _quantity(budget.time, "s", ("budget", "time"), faults)
+    front = _section(ParetoSection, "pareto", data, faults)
+    front_budget = _quantity(front.time_budget, "s", ("pareto", "time_budget"), faults)
+    if "pareto" in data and "optimise" not in data:
+        faults.missing(("optimise",), "a table [optimise], as [pareto] begins at the optimum")
     if "optimise" in data and "objective" not in data:
         faults.missing(("objective",), "a table [objective] with minimise = a design output, as [optimise] is given")
     if not scene.want and not bounds and goal is None:
@@ -163,7 +169,9 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     if bare is None:
         raise StudyError(str(path), faults.lines)
     names = [name for _, name in _texts(data, "scene", "want")]
-    family = extended(bare, [*names, *(bounds or {}), *([goal] if goal else [])])
+    family = extended(
+        bare, [*names, *(bounds or {}), *([goal] if goal else []), *([front.output] if front.output else [])]
+    )
     given = {} if speed is None else {p: speed for p in family.parameter_names if SPEED.fullmatch(p)}
     for k, name in _texts(data, "scene", "want"):
         read_output_name(family, name, ("scene", "want", k), faults)
@@ -175,6 +183,9 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     limits = (*prescribed_limits(prescribed), *read_limits(family, bounds or {}, faults))
     if goal is not None:
         read_output_name(family, goal, ("objective", "minimise"), faults)
+    pareto = None
+    if isinstance(data.get("pareto"), dict):
+        pareto = read_pareto(front, data["pareto"], family, goal, front_budget, faults)
     fit = _fit(_section(FitSection, "fit", data, faults), family, faults) if "fit" in data else None
     fitted = fit.parameters(family) if fit is not None else ()
     made = () if locus is None else locus.made
@@ -188,6 +199,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         raise StudyError(str(path), faults.lines)
 
     wanted = [*scene.want, *prescribed, *(limit.output for limit in limits), *([goal] if goal else [])]
+    wanted += [pareto.output] if pareto else []
     defaults = {"accuracy": _without_none(accuracy.__dict__), "output": output.model_dump()}
     return Study(
         name=about.name or "",
@@ -205,6 +217,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         accuracy=accuracy,
         window=window,
         optimise=OptimiseSettings(search.starts, search.seed, time_budget) if "optimise" in data else None,
+        pareto=pareto,
         tolerance=tolerance,
         reference=reference,
         output=OutputSettings(output.keep, output.dtype, output.curves),

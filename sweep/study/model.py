@@ -128,6 +128,17 @@ class OptimiseSection(Section):
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
 
 
+class ParetoSection(Section):
+    """[pareto]; at_most and at_least are read like parameters"""
+
+    required = ("output",)
+    output: str | None = Field(None, description="the name of a design output, not the objective")
+    at_most: Any = None
+    at_least: Any = None
+    starts: Annotated[int, Field(ge=0, le=1000)] = Field(2, description="a whole number, 0 to 1000")
+    time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
+
+
 class ToleranceSection(Section):
     """[tolerance]"""
 
@@ -188,6 +199,7 @@ TABLES = (
     "objective",
     "accuracy",
     "optimise",
+    "pareto",
     "tolerance",
     "reference",
     "output",

@@ -49,6 +49,21 @@ class OptimiseSettings:
 
 
 @dataclass(frozen=True)
+class ParetoSettings:
+    """Bounds on a second output for each of which the least objective is searched.
+
+    ``bounds`` are upper ones, or with ``at_least`` lower ones; ``starts`` designs of the sweep within each bound are
+    searched besides the optimum and the result of the next looser bound; ``time_budget`` [s] is for the whole front.
+    """
+
+    output: str
+    bounds: tuple[float, ...]
+    at_least: bool = False
+    starts: int = 2
+    time_budget: float | None = None
+
+
+@dataclass(frozen=True)
 class Tolerance:
     """Manufacturing tolerances: +- of every length [mm] and of every angle [rad]; zero is exact."""
 
@@ -77,8 +92,9 @@ class Budget:
 class Study:
     """A question about one mechanism, made by :func:`sweep.study.load_study`.
 
-    ``want`` holds every design output that is computed: the wanted ones, then those of the limits, then the objective.
-    ``data`` is the file's content with defaults filled in, ready for JSON; ``study_from_data`` makes the study again.
+    ``want`` holds every design output that is computed: the wanted ones, those of the limits, the objective and what is
+    set against it.  ``data`` is the file's content with defaults filled in, ready for JSON;
+    ``study_from_data`` makes the study again.
     """
 
     name: str
@@ -96,6 +112,7 @@ class Study:
     accuracy: Accuracy
     window: tuple[float, float] | None
     optimise: OptimiseSettings | None
+    pareto: ParetoSettings | None
     tolerance: Tolerance | None
     reference: dict[str, float] | None
     output: OutputSettings
@@ -159,6 +176,8 @@ class Study:
             "reference": self.reference,
             "output": asdict(self.output),
         }
+        if self.pareto is not None:
+            content["pareto"] = asdict(self.pareto)
         if self.tolerance is not None:
             content["tolerance"] = asdict(self.tolerance)
         return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()

@@ -1,0 +1,166 @@
+"""A study's front: from its dataset and its optimum to ``_pareto.parquet``, step by step and resumable."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels import status as st
+from sweep import store
+from sweep.cascade import MAGNITUDES
+from sweep.errors import InputError
+from sweep.families.base import Array
+from sweep.optimise.certificate import Result
+from sweep.optimise.pareto import Front, advance
+from sweep.optimise.starts import diverse
+from sweep.optimise.study import problem_and_starts
+from sweep.optimise.written import certificates, outputs, write
+
+if TYPE_CHECKING:
+    from sweep.optimise.problem import Problem
+    from sweep.study import ParetoSettings, Study
+
+KEPT = 2048  # best rows of the dataset within each bound among which starts are chosen
+KEY, STATE = b"key", b"state"
+
+
+def front_study(
+    study: Study, folder: str | Path, key: str, stop: Callable[[], bool] | None = None, jobs: int = 1
+) -> Path:
+    """Search the least objective for each bound of [pareto] and write the front beside the optimum, step by step.
+
+    A front in the folder that carries the same key is taken up where it stopped and ends with the bytes of one that was
+    never stopped, unless a time budget cut a search short.
+
+    Parameters
+    ----------
+    study : with [pareto]
+    folder : its dataset, with ``_optimum.parquet``
+    key : what the result depends on, in a word
+    stop : asked often; true ends the search as Ctrl-C does
+    jobs : processes the starts are spread over; the result does not depend on it
+
+    Returns
+    -------
+    Path of ``_pareto.parquet``.
+
+    Raises
+    ------
+    InputError
+        if the study has no [pareto] section
+    StoreError
+        if the folder cannot be written
+    KeyboardInterrupt
+        if the search was stopped, after the best so far was written.
+    """
+    if study.pareto is None:
+        raise InputError("pareto", None, "a [pareto] section", str(study.path))
+    place = Path(folder)
+    settings, path = study.pareto, place / store.PARETO
+    front = saved(path, key) or Front.of(settings)
+    if front.complete and path.exists():
+        return path
+    _, problem, _ = problem_and_starts(study, place)
+    starts = _starts(study, settings, problem, place)
+    kept = front
+    for best in advance(problem, settings, front, starts, stop, jobs):
+        kept = best if best.taken > kept.taken else kept
+        _write(path, study, settings, best, key, kept)
+    if not kept.complete:
+        raise KeyboardInterrupt
+    return path
+
+
+def saved(path: Path, key: str) -> Front | None:
+    """The front a file holds, as its search left it; None where there is no file, or one with another key."""
+    import pyarrow.parquet as pq
+
+    if not path.is_file():
+        return None
+    about = pq.read_schema(path).metadata
+    if about.get(KEY) != key.encode():
+        return None
+    state = json.loads(about[STATE])
+    return Front(
+        tuple(state["bounds"]), tuple(_result(r) for r in state["results"]), tuple(state["found"]), state["taken"]
+    )
+
+
+def _result(noted: dict[str, Any] | None) -> Result | None:
+    if noted is None:
+        return None
+    return Result(**noted | {"design": np.array(noted["design"]), "active": tuple(noted["active"])})
+
+
+def _noted(result: Result | None) -> dict[str, Any] | None:
+    return None if result is None else asdict(result) | {"design": result.design.tolist()}
+
+
+def _write(path: Path, study: Study, settings: ParetoSettings, best: Front, key: str, kept: Front) -> None:
+    """``best`` becomes the rows; ``kept``, the front after its last finished step, is what a search goes on from."""
+    bounds, results = (list(column) for column in zip(*best.known(), strict=True))
+    designs = np.array([r.design for r in results])
+    columns: dict[str, Any] = {"bound": bounds}
+    columns |= {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}
+    columns |= outputs(study, designs) | certificates(results)
+    side = "lower" if settings.at_least else "upper"
+    texts = {"bound": (_unit(study, settings.output), f"{side} bound on {settings.output}")}
+    state = asdict(replace(kept, results=())) | {"results": [_noted(r) for r in kept.results]}
+    about = {"output": settings.output, "side": "at least" if settings.at_least else "at most"}
+    about |= {"complete": str(best.complete).lower(), KEY.decode(): key, STATE.decode(): json.dumps(state)}
+    write(path, columns, study, texts, about)
+
+
+def _unit(study: Study, name: str) -> str:
+    from sweep.study.units import internal_unit
+    from sweep.summaries import output
+
+    return internal_unit(output(study.family, name).unit)
+
+
+def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path) -> list[Array]:
+    """For each bound, the loosest first: the optimum, then diverse best designs of the dataset within the bound."""
+    names = list(study.family.parameter_names)
+    optimum = _columns(folder / store.OPTIMUM, [*names, "role"])
+    own = np.column_stack([optimum[name] for name in names])[optimum["role"] == "optimum"].astype(np.float64)
+    chosen = []
+    for designs, merit in within(study, settings, Front.of(settings).bounds, folder):
+        found = diverse(problem, designs, merit, settings.starts) if settings.starts else designs[:0]
+        chosen.append(np.concatenate([own, found]))
+    return chosen
+
+
+def within(
+    study: Study, settings: ParetoSettings, bounds: tuple[float, ...], folder: Path
+) -> list[tuple[Array, Array]]:
+    """The best feasible designs (k, P) of a dataset within each bound, k up to 2048, and their objective."""
+    assert study.objective is not None
+    names = study.family.parameter_names
+    kept = [(np.empty((0, len(names))), np.empty(0)) for _ in bounds]
+    for part in store.parts(folder):
+        columns = _columns(part.path, [*names, study.objective.output, settings.output, "status"])
+        designs = np.column_stack([columns[name] for name in names]).astype(np.float64)
+        merit = columns[study.objective.output].astype(np.float64)
+        second = columns[settings.output].astype(np.float64)
+        size = np.abs(second) if settings.output.rstrip("0123456789") in MAGNITUDES else second
+        good = (columns["status"] == st.OK) & np.isfinite(merit)
+        for k, bound in enumerate(bounds):
+            inside = good & (size >= bound if settings.at_least else size <= bound)
+            more, values = (
+                np.concatenate(pair) for pair in zip(kept[k], (designs[inside], merit[inside]), strict=True)
+            )
+            best = np.sort(np.argsort(values, kind="stable")[:KEPT])
+            kept[k] = more[best], values[best]
+    return kept
+
+
+def _columns(path: Path, names: list[str]) -> dict[str, Any]:
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(path, columns=list(dict.fromkeys(names)))
+    return {name: table[name].to_numpy() for name in table.column_names}

@@ -1,0 +1,32 @@
+"""The size of a mechanism: the largest of its lengths, offsets by magnitude; what a box has to hold at least."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.effects import input_names
+from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step
+
+SIZE = Output("size", "length", "largest length of the mechanism, offsets by magnitude")
+NS_SIZE = 10.0
+
+
+def lengths(family: Family) -> tuple[str, ...]:
+    """Parameters that are lengths of the mechanism itself, not of bodies and bearings that effects ask for."""
+    others = input_names(family)
+    return tuple(p.name for p in family.parameters if p.unit == "length" and p.name not in others)
+
+
+def size_step(family: Family) -> Step | None:
+    """The route to ``size``; None where a family has ratios of lengths only."""
+    names = lengths(family)
+    if not names:
+        return None
+    columns = [family.parameter_names.index(name) for name in names]
+
+    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+        n = len(designs)
+        found: Columns = {name: np.abs(designs[:, columns]).max(axis=1) for name in wanted & {SIZE.name}}
+        return found | {f"err_{SIZE.name}": np.zeros(n), "status": np.zeros(n, np.uint8)}
+
+    return Step("size", (SIZE,), run, NS_SIZE)
