@@ -50,7 +50,8 @@ def margins(family: Family, designs: Array, suffixes: tuple[str, ...], accuracy:
     status = np.zeros(n, np.uint8)
     for suffix in suffixes:
         alive = np.flatnonzero(status == st.OK)
-        part = _stage_margin(family, designs[alive], suffix, accuracy)
+        with np.errstate(all="ignore"):  # what is no number, or leaves float64, has its status
+            part = _stage_margin(family, designs[alive], suffix, accuracy)
         status[alive] = part["status"]
         for name in NAMES:
             for key in (f"{name}{suffix}", f"err_{name}{suffix}"):
@@ -122,8 +123,7 @@ def _from_poses(family: Family, designs: Array, suffix: str) -> Columns:
     err_margin = least.err / scale
     margin = np.where(turns, np.cos(pressure) ** 2, least.value / scale)
     # d(angle) = d(cos^2) / sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
-    with np.errstate(divide="ignore"):
-        err_angle = np.minimum(err_margin / np.abs(np.sin(2.0 * pressure)), np.sqrt(err_margin)) + 2.0**-51
+    err_angle = np.minimum(err_margin / np.abs(np.sin(2.0 * pressure)), np.sqrt(err_margin)) + 2.0**-51
     return {
         f"rotatable{suffix}": turns,
         f"err_rotatable{suffix}": np.zeros(len(designs)),

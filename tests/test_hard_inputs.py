@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from kernels import status as st
+from studies.accuracy.reference import condition, transfer_functions
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
 from sweep.summaries import design_outputs, summarise
@@ -154,13 +155,34 @@ def test_exact_change_points_are_undecidable():
         assert abs(float(found["margin"][0])) < 1e-14
 
 
-def test_coupler_parallel_to_an_axis_is_no_trouble_for_the_motion():
-    # Coupler parallel to the rocker axis at phi = 0: B above C, its component in the rocker plane vanishes.
-    design = np.array([1.0, 1.5, 1.0, 2.0, 1.5, 0.0, 0.0, 1.0])
-    columns = poses(design, np.array([[0.0, 1e-9]]))
-    assert columns["status"][0, 0] in (st.DEAD_POINT, st.OK)
-    assert columns["psi"][0, 0] == pytest.approx(math.pi, abs=1e-7) or abs(columns["psi"][0, 0]) == math.pi
+@pytest.mark.parametrize("branch", [1.0, -1.0])
+def test_coupler_parallel_to_the_rocker_axis_is_a_dead_point(branch):
+    # Planar, phi = 0: the pin at (1, 0, 1.5) above the ball at (1, 0, 0); no force of the coupler turns the rocker.
+    design = np.array([1.0, 1.5, 1.0, 2.0, 1.5, 0.0, 0.0, branch])
+    columns = poses(design, np.array([[0.0, 1e-3]]))
+    assert columns["status"].tolist() == [[st.DEAD_POINT, st.NOT_ASSEMBLED]]
+    assert abs(columns["psi"][0, 0]) == pytest.approx(math.pi, abs=1e-15)
+    assert columns["pressure_angle"][0, 0] == pytest.approx(math.pi / 2, abs=1e-15)
+    assert all(np.isnan(columns[name][0, 0]) for name in ("dpsi", "d2psi", "d3psi"))
     assert explained(columns, POSES)
+    assert summary(design)["status"][0] in (st.NOT_ROTATABLE, st.UNDECIDABLE)
+
+
+def test_coupler_parallel_to_the_crank_axis_is_no_trouble_for_the_motion():
+    # Joints first: the ball stands on the line through the crank pin along the crank axis.
+    a, f, b, alpha, phi, psi = 0.5, 0.3, 2.0, 0.9, 0.7, 1.1
+    sa, ca = math.sin(alpha), math.cos(alpha)
+    pin = np.array([a * math.cos(phi), f * sa + a * ca * math.sin(phi), f * ca - a * sa * math.sin(phi)])
+    ball = pin + b * np.array([0.0, sa, ca])
+    c = ball[1] / math.sin(psi)
+    design = np.array([a, b, c, ball[0] - c * math.cos(psi), f, ball[2], alpha, 1.0])
+    columns = poses(design, np.array([[phi]]))
+    assert columns["status"][0, 0] == st.OK
+    exact, cond = transfer_functions(design, phi), condition(design, phi)
+    assert float(exact[0]) == pytest.approx(psi, abs=1e-14)
+    for order, name in enumerate(("psi", "dpsi", "d2psi", "d3psi")):
+        size = max(*cond[: order + 1], abs(float(exact[order])))
+        assert abs(columns[name][0, 0] - float(exact[order])) <= 8.0 * 2.0**-53 * size, name
 
 
 def test_random_bit_patterns_never_raise_and_every_nan_is_explained():

@@ -6,7 +6,6 @@ The checks are functions of this file; a control that passes its check would mea
 import math
 
 import mpmath as mp
-import numba
 import numpy as np
 
 from kernels import status as st
@@ -135,22 +134,6 @@ def test_nearest_root_tracking_changes_the_branch_at_a_change_point():
 
     assert stays_on_its_branch(both[0], slopes(both[0]))
     assert not stays_on_its_branch(tracked, slopes(tracked))
-
-
-def notices_nan(function):
-    return function(float("nan")) and not function(1.0)
-
-
-def test_full_fastmath_does_not_notice_nan():
-    def is_nan(x):
-        return x != x
-
-    assert notices_nan(numba.njit(error_model="numpy")(is_nan))
-    assert not notices_nan(numba.njit(fastmath=True)(is_nan))
-    invalid = random_designs(1, 1)
-    invalid[0, 1] = math.nan
-    assert poses(invalid, np.array([[0.3]]))["status"][0, 0] == st.INVALID_INPUT
-    assert margins(invalid)["status"][0] == st.INVALID_INPUT
 
 
 def jerk_meets_the_oracle(values, rows):

@@ -78,7 +78,7 @@ def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> 
     status, outputs = _empty(MAX_OUTPUTS, wanted, len(designs))
     geared_dwell.turn_maxima(designs, status, *outputs.values())
     columns = _columns(outputs, status)
-    with np.errstate(divide="ignore"):
+    with np.errstate(all="ignore"):  # what is no number has its status
         growth = 128.0 * ROUNDING * (1.0 + np.hypot(designs[:, 0] - 1.0, designs[:, 1] + 1.0) ** -1.25)
     for name, value in outputs.items():
         if value is not None:

@@ -77,12 +77,12 @@ def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
     status = np.empty(n, np.uint8)
     least, turns, angle = np.empty(n), np.empty(n), np.empty(n)
     rssp.margin(designs, status, least, turns, angle, None)
-    scale = designs[:, 1] ** 2
-    # Rounding errors of Q = (b - m)(b + m) - n^2, taken where m and n are largest.
-    size = (np.abs(designs[:, 2]) + designs[:, 0]) ** 2 + (np.abs(designs[:, 3]) + designs[:, 0]) ** 2
-    err_margin = 18.0 * EPS * size / scale + 4.0 * EPS
-    # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
-    with np.errstate(divide="ignore"):
+    with np.errstate(all="ignore"):  # lengths beyond any drawing have their status
+        scale = designs[:, 1] ** 2
+        # Rounding errors of Q = (b - m)(b + m) - n^2, taken where m and n are largest.
+        size = (np.abs(designs[:, 2]) + designs[:, 0]) ** 2 + (np.abs(designs[:, 3]) + designs[:, 0]) ** 2
+        err_margin = 18.0 * EPS * size / scale + 4.0 * EPS
+        # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
         err_angle = np.minimum(err_margin / np.abs(np.sin(2.0 * angle)), np.sqrt(err_margin)) + 4.0 * EPS
     columns: Columns = {
         "rotatable": turns == 1.0,
