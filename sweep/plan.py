@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 import numpy as np
 
 from kernels.status import OK
-from sweep.cascade import Cascade, levels
-from sweep.chunk import output_columns, parameter_matrix
+from sweep.cascade import BLOCK, CALL_SECONDS, Cascade, levels
+from sweep.chunk import output_columns, parameter_matrix, parameter_ns
 from sweep.families.base import Array, Family, Unit
 from sweep.study.units import internal_unit
 from sweep.summaries import output
@@ -146,8 +146,8 @@ def choose_chunk_size(study: Study) -> int:
 def pilot(study: Study) -> Pilot:
     """Send about a thousand designs, spread over the space, through the cascade.
 
-    The time counts each route as often as designs reached it, by the routes' own cost figures, so it is the same on
-    every machine.
+    The time counts parameters, and each route as often as designs reached it, by their own cost figures, so it is the
+    same on every machine.
     """
     count = study.space.count
     length = min(PILOT_LENGTH, count)
@@ -158,8 +158,12 @@ def pilot(study: Study) -> Pilot:
     cascade = Cascade(study)
     cascade.feed(np.arange(len(designs)), designs, status)
     cascade.end(())
-    nanoseconds = sum(n * level.ns_per_design for n, level in zip(cascade.reached, levels(study), strict=True))
-    return Pilot(1e-9 * nanoseconds / len(designs), float(cascade.counts[OK] / len(designs)))
+    shares = [reached / len(designs) for reached in cascade.reached]
+    seconds, calls = 1e-9 * parameter_ns(study), 1.0 / BLOCK
+    for share, level in zip(shares, levels(study), strict=True):
+        seconds += 1e-9 * share * level.ns_per_design
+        calls += share / level.batch
+    return Pilot(seconds + CALL_SECONDS * calls, float(cascade.counts[OK] / len(designs)))
 
 
 def spread_designs(study: Study, number: int) -> Array:

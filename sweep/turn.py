@@ -95,7 +95,8 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
     """Estimated cost of a general route [ns per design], from measurements of chains and single families."""
     stages = len(family.stages) if isinstance(family, Chain) else 1
     if group == "margin":
-        return sum(100.0 if own_step(family, s, accuracy) else NS_MARGIN for s in margin_suffixes(family))
+        followed = enumerate(margin_suffixes(family), start=1)
+        return sum(100.0 if own_step(family, s, accuracy) else NS_MARGIN * stage for stage, s in followed)
     ways = _ways(family, names)
     requests = {r for way in ways for r in way.requests(False)}
     # What effects add is paid once per effect and pose, and far outweighs the motion.
@@ -112,7 +113,7 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
 
 
 # Measured on one core of a Zen 4 (docs/extrema.md): per sample and stage, per sample and extremum, per design and
-# stage, per refined extremum at a target of 1e-8, per margin without a step.
+# stage, per refined extremum at a target of 1e-8, per stage followed for a margin without a step.
 NS_POSE = 5.0
 NS_SCAN = 2.0
 NS_SEARCH = 800.0

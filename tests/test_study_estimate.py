@@ -39,12 +39,18 @@ def study(folder: Path, count: int = 40, keep: str = "feasible") -> Study:
 
 
 def test_estimate_grows_with_the_designs(tmp_path: Path) -> None:
-    small, large = estimate(study(tmp_path), 2), estimate(study(tmp_path, 40_000), 2)
-    assert large.designs == 1000 * small.designs == 20_000_000
+    small, large = estimate(study(tmp_path, 4000), 2), estimate(study(tmp_path, 40_000), 2)
+    assert large.designs == 10 * small.designs == 20_000_000
     assert large.chunks == -(-large.designs // large.chunk_size)
-    assert large.seconds == pytest.approx(1000 * small.seconds, rel=0.2)
-    assert large.disk_bytes == pytest.approx(1000 * small.disk_bytes, rel=0.2)
+    assert large.seconds == pytest.approx(10 * small.seconds, rel=0.2)
+    assert large.disk_bytes == pytest.approx(10 * small.disk_bytes, rel=0.2)
     assert large.memory_bytes < 2 * 2**30
+
+
+def test_a_small_study_costs_more_per_design(tmp_path: Path) -> None:
+    """Every route is called at least once a chunk, however few designs it gets."""
+    small, large = estimate(study(tmp_path), 2), estimate(study(tmp_path, 40_000), 2)
+    assert small.seconds / small.designs > 1.5 * large.seconds / large.designs
 
 
 def test_two_workers_take_half_the_time_and_more_memory(tmp_path: Path) -> None:

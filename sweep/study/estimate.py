@@ -12,9 +12,9 @@ from sweep.study.study import Study
 # With no survivor in the pilot, this share is assumed.
 LEAST_KEPT = 1e-3
 COARSEST_TARGET = 0.1
-# Measured: the parameter values of a design take 100 ns, writing its row 120 ns.
-SPACE_SECONDS = 100e-9
+# Measured: writing a row takes 120 ns, a chunk by itself 5 ms.
 WRITE_SECONDS_PER_ROW = 120e-9
+WRITE_SECONDS_PER_CHUNK = 5e-3
 # Measured: what zstd leaves of a result and of its error estimate; a sampled parameter keeps seven of its eight bytes,
 # the parameters of a lattice, design number and status together take less than half a byte a row.
 PACKED_RESULT, PACKED_ERROR = 0.78, 0.4
@@ -60,6 +60,7 @@ def estimate(study: Study, jobs: int) -> Estimate:
         assumed.  ``disk_bytes`` takes every result of a row as computed and free of repetition, which is too much where
         rows of infeasible designs are kept or symmetries make values repeat.
     """
+    from sweep.cascade import CALL_SECONDS, levels
     from sweep.plan import choose_chunk_size, describe_columns, pilot, row_bytes
 
     found = pilot(study)
@@ -72,10 +73,13 @@ def estimate(study: Study, jobs: int) -> Estimate:
         if column.role == "output" and not column.name.startswith("rotatable")
     )
     sampled = len(study.space.axes) * SAMPLED_VALUE_BYTES if study.space.kind == "sobol" else 0.0
-    work = designs * (found.seconds_per_design + SPACE_SECONDS + kept * WRITE_SECONDS_PER_ROW)
+    chunks = -(-designs // chunk_size)
+    work = designs * (found.seconds_per_design + kept * WRITE_SECONDS_PER_ROW)
+    # At the end of a chunk every level does what waits there, however little.
+    work += chunks * (WRITE_SECONDS_PER_CHUNK + CALL_SECONDS * len(levels(study)))
     return Estimate(
         designs=designs,
-        chunks=-(-designs // chunk_size),
+        chunks=chunks,
         chunk_size=chunk_size,
         jobs=jobs,
         kept=kept,
@@ -87,13 +91,14 @@ def estimate(study: Study, jobs: int) -> Estimate:
 
 
 def other_accuracies(study: Study, jobs: int) -> tuple[tuple[str, float], ...]:
-    """What the same sweep would take with one digit less and one more, or with half and twice the samples.
+    """What the same sweep would take at the accuracies of :func:`neighbours`: in words, and the estimated seconds."""
+    return tuple((words, estimate(other, jobs).seconds) for words, other in neighbours(study))
 
-    Returns
-    -------
-    tuple
-        the accuracy in words and the estimated seconds of the sweep, from the same figures as :func:`estimate`; an
-        accuracy outside the range of `sweep.summarise` is left out
+
+def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
+    """The same study with one digit less and one more, or with half and twice the samples; in words, and the study.
+
+    An accuracy outside the range of `sweep.summarise` is left out.
     """
     from sweep.study.load import study_from_data
     from sweep.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
@@ -107,8 +112,7 @@ def other_accuracies(study: Study, jobs: int) -> tuple[tuple[str, float], ...]:
         counts = (("half the samples", samples // 2), ("twice the samples", 2 * samples))
         settings = [(words, {"samples": n}) for words, n in counts if FEWEST_SAMPLES <= n <= MOST_SAMPLES]
     return tuple(
-        (words, estimate(study_from_data(study.data | {"accuracy": setting}, study.path), jobs).seconds)
-        for words, setting in settings
+        (words, study_from_data(study.data | {"accuracy": setting}, study.path)) for words, setting in settings
     )
 
 
