@@ -13,6 +13,7 @@ from kernels import status as st
 from sweep.synthesis.tasks import (
     EngineeringMethod,
     Position,
+    Setting,
     SlotPosition,
     Task1,
     Task2,
@@ -57,8 +58,11 @@ TASK1 = Case(
 )
 TASK2 = Case(Task2, swing_range=(0.5, 1.2), phi0_range=(2.9, 3.5), **SPACE, max_pressure_angle=1.2, bounds=BOUNDS,
              positions=(Position(1.0, 0.2), Position(2.0, 0.6)))  # fmt: skip
-TASK3 = Case(Task3, swing=0.8, phi0=3.2, second_swing=0.6, second_phi0=3.2, adjusted="f", adjusted_range=(-4.0, 4.0),
+TASK3 = Case(Task3, swing=0.8, phi0=3.2, settings=(Setting(0.6, 3.2),), adjusted="f", adjusted_range=(-4.0, 4.0),
              **SPACE, f_range=(-3.0, 3.0), max_pressure_angle=1.3, bounds=BOUNDS)  # fmt: skip
+TASK3_THREE = Case(Task3, swing=0.8, phi0=3.2, settings=(Setting(0.7, 3.2), Setting(0.6)), adjusted="g",
+                   adjusted_range=(-4.0, 4.0), **SPACE, f_range=(-3.0, 3.0), g_range=(0.2, 2.0), max_pressure_angle=1.3,
+                   bounds=BOUNDS)  # fmt: skip
 TASK4 = Case(Task4, swing=np.radians(45.0), phi0=np.radians(165.0), e=1.0, objective="pressure_angle")
 TASK5 = Case(Task5, swing=0.8, phi0=3.2, **SPACE, f_range=(-3.0, 3.0), rho0=0.5, bounds=STAGE_BOUNDS,
              max_pressure_angle=1.2, positions=(SlotPosition(1.0, 0.1), SlotPosition(2.0, 0.38)))  # fmt: skip
@@ -122,6 +126,27 @@ def test_task1_two_positions():
             check_position(rocker(solution), turn, position)
 
 
+def test_task1_planar_one_position_fixes_the_place():
+    """In the plane f drops out: one position is an equation for phi1, and there is nothing left to minimise."""
+    wanted = Position(1.2, 0.3)
+    problem = Task1(0.8, 3.2, 1.0, 0.0, 0.0, positions=(wanted,), max_pressure_angle=1.3)
+    assert problem.equations == ("position 1",)
+    found = [s for s in solve(problem) if s.feasible]
+    assert found
+    for solution in found:
+        table = rocker(solution)
+        assert table["alpha"] == [0.0] and table["f"] == table["g"]
+        check_position(table, check_limits(table, 0.8, 3.2, 1.3), wanted)
+    # A dense search over phi1 sees the same places as changes of sign, and no more.
+    grid = np.linspace(0.0, 2.0 * np.pi, 7201)
+    dense = problem.evaluate(grid[:, None])
+    missed = np.where((dense.limits >= 0.0).all(axis=1), dense.equations[:, 0], np.nan)
+    crossed = np.flatnonzero(missed[1:] * missed[:-1] < 0.0)
+    places = sorted(solution.unknowns["phi1"] for solution in found)
+    assert len(crossed) == len(places)
+    np.testing.assert_allclose(grid[crossed], places, atol=grid[1])
+
+
 def test_task2_swing_and_phi0_are_found_with_the_least_acceleration():
     solution = best(TASK2)
     table = rocker(solution)
@@ -142,7 +167,21 @@ def test_task3_one_dimension_makes_the_second_setting():
     solution = best(TASK3)
     table = rocker(solution)
     check_limits(table, 0.8, 3.2, 1.3)
-    check_limits(table | {"f": [solution.mechanism["second_f"]]}, 0.6, 3.2, 1.3)
+    check_limits(table | {"f": [solution.mechanism["f of setting 2"]]}, 0.6, 3.2, 1.3)
+
+
+def test_task3_three_settings_by_one_dimension():
+    solution = best(TASK3_THREE)
+    table = rocker(solution)
+    check_limits(table, 0.8, 3.2, 1.3)
+    check_limits(table | {"g": [solution.mechanism["g of setting 2"]]}, 0.7, 3.2, 1.3)
+    third = table | {"g": [solution.mechanism["g of setting 3"]]}
+    found = sweep.summarise("rssr", third, ["swing", "max_pressure_angle"], accuracy=1e-12).iloc[0]
+    assert found["swing"] == pytest.approx(0.6, abs=1e-9)
+    assert found["max_pressure_angle"] <= 1.3 + 1e-7
+    # The same links stand in all three settings: nothing else was changed, and phi0 of the third was free.
+    free = sweep.summarise("rssr", third, "phi0", accuracy=1e-12)["phi0"][0]
+    assert abs(free - 3.2) > 1e-3
 
 
 def test_task3_adjustments_are_the_derivatives():
@@ -245,6 +284,16 @@ def test_task7_stroke_and_accelerations_at_its_ends():
     # The whole turn is looked at, not only the ends.
     assert turn["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=2e-3)
     assert turn["max_abs_d2s"][0] >= 0.6 - 1e-9
+
+
+def test_task7_surplus_goes_to_the_pressure_angle():
+    smooth, easy = best(TASK7), best(Case(Task7, **TASK7.numbers, objective="pressure_angle"))
+    wanted = ["max_pressure_angle2", "max_abs_d2s"]
+    one, other = (sweep.summarise(["rssr", "rssp"], chain_columns(s, "rssp"), wanted).iloc[0] for s in (smooth, easy))
+    assert np.sin(other["max_pressure_angle2"]) == pytest.approx(easy.objective, rel=2e-3)
+    assert other["max_pressure_angle2"] < one["max_pressure_angle2"] - 0.01
+    assert other["max_abs_d2s"] > one["max_abs_d2s"]
+    assert max(abs(residual) for residual in easy.equations.values()) < 1e-9
 
 
 def test_task8_dwells_within_its_tolerance():

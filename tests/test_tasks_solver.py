@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sweep.errors import InputError
-from sweep.synthesis.tasks import EngineeringMethod, Position, Task1, Task2, Task3, Task4, Task7, solve
+from sweep.synthesis.tasks import EngineeringMethod, Position, Setting, Task1, Task2, Task3, Task4, Task7, solve
 from sweep.synthesis.tasks.problem import Candidates, Unknown
 
 DRIVE = {"a": 0.4, "b": 1.8, "c": 1.2, "e": 1.5, "f": 1.2, "g": 1.0, "alpha": 1.3, "branch": -1.0}
@@ -95,7 +95,13 @@ def test_solution_reads_as_text():
         ),
         (lambda: Task1(0.9, 3.3, 1.0, 0.0, 1.0, ()), "positions"),
         (lambda: Task2((0.5, 1.0), (3.0, 3.5), 1.0, 0.0, 0.0, (Position(1, 0.2), Position(2, 0.6))), "alpha"),
-        (lambda: Task3(0.8, 3.2, 0.8, None, "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), "second_swing"),
+        (lambda: Task3(0.8, 3.2, (Setting(0.8),), "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), "another swing"),
+        (lambda: Task3(0.8, 3.2, (Setting(None),), "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), "another swing"),
+        (lambda: Task3(0.8, 3.2, (), "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), "at least one"),
+        (
+            lambda: Task3(0.8, 3.2, tuple(Setting(x, 3.2) for x in (0.7, 0.6, 0.5)), "f", (-1, 1), 1, 1, 1.3, (-1, 1)),
+            "at most 5",
+        ),
         (lambda: Task7(DRIVE, 1.0, -0.6, -0.5), "start_acceleration"),
         (lambda: Task7(DRIVE | {"a": 5.0}, 1.0, 0.6, -0.5), "drive"),
     ],

@@ -7,6 +7,7 @@ from sweep.synthesis.tasks.problem import Solution as Solution
 from sweep.synthesis.tasks.solver import solve as solve
 from sweep.synthesis.tasks.task1 import Task1 as Task1
 from sweep.synthesis.tasks.task2 import Task2 as Task2
+from sweep.synthesis.tasks.task3 import Setting as Setting
 from sweep.synthesis.tasks.task3 import Task3 as Task3
 from sweep.synthesis.tasks.task3 import adjustments as adjustments
 from sweep.synthesis.tasks.task4 import Task4 as Task4

@@ -1,10 +1,10 @@
-"""Task 3: an adjustable crank-rocker: two settings that differ in one dimension; which dimension adjusts what."""
+"""Task 3: an adjustable crank-rocker: settings that differ in one dimension; which dimension adjusts what."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -33,84 +33,124 @@ _EXACT = Accuracy(target=1e-12)
 ALONE = 10.0  # so many times more strongly: the dimension adjusts that quantity alone
 
 
+class Setting(NamedTuple):
+    """What the mechanism does after one dimension has been changed [rad]; None leaves it free."""
+
+    swing: float | None
+    phi0: float | None = None
+
+    @property
+    def asked(self) -> dict[str, float]:
+        """The limits that are prescribed."""
+        return {name: value for name, value in self._asdict().items() if value is not None}
+
+
 @dataclass(frozen=True)
 class Task3:
-    """To be found: phi1, f and the second setting of one dimension.
+    """To be found: phi1, f, and for every further setting the value of the one dimension that differs.
 
     Parameters
     ----------
     swing, phi0 : of the first setting, signed and in the crank's sense [rad]
-    second_swing, second_phi0 : of the second setting; ``second_phi0=None`` leaves it free
-    adjusted : the dimension that differs, and ``adjusted_range``, where its second value is looked for
+    settings : what each further setting asks for, swing or phi0 or both
+    adjusted : the dimension that differs, and ``adjusted_range``, where its other values are looked for
     e, g, alpha : as `EngineeringMethod`; the first setting, if e or g is the dimension adjusted
     f_range : where f is looked for
-    max_pressure_angle : limit over the whole turn in both settings [rad]
+    g_range, alpha_range : where g and alpha are looked for, if they are to be found as well
+    max_pressure_angle : limit over the whole turn in every setting [rad]
     bounds : of the lengths found, by name (a, b, c)
 
     Raises
     ------
     InputError
-        if both settings ask for the same.
+        for no setting, one that asks for nothing or for what the first has already, or more than can be met.
     """
 
     swing: float
     phi0: float
-    second_swing: float
-    second_phi0: float | None
+    settings: tuple[Setting, ...]
     adjusted: Literal["a", "b", "c", "e", "f", "g"]
     adjusted_range: tuple[float, float]
     e: float
     g: float
     alpha: float
     f_range: tuple[float, float]
+    g_range: tuple[float, float] | None = None
+    alpha_range: tuple[float, float] | None = None
     max_pressure_angle: float = 0.5 * np.pi
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
-    objective: str = field(default="largest |d2psi| of both settings", init=False)
+    objective: str = field(default="largest |d2psi| of all settings", init=False)
 
     def __post_init__(self) -> None:
-        if self.second_swing == self.swing and self.second_phi0 in (None, self.phi0):
-            raise InputError("second_swing", self.second_swing, "another swing or phi0 than the first", "Task3")
+        if not self.settings:
+            raise InputError("settings", self.settings, "at least one besides the first", "Task3")
+        first = {"swing": self.swing, "phi0": self.phi0}
+        for setting in self.settings:
+            if all(first[name] == value for name, value in setting.asked.items()):
+                raise InputError("settings", setting, "another swing or phi0 than the first", "Task3")
+        if len(self.equations) > len(self.unknowns):
+            allowed = f"at most {len(self.unknowns)} swings and phi0 in all, or g_range, alpha_range"
+            raise InputError("settings", len(self.equations), allowed, "Task3")
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """phi1, f and the second value of the adjusted dimension."""
+        """phi1, f, what else is free, and the further values of the adjusted dimension."""
+        free = {"f": self.f_range, "g": self.g_range, "alpha": self.alpha_range}
         return (
             Unknown("phi1", 0.0, 2.0 * np.pi, periodic=True),
-            Unknown("f", *self.f_range),
-            Unknown(f"second_{self.adjusted}", *self.adjusted_range),
+            *(Unknown(name, *ends) for name, ends in free.items() if ends is not None),
+            *(Unknown(name, *self.adjusted_range) for name in self._values),
         )
 
     @property
     def equations(self) -> tuple[str, ...]:
-        """What the second setting has to do."""
-        return ("second swing",) if self.second_phi0 is None else ("second swing", "second phi0")
+        """What the further settings have to do."""
+        return tuple(f"{name} of setting {k}" for k, setting in enumerate(self.settings, 2) for name in setting.asked)
 
     @property
     def limits(self) -> tuple[str, ...]:
-        """Pressure angles of both settings, bounds of the lengths."""
-        return ("pressure angle", "second pressure angle", *size_names(self.bounds))
+        """Pressure angles of all settings, bounds of the lengths."""
+        pressure = tuple(f"pressure angle of setting {k}" for k in range(1, len(self.settings) + 2))
+        return (*pressure, *size_names(self.bounds))
+
+    @property
+    def _values(self) -> tuple[str, ...]:
+        return tuple(f"{self.adjusted} of setting {k}" for k in range(2, len(self.settings) + 2))
 
     def evaluate(self, x: Array) -> Candidates:
         """See `Problem`."""
         ones = np.ones(len(x))
-        fixed = (self.swing * ones, self.phi0 * ones, x[:, 0], self.e * ones, x[:, 1])
-        first, _ = designs_on_locus(*fixed, self.g * ones, self.alpha * ones)
-        second = first.copy()
-        second[:, RSSR.parameter_names.index(self.adjusted)] = x[:, 2]
-        second[np.isnan(first).any(axis=1)] = np.nan
-        alive = np.flatnonzero((second[:, :3] > 0.0).all(axis=1))
-        limits = design_outputs(RSSR, second[alive], ["swing", "phi0"], _EXACT)
-        equations = np.full((len(x), len(self.equations)), np.nan)
-        equations[alive, 0] = np.asarray(limits["swing"], np.float64) - self.second_swing
-        if self.second_phi0 is not None:
-            equations[alive, 1] = np.asarray(limits["phi0"], np.float64) - self.second_phi0
-        slacks = [pressure_limit(d, self.max_pressure_angle) for d in (first, second)]
-        curves = [np.asarray(motion(d, turn(), "d2psi")["d2psi"], np.float64) for d in (first, second)]
+        found = dict(zip((u.name for u in self.unknowns), x.T, strict=True))
+        first, _ = designs_on_locus(
+            self.swing * ones, self.phi0 * ones, found["phi1"], self.e * ones, found["f"],
+            found.get("g", self.g * ones), found.get("alpha", self.alpha * ones),
+        )  # fmt: skip
+        designs, equations = [first], []
+        for name, setting in zip(self._values, self.settings, strict=True):
+            design = first.copy()
+            design[:, RSSR.parameter_names.index(self.adjusted)] = found[name]
+            design[np.isnan(first).any(axis=1) | (design[:, :3] <= 0.0).any(axis=1)] = np.nan
+            designs.append(design)
+            equations += _missed(design, setting)
+        slacks = [pressure_limit(design, self.max_pressure_angle) for design in designs]
+        curves = [np.asarray(motion(design, turn(), "d2psi")["d2psi"], np.float64) for design in designs]
         columns = named(first)
-        sizes = size_limits(columns, self.bounds)
-        results = columns | {f"second_{self.adjusted}": x[:, 2]}
-        return Candidates(equations, stacked(len(x), [*slacks, *sizes]), np.hstack(curves), results)
+        limits = stacked(len(x), [*slacks, *size_limits(columns, self.bounds)])
+        results = columns | {name: found[name] for name in self._values}
+        return Candidates(stacked(len(x), equations), limits, np.hstack(curves), results)
+
+
+def _missed(designs: Array, setting: Setting) -> list[Array]:
+    """By how much designs miss what a setting asks for; nan where there is no mechanism."""
+    alive = np.flatnonzero(np.isfinite(designs).all(axis=1))
+    found = design_outputs(RSSR, designs[alive], list(setting.asked), _EXACT)
+    missed = []
+    for name, value in setting.asked.items():
+        column = np.full(len(designs), np.nan)
+        column[alive] = np.asarray(found[name], np.float64) - value
+        missed.append(column)
+    return missed
 
 
 def adjustments(design: Mapping[str, float]) -> pd.DataFrame:

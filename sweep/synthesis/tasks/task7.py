@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -33,6 +34,8 @@ class Task7:
     kappa, branch : sense of the connection of the stages, assembly mode of the slider-crank
     size_range : where a2, b2 and |e2| are looked for, in strokes
     max_pressure_angle : limit of the slider-crank over the whole motion [rad]
+    objective : what the surplus of unknowns goes to: "acceleration", max |d2s| over the turn, or "pressure_angle", the
+        largest of the slider-crank
     bounds : of what is found, by name (a2, b2, e2)
 
     Raises
@@ -51,12 +54,12 @@ class Task7:
     branch: int = 1
     size_range: tuple[float, float] = (0.3, 6.0)
     max_pressure_angle: float = np.radians(45.0)
+    objective: Literal["acceleration", "pressure_angle"] = "acceleration"
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     equations: tuple[str, ...] = field(
         default=("stroke", "acceleration at the start", "acceleration at the end"), init=False
     )
-    objective: str = field(default="largest |d2s/dphi2| over the turn", init=False)
     _first: Drive = field(init=False, repr=False)
     _second_derivatives: tuple[float, float] = field(init=False, repr=False)
 
@@ -114,5 +117,8 @@ class Task7:
             residuals.append(self.kappa * second * ds[:, k] / wanted[k] - 1.0)
         motion = chain_motion(chain_of("rssp"), columns, "d2s", "pressure_angle2")
         slacks = [second_pressure_limit(motion, self.max_pressure_angle), *size_limits(columns, self.bounds)]
-        curve = np.asarray(motion["d2s"], np.float64)
+        if self.objective == "acceleration":
+            curve = np.asarray(motion["d2s"], np.float64)
+        else:
+            curve = np.sin(np.asarray(motion["pressure_angle2"], np.float64))
         return Candidates(stacked(n, residuals), stacked(n, slacks), curve, columns)
