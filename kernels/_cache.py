@@ -133,7 +133,12 @@ class KernelCache(FunctionCache):
 
 
 def kept(dispatcher: Any) -> Any:
-    """A dispatcher that loads its machine code and keeps what it compiles, where that is safe and there is room."""
-    if _IMPORTED.as_hashed() and _Place.from_function(dispatcher.py_func, dispatcher.py_func.__code__.co_filename):
+    """A dispatcher that loads its machine code and keeps what it compiles, where that is safe and there is room.
+
+    A function from outside of the package, as a bench or a study may have, is in no hash: every process compiles it.
+    """
+    file = dispatcher.py_func.__code__.co_filename
+    ours = Path(file).resolve().is_relative_to(SOURCES)
+    if ours and _IMPORTED.as_hashed() and _Place.from_function(dispatcher.py_func, file):
         dispatcher._cache = KernelCache(dispatcher.py_func)  # type: ignore[no-untyped-call]
     return dispatcher

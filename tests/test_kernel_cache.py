@@ -72,6 +72,13 @@ def test_code_is_compiled_once_and_found_again(tree: Path) -> None:
     assert report(tree) == ["2.0", "1", "KernelCache"]
 
 
+def test_a_kernel_outside_of_the_package_is_compiled_and_not_kept(tree: Path) -> None:
+    (tree.parent / "bench.py").write_text(KERNEL)
+    program = "from bench import run; print(run(1.0), len(run.stats.cache_hits), type(run._cache).__name__)"
+    for _ in range(2):
+        assert report(tree, program) == ["2.0", "0", "NullCache"]
+
+
 def test_an_edit_of_a_helper_gives_its_new_result_and_back_again_the_old(tree: Path) -> None:
     assert report(tree)[0] == "2.0"
     edit(tree, 5)
