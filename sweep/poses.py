@@ -45,7 +45,7 @@ def evaluate(
     """
     import pandas as pd
 
-    bare = find_family(family)
+    bare = find_family(family).precise()
     mechanism = extended(bare, [want] if isinstance(want, str) else want)
     wanted = pose_wants(mechanism, want)
     extra = () if phi is not None else ("phi",)

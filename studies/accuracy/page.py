@@ -212,18 +212,19 @@ def _positions(m: Measured) -> list[str]:
 
 def _exact(m: Measured) -> list[str]:
     rows = [
-        [r.region, r.constant, sig(r.psi), sig(r.dpsi), sig(r.d2psi), sig(r.d3psi), f"{r.ns_per_design:.0f}"]
+        [r.region, r.closure, sig(r.psi), sig(r.dpsi), sig(r.d2psi), sig(r.d3psi), f"{r.ns_per_pose:.0f}"]
         for r in m.exact.itertuples()
     ]
-    head = ["region", "closure constant", "psi [rad]", "dpsi", "d2psi", "d3psi", "more ns per design"]
+    head = ["region", "closure", "psi [rad]", "dpsi", "d2psi", "d3psi", "ns per pose"]
     return [
         "",
         "## Doubles meant to the last bit",
         "",
         "A long coupler multiplies the rounding of its own length; that is in cond, and a drawing loses nothing by it.",
-        "Where the given doubles are exact (a comparison with exact arithmetic), the closure constant can be summed",
-        "in twice the working precision, once per design: `kernels.families.rssr.exact`. Largest errors, of the",
-        "derivatives relative to their own size plus that of the velocity:",
+        "Where the given doubles are exact (a comparison with exact arithmetic), it is lost. `sweep.evaluate` closes",
+        "the linkage in twice the working precision; sweeps do not, and are several times faster on grids.",
+        "Largest errors, of the derivatives relative to their own size plus that of the velocity; times with a design",
+        "per pose:",
         "",
         *pipe_table(head, rows),
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -98,7 +98,8 @@ class Family:
     ``joints(designs, angles, motion, per_pose, per_design)`` fills the records of :mod:`kernels.joints` that effects
     work from, out of the pose outputs ``joint_needs``; ``ellipse(designs)`` gives the curve that
     :mod:`kernels.effects.pressure_extrema` takes.  A family without them has no effects.  ``dear`` names, for pose
-    outputs that cost far more than the motion, what they are computed by and its cost [ns per pose].
+    outputs that cost far more than the motion, what they are computed by and its cost [ns per pose].  ``precise_poses``
+    is a slower ``poses`` for real numbers whose errors are a few roundings of what is given, where the family has one.
     """
 
     name: str
@@ -114,6 +115,11 @@ class Family:
     joint_needs: tuple[str, ...] = ()
     ellipse: EllipseFunction | None = None
     dear: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    precise_poses: PoseFunction | None = None
+
+    def precise(self) -> Family:
+        """Give the same family with the most accurate poses it has: for single poses, not for sweeps."""
+        return self if self.precise_poses is None else replace(self, poses=self.precise_poses)
 
     @property
     def parameter_names(self) -> tuple[str, ...]:

@@ -38,6 +38,10 @@ class Chain(Family):
 
     stages: tuple[Stage, ...] = ()
 
+    def precise(self) -> Chain:
+        """The chain of the stages with the most accurate poses they have."""
+        return chain(tuple(stage.family.precise() for stage in self.stages))
+
 
 @dataclass
 class _Plan:

@@ -81,6 +81,17 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return columns | {"status": status}
 
 
+def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """As :func:`poses`, with the closure in twice the working precision; for float64 only."""
+    shape = (designs.shape[0], angles.cos.shape[1])
+    status, constants = np.empty(shape, np.uint8), np.empty((shape[0], rssr.PRECISE_COLUMNS))
+    outputs = optional_outputs(_POSE_NAMES, wanted, shape)
+    rssr.precise_constants(designs, constants)
+    rssr.precise_poses(designs, constants, angles.cos, angles.sin, status, *outputs)
+    columns: Columns = {name: out for name, out in zip(_POSE_NAMES, outputs, strict=True) if out is not None}
+    return columns | {"status": status}
+
+
 _JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
 
 
@@ -229,4 +240,5 @@ FAMILY = Family(
     joints=joint_records,
     joint_needs=_JOINT_NEEDS,
     ellipse=ellipse,
+    precise_poses=precise_poses,
 )

@@ -1,7 +1,8 @@
 """Spatial crank-rocker with two revolute and two ball joints (RSSR); planar four-bar for alpha = 0, f = g.
 
-``closure`` reduces a design to its constants, ``motion`` evaluates poses, ``dense`` sweeps a grid of crank angles,
-``margin`` decides rotatability, ``limits`` finds the limit positions and ``maxima`` the true maxima over the turn.
+``closure`` reduces a design to its constants, ``motion`` evaluates poses (``precise`` in twice the working precision),
+``dense`` sweeps a grid of crank angles, ``margin`` decides rotatability, ``limits`` finds the limit positions and
+``maxima`` the true maxima over the turn.
 """
 
 from kernels.families.rssr.closure import Design as Design
@@ -14,3 +15,6 @@ from kernels.families.rssr.margin import margin as margin
 from kernels.families.rssr.maxima import sampling_tables as sampling_tables
 from kernels.families.rssr.maxima import true_maxima as true_maxima
 from kernels.families.rssr.motion import poses as poses
+from kernels.families.rssr.precise import PRECISE_COLUMNS as PRECISE_COLUMNS
+from kernels.families.rssr.precise import precise_constants as precise_constants
+from kernels.families.rssr.precise import precise_poses as precise_poses

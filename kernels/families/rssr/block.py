@@ -11,11 +11,14 @@ import math
 import numpy as np
 
 from kernels._jit import inline
-from kernels.families.rssr.closure import EPS, Array, reduce_scaled, unit_scale
+from kernels.families.rssr.closure import EPS, Array, reduce_scaled, unit_scale, within_unit_range
 from kernels.reduce import largest, smallest
-from kernels.trigpoly import LAST_STEP, approach, far_minimum, lowest_of_16, minimum, point, shortfall
+from kernels.trigpoly import approach, far_minimum, lowest_of_16, minimum, point, shortfall
 
 BLOCK = 64
+# After a second step of at most _LONGEST the way to the minimum is below _NEAR (3e-6 was seen); its third power
+# float64 does not show.  The test for the global minimum is as blunt: what is not _SURE is done again, with care.
+_LONGEST, _NEAR, _SURE = 1e-2, 1e-5, 1e-4
 # Rows: the fields of Reduced, the polynomial of Delta, its minimum.  During loading they hold the design itself.
 E, Y0, CA, K0, K1, K2, W_SIZE, COUPLER, ROCKER, Z0, SA, BRANCH, VALID = (k * BLOCK for k in range(13))
 C1, S1, C2, S2, COS, SIN, STEP, DELTA, CURVATURE, TOLERANCE, ACROSS = (k * BLOCK for k in range(13, 24))
@@ -31,12 +34,18 @@ def new_block() -> Array:
 @inline
 def load_block(designs: Array, start: int, count: int, at: Array) -> None:
     """Reduce the designs start ... start + count - 1."""
+    scaled = False
     for k in range(count):
         i = start + k
-        unit = unit_scale(designs[i, 2])
-        at[k + E], at[k + Y0], at[k + CA] = designs[i, 0] * unit, designs[i, 1] * unit, designs[i, 2] * unit
-        at[k + K0], at[k + K1], at[k + K2] = designs[i, 3] * unit, designs[i, 4] * unit, designs[i, 5] * unit
+        at[k + E], at[k + Y0], at[k + CA] = designs[i, 0], designs[i, 1], designs[i, 2]
+        at[k + K0], at[k + K1], at[k + K2] = designs[i, 3], designs[i, 4], designs[i, 5]
         at[k + W_SIZE], at[k + COUPLER] = designs[i, 6], designs[i, 7]
+        scaled |= not within_unit_range(designs[i, 2])
+    if scaled:  # apart, because only so the loop above is free of calls
+        for k in range(count):
+            unit = unit_scale(at[k + CA])
+            for row in (E, Y0, CA, K0, K1, K2):
+                at[k + row] *= unit
     for k in range(count):
         r = reduce_scaled(
             at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE], at[k + COUPLER]
@@ -66,31 +75,32 @@ def least_delta(count: int, at: Array) -> None:
         c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2]
         u, v, step = approach(c1, s1, c2, s2, at[k + COS], at[k + SIN])
         at[k + COS], at[k + SIN] = u, v
-        at[k + STEP] = math.inf if shortfall(c1, s1, c2, s2, u, v) > 0.0 else step
+        size = abs(c1) + abs(s1) + abs(c2) + abs(s2)
+        at[k + STEP] = math.inf if shortfall(c1, s1, c2, s2, u, v) > -_SURE * size else step
     for k in range(count):
-        if at[k + STEP] > LAST_STEP:
+        if at[k + STEP] > _LONGEST:
             m = minimum(at[k + C1], at[k + S1], at[k + C2], at[k + S2])
             at[k + COS], at[k + SIN] = m.cos, m.sin
     for k in range(count):
         u, v, e, y0, ca = at[k + COS], at[k + SIN], at[k + E], at[k + Y0], at[k + CA]
         k0, k1, k2 = at[k + K0], at[k + K1], at[k + K2]
         # The expanded coefficients only place the minimum; its value comes from X, Y, W themselves, and its slope there
-        # takes off what the rounding of the coefficients displaced it by.
+        # takes off what is left of the way to it.
         x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
         slope = x * v + y * ca * u - w * (k1 * u + k2 * v)
         curvature = -(at[k + C1] * u + at[k + S1] * v) - 4.0 * (
             at[k + C2] * ((u - v) * (u + v)) + at[k + S2] * (2.0 * u * v)
         )
-        moved = 2.0 * slope * slope / curvature
-        delta = x * x + y * y - w * w
-        small = (moved >= 0.0) & (moved < 1e-6 * abs(delta))
-        at[k + DELTA] = delta - (moved if small else 0.0)
+        step = -2.0 * slope / curvature
+        step = step if (curvature > 0.0) & (abs(step) <= _NEAR) else 0.0
+        at[k + DELTA] = (x * x + y * y - w * w) + slope * step
+        shrink = 1.0 - 0.5 * step * step
+        u, v = (u - v * step) * shrink, (v + u * step) * shrink
+        at[k + COS], at[k + SIN] = u, v
         at[k + CURVATURE] = curvature
         mx, my, mw = abs(e) + 1.0, abs(y0) + abs(ca), at[k + W_SIZE]
         w_error = 18.0 * EPS * mw
         at[k + TOLERANCE] = EPS * (14.0 * mx * mx + 18.0 * my * my + 38.0 * (mx + my) * mw) + w_error * w_error
-        z, p = at[k + Z0] - at[k + SA] * v, at[k + ROCKER] - w
-        at[k + ACROSS] = math.sqrt(p * p + z * z)
 
 
 @inline

@@ -12,6 +12,7 @@ import math
 from kernels._jit import inline, kernel
 from kernels.families.rssr.closure import EPS
 from kernels.families.rssr.derivatives import follower, order_pair
+from kernels.reduce import largest
 
 _TURN = 2.0 * math.pi
 _WIDEST = _TURN / 24.0
@@ -20,13 +21,32 @@ _ATTEMPTS = 8
 
 @inline
 def rounding(
-    order: int, e: float, y0: float, ca: float, k0: float, k1: float, k2: float, w_size: float, u: float, v: float
+    order: int,
+    e: float,
+    y0: float,
+    ca: float,
+    k0: float,
+    k1: float,
+    k2: float,
+    w_size: float,
+    u: float,
+    v: float,
+    height: float,
 ) -> float:
-    """Relative rounding error of the transfer function of that order, which behaves like Delta^(1/2 - order)."""
+    """Relative rounding error of the transfer function of that order where it is ``height``.
+
+    It behaves like Delta^(1/2 - order), so it is off relatively by what Delta is.  And it is a sum of terms of the size
+    1, k1, k2 over T, whose rounding, and that of the angle in them, stays however small the sum is.
+    """
     x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
     mx, my = abs(e) + 1.0, abs(y0) + abs(ca)
-    tolerance = 8.0 * EPS * (abs(x) * mx + abs(y) * my + abs(w) * w_size)
-    return (order + 0.5) * tolerance / (x * x + y * y - w * w) + 32.0 * EPS
+    tolerance = 4.0 * EPS * (abs(x) * mx + abs(y) * my + abs(w) * w_size)
+    delta = x * x + y * y - w * w
+    per_t = 1.0 / math.sqrt(largest(delta, 1e-300))
+    terms = (2.0 * EPS * (2.0 + abs(k1) + abs(k2)) + 0.5 * tolerance * per_t) * per_t
+    more = 1.0 + per_t
+    terms *= 1.0 if order == 1 else (more if order == 2 else more * more)
+    return (order + 0.5) * tolerance * (per_t * per_t) + 8.0 * EPS + terms / abs(height)
 
 
 @inline
@@ -81,7 +101,7 @@ def careful_maximum(
                     if peak > best:
                         best, place, error, reach = peak, where, bound, width
             phi, y, dy = following, y2, dy2
-        relative = rounding(order, e, y0, ca, k0, k1, k2, w_size, math.cos(place), math.sin(place))
+        relative = rounding(order, e, y0, ca, k0, k1, k2, w_size, math.cos(place), math.sin(place), best)
         error += best * relative
         change = abs(best - before)
         if not missed and best > 0.0 and change <= 0.1 * target * best + error:

@@ -65,9 +65,15 @@ def axial_square(f: Any, g: Any, alpha: Any, ca: Any) -> tuple[Any, Any]:
 
 
 @inline
+def within_unit_range(c: float) -> bool:
+    """Whether a rocker of length c needs no scaling: no square can leave float64."""
+    return (c > 1e-6) & (c < 1e6)
+
+
+@inline
 def unit_scale(c: float) -> float:
-    """Power of two that brings a rocker of length c to the unit range; 1 where no square can leave float64 anyway."""
-    if 1e-6 < c < 1e6:
+    """Power of two that brings a rocker of length c to the unit range; 1 where it is near enough."""
+    if within_unit_range(c):
         return 1.0
     _, exponent = math.frexp(c)
     return math.ldexp(1.0, -exponent)

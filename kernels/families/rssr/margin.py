@@ -11,14 +11,19 @@ import math
 from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.families.rssr.block import (
-    ACROSS,
     BLOCK,
     COS,
     COUPLER,
     DELTA,
+    K0,
+    K1,
+    K2,
+    ROCKER,
+    SA,
     SIN,
     TOLERANCE,
     VALID,
+    Z0,
     least_delta,
     load_block,
     new_block,
@@ -31,7 +36,16 @@ def turning_status(delta: float, tolerance: float, valid: bool) -> int:
     """Whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT."""
     code = st.OK if delta > tolerance else st.UNDECIDABLE
     code = st.NOT_ROTATABLE if delta < -tolerance else code
-    return code if valid and delta == delta else st.INVALID_INPUT
+    return code if valid & (delta == delta) else st.INVALID_INPUT
+
+
+@inline
+def _angle(at: Array, k: int) -> float:
+    """Pressure angle at the least Delta; an arctangent, because an arccosine loses half the digits of a small angle."""
+    u, v = at[k + COS], at[k + SIN]
+    radial = at[k + ROCKER] - (at[k + K0] + at[k + K1] * v - at[k + K2] * u)
+    axial = at[k + Z0] - at[k + SA] * v
+    return math.atan2(math.sqrt(radial * radial + axial * axial), math.sqrt(at[k + DELTA]))
 
 
 @kernel
@@ -74,12 +88,16 @@ def margin(
             if margin is not None:
                 margin[i] = delta / (at[k + COUPLER] * at[k + COUPLER]) if known else math.nan
             if rotatable is not None:
-                rotatable[i] = (1.0 if delta > 0.0 else 0.0) if known and code != st.UNDECIDABLE else math.nan
-            if max_pressure_angle is not None:
-                angle = math.atan2(at[k + ACROSS], math.sqrt(delta)) if code == st.OK else math.nan
-                max_pressure_angle[i] = angle
-            if phi_min is not None:
-                phi_min[i] = math.atan2(at[k + SIN], at[k + COS]) if known else math.nan
+                turns = 1.0 if delta > 0.0 else 0.0
+                rotatable[i] = turns if known & (code != st.UNDECIDABLE) else math.nan
             if error is not None:
                 per_square = 1.0 / (at[k + COUPLER] * at[k + COUPLER])
                 error[i] = (at[k + TOLERANCE] + 4.0 * EPS * abs(delta)) * per_square if known else math.nan
+        # What needs a call comes last: only without one a loop over designs vectorises.
+        if max_pressure_angle is not None:
+            for k in range(count):
+                max_pressure_angle[start + k] = _angle(at, k) if status[start + k] == st.OK else math.nan
+        if phi_min is not None:
+            for k in range(count):
+                known = status[start + k] != st.INVALID_INPUT
+                phi_min[start + k] = math.atan2(at[k + SIN], at[k + COS]) if known else math.nan

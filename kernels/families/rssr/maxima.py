@@ -175,6 +175,7 @@ def _finish(count: int, m: Array, order: int, target: float, first: Array | None
             m[i + _SIZE],
             m[i + _U],
             m[i + _V],
+            peak,
         )
         m[i + _ROUNDING] = relative
         m[i + _REACH] = 2.0 * abs(dy / d2y) + 4.0 * relative * math.sqrt(abs(y / d2y)) + _TURNED

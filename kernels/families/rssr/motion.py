@@ -32,7 +32,6 @@ def poses(
     x_c: Numbers | None,
     y_c: Numbers | None,
     z_c: Numbers | None,
-    k0: Numbers | None = None,
 ) -> None:
     """Position, transfer functions, discriminant, pressure angle and joints of every design at its crank angles.
 
@@ -44,7 +43,6 @@ def poses(
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; complex128 where they depend on the designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT
     psi ... z_c : (n, m) out, or None: what is None is neither computed nor compiled; complex128 if an input is
-    k0 : (n,) constant of the closure by :func:`kernels.families.rssr.exact.exact_constant`, or None: plain arithmetic
 
     Notes
     -----
@@ -52,20 +50,18 @@ def poses(
     The dead-point band is the rounding error of Delta itself; outside it the sign of Delta is right for the given
     doubles up to the rounding of K.  ``discriminant`` is a length to the fourth power and leaves float64 at scales
     beyond 1e+-77, as inf or 0; the status is decided on Delta in units of the crank.
-    Largest error over the 422 oracle rows, hard ones included: 2.1 x 2^-53 x max(cond, |y|).
+    Largest error over the 422 oracle rows, hard ones included: 2.1 x 2^-53 x max(cond, |y|); 134 was found by search,
+    where the coupler is short.  :mod:`kernels.families.rssr.precise` has neither.
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
         row = i if cos_phi.shape[0] > 1 else 0
-        constant = r.k0
-        if k0 is not None:
-            constant = k0[i]
         two_ac = 2.0 * designs[i, 0] * designs[i, 2]
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
             hu, hv = r.ca * u, r.ca * v
             x, y, w1 = r.e - u, r.y0 + hv, r.k2 * u - r.k1 * v
-            w = constant - w1
+            w = r.k0 - w1
             rr = x * x + y * y
             delta = rr - w * w
             tolerance = discriminant_tolerance(r, x, y, w)

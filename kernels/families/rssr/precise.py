@@ -1,0 +1,226 @@
+"""Motion of the spatial crank-rocker for exactly the given doubles: the closure in twice the working precision.
+
+In plain arithmetic (:mod:`kernels.families.rssr.motion`) the discriminant of a short coupler, and the constant of a
+long one, are small differences of large numbers: their rounding exceeds what rounding the inputs once would do.  Here
+everything between the given numbers and the results is a pair of numbers (:mod:`kernels.twofold`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kernels import status as st
+from kernels import twofold as two
+from kernels._jit import inline, kernel
+from kernels.families.rssr.closure import EPS, Array, Status, reduce_scaled, unit_scale
+from kernels.twofold import Twofold
+
+# Columns of the constants: high and low parts in units of the crank, mirrored to branch +1; then plain numbers.
+E, Y0, CA, K0, K1, K2, HALF, RHO, Z0, SA = range(0, 20, 2)
+MX, MY, MW, VALID, BRANCH = range(20, 25)
+PRECISE_COLUMNS = 25
+BAND = 4.0 * EPS  # what rounding the given numbers does to Delta: a dead point made in float64 is still one
+_ROW = 64  # designs side by side; the constant stride lets the loop over them become vector code
+
+
+@inline
+def _put(at: Array, column: int, k: int, x: Twofold) -> None:
+    at[column * _ROW + k], at[(column + 1) * _ROW + k] = x
+
+
+@inline
+def _reduce(at: Array, k: int) -> None:
+    """The constants of one design of the block in place of its parameters, which are the first eight rows."""
+    a, b, c, e = at[k], at[_ROW + k], at[2 * _ROW + k], at[3 * _ROW + k]
+    f, g, alpha, branch = at[4 * _ROW + k], at[5 * _ROW + k], at[6 * _ROW + k], at[7 * _ROW + k]
+    r = reduce_scaled(a, b, c, e, f, g, alpha, branch)
+    at[MX * _ROW + k], at[MY * _ROW + k], at[MW * _ROW + k] = abs(r.e) + 1.0, abs(r.y0) + 1.0, r.w_size
+    at[VALID * _ROW + k], at[BRANCH * _ROW + k] = 1.0 if r.valid else 0.0, branch
+    sa, ca = two.sine_cosine(alpha)
+    one = (1.0, 0.0)
+    per_a, per_c = two.divide(one, (a, 0.0), 1.0 / a), two.divide(one, (c, 0.0), 1.0 / c)
+    # f^2 + g^2 - 2 f g cos(alpha) without cancellation near alpha = 0, pi (K*): 1 - cos = sin^2/(1 + cos)
+    sign = 1.0 if ca[0] >= 0.0 else -1.0
+    gap = two.two_sum(f, -sign * g)
+    whole = two.add(one, (sign * ca[0], sign * ca[1]))
+    far = two.divide(two.multiply(sa, sa), whole, 1.0 / whole[0])
+    far = two.multiply(two.two_product(2.0 * sign * f, g), far)
+    square = two.multiply(two.two_sum(c, -b), two.two_sum(c, b))
+    square = two.add(square, two.add(two.two_product(a, a), two.two_product(e, e)))
+    square = two.add(square, two.add(two.multiply(gap, gap), far))
+    _put(at, E, k, two.scale(per_a, e))
+    _put(at, Y0, k, two.multiply(two.scale(sa, branch * f), per_a))
+    _put(at, CA, k, (branch * ca[0], branch * ca[1]))
+    _put(at, K0, k, two.multiply(two.multiply(square, (0.5 * per_c[0], 0.5 * per_c[1])), per_a))
+    _put(at, K1, k, two.multiply(two.scale(sa, g), per_c))
+    _put(at, K2, k, two.scale(per_c, e))
+    _put(at, HALF, k, two.scale(per_c, 0.5 * a))
+    _put(at, RHO, k, two.scale(per_a, c))
+    _put(at, Z0, k, two.multiply(two.add(two.scale(ca, f), (-g, 0.0)), per_a))
+    _put(at, SA, k, sa)
+
+
+@kernel
+def precise_constants(designs: Array, out: Array) -> None:
+    """The numbers of :class:`Reduced` in twice the working precision.
+
+    Parameters
+    ----------
+    designs : (n, 8) columns of :class:`Design`
+    out : (n, PRECISE_COLUMNS) out
+    """
+    at = np.empty(PRECISE_COLUMNS * _ROW)
+    for start in range(0, designs.shape[0], _ROW):
+        count = min(_ROW, designs.shape[0] - start)
+        for k in range(count):
+            unit = unit_scale(designs[start + k, 2])
+            for column in range(8):
+                at[column * _ROW + k] = designs[start + k, column] * (unit if column < 6 else 1.0)
+        for k in range(count):
+            _reduce(at, k)
+        for k in range(count):
+            for column in range(PRECISE_COLUMNS):
+                out[start + k, column] = at[column * _ROW + k]
+
+
+@inline
+def _get(constants: Array, row: int, i: int) -> Twofold:
+    return constants[i, row], constants[i, row + 1]
+
+
+@kernel
+def precise_poses(
+    designs: Array,
+    constants: Array,
+    cos_phi: Array,
+    sin_phi: Array,
+    status: Status,
+    psi: Array | None,
+    dpsi: Array | None,
+    d2psi: Array | None,
+    d3psi: Array | None,
+    sin_psi: Array | None,
+    cos_psi: Array | None,
+    discriminant: Array | None,
+    pressure_angle: Array | None,
+    x_b: Array | None,
+    y_b: Array | None,
+    z_b: Array | None,
+    x_c: Array | None,
+    y_c: Array | None,
+    z_c: Array | None,
+) -> None:
+    """As :func:`kernels.families.rssr.motion.poses`, for float64 designs only, correct to a few roundings.
+
+    Parameters
+    ----------
+    designs : (n, 8) columns of :class:`Design`
+    constants : (n, PRECISE_COLUMNS) by :func:`precise_constants`
+    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
+    status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT; the band of dead
+        points is half as wide as in plain arithmetic
+    psi ... z_c : (n, m) out, or None: what is None is neither computed nor compiled
+
+    Notes
+    -----
+    (u, v) = (cos phi, sin phi) are taken as they are; what their rounding takes from the unit length is put into W, so
+    that it only displaces the crank pin.  The derivatives follow from d . d = b^2: with d' = p k' - B' and so on,
+    d . d' = 0, d . d'' = -d' . d', d . d''' = -3 d' . d'', where no term is much larger than what it belongs to.
+    """
+    for i in range(designs.shape[0]):
+        row = i if cos_phi.shape[0] > 1 else 0
+        e, y0, ca = _get(constants, E, i), _get(constants, Y0, i), _get(constants, CA, i)
+        k0, k1, k2 = _get(constants, K0, i), _get(constants, K1, i), _get(constants, K2, i)
+        half, rho, z0, sa = (
+            _get(constants, HALF, i),
+            _get(constants, RHO, i),
+            _get(constants, Z0, i),
+            _get(constants, SA, i),
+        )
+        mx, my, mw = constants[i, MX], constants[i, MY], constants[i, MW]
+        valid, branch = constants[i, VALID] != 0.0, constants[i, BRANCH]
+        two_ac = 2.0 * designs[i, 0] * designs[i, 2]
+        for j in range(cos_phi.shape[1]):
+            u, v = cos_phi[row, j], sin_phi[row, j]
+            uu, vv = two.two_product(u, u), two.two_product(v, v)
+            length = two.two_sum(uu[0], vv[0])
+            excess = (length[0] - 1.0) + (length[1] + (uu[1] + vv[1]))  # u^2 + v^2 - 1
+            x = two.add(e, (-u, 0.0))
+            y = two.add(y0, two.scale(ca, v))
+            w = two.add(k0, two.subtract(two.scale(k1, v), two.scale(k2, u)))
+            w = two.normal(w[0], w[1] + half[0] * excess)
+            rr = two.add(two.multiply(x, x), two.multiply(y, y))
+            delta = two.subtract(rr, two.multiply(w, w))
+            tolerance = BAND * (abs(x[0]) * mx + abs(y[0]) * my + abs(w[0]) * mw)
+            tolerance += BAND * BAND * (mx * mx + my * my + mw * mw)
+            code = st.OK
+            if not valid or delta[0] != delta[0]:
+                code = st.INVALID_INPUT
+            elif delta[0] < -tolerance:
+                code = st.NOT_ASSEMBLED
+            elif delta[0] <= tolerance:
+                code = st.DEAD_POINT if rr[0] > tolerance else st.SINGULAR
+            status[i, j] = code
+            if discriminant is not None:
+                discriminant[i, j] = (delta[0] * two_ac) * two_ac if valid else math.nan
+            has_angle = code == st.OK or code == st.DEAD_POINT
+            per_rr = 1.0 / rr[0] if has_angle else math.nan
+            t = two.root(delta) if code == st.OK else (0.0, 0.0)
+            # minus cosine and minus sine of the mirrored rocker angle
+            c = two.divide(two.add(two.multiply(x, w), two.multiply(y, t)), rr, per_rr)
+            s = two.divide(two.subtract(two.multiply(x, t), two.multiply(y, w)), rr, per_rr)
+            if cos_psi is not None:
+                cos_psi[i, j] = -c[0]
+            if sin_psi is not None:
+                sin_psi[i, j] = -branch * s[0]
+            if psi is not None:
+                psi[i, j] = math.atan2(-branch * s[0], -c[0])
+            if x_b is not None:
+                x_b[i, j] = designs[i, 0] * u if valid else math.nan
+            if y_b is not None:
+                y_b[i, j] = branch * designs[i, 0] * y[0] if valid else math.nan
+            z = two.subtract(z0, two.scale(sa, v))
+            if z_b is not None:
+                z_b[i, j] = designs[i, 0] * z[0] + designs[i, 5] if valid else math.nan
+            if x_c is not None:
+                x_c[i, j] = designs[i, 3] - designs[i, 2] * c[0]
+            if y_c is not None:
+                y_c[i, j] = -branch * designs[i, 2] * s[0]
+            if z_c is not None:
+                z_c[i, j] = designs[i, 5] if has_angle else math.nan
+            if pressure_angle is not None:
+                across = math.hypot(two.subtract(rho, w)[0], z[0])
+                pressure_angle[i, j] = math.atan2(across, t[0]) if has_angle else math.nan
+            if dpsi is not None or d2psi is not None or d3psi is not None:
+                # d from the crank pin to the ball, B' = (-v, hu, -su), B'' = (-u, -hv, sv), k = -(c, s), k' = (s, -c)
+                dx, dy = two.subtract(x, two.multiply(rho, c)), two.add(y, two.multiply(rho, s))  # dy, dz negative
+                hu, su = two.scale(ca, u), two.scale(sa, u)
+                rise = two.multiply(rho, t)
+                per_rise = 1.0 / rise[0] if code == st.OK else math.nan
+                p = two.subtract(two.multiply(z, su), two.add(two.multiply(dy, hu), two.scale(dx, v)))
+                p = two.divide(p, rise, per_rise)
+                if dpsi is not None:
+                    dpsi[i, j] = branch * p[0]
+                if d2psi is not None or d3psi is not None:
+                    hv, sv = two.scale(ca, v), two.scale(sa, v)
+                    inward, turn = two.subtract(rho, w), two.multiply(p, rho)
+                    centre = two.multiply(p, turn)
+                    d1x, d1y = two.add(two.multiply(turn, s), (v, 0.0)), two.add(two.multiply(turn, c), hu)  # d1y neg.
+                    square = two.add(two.add(two.multiply(d1x, d1x), two.multiply(d1y, d1y)), two.multiply(su, su))
+                    along = two.subtract(two.scale(dx, u), two.multiply(centre, inward))
+                    along = two.add(along, two.subtract(two.multiply(z, sv), two.multiply(dy, hv)))
+                    q = two.divide(two.add(square, along), rise, per_rise)  # negative
+                    if d2psi is not None:
+                        d2psi[i, j] = -branch * q[0]
+                    if d3psi is not None:
+                        swing = two.multiply(q, rho)
+                        d2x = two.subtract(two.add(two.multiply(centre, c), (u, 0.0)), two.multiply(swing, s))
+                        d2y = two.add(two.add(two.multiply(centre, s), two.multiply(swing, c)), hv)
+                        both = two.subtract(two.multiply(d1x, d2x), two.multiply(d1y, d2y))
+                        both = two.subtract(both, two.multiply(su, sv))
+                        both = two.add(both, two.multiply(two.multiply(turn, q), inward))
+                        cube = two.multiply(p, two.add(two.multiply(p, p), (-1.0, 0.0)))
+                        both = two.divide(both, rise, per_rise)
+                        d3psi[i, j] = branch * two.subtract(cube, two.scale(both, 3.0))[0]
