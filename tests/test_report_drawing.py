@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.report.drawing import mechanism_figure, stages
+from sweep.report.drawing import mechanism_caption, mechanism_figure, stages
 from sweep.report.figures import house_style
 from tests.report_dataset import curve
 
@@ -77,3 +77,19 @@ def test_figure_has_a_row_for_each_mechanism_and_two_views_of_a_spatial_stage() 
     ]
     upper, lower = figure.axes[0], figure.axes[3]
     assert (upper.get_xlim(), upper.get_ylim()) == (lower.get_xlim(), lower.get_ylim())
+
+
+def test_caption_says_only_what_is_drawn() -> None:
+    several = mechanism_caption(curve("optimum", 12.0))
+    assert "frame of its own" in several and "Front" in several and "Triangles" in several
+    path = pd.DataFrame({"role": "optimum", "x_m": np.cos(PHI), "y_m": 1.1 * np.sin(PHI)})
+    alone = mechanism_caption(path)
+    assert not any(word in alone for word in ("frame", "Front", "Triangles", "Grey"))
+
+
+def test_shafts_are_numbered_through_the_chain() -> None:
+    with house_style():
+        figure = mechanism_figure(curve("optimum", 12.0), "mm")
+    assert figure is not None
+    front, _, second = ([text.get_text() for text in axes.texts] for axes in figure.axes)
+    assert front == ["1", "2"] and second == ["2"]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from sweep.report.quantities import number, percent_change, quantity
+from sweep.report.quantities import change, number, percent_change, quantity
 
 RPM = 2.0 * math.pi / 60.0
 
@@ -88,3 +88,13 @@ def test_percent_change_names_its_direction() -> None:
     assert percent_change(-11.0, 10.0) == "10\u00a0% more"
     assert percent_change(10.0, 10.0) == "the same"
     assert percent_change(1.0, 0.0) == percent_change(math.nan, 1.0) == ""
+
+
+def test_changes_of_sizes_angles_and_signed_values() -> None:
+    assert change(quantity("max_abs_d2s", "length"), 8.0, 10.0) == "20\u00a0% less"
+    assert change(quantity("swing", "rad"), -math.radians(50.0), math.radians(40.0)) == "10° more"
+    # From one side of zero to the other there are no percents.
+    assert change(quantity("max_x_m2", "length"), -45.0, 55.0) == "100\u00a0mm less"
+    assert change(quantity("max_x_m2", "length"), 66.0, 55.0) == "20\u00a0% more"
+    assert change(quantity("dwell_angle", "rad"), 1.0, 1.0 + 1e-15) == "the same"
+    assert change(quantity("max_abs_d2s", "length"), math.nan, 1.0) == ""

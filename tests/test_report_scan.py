@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from pathlib import Path
 
@@ -111,3 +112,9 @@ def naive_front(points: np.ndarray) -> np.ndarray:
     unique = np.unique(points, axis=0)
     kept = [p for p in unique if not any((q <= p).all() and (q != p).any() for q in unique)]
     return np.array(kept).reshape(-1, 2)
+
+
+def test_an_angle_comes_back_into_a_whole_turn_only() -> None:
+    whole = Cells.of_range("offset2", -math.pi, math.pi, 8)
+    assert whole.placed(math.radians(318.9)) == pytest.approx(math.radians(-41.1))
+    assert Cells.of_range("alpha", 0.0, 1.5, 8).placed(5.0) == 5.0

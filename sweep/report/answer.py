@@ -123,7 +123,8 @@ def answer(data: Dataset, found: Scan) -> list[str]:
     second = data.second
     if second is not None and _is_number(data.result, second):
         sentences.append(_comparison(data, second))
-    sentences += _limit_sentences(limit_states(data))
+    # What [locus] prescribes as an axis is a space that was searched; as a value it holds by construction.
+    sentences += _limit_sentences([s for s in limit_states(data) if s.shown.name not in data.study.prescribed])
     sentences += _edge_sentence(data)
     sentences += _sweep_sentences(data, found)
     sentences.append(front_sentence(data))
@@ -136,7 +137,8 @@ def answer(data: Dataset, found: Scan) -> list[str]:
 def _headline(data: Dataset, who: str, name: str) -> str:
     shown = quantity(name, data.units.get(name, ""))
     value, old = _value(data.result, name), _value(data.reference, name)
-    text = f"{who} has a {shown.words} of {_with_speed(data, shown, value)}"
+    article = "an" if shown.words[0] in "aeiou" else "a"
+    text = f"{who} has {article} {shown.words} of {_with_speed(data, shown, value)}"
     if data.reference is None:
         return f"{text}."
     if math.isnan(old):

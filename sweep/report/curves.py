@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from sweep.families.base import Array
     from sweep.study import Limit
 
+FAR_LIMIT = 2.5  # limits farther out than so many times the curves are not drawn: the curves would be flat
 SHOWN = re.compile(r"(d[23]?)?(s|psi)|dev|pressure_angle\d*")
 
 
@@ -122,7 +123,7 @@ def motion_caption(curves: pd.DataFrame, position: str, speed: str, window: tupl
     text = "Derivatives are with respect to the crank angle" + (f"; right-hand scales: at {speed}. " if speed else ". ")
     if not turning(curves, position):
         text += "Every curve starts at the lowest position, from which the position counts. "
-    text += "Dotted red: limits."
+    text += "Dotted red: limits that are near the curves."
     if window is not None and "dev" in curves:
         text += f" Shaded: the part of the stroke in which the deviation counts, {100 * window[0]:g} to"
         text += f" {100 * window[1]:g} % from the lowest position; outside it the curve may leave the panel."
@@ -154,6 +155,8 @@ def _limit_lines(axes: Axes, name: str, shown: Quantity, limits: tuple[Limit, ..
             (limit.minimum, (f"min_{name}",)),
         ):
             if value is None or limit.output not in outputs:
+                continue
+            if abs(value) * shown.factor > FAR_LIMIT * np.abs(axes.dataLim.intervaly).max():
                 continue
             both = limit.output.startswith("max_abs_") and not name.startswith("pressure_angle")
             for sign in (1.0, -1.0) if both else (1.0,):

@@ -93,6 +93,26 @@ def _joint(letter: str, path: Array) -> Joint:
     return Joint(letter, path, middle + np.array([x, y]) @ directions[:2], straight=False)
 
 
+def mechanism_caption(curves: pd.DataFrame) -> str:
+    """What the figure shows, of what there is to see."""
+    drawn = [stages(turn) for _, turn in curves.groupby("role", sort=False)]
+    every = [stage for found in drawn for stage in found]
+    text = f"{POSITIONS} positions of the crank at equal steps, the first one bold."
+    if any(joint.pivot is not None for stage in every for joint in stage.held):
+        text += " Triangles: fixed pivots."
+    if any(stage.held for stage in every):
+        text += " Grey: paths of joints on a link that turns; green: paths of the others."
+    if any(stage.spatial for stage in every):
+        text += " Front: seen along z, the output axis of the stage; side: seen along x."
+    if any(len(found) > 1 for found in drawn):
+        text += (
+            " Every stage is drawn in a frame of its own; equal numbers at the pivots are the same shaft. The chain"
+            " fixes the angle by which that shaft drives the next stage (phi2 = kappa2 psi1 + offset2), but not where"
+            " along the shaft that stage stands, nor how its frame is turned about it: both are left to the designer."
+        )
+    return text
+
+
 def mechanism_figure(curves: pd.DataFrame, unit: str) -> Figure | None:
     """Every stage in several positions, result beside or above reference; a spatial stage in two projections."""
     drawn = [(str(role), stages(turn)) for role, turn in curves.groupby("role", sort=False)]
@@ -110,11 +130,12 @@ def mechanism_figure(curves: pd.DataFrame, unit: str) -> Figure | None:
         figure = new_figure(WIDTH, min((WIDTH / len(drawn) - 0.9) / shapes[0], 3.4) + 1.0)
         panels = figure.subplots(1, len(drawn), squeeze=False).T
     else:
-        figure = new_figure(WIDTH, (min((WIDTH - 0.9 * len(views)) / sum(shapes), 3.4) + 1.0) * len(drawn))
+        figure = new_figure(WIDTH, (min((WIDTH - 0.9 * len(views)) / sum(shapes), 3.4) + 1.25) * len(drawn))
         panels = figure.subplots(len(drawn), len(views), squeeze=False, width_ratios=shapes)
     for row, (role, found) in zip(panels, drawn, strict=True):
         for axes, (k, plane), frame in zip(row, views, frames, strict=True):
-            _draw(axes, found[k], plane, REFERENCE if role == "reference" else OPTIMUM, unit)
+            shaft = k + 1 if len(found) > 1 else None
+            _draw(axes, found[k], plane, REFERENCE if role == "reference" else OPTIMUM, unit, shaft)
             axes.set_xlim(frame[0])
             axes.set_ylim(frame[1])
             side = "" if len(views) == len(found) else {"xy": ", front", "zy": ", side"}[plane]
@@ -133,7 +154,8 @@ def _frame(same: list[Stage], plane: str) -> tuple[tuple[float, float], tuple[fl
     return (float(low[0]) - margin, float(high[0]) + margin), (float(low[1]) - margin, float(high[1]) + margin)
 
 
-def _draw(axes: Axes, stage: Stage, plane: str, colour: str, unit: str) -> None:
+def _draw(axes: Axes, stage: Stage, plane: str, colour: str, unit: str, shaft: int | None) -> None:
+    """A stage seen in a plane; with ``shaft``, the number of its crank's shaft, the pivots are numbered from there."""
     columns = ["xyz".index(letter) for letter in plane]
     joints = [*stage.held, *stage.free]
     poses = np.linspace(0, len(joints[0].path), POSITIONS, endpoint=False).astype(int)
@@ -169,6 +191,10 @@ def _draw(axes: Axes, stage: Stage, plane: str, colour: str, unit: str) -> None:
         if joint.pivot is not None:
             x, y = joint.pivot[columns]
             axes.scatter(x, y, marker="^", s=60, color="#333333", zorder=6)
+            if shaft is not None:
+                ring = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "#333333", "linewidth": 0.7}
+                axes.annotate(str(shaft), (x, y), (6, 6), textcoords="offset points", bbox=ring, zorder=7)
+                shaft += 1
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlabel(f"{plane[0]} [{unit}]" if unit else plane[0])
     axes.set_ylabel(f"{plane[1]} [{unit}]" if unit else plane[1])

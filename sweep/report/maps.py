@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -43,7 +44,13 @@ def map_figure(
     marks: dict[str, tuple[float, float]],
     overlays: Sequence[Overlay],
 ) -> Figure:
-    """Best objective per cell, and the share of the cell's designs that is feasible; ``marks`` in stored units."""
+    """Best objective per cell, and the share of the cell's designs that is feasible; ``marks`` in stored units.
+
+    Marks outside the space that was searched are left out.
+    """
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import NullLocator
+
     figure = new_figure(WIDTH, 4.6)
     panels = figure.subplots(1, 2 if objective is not None else 1, squeeze=False, sharex=True, sharey=True)[0]
     (x_cells, x_shown), (y_cells, y_shown) = x, y
@@ -58,12 +65,21 @@ def map_figure(
         axes.grid(False)
         norm = _norm(values) if colours == "viridis_r" else _share_norm(values)
         mesh = axes.pcolormesh(*edges, values, cmap=colours, norm=norm, rasterized=True)
-        figure.colorbar(mesh, ax=axes, label=label, orientation="horizontal", location="top", shrink=0.9, aspect=32)
+        bar = figure.colorbar(mesh, ax=axes, label=label, location="top", shrink=0.9, aspect=32)
+        if isinstance(norm, LogNorm):
+            bar.set_ticks(_round_between(float(norm.vmin or 0.0), float(norm.vmax or 0.0)))
+            bar.ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+            bar.ax.xaxis.set_minor_locator(NullLocator())
         axes.set_xlabel(x_shown.label)
         limits = axes.get_xlim(), axes.get_ylim()
         for overlay in overlays:
             axes.plot(overlay.x * x_shown.factor, overlay.y * y_shown.factor, color=LIMIT, label=overlay.label)
-        _place(axes, marks, x_shown.factor, y_shown.factor)
+        inside = {
+            role: (x, y)
+            for role, (x, y) in marks.items()
+            if _between(x * x_shown.factor, limits[0]) and _between(y * y_shown.factor, limits[1])
+        }
+        _place(axes, inside, x_shown.factor, y_shown.factor)
         axes.set_xlim(limits[0])
         axes.set_ylim(limits[1])
     panels[0].set_ylabel(y_shown.label)
@@ -144,6 +160,11 @@ def trade_off_figure(
     return figure
 
 
+def _between(value: float, ends: tuple[float, float]) -> bool:
+    edge = 1e-9 * (ends[1] - ends[0])
+    return ends[0] - edge <= value <= ends[1] + edge
+
+
 def _place(axes: Axes, marks: dict[str, tuple[float, float]], x_factor: float, y_factor: float) -> None:
     for role, (x, y) in marks.items():
         if np.isfinite(x) and np.isfinite(y):
@@ -163,6 +184,13 @@ def _norm(values: Array) -> object:
     if low > 0.0 and high > 10.0 * low:
         return LogNorm(low, high)
     return Normalize(low, high if high > low else low + 1.0)
+
+
+def _round_between(low: float, high: float) -> list[float]:
+    """1, 2, 5, 10, ... between two bounds, at most eight of them."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    ticks = [step * 10.0**k for k in decades for step in (1.0, 2.0, 5.0) if low <= step * 10.0**k <= high]
+    return ticks[:: max(1, -(-len(ticks) // 8))]
 
 
 def _share_norm(values: Array) -> object:

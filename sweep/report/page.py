@@ -14,7 +14,7 @@ from sweep.errors import StoreError
 from sweep.report import answer, front, robust, tables
 from sweep.report.curves import motion_caption, motion_figure
 from sweep.report.dataset import Dataset, read_dataset
-from sweep.report.drawing import COORDINATE, mechanism_figure
+from sweep.report.drawing import COORDINATE, mechanism_caption, mechanism_figure
 from sweep.report.figures import TEMPLATES, Saved, house_style, save
 from sweep.report.files import copy_tables, write_survivors
 from sweep.report.maps import Overlay, line_figure, map_figure, trade_off_figure
@@ -98,7 +98,7 @@ def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[s
     pair = most_telling(found)
     if pair is not None:
         x, y = pair
-        at = {role: (float(row[x]), float(row[y])) for role, row in marks.items()}
+        at = {role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()}
         known = overlays(study, x, y)
         grid = found.grids[pair]
         sides = (by_name[x], axis_quantity(data, x)), (by_name[y], axis_quantity(data, y))
@@ -183,6 +183,7 @@ def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Sa
         tolerances=robust.tolerance_rows(data),
         tolerance=robust.tolerance_words(data),
         slopes=robust.slope_rows(data),
+        mechanism="" if data.curves is None else mechanism_caption(data.curves),
         motion=""
         if data.curves is None
         else motion_caption(data.curves, data.study.family.position, answer.rpm(data.study.speed), data.study.window),

@@ -13,9 +13,11 @@ POSITIONS = {
     "psi": "follower angle",
     "dev": "deviation from the line",
     "phi0": "crank angle between the limit positions",
+    "phi_ext": "crank angle of the extended position",
+    "phi_fold": "crank angle of the folded position",
 }
 DERIVATIVES = ("", "velocity", "acceleration", "jerk")
-SYMBOLS = {"psi": "ψ", "phi": "φ", "phi0": "φ₀"}
+SYMBOLS = {"psi": "ψ", "phi": "φ", "phi0": "φ₀", "phi_ext": "φ extended", "phi_fold": "φ folded"}
 PRIMES = ("", "′", "″", "‴")
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
 REDUCTIONS = {
@@ -129,7 +131,7 @@ def _derivative(base: str) -> tuple[int, str, str]:
 def _pretty_unit(unit: str) -> str:
     if unit in ("1", "", "ratio", "sign", "none", "count"):
         return ""
-    return re.sub(r"\^(\d)", lambda m: POWERS[int(m[1])], unit)
+    return re.sub(r"\^(\d)", lambda m: POWERS[int(m[1])], unit).replace("*", "\u00b7")
 
 
 def number(value: float, digits: int = 5) -> str:
@@ -163,7 +165,9 @@ def change(shown: Quantity, new: float, old: float) -> str:
     difference = new - old if signed else abs(new) - abs(old)
     if not math.isfinite(difference):
         return ""
-    return f"{shown.show(abs(difference), 3)} {'less' if difference < 0.0 else 'more'}" if difference else "the same"
+    if abs(difference) <= 1e-9 * max(abs(new), abs(old)):
+        return "the same"
+    return f"{shown.show(abs(difference), 3)} {'less' if difference < 0.0 else 'more'}"
 
 
 def percent_change(new: float, old: float) -> str:

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from sweep.report.dataset import Dataset
 
 
+STEPS = {"length": (0.1, "0.1\u00a0mm"), "angle": (math.radians(0.1), "0.1°")}
+
+
 @dataclass(frozen=True)
 class ToleranceRow:
     """One output of the optimum as it is made; ``within`` is the share that keeps the limit."""
@@ -27,7 +30,7 @@ class ToleranceRow:
 
 @dataclass(frozen=True)
 class SlopeRow:
-    """One dimension: change of the objective in percent where it grows, and where it shrinks, by 0.1 mm or 0.1 deg."""
+    """One dimension: change of the objective in percent where it grows, and where it shrinks, by ``step``."""
 
     name: str
     text: str
@@ -73,12 +76,11 @@ def slope_rows(data: Dataset) -> list[SlopeRow]:
     ranked = []
     for row in own:
         name, value = str(row["parameter"]), abs(float(row["value"]))
-        angle = units.get(name) == "angle"
-        step = math.radians(0.1) if angle else 0.1
+        step, step_words = STEPS.get(units.get(name, ""), (0.1, "0.1"))
         if not value > 0.0 or math.isnan(row["growing"]):
             continue
         up, down = (100.0 * step * x / value for x in (row["growing"], -row["shrinking"]))
-        shown = SlopeRow(name, texts.get(name, ""), "0.1°" if angle else "0.1\u00a0mm", _percent(up), _percent(down))
+        shown = SlopeRow(name, texts.get(name, ""), step_words, _percent(up), _percent(down))
         ranked.append((max(abs(up), abs(down)), shown))
     return [shown for _, shown in sorted(ranked, key=lambda pair: -pair[0])]
 

@@ -46,6 +46,13 @@ class Cells:
         """Equal cells of a sampled axis."""
         return cls(name, np.linspace(low, high, count + 1), np.full(count, 1.0 / count))
 
+    def placed(self, value: float) -> float:
+        """A value of this axis; an angle swept over a whole turn comes back into it."""
+        low, high = float(self.edges[0]), float(self.edges[-1])
+        if abs(high - low - 2.0 * np.pi) > 1e-6 * np.pi:
+            return value
+        return low + (value - low) % (2.0 * np.pi)
+
     def index(self, values: Array) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
         """Cell of each value."""
         return np.clip(np.searchsorted(self.edges, values, side="right") - 1, 0, self.edges.size - 2)

@@ -13,6 +13,10 @@ from sweep.report.quantities import change, number, quantity
 if TYPE_CHECKING:
     from sweep.report.dataset import Dataset
     from sweep.report.scan import Scan
+    from sweep.study import Study
+
+
+FEW = 3
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,8 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
             space = "follows from the limit positions" if p.name in links else "fitted"
         elif p.choices is not None and high > low:
             space = " or ".join(number(choice) for choice in p.choices)
+        elif high > low and (listed := _few_values(study, p.name)) is not None:
+            space = f"{' or '.join(number(value * shown.factor) for value in listed[:-1])} or {shown.show(listed[-1])}"
         elif high > low:
             space = f"{number(low * shown.factor)} to {shown.show(high)}"
             near = 1e-9 * (high - low)
@@ -99,6 +105,12 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
         space += ", then scaled" if p.name in study.rescaled else ""
         rows.append(ParameterRow(p.name, p.text, shown.show(value, 6), shown.show(other, 6), space, edge))
     return rows
+
+
+def _few_values(study: Study, name: str) -> list[float] | None:
+    """The values of an axis that has two or three of them: they are a choice, not a range."""
+    axis = next((axis for axis in study.space.axes if axis.name == name), None)
+    return None if axis is None or axis.values is None or len(axis.values) > FEW else axis.values.tolist()
 
 
 def fates(data: Dataset, found: Scan) -> list[Fate]:
