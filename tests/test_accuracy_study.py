@@ -12,12 +12,13 @@ from mpmath import mp, mpf
 
 from kernels.families import rssr
 from kernels.families.rssr.single import dense_acceleration_single
-from studies.accuracy import marks, oracle, reference, tables
+from studies.accuracy import answer, digits, lookup, marks, oracle, publish, reference, tables
 from studies.accuracy.methods import acceleration_methods, swing_methods
 from studies.accuracy.regions import margins, regions, rotatable
 from sweep.sampling import turn
 
 NAMES = ("a", "b", "c", "e", "f", "g", "alpha", "sigma")
+ROOT = Path(__file__).parents[1]
 ROWS = [r for r in oracle.read(Path(__file__).parent / "oracle", "rssr") if r["feasible"] and not r["alpha_exact"]]
 
 
@@ -41,8 +42,9 @@ def areas():
 def test_regions_hold_what_they_say(areas):
     angles = {area.name: np.degrees(np.arccos(np.sqrt(margins(area.designs)))) for area in areas}
     assert all(np.isfinite(a).all() and a.size == 12 for a in angles.values())
-    assert angles["ordinary"].max() < 60.0 <= angles["60-75"].min() <= angles["60-75"].max() < 75.0
-    assert angles["beyond 84"].min() >= 84.0 and angles["change point"].min() > 89.0
+    assert angles["ordinary"].max() < 60.0 <= angles["pressure angle 60-75"].min()
+    assert angles["pressure angle 60-75"].max() < 75.0
+    assert angles["pressure angle beyond 84"].min() >= 84.0 and angles["change point"].min() > 89.0
 
 
 def test_reference_of_extrema_is_above_every_sample_and_close(areas):
@@ -89,21 +91,96 @@ def test_single_precision_grid_is_single_precision(areas):
     assert np.isnan(single[0])
 
 
-def test_cheapest_setting_within_the_bound_is_named():
-    rows = [
-        ("here", "grid", 32, 1e-2, 10.0, 0),
-        ("here", "grid", 64, 1e-4, 20.0, 0),
-        ("here", "grid", 128, 1e-6, 40.0, 0),
+COLUMNS = ("quantity", "region", "method", "setting", "largest_error", "ns_per_design", "unanswered")
+
+
+def made_up(
+    region, grid=((32, 1e-2, 10.0), (64, 1e-4, 20.0), (128, 1e-6, 40.0)), own=((1e-3, 1e-9, 5.0), (1e-8, 1e-9, 5.0))
+):
+    """Two curves of a quantity: a grid and the house's own method."""
+    rows = [("max_abs_d2psi", region, "grid, float64", *point, 0) for point in grid]
+    return rows + [("max_abs_d2psi", region, "accuracy=", *point, 0) for point in own]
+
+
+def test_coarsest_setting_within_the_bound_is_named():
+    work = pd.DataFrame(
+        [*made_up("here"), ("max_abs_d2psi", "there", "grid, float64", 128, 1e-6, 40.0, 3)], columns=COLUMNS
+    )
+    lines = tables.reached_table(work, 1e-3)
+    assert lines[2:] == ["| here | N 64: 20 ns, x 4 | 1e-3: 5 ns |", "| there | - | - |"]
+
+
+def test_advice_names_the_cheapest_method_that_keeps_the_bound_everywhere():
+    rows = made_up("ordinary") + made_up("long coupler", own=((1e-3, 2e-4, 7.0), (1e-8, 1e-9, 9.0)))
+    rows += made_up("change point", grid=((32, 1.0, 10.0),), own=((1e-3, 1e-5, 900.0), (1e-8, 1e-6, 1000.0)))
+    work = pd.DataFrame(rows, columns=COLUMNS)
+    storage = pd.DataFrame(
+        {"dtype": ["float64", "float32"], "bytes_per_row": [80.0, 60.0], "margin": [0.0, 6e-8]}
+        | {key: [0.0, 5e-8] for key in ("max_pressure_angle", "max_abs_d2psi")}
+    )
+    coarse, fine, *_, edge, disk = answer.advice(work, storage)
+    assert "use `accuracy = 1e-3`. 6 ns a design on average, 7 ns in the dearest region (long coupler)" in coarse
+    assert "Next best: grid, float64, N 64, 3.3 times as long." in coarse
+    assert "use `accuracy = 1e-8`" in fine and "Nothing else measured" in fine
+    assert "A grid of 32 is off by 100 %" in edge
+    assert "saves 25 % of the bytes and adds 6.0e-08" in disk
+
+
+def test_one_digit_more_multiplies_the_time_of_a_grid_by_what_was_measured():
+    rows = made_up("ordinary", grid=((32, 1e-3, 10.0), (1000, 1e-6, 270.0)))
+    lines = answer.answer(pd.DataFrame(rows + made_up("pressure angle beyond 84"), columns=COLUMNS))
+    (grid,) = (line for line in lines if "| grid, float64 |" in line)
+    assert grid.endswith("| x 3.00 |")
+    (own,) = (line for line in lines if "**`accuracy=`**" in line)
+    assert own.endswith("| x 1.00 |")
+
+
+def test_marks_in_the_readme_are_those_of_the_page():
+    readme, page = ((ROOT / name).read_text() for name in ("README.md", "docs/accuracy.md"))
+    table = readme.split(publish.BEGIN)[1].split(publish.END)[0].strip()
+    assert table.startswith("| mark | asked | measured | met |")
+    assert table in page
+
+
+def test_marks_replace_what_stands_between_the_two_comments():
+    text = f"before\n{publish.BEGIN}\nold \\1\n{publish.END}\nafter\n"
+    new = publish.with_marks(text, ["| a \\| b |"])
+    assert new == f"before\n{publish.BEGIN}\n\n| a \\| b |\n\n{publish.END}\nafter\n"
+    with pytest.raises(ValueError, match="allowed: one"):
+        publish.with_marks("nothing here", [])
+
+
+def test_tables_of_the_turn_give_angles_between_their_samples(areas):
+    """Halving the step divides the error of straight lines by 4 and of cubics by 16, through the jump at pi too."""
+    designs = areas[0].designs
+    phi = np.random.default_rng(2).uniform(0.0, 2.0 * np.pi, (len(designs), 60))
+    methods = {(m.curve, m.setting): m.run(designs) for m in lookup.position_methods((128, 256), phi)}
+    exact = methods["direct, float64", 1]
+    for curve, rate in (("table, straight lines", 4.0), ("table, cubics", 16.0)):
+        coarse, fine = (np.sqrt((np.sin(methods[curve, n] - exact) ** 2).mean()) for n in (128, 256))
+        assert coarse / fine == pytest.approx(rate, rel=0.15)
+    assert np.abs(np.sin(methods["direct, twice float64", 1] - exact)).max() < 1e-14
+    assert 1e-8 < np.abs(np.sin(methods["direct, float32", 1] - exact)).max() < 1e-5
+    first = [
+        reference.angle_error(got, reference.position(d, p))
+        for got, d, p in zip(exact[:, 0], designs, phi[:, 0], strict=True)
     ]
-    rows += [("here", "accuracy=", 1e-8, 1e-9, 5.0, 0), ("there", "grid", 128, 1e-6, 40.0, 3)]
-    names = ("region", "method", "setting", "largest_error", "ns_per_design", "unanswered")
-    lines = tables.reached_table(pd.DataFrame(rows, columns=list(names)), 1e-3)
-    assert lines[2:] == ["| here | N 64: 20 ns, x4 | 1e-08: 5 ns |", "| there | - | - |"]
+    assert max(first) < 1e-14
 
 
-def test_page_becomes_html_with_tables_and_marks():
-    page = "# Title\n\nText with `code` and **no**.\n\n| a | b |\n|---|---|\n| 1 \\| 2 | 3 < 4 |\n"
-    body = tables.html_body(page, after="# Title", inserted="<img>")
-    assert "<h1>Title</h1>\n<img>" in body
+def test_a_digit_more_costs_the_optimiser_looks_that_can_be_counted():
+    history = digits.optimiser_digits(1, 20)
+    assert (history["looks"].diff().dropna() >= 0).all() and history["looks"].min() >= 20
+    assert history["converged"].iloc[0] == 1
+    targets = digits.optimiser_targets(1)
+    assert targets["difference_from_finest"].max() < 1e-6
+
+
+def test_page_becomes_html_with_tables_lists_and_pictures():
+    page = "# Title\n\n![what it shows](figures/a.svg)\n\nText with `code` and **no**.\n\n* one\n* two\n\n"
+    page += "| a | b |\n|---|---|\n| 1 \\| 2 | 3 < 4 |\n"
+    body = tables.html_body(page, {"figures/a.svg": "data:image/svg+xml;base64,AA"})
+    assert '<h1>Title</h1>\n<img alt="what it shows" src="data:image/svg+xml;base64,AA">' in body
+    assert "<ul><li>one</li><li>two</li></ul>" in body
     assert "<td>1 | 2</td><td>3 &lt; 4</td>" in body
     assert "<code>code</code>" in body and "<strong>no</strong>" in body

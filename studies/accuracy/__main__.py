@@ -7,13 +7,14 @@ import json
 import time
 from pathlib import Path
 
-from studies.accuracy import costs, oracle
-from studies.accuracy.diagrams import extrema_table, position_table
+from studies.accuracy import costs, digits, oracle
+from studies.accuracy.diagrams import position_table, work_table
 from studies.accuracy.exact import exact_table
 from studies.accuracy.figures import draw
 from studies.accuracy.machine import description
-from studies.accuracy.marks import marks
+from studies.accuracy.marks import marks, smoke_mark, study_mark, tables_mark
 from studies.accuracy.page import Measured, html, markdown
+from studies.accuracy.publish import publish
 from studies.accuracy.regions import regions
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,35 +37,50 @@ def main() -> None:
 
     import pandas as pd
 
-    areas = regions(60 if smoke else 500, SEED)
+    areas = regions(16 if smoke else 500, SEED)
     done("regions")
+    work = work_table(areas, smoke)
+    done("work and precision")
+    positions, exact = position_table(areas, 10 if smoke else 400), exact_table(areas, 10 if smoke else 400)
+    factors = oracle.frame(oracle.factors(TABLES, few=smoke))
+    done("errors against 60 digits and the 25-digit tables")
+    outputs, storage = costs.output_costs(areas[0].designs, smoke), costs.storage_costs(20_000 if smoke else 200_000)
+    optimiser = (
+        digits.optimiser_digits(1 if smoke else 4, 40 if smoke else 1),
+        digits.optimiser_targets(1 if smoke else 8),
+    )
+    done("outputs, storage, optimiser")
+    reached = [*marks(*((500, 50) if smoke else (100_000, 2000))), tables_mark(factors)]
+    if not smoke:
+        reached += [smoke_mark(), study_mark(time.perf_counter() - start)]
+    done("marks")
     found = Measured(
         machine=description(),
         smoke=smoke,
         regions=tuple((area.name, area.text) for area in areas),
-        marks=pd.DataFrame([mark.__dict__ for mark in marks(*((500, 50) if smoke else (100_000, 2000)))]),
-        positions=position_table(areas, 15 if smoke else 400),
-        exact=exact_table(areas, 15 if smoke else 400),
-        extrema=extrema_table(areas, smoke),
-        outputs=costs.output_costs(areas[0].designs, smoke),
-        storage=costs.storage_costs(20_000 if smoke else 500_000),
-        optimiser=costs.optimiser_costs((1e-4, 1e-8) if smoke else (1e-3, 1e-4, 1e-6, 1e-8, 1e-10), 1 if smoke else 8),
-        oracle=oracle.frame(oracle.factors(TABLES)),
+        marks=pd.DataFrame([mark.__dict__ for mark in reached]),
+        positions=positions,
+        exact=exact,
+        work=work,
+        outputs=outputs,
+        storage=storage,
+        digits=optimiser[0],
+        targets=optimiser[1],
+        oracle=factors,
         worst=pd.DataFrame(json.loads((TABLES / "worst_found.json").read_text())["rows"])[
             ["region", "output", "factor"]
         ],
         peers=pd.read_parquet(out / "peers.parquet") if (out / "peers.parquet").exists() else None,
     )
-    done("measured")
     out.mkdir(parents=True, exist_ok=True)
     for name, table in found.tables():
         table.to_parquet(out / f"{name}.parquet", index=False)
-    figures = draw(found.extrema, out / "figures")
+    figures = draw(found.work, found.outputs, found.regions, out / "figures")
     page = markdown(found)
     (out / "accuracy.md").write_text(page, encoding="utf-8")
     (out / "report.html").write_text(html(page, figures), encoding="utf-8")
     if not smoke:
-        (ROOT / "docs" / "accuracy.md").write_text(page, encoding="utf-8")
+        publish(found, page, figures, ROOT)
     done(f"{out.relative_to(ROOT) if out.is_relative_to(ROOT) else out}/report.html")
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from studies.accuracy import reference
+from studies.accuracy.lookup import position_methods
 from studies.accuracy.methods import Method, acceleration_methods, swing_methods
 from studies.accuracy.regions import Region
 from studies.accuracy.timing import seconds
@@ -18,45 +19,83 @@ if TYPE_CHECKING:
 
 SAMPLES = tuple(2**k for k in range(5, 15))
 TARGETS = tuple(10.0**-k for k in range(3, 13))
+DESIGNS, ANGLES, JUDGED = 200, 360, 12  # of positions: designs a region, crank angles timed, crank angles judged
 SMOKE_SAMPLES, SMOKE_TARGETS = (32, 256, 2048), (1e-3, 1e-6, 1e-10)
 
 
-def extrema_table(regions: Iterable[Region], smoke: bool) -> pd.DataFrame:
-    """One row per quantity, region and method: largest and median relative error, time, share without an answer."""
+def work_table(regions: Iterable[Region], smoke: bool) -> pd.DataFrame:
+    """One row per quantity, region and method: largest and median error, time, how many designs without an answer.
+
+    Errors of extrema are relative, those of positions in rad; a time is that of one design, of positions for
+    :data:`ANGLES` of its crank angles.
+    """
     samples, targets = (SMOKE_SAMPLES, SMOKE_TARGETS) if smoke else (SAMPLES, TARGETS)
     rows = []
     for region in regions:
+        rows += _position_rows(region, samples, 8 if smoke else DESIGNS)
         exact = reference.largest_acceleration(region.designs)
-        rows += _rows("max_abs_d2psi", region, region.designs, exact, acceleration_methods(samples, targets))
+        rows += _extremum_rows("max_abs_d2psi", region, region.designs, exact, acceleration_methods(samples, targets))
         swing = reference.swing(region.designs)
         swings = np.isfinite(swing)
         designs = np.ascontiguousarray(region.designs[swings])
-        rows += _rows("swing", region, designs, swing[swings], swing_methods(samples, targets))
+        rows += _extremum_rows("swing", region, designs, swing[swings], swing_methods(samples, targets))
     return _frame(rows)
 
 
-def _rows(
+def _position_rows(region: Region, samples: tuple[int, ...], count: int) -> list[dict[str, object]]:
+    """Errors at few angles, a third of them crowded about the sharpest place; times at many."""
+    generator = np.random.default_rng(len(region.name))
+    designs = np.ascontiguousarray(region.designs[:count])
+    many = generator.uniform(0.0, 2.0 * np.pi, (len(designs), ANGLES))
+    few = many[:, :JUDGED].copy()
+    away = 10.0 ** generator.uniform(-9.0, 0.0, (len(designs), JUDGED // 3))
+    few[:, : JUDGED // 3] = np.mod(reference.hardest_angle(designs)[:, None] + away, 2.0 * np.pi)
+    exact = [[reference.position(design, phi) for phi in row] for design, row in zip(designs, few, strict=True)]
+    rows = []
+    for judged, timed in zip(position_methods(samples, few), position_methods(samples, many), strict=True):
+        found = judged.run(designs)
+        error = np.array(
+            [
+                max(
+                    reference.angle_error(got, psi) if np.isfinite(got) else np.nan
+                    for got, psi in zip(*pair, strict=True)
+                )
+                for pair in zip(found, exact, strict=True)
+            ]
+        )
+        took = seconds(_call(timed.run, designs), repeats=3)
+        rows.append(_row("psi", region, judged, error, took))
+    return rows
+
+
+def _extremum_rows(
     quantity: str, region: Region, designs: Array, exact: Array, methods: list[Method]
 ) -> list[dict[str, object]]:
-    found = []
-    for method in methods:
-        error = np.abs(method.run(designs) - exact) / exact
-        answered = np.isfinite(error)
-        took = seconds(_call(method.run, designs), repeats=3)
-        found.append(
-            {
-                "quantity": quantity,
-                "region": region.name,
-                "method": method.curve,
-                "setting": method.setting,
-                "largest_error": float(error[answered].max(initial=0.0)),
-                "median_error": float(np.median(error[answered])) if answered.any() else float("nan"),
-                "ns_per_design": 1e9 * took / len(designs),
-                "designs": len(designs),
-                "unanswered": int((~answered).sum()),
-            }
+    return [
+        _row(
+            quantity,
+            region,
+            method,
+            np.abs(method.run(designs) - exact) / exact,
+            seconds(_call(method.run, designs), repeats=3),
         )
-    return found
+        for method in methods
+    ]
+
+
+def _row(quantity: str, region: Region, method: Method, error: Array, took: float) -> dict[str, object]:
+    answered = np.isfinite(error)
+    return {
+        "quantity": quantity,
+        "region": region.name,
+        "method": method.curve,
+        "setting": method.setting,
+        "largest_error": float(error[answered].max(initial=0.0)),
+        "median_error": float(np.median(error[answered])) if answered.any() else float("nan"),
+        "ns_per_design": 1e9 * took / len(error),
+        "designs": len(error),
+        "unanswered": int((~answered).sum()),
+    }
 
 
 def _call(run: Callable[[Array], Array], designs: Array) -> Callable[[], Array]:

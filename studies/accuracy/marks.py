@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import tempfile
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +20,9 @@ from studies.accuracy.regions import BRANCH, drawn, rotatable
 from studies.accuracy.timing import seconds
 from sweep.families.base import Array
 from sweep.sampling import Index, Status, turn
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TARGET = 1e-8
 WRONG_PEAK = 1e-4  # relative difference in height that no refinement of the right peak leaves
@@ -38,6 +45,31 @@ def marks(designs: int, decisions: int) -> list[Mark]:
     turning = rotatable(designs, 2024)
     mixed = drawn(designs, np.random.default_rng(7))
     return [*_maxima(turning), *_margin(mixed), _verdicts(decisions), _two_threads(mixed)]
+
+
+def tables_mark(oracle: pd.DataFrame) -> Mark:
+    """Rows of the oracle tables whose error is above the factor of their sheet; ``oracle`` as of :mod:`.oracle`."""
+    beyond = int((~(oracle["factor"] <= oracle["allowed"])).sum())
+    rows = int(oracle.groupby(["table", "kind"])["rows"].max().sum())
+    text = f"{beyond} of {len(oracle)}, over {rows} rows; {int(oracle['undecidable'].sum())} declared undecidable"
+    return Mark(
+        "quantities and kinds of oracle rows beyond the factor of their sheet (8, 16, 64)", "0", text, beyond == 0
+    )
+
+
+def smoke_mark() -> Mark:
+    """The smoke version of this study, run as a user would, with warm kernels."""
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        command = [sys.executable, "-m", "studies.accuracy", "--smoke", "--out", folder]
+        subprocess.run(command, check=True, capture_output=True)
+        took = time.perf_counter() - start
+    return Mark("`make smoke-accuracy` [s]", "20", f"{took:.0f}", took <= 20.0)
+
+
+def study_mark(took: float) -> Mark:
+    """The study that measures all this."""
+    return Mark("`make study-accuracy` [min]", "10", f"{took / 60.0:.1f}", took <= 600.0)
 
 
 def _true_maxima(designs: Array, target: float) -> Callable[[], tuple[Array, Array, Array]]:
@@ -192,7 +224,8 @@ def _two_threads(designs: Array) -> Mark:
         rssr.margin(part, status, out[0], out[1], None, None, None)
         rssr.true_maxima(part, cos, sin, TARGET, status, None, None, None, None, out[2], None)
 
-    took = seconds(lambda: _together(work, list(zip(halves, statuses, strict=True))), REPEATS)
+    parts = list(zip(halves, statuses, strict=True))
+    took = seconds(lambda: _together(work, parts), REPEATS, clock=time.perf_counter)
     each, turning = 1e9 * took / len(designs), float(np.mean(np.concatenate(statuses) == st.OK))
     text = f"{each:.0f} of wall time; {100 * turning:.0f} % of the designs turn and have their maximum found"
     assert set(np.unique(designs[:, BRANCH])) <= {-1.0, 1.0}

@@ -45,9 +45,11 @@ def read(folder: Path, name: str) -> list[dict[str, Any]]:
     return rows
 
 
-def factors(folder: Path) -> list[Worst]:
-    """Every table whose sheet states a tolerance for motions, limit positions, pressure angles and dwells."""
-    judges = (_rssr, _rssp, _needle, _composite, _limits, _pressure, _geared_dwell)
+def factors(folder: Path, few: bool = False) -> list[Worst]:
+    """Every table whose sheet states a tolerance; with ``few`` the crank-rocker's poses and limit positions alone."""
+    if few:
+        return [*_rssr(folder), *_limits(folder)]
+    judges = (_rssr, _rssp, _needle, _composite, _limits, _pressure, _largest_pressure, _synthesis, _geared_dwell)
     return [worst for judge in judges for worst in judge(folder)]
 
 
@@ -181,7 +183,7 @@ def _limits(folder: Path) -> list[Worst]:
 
 
 def _pressure(folder: Path) -> list[Worst]:
-    """Pressure angles of crank-rockers, row by row, and the largest over the turn of both families."""
+    """Pressure angles of crank-rockers."""
     rows = [row | row["expected"] for row in read(folder, "pressure") if row["kind"] == "rssr"]
     names = ("a", "b", "c", "e", "f", "g", "alpha")
     table = {name: _column([row["inputs"] for row in rows], name) for name in (*names, "phi")}
@@ -194,6 +196,39 @@ def _pressure(folder: Path) -> list[Worst]:
     }
     got = sweep.evaluate("rssr", table, list(wanted))
     return _judge("pressure", rows, got, wanted, 64.0, (), lambda row, k: float(row["sens"][k]))
+
+
+def _largest_pressure(folder: Path) -> list[Worst]:
+    """Largest pressure angle over the turn; the rows carry no sensitivity, the unit is a rounding of one radian."""
+    found = []
+    for family, names in (("rssr", ("a", "b", "c", "e", "f", "g", "alpha")), ("rssp", ("a", "b", "e", "f", "alpha"))):
+        rows = [row | row["expected"] for row in read(folder, "pressure") if row["kind"] == f"extrema_{family}"]
+        rows = [row | {"kind": f"extrema, {family}"} for row in rows]
+        table = {name: _column([row["inputs"] for row in rows], name) for name in names}
+        table |= {"branch": [float(row["inputs"].get("sigma", 1)) for row in rows]}
+        got = sweep.summarise(family, table, "max_pressure_angle", accuracy=FINEST)
+        keys = {"max_pressure_angle": ("theta_max", ["theta_max"])}
+        rows = [{key: value for key, value in row.items() if key != "case"} for row in rows]
+        found += _judge("largest pressure angle", rows, got, keys, 64.0, (), lambda row, key: 1.0)
+    return found
+
+
+def _synthesis(folder: Path) -> list[Worst]:
+    """Links from a requirement: of the two solutions of every row, the one nearer to the table's crank."""
+    found = []
+    for family, mechanism, inputs, outputs in (
+        ("rssr", "RSSR", {"swing": "psi0", "psi1": "psi1", "g": "g"}, {"a": "a", "b": "b", "c": "c"}),
+        ("rssp", "RSSP", {"stroke": "S0"}, {"a": "a", "b": "b", "s_ext": "S1"}),
+    ):
+        rows = [row for row in read(folder, "synthesis") if row["mechanism"] == mechanism]
+        keys = inputs | {name: name for name in ("phi0", "e", "f", "alpha")}
+        both = sweep.synthesise(family, {ours: _column(rows, theirs) for ours, theirs in keys.items()})
+        crank = np.array(_column(rows, "a"))[both.index.to_numpy()]
+        nearest = both.assign(off=(both["a"] / crank - 1.0).abs().fillna(np.inf)).sort_values("off", kind="stable")
+        got = nearest[~nearest.index.duplicated()].sort_index()
+        wanted = {name: (key, [key]) for name, key in (outputs | {"phi_ext": "phi1"}).items()}
+        found += _judge(f"synthesis of {family}", rows, got, wanted, 16.0, ("phi_ext",))
+    return found
 
 
 def _geared_dwell(folder: Path) -> list[Worst]:

@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from studies.accuracy.answer import BOUNDS, QUANTITIES, advice, answer
 from studies.accuracy.reference import ORDERS
-from studies.accuracy.tables import pipe_table, reached_table
+from studies.accuracy.tables import HOUSE, duration, html_body, pipe_table, power, prose, reached_table
 from studies.accuracy.tables import significant as sig
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from sweep.report.figures import Saved
-
-HARD = ("change point",)
 
 
 @dataclass(frozen=True)
@@ -30,10 +29,11 @@ class Measured:
     marks: pd.DataFrame
     positions: pd.DataFrame
     exact: pd.DataFrame
-    extrema: pd.DataFrame
+    work: pd.DataFrame
     outputs: pd.DataFrame
     storage: pd.DataFrame
-    optimiser: pd.DataFrame
+    digits: pd.DataFrame
+    targets: pd.DataFrame
     oracle: pd.DataFrame
     worst: pd.DataFrame
     peers: pd.DataFrame | None
@@ -49,140 +49,175 @@ def markdown(m: Measured) -> str:
     parts = [
         "# What accuracy costs in time",
         "",
-        "Written by `make study-accuracy`; do not edit. Ratios travel between machines, nanoseconds do not.",
+        *prose(
+            "Smoke version: few designs, rough figures."
+            if m.smoke
+            else "Every figure here is measured, none is typed.",
+            f"Machine: {m.machine}. Ratios travel between machines, nanoseconds do not. `make study-accuracy` writes",
+            "this page and the tables behind it, `results/accuracy/*.parquet`; what is promised is in promises.md.",
+        ),
         "",
-        f"Measured on {m.machine}." + (" Smoke version: few designs, rough figures." if m.smoke else ""),
-        *_advice(m),
+        *_picture("accuracy", "Time per design against largest error, ordinary crank-rockers, one curve per method"),
+        *answer(m.work),
+        "",
+        "## What to use",
+        "",
+        "Picked from the measurements: the cheapest method that keeps the bound, at its coarsest setting that does.",
+        "",
+        *advice(m.work, m.storage),
         *_marks(m),
         *_regions(m),
-        *_extrema(m),
+        *_work(m),
         *_outputs(m),
+        *_storage(m),
+        *_optimiser(m),
         *_positions(m),
+        *_exact(m),
         *_peers(m),
-        *_oracle(m),
+        *_known(m),
     ]
     return "\n".join(parts) + "\n"
 
 
-def _points(m: Measured, quantity: str, method: str, setting: float) -> pd.DataFrame:
-    t = m.extrema
-    return t[(t["quantity"] == quantity) & (t["method"] == method) & np.isclose(t["setting"], setting)]
+def _picture(name: str, text: str) -> list[str]:
+    return [f"![{text}](figures/{name}.svg)", ""]
 
 
-def _advice(m: Measured) -> list[str]:
-    target = sorted(m.extrema.loc[m.extrema["method"] == "accuracy=", "setting"].unique())
-    grids = m.extrema.loc[m.extrema["method"] == "grid, float64", "setting"]
-    grid = grids.iloc[(grids - 360.0).abs().argmin()]
-    rough, fine = target[-1], target[0]
-    lines = ["", "## What to use", ""]
-    rows = []
-    for name, method, setting in (
-        (f"nightly map: `accuracy = {rough:g}`", "accuracy=", rough),
-        (f"drawing, optimum, comparison with a measurement: `accuracy = {fine:g}`", "accuracy=", fine),
-        (f"plain grid, `samples = {grid:g}`, for comparison", "grid, float64", grid),
-    ):
-        points = _points(m, "max_abs_d2psi", method, setting)
-        easy = points[~points["region"].isin(HARD)]
-        hard = points[points["region"].isin(HARD)]
-        rows.append(
-            [
-                name,
-                f"{easy['ns_per_design'].median():.0f}",
-                sig(easy["largest_error"].max()),
-                f"{hard['ns_per_design'].max():.0f}",
-                sig(hard["largest_error"].max()) + _unanswered(hard),
-            ]
-        )
-    lines += pipe_table(
-        ["max of abs d2psi", "ns per design", "largest error", "ns at change points", "error there"], rows
-    )
-    lines += [
-        "",
-        "For a nightly map take the coarsest target: the maximum is refined between the samples anyway, so it",
-        "costs about what the finest does, and less than a grid that is wrong by percents. For a drawing take the",
-        "finest; what it adds is paid only by designs near a change point. A grid pays only where the whole curve is",
-        "wanted. float32 halves the time of a grid and is good for sorting out, not for a number that is kept.",
-        "The largest error is that of long couplers, where it is the rounding of their own length; without them it is",
-        f"{sig(_easiest(m, rough))} and {sig(_easiest(m, fine))}.",
-    ]
-    return lines
-
-
-def _easiest(m: Measured, target: float) -> float:
-    points = _points(m, "max_abs_d2psi", "accuracy=", target)
-    return float(points.loc[~points["region"].isin((*HARD, "long coupler")), "largest_error"].max())
-
-
-def _unanswered(points: pd.DataFrame) -> str:
-    count, total = int(points["unanswered"].sum()), int(points["designs"].sum())
-    return f" ({count} of {total} not answered)" if count else ""
+def marks_table(marks: pd.DataFrame) -> list[str]:
+    """The marks: what was asked, what was measured, whether it was met; also for the README."""
+    rows = [[mark, asked, measured, "yes" if met else "**no**"] for mark, asked, measured, met in marks.to_numpy()]
+    return pipe_table(["mark", "asked", "measured", "met"], rows)
 
 
 def _marks(m: Measured) -> list[str]:
-    rows = [
-        [r.name_, r.asked, r.measured, "yes" if r.met else "**no**"]
-        for r in m.marks.rename(columns={"name": "name_"}).itertuples()
+    return [
+        "",
+        "## Marks",
+        "",
+        "Set before the code was written; missed ones are named as such.",
+        "",
+        *marks_table(m.marks),
     ]
-    return ["", "## Marks", "", *pipe_table(["mark", "asked", "measured", "met"], rows)]
 
 
 def _regions(m: Measured) -> list[str]:
     return [
         "",
-        "## Regions",
+        "## Work and precision by region",
+        "",
+        "Crank-rockers with random proportions, sorted by what makes them hard for float64 and for a grid:",
         "",
         *pipe_table(["region", "what its designs have in common"], [list(r) for r in m.regions]),
+        "",
     ]
 
 
-def _extrema(m: Measured) -> list[str]:
-    lines = ["", "## Work and precision", ""]
-    lines += [
-        "Error: largest relative error over the designs of a region against 65 536 samples, a quarter of them",
-        "crowded about the least discriminant, and halving. Time: one thread, shortest of three. Each cell: the",
-        "cheapest setting whose largest error is below the bound, its time per design, and the ratio to",
-        "`accuracy=`; - where no setting reaches it. The reference's height of the acceleration is computed in 60",
-        "digits; at change points the rounding of the discriminant alone leaves 1e-6 to any method in float64.",
+def _work(m: Measured) -> list[str]:
+    lines = [
+        *prose(
+            "Time: processor time of one thread, shortest of three. Extrema: largest relative error over the",
+            "designs of a region against 65 536 samples, a quarter of them crowded about the least discriminant,",
+            "and halving; the height of the acceleration in 60 digits. At change points the rounding of the",
+            "discriminant alone leaves 1e-6 to any method in float64. Positions: each design is asked for its",
+            "rocker angle at 360 random crank angles; a table is made first and read between its samples. Error in",
+            "rad against 60 digits, at angles a third of which crowd about the sharpest place of the motion.",
+        ),
+        "",
     ]
-    for quantity, title in (("max_abs_d2psi", "Largest acceleration over the turn"), ("swing", "Swing")):
-        for bound in (1e-3, 1e-6, 1e-9):
-            part = m.extrema[m.extrema["quantity"] == quantity]
-            lines += ["", f"### {title}, error below {bound:g}", "", *reached_table(part, bound)]
-    return lines
+    for quantity, title in QUANTITIES.items():
+        lines += [f"### {title[0].upper()}{title[1:]}", ""]
+        lines += _picture(
+            f"accuracy-{quantity}", f"Time per design against largest error: {title}, one panel per region"
+        )
+        for bound in BOUNDS:
+            part = m.work[m.work["quantity"] == quantity]
+            lines += [
+                f"Error below {power(bound)}: coarsest setting that keeps it, its time per design, how many times that"
+                f" of {HOUSE[quantity]}; - where none does.",
+                "",
+                *reached_table(part, bound),
+                "",
+            ]
+    return lines[:-1]
 
 
 def _outputs(m: Measured) -> list[str]:
     rows = [
-        [r.kind, r.outputs, sig(r.ns_per_pose), sig(r.times_position), f"{r.ns_per_design:.0f}"]
-        for r in m.outputs.itertuples()
+        [r.kind, r.what, r.family, f"{sig(r.nanoseconds)} ns", sig(r.times_position)]
+        for r in m.outputs[m.outputs["per"] == "pose"].itertuples()
     ]
-    lines = ["", "## What each further output costs", ""]
-    lines += ["Crank-rocker, 720 poses a turn, each line computed alone; x psi: times the angle psi at a pose."]
-    lines += ["", *pipe_table(["kind", "outputs", "ns per pose", "x psi", "ns per design"], rows)]
-    stored = [
-        [r.dtype, sig(r.bytes_per_row), f"{r.ns_per_design:.0f}", sig(r.largest_error_of_storing)]
-        for r in m.storage.itertuples()
-    ]
-    lines += ["", "## float32 or float64 on disk", ""]
-    lines += [
-        "A Sobol sample, rotatable designs kept, three outputs with their error estimates, seven parameters in float64."
-    ]
-    lines += [
-        "",
-        *pipe_table(["dtype", "bytes per row", "ns per design swept", "largest relative error added"], stored),
-    ]
-    digits = [
-        [f"{r.accuracy:g}", sig(r.seconds_per_start), str(r.converged), sig(r.difference_from_finest)]
-        for r in m.optimiser.itertuples()
-    ]
-    lines += ["", "## One more digit in the optimiser", ""]
-    lines += [
-        "Least acceleration for a swing of 45 degrees and a pressure angle of at most 45 degrees, four variables."
+    turns = [
+        [r.kind, r.what, r.family, duration(r.nanoseconds), sig(r.times_position)]
+        for r in m.outputs[m.outputs["per"] == "design"].itertuples()
     ]
     return [
-        *lines,
         "",
-        *pipe_table(["accuracy", "s per start", "converged", "optimum differs from the finest by"], digits),
+        "## What each further output costs",
+        "",
+        *prose(
+            "Every output and every effect of the register, each line computed alone with all it needs, in one run,",
+            "360 poses a turn. Pose outputs, and how many times the angle psi:",
+        ),
+        "",
+        *pipe_table(["how", "outputs", "family", "per pose", "x psi"], rows),
+        "",
+        "Outputs of a whole turn, and how many times psi at its 360 poses (extrema to 1e-8):",
+        "",
+        *pipe_table(["how", "outputs", "family", "per design", "x a turn of psi"], turns),
+        "",
+        *_picture("accuracy-prices", "What each output and effect costs, per pose and per design"),
+    ][:-1]
+
+
+def _storage(m: Measured) -> list[str]:
+    rows = [
+        [
+            r.dtype,
+            sig(r.bytes_per_row),
+            f"{r.ns_per_design:.0f}",
+            sig(r.margin),
+            sig(r.max_pressure_angle),
+            sig(r.max_abs_d2psi),
+        ]
+        for r in m.storage.itertuples()
+    ]
+    head = ["dtype", "bytes per row", "ns per design swept", "margin", "max_pressure_angle", "max_abs_d2psi"]
+    return [
+        "",
+        "## float32 or float64 on disk",
+        "",
+        *prose(
+            "A Sobol sample, rotatable designs kept, three outputs with their error estimates, seven parameters in",
+            "float64; processor time of the whole sweep, and the largest relative error that storing adds.",
+        ),
+        "",
+        *pipe_table(head, rows),
+    ]
+
+
+def _optimiser(m: Measured) -> list[str]:
+    first, last = m.digits.iloc[0], m.digits.iloc[-1]
+    coarse, fine = m.targets.iloc[0], m.targets.iloc[-1]
+    rows = [[f"1e-{r.digits}", f"{r.looks:.0f}", f"{r.milliseconds:.0f}"] for r in m.digits.itertuples()]
+    more = (last["milliseconds"] / first["milliseconds"]) ** (1.0 / (last["digits"] - first["digits"]))
+    return [
+        "",
+        "## One more digit in the optimiser",
+        "",
+        *prose(
+            "Least acceleration for a swing of 45 degrees and a pressure angle of at most 45 degrees, four",
+            "variables: looks at the mechanism, and processor time, until the best design stays that near to the",
+            f"end of the search. Medians of {first['converged']:.0f} of {first['starts']:.0f} starts.",
+        ),
+        "",
+        *pipe_table(["optimum within", "looks", "ms"], rows),
+        "",
+        *prose(
+            f"One digit more multiplies the time by {more:.2f}. The extrema inside are refined to rounding whatever",
+            f"`accuracy` says: `accuracy = {power(coarse['accuracy'])}` and `{power(fine['accuracy'])}` find optima",
+            f"that differ by {sig(coarse['difference_from_finest'])}, in {coarse['ms_per_start']:.0f} and",
+            f"{fine['ms_per_start']:.0f} ms a start.",
+        ),
     ]
 
 
@@ -206,7 +241,6 @@ def _positions(m: Measured) -> list[str]:
         "Random crank angles. cond is the sum over all inputs of abs(x dy/dx): what one rounding of each input does.",
         "",
         *pipe_table(head, rows),
-        *_exact(m),
     ]
 
 
@@ -220,11 +254,13 @@ def _exact(m: Measured) -> list[str]:
         "",
         "## Doubles meant to the last bit",
         "",
-        "A long coupler multiplies the rounding of its own length; that is in cond, and a drawing loses nothing by it.",
-        "Where the given doubles are exact (a comparison with exact arithmetic), it is lost. `sweep.evaluate` closes",
-        "the linkage in twice the working precision; sweeps do not, and are several times faster on grids.",
-        "Largest errors, of the derivatives relative to their own size plus that of the velocity; times with a design",
-        "per pose:",
+        *prose(
+            "A long coupler multiplies the rounding of its own length; that is in cond, and a drawing loses nothing",
+            "by it. Where the given doubles are exact (a comparison with exact arithmetic), it is lost.",
+            "`sweep.evaluate` closes the linkage in twice the working precision; sweeps do not, and are several",
+            "times faster on grids. Largest errors, of the derivatives relative to their own size plus that of the",
+            "velocity; times with a design per pose:",
+        ),
         "",
         *pipe_table(head, rows),
     ]
@@ -238,49 +274,71 @@ def _peers(m: Measured) -> list[str]:
     distance = sig(m.peers["distance_of_rocker_pins"].max())
     return [
         *lines,
-        "One planar four-bar, rocker at evenly spaced crank angles, each tool by its fastest way, on this machine",
-        f"(`make bench-peers`); their rocker pins differ by at most {distance} cranks.",
+        *prose(
+            "One planar four-bar, rocker at evenly spaced crank angles, each tool by its fastest way, on this",
+            f"machine (`make bench-peers`); their rocker pins differ by at most {distance} cranks.",
+        ),
         "",
         *pipe_table(["what", "ns per crank angle", "times as fast"], rows),
     ]
 
 
-def _oracle(m: Measured) -> list[str]:
+def _known(m: Measured) -> list[str]:
+    """Largest factors: one line per table, then by quantity and kind of row, then what the search found."""
     lines = [
         "",
         "## Largest known factors",
         "",
-        "Every row of the 25-digit tables, in units of 2^-53 max(cond, abs y); for the geared dwell drive, whose",
-        "table has no cond, of abs y, its lower derivatives and what one rounding of phi does.",
-        f"Rows declared undecidable: {int(m.oracle['undecidable'].sum())}. `make search-worse` looks for worse poses.",
+        *prose(
+            "Every row of the 25-digit tables, in units of 2^-53 max(cond, abs y); for the geared dwell drive,",
+            "whose table has no cond, of abs y, its lower derivatives and what one rounding of phi does; for the",
+            "largest pressure angle of a rounding of one radian. Rows declared undecidable:",
+            f"{int(m.oracle['undecidable'].sum())}.",
+        ),
+        "",
     ]
-    for table, part in m.oracle.groupby("table", sort=False):
+    tables = m.oracle.groupby("table", sort=False)
+    summary = []
+    for table, part in tables:
+        top = part.sort_values("factor").iloc[-1]
+        count = f"{part.groupby('quantity')['rows'].sum().max()}"
+        kind = str(top["kind"]).replace("_", " ")
+        summary.append([table, count, f"{top['allowed']:g}", sig(top["factor"]), top["quantity"], kind])
+    lines += pipe_table(["table", "rows", "allowed", "largest known", "of", "among"], summary)
+    for table, part in tables:
         quantities = list(dict.fromkeys(part["quantity"]))
         rows = []
-        for kind, cells in part.groupby("kind", sort=False):
+        for name, cells in part.groupby("kind", sort=False):
             known = dict(zip(cells["quantity"], cells["factor"], strict=True))
             count = str(int(cells["rows"].max()))
-            rows.append([str(kind).replace("_", " "), count, *(sig(known.get(q, np.nan)) for q in quantities)])
+            rows.append([str(name).replace("_", " "), count, *(sig(known.get(q, np.nan)) for q in quantities)])
         lines += ["", f"### {table}, allowed {part['allowed'].iloc[0]:g}", ""]
         lines += pipe_table(["kind of rows", "rows", *quantities], rows)
     worst = [
         [str(region), *(sig(part.loc[part["output"] == name, "factor"].max()) for name in ORDERS)]
         for region, part in m.worst.groupby("region", sort=False)
     ]
-    return [*lines, "", "### Largest found by search", "", *pipe_table(["region", *ORDERS], worst)]
+    return [
+        *lines,
+        "",
+        "### Largest found by search",
+        "",
+        *prose(
+            "Crank-rockers outside the tables: `make search-worse` looks for poses with larger factors than any",
+            "known; the tests replay them.",
+        ),
+        "",
+        *pipe_table(["region", *ORDERS], worst),
+    ]
 
 
 def html(page: str, figures: list[Saved]) -> str:
     """The page with its diagrams, self-contained."""
-    from html import escape
-
-    from studies.accuracy.tables import html_body
-
-    images = "".join(f'<img alt="{escape(figure.path.stem)}" src="{figure.uri}">' for figure in figures)
+    images = {f"figures/{figure.path.name}": figure.uri for figure in figures}
     style = "body{font:15px/1.45 system-ui,sans-serif;max-width:1150px;margin:2em auto;padding:0 1em;color:#222}" \
         "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.15em .7em;border-bottom:1px solid #e4e7eb;" \
         "text-align:left;font-variant-numeric:tabular-nums}img{width:100%}code{background:#f3f4f6}"  # fmt: skip
     head = (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Accuracy and time</title><style>{style}</style>'
     )
-    return head + html_body(page, after="## Work and precision", inserted=images) + "</html>\n"
+    return head + html_body(page, images) + "</html>\n"

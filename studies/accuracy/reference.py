@@ -29,11 +29,16 @@ def transfer_functions(design: Array, phi: float) -> tuple[Any, ...]:
         return _motion([mpmath.mpf(float(x)) for x in (*design[:7], phi)], int(design[7]))
 
 
-def _motion(inputs: list[Any], branch: int) -> tuple[Any, ...]:
-    """From the implicit equation in the plain letters of the sources; nothing is shared with the kernels.
+def position(design: Array, phi: float) -> Any:
+    """The angle psi alone, up to full turns, as an mpmath number."""
+    import mpmath
 
-    The angle is arctangent plus arccosine, the derivatives come from the partials of ``F = |BC|^2 - b^2``.
-    """
+    with mpmath.workdps(DIGITS):
+        return _angle([mpmath.mpf(float(x)) for x in (*design[:7], phi)], int(design[7]))[0]
+
+
+def _angle(inputs: list[Any], branch: int) -> tuple[Any, ...]:
+    """Arctangent plus arccosine from the implicit equation in the plain letters of the sources; no kernel's algebra."""
     import mpmath
 
     a, b, c, e, f, g, alpha, phi = inputs
@@ -41,7 +46,15 @@ def _motion(inputs: list[Any], branch: int) -> tuple[Any, ...]:
     x, y = e - a * u, f * sa + a * ca * v
     square = a * a - b * b + c * c + e * e + f * f + g * g - 2 * f * g * ca
     w = (square + 2 * a * (g * sa * v - e * u)) / (2 * c)
-    psi = mpmath.atan2(y, -x) + branch * mpmath.acos(w / mpmath.sqrt(x * x + y * y))
+    return mpmath.atan2(y, -x) + branch * mpmath.acos(w / mpmath.sqrt(x * x + y * y)), u, v, sa, ca, x, y
+
+
+def _motion(inputs: list[Any], branch: int) -> tuple[Any, ...]:
+    """The angle, and its derivatives from the partials of ``F = |BC|^2 - b^2``."""
+    import mpmath
+
+    a, _, c, e, _, g, _, _ = inputs
+    psi, u, v, sa, ca, x, y = _angle(inputs, branch)
     k, s = mpmath.cos(psi), mpmath.sin(psi)
     f_p = 2 * a * (c * v * k - c * ca * u * s + e * v + g * sa * u)
     f_pp = 2 * a * (c * u * k + c * ca * v * s + e * u - g * sa * v)
@@ -124,7 +137,7 @@ def _extremum(designs: Array, pose: str, sign: int) -> tuple[Array, Array]:
     steps = np.sort(np.concatenate([np.linspace(-np.pi, np.pi, SAMPLES * 3 // 4 + 1)[1:], near[:-1], -near[:-1]]))
     for start in range(0, len(designs), _BLOCK):
         rows = np.arange(start, min(start + _BLOCK, len(designs)))
-        phi = _least_discriminant(designs[rows])[:, None] + steps
+        phi = hardest_angle(designs[rows])[:, None] + steps
         columns, _ = pose_columns(RSSR, designs[rows], phi, (pose,))
         y, winds = columns[pose], np.zeros(rows.size, np.bool_)
         if pose == "psi":
@@ -146,7 +159,8 @@ def _extremum(designs: Array, pose: str, sign: int) -> tuple[Array, Array]:
     return best, place
 
 
-def _least_discriminant(designs: Array) -> Array:
+def hardest_angle(designs: Array) -> Array:
+    """Crank angle of the least discriminant, next to which a motion is sharpest."""
     status, place = np.empty(len(designs), np.uint8), np.empty(len(designs))
     rssr.margin(designs, status, None, None, None, place, None)
     return place

@@ -52,10 +52,22 @@ def regions(n: int, seed: int) -> tuple[Region, ...]:
     plain = rotatable(40 * n, seed)
     angle = np.degrees(np.arccos(np.sqrt(margins(plain))))
     found = [
-        Region("ordinary", "pressure angle below 60 degrees", plain[angle < 60.0][:n]),
-        Region("60-75", "largest pressure angle 60 to 75 degrees", plain[(angle >= 60.0) & (angle < 75.0)][:n]),
-        Region("75-84", "largest pressure angle 75 to 84 degrees", plain[(angle >= 75.0) & (angle < 84.0)][:n]),
-        Region("beyond 84", "largest pressure angle 84 to 89.4 degrees", _beyond(plain, angle)[:n]),
+        Region("ordinary", "largest pressure angle below 60 degrees", plain[angle < 60.0][:n]),
+        Region(
+            "pressure angle 60-75",
+            "largest pressure angle 60 to 75 degrees",
+            plain[(angle >= 60.0) & (angle < 75.0)][:n],
+        ),
+        Region(
+            "pressure angle 75-84",
+            "largest pressure angle 75 to 84 degrees",
+            plain[(angle >= 75.0) & (angle < 84.0)][:n],
+        ),
+        Region(
+            "pressure angle beyond 84",
+            "largest pressure angle 84 to 89.4 degrees",
+            _beyond(plain, angle)[:n],
+        ),
         Region("change point", "coupler within 1e-9 to 1e-5 of one with a dead point", _change_points(plain, n, seed)),
         Region("parallel axes", "alpha 1e-8 to 1e-3, offsets f and g about 100 cranks", _parallel(n, seed)),
         Region("long coupler", "one of e, f, g and the coupler 1e2 to 1e5 cranks long", _long(n, seed)),

@@ -41,7 +41,7 @@ def designs(full: Family, n: int, first: int = 0) -> Array:
     matrix = np.array(values, dtype=np.float64) * (1.0 + noise)
     for k, p in enumerate(full.parameters):
         if p.choices is not None or p.name not in CENTRE:
-            matrix[:, k] = values[k]  # type: ignore[call-overload]
+            matrix[:, k] = values[k]
     return matrix
 
 
@@ -109,10 +109,8 @@ def everything(n: int) -> tuple[float, float, float]:
         if names:
             parts += best(lambda names=names: full.poses(matrix, angles, names), 2)  # type: ignore[misc]
     for step in steps:
-        parts += best(
-            lambda step=step: step.run(matrix, frozenset(o.name for o in step.provides), Accuracy(target=1e-8)),
-            2,  # type: ignore[misc]
-        )
+        whole_turn = frozenset(o.name for o in step.provides)
+        parts += best(lambda step=step, w=whole_turn: step.run(matrix, w, Accuracy(target=1e-8)), 2)  # type: ignore[misc]
     start = time.perf_counter()
     for first in range(0, n, block):
         whole(designs(full, min(block, n - first), first))
