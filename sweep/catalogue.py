@@ -120,6 +120,8 @@ def output(family: Family, name: str) -> Output:
         special = ", ".join(n for n in names if not n.startswith(tuple(f"{r}_" for r in REDUCTIONS)))
         of_effects = [o.name for o in offered(family)]
         near = nearest(name, [*names, *of_effects, *(f"{base}_{x}" for x in of_effects for base in REDUCTIONS)])
+        if name in family.pose_names:
+            near = f"; {name} is one of a single pose, ask `evaluate`"
         known = f"{known}{special}, and those of effects (sweep effects)" if of_effects else f"{known}{special}"
         raise InputError("output", name, f"{known}{near}", f"design outputs of {family.name}")
     return way.output

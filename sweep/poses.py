@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sweep.catalogue import output_names
 from sweep.effects import extended, input_names, offered
 from sweep.errors import InputError, nearest
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Family
-from sweep.tables import design_matrix
+from sweep.tables import design_matrix, numbers, wanted_names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +47,7 @@ def evaluate(
     import pandas as pd
 
     bare = find_family(family).precise()
-    mechanism = extended(bare, [want] if isinstance(want, str) else want)
+    mechanism = extended(bare, wanted_names(want, f"pose outputs of {bare.name}"))
     wanted = pose_wants(mechanism, want)
     extra = () if phi is not None else ("phi",)
     matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))
@@ -57,11 +58,10 @@ def evaluate(
         index = table.index if isinstance(table, pd.DataFrame) else None
         return pd.DataFrame({name: columns[name].ravel() for name in [*wanted, "status"]}, index=index)
 
-    grid = np.atleast_1d(np.asarray(phi, dtype=np.float64)).ravel()
+    grid = np.atleast_1d(numbers(phi, "phi", "phi, position")).ravel()
     if not np.isfinite(grid).all():
-        raise InputError(
-            "phi", "nan or infinity", "finite angles", f"phi, position {int(np.argmin(np.isfinite(grid)))}"
-        )
+        position = int(np.argmin(np.isfinite(grid)))
+        raise InputError("phi", float(grid[position]), "a finite number", f"phi, position {position}")
     columns = mechanism.poses(matrix, Angles.of(grid[None, :]), frozenset(wanted))
     head = {"design": np.repeat(np.arange(len(matrix)), grid.size), "phi": np.tile(grid, len(matrix))}
     return pd.DataFrame(head | {name: columns[name].ravel() for name in [*wanted, "status"]})
@@ -69,10 +69,12 @@ def evaluate(
 
 def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:
     """The wanted names without repetition; an unknown one is an error that names the nearest."""
-    wanted = [want] if isinstance(want, str) else list(dict.fromkeys(want))
+    wanted = wanted_names(want, f"pose outputs of {mechanism.name}")
     for name in wanted:
         if name not in mechanism.pose_names and name != "status":
             known = ", ".join(mechanism.pose_names)
             guess = nearest(name, [*mechanism.pose_names, *(o.name for o in offered(mechanism))])
+            if name in output_names(mechanism):
+                guess = f"; {name} is one of a whole turn, ask `summarise`"
             raise InputError("want", name, f"{known}{guess}", f"pose outputs of {mechanism.name}")
     return [name for name in wanted if name != "status"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from sweep.families.chain import Stage
 from sweep.margins import margin_suffixes
 from sweep.means import mean_squares
 from sweep.sampling import Index
-from sweep.tables import design_matrix
+from sweep.tables import design_matrix, wanted_names
 from sweep.turn import Group, group_ns, limits_and_reductions, margin_group
 
 if TYPE_CHECKING:
@@ -94,8 +95,8 @@ def summarise(
     """
     import pandas as pd
 
-    wanted = [want] if isinstance(want, str) else list(dict.fromkeys(want))
     bare = find_family(family)
+    wanted = wanted_names(want, f"design outputs of {bare.name}")
     mechanism = extended(bare, wanted)
     wanted = [name for name in wanted if name != "status"]
     chosen = _accuracy(samples, accuracy)
@@ -234,15 +235,18 @@ def _accuracy(samples: int | None, accuracy: float | None) -> Accuracy:
     if samples is not None and accuracy is not None:
         raise InputError("samples", samples, "either samples= or accuracy=, not both", "summarise")
     if samples is not None:
-        if int(samples) != samples or not FEWEST_SAMPLES <= samples <= MOST_SAMPLES:
+        if not (isinstance(samples, Real) and FEWEST_SAMPLES <= samples <= MOST_SAMPLES and int(samples) == samples):
             raise InputError("samples", samples, f"a whole number from {FEWEST_SAMPLES} to {MOST_SAMPLES}", "summarise")
         return Accuracy(samples=int(samples))
-    target = DEFAULT_TARGET if accuracy is None else float(accuracy)
-    if not FINEST_TARGET <= target <= 0.1:
+    target = DEFAULT_TARGET if accuracy is None else accuracy
+    if not (isinstance(target, Real) and FINEST_TARGET <= target <= 0.1):
         raise InputError("accuracy", accuracy, f"a relative error from {FINEST_TARGET:g} to 0.1", "summarise")
-    return Accuracy(target=target)
+    return Accuracy(target=float(target))
 
 
 def _check_window(window: tuple[float, float] | None) -> None:
-    if window is not None and not (len(window) == 2 and 0.0 <= window[0] < window[1] <= 1.0):
+    if window is None:
+        return
+    two = isinstance(window, Sequence) and len(window) == 2 and all(isinstance(x, Real) for x in window)
+    if not (two and 0.0 <= window[0] < window[1] <= 1.0):
         raise InputError("window", window, "two fractions of the stroke, 0 <= from < to <= 1", "design outputs")

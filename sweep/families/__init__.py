@@ -22,7 +22,9 @@ def family(name: str | Sequence[str]) -> Family:
     """
     if isinstance(name, str):
         return _single(name)
-    names = tuple(name)
+    names = tuple(name) if isinstance(name, Sequence) else (name,)
+    if not names or not all(isinstance(part, str) for part in names):
+        raise InputError("family", name, f"one of {', '.join(NAMES)}, or a list of them", "family")
     if len(names) == 1:
         return _single(names[0])
     return _chain(names)
