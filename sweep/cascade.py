@@ -7,6 +7,7 @@ survivors wait before each route until there are enough of them, or until no mor
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -99,6 +100,7 @@ class Cascade:
     should_stop: Callable[[], bool] = lambda: False
     reached: list[int] = field(init=False)
     counts: NDArray[np.int64] = field(init=False)
+    missed: Counter[str] = field(init=False)
 
     def __post_init__(self) -> None:
         self._levels = levels(self.study)
@@ -107,6 +109,7 @@ class Cascade:
         self._go_on = (codes.OK, *PARTIAL) if self.study.output.keep == "all" else (codes.OK,)
         self.reached = [0] * len(self._levels)
         self.counts = np.zeros(256, np.int64)
+        self.missed = Counter()
 
     def feed(self, index: NDArray[np.int64], designs: Array, status: NDArray[np.uint8]) -> None:
         """Send designs (k, P) in; those that are not OK (k,) leave at once."""
@@ -162,7 +165,7 @@ class Cascade:
                 raise Dropped
             part = together.only(slice(low, min(low + level.batch, end)))
             self.reached[number] += part.index.size
-            done, goes_on = _fitted(self.study, part) if level.route is None else self._computed(level.route, part)
+            done, goes_on = self._fitted(part) if level.route is None else self._computed(level.route, part)
             self._sort(done, goes_on, number + 1)
             self._work(number + 1, whole=False)
 
@@ -173,9 +176,27 @@ class Cascade:
         status = np.where(batch.status == codes.OK, found["status"], batch.status)
         for limit in study.tested_limits:
             if limit.output in found:
-                status[(status == codes.OK) & ~meets(limit, found[limit.output])] = codes.LIMIT_EXCEEDED
+                self._leave(limit, status, (status == codes.OK) & ~meets(limit, found[limit.output]))
         more = {name: np.asarray(values, np.float64) for name, values in found.items() if name != "status"}
         return Batch(batch.index, batch.designs, batch.outputs | more, status), np.isin(status, self._go_on)
+
+    def _fitted(self, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
+        """A batch with its fitted parameters, and which of its designs keep the limits on parameters."""
+        study, designs, status = self.study, batch.designs, batch.status.copy()
+        goes_on = np.ones(status.size, np.bool_)
+        if study.fit is not None:
+            designs, fate = fit_line(study.family, designs, study.fit, study.window)
+            status[:] = fate
+            goes_on = fate == codes.OK
+        for limit in study.parameter_limits:
+            exceeds = goes_on & ~meets(limit, designs[:, study.family.parameter_names.index(limit.output)])
+            self._leave(limit, status, exceeds)
+            goes_on &= ~exceeds
+        return Batch(batch.index, designs, batch.outputs, status), goes_on
+
+    def _leave(self, limit: Limit, status: NDArray[np.uint8], exceeds: NDArray[np.bool_]) -> None:
+        status[exceeds] = codes.LIMIT_EXCEEDED
+        self.missed[limit.output] += int(exceeds.sum())
 
     def _sort(self, batch: Batch, goes_on: NDArray[np.bool_], number: int) -> None:
         """Designs that go on wait at a level, if there is one more; the others leave."""
@@ -213,21 +234,6 @@ def _before_fit(study: Study, route: Route) -> bool:
     last = len(study.families)
     numbers = [re.search(r"(\d+)$", name) for name in route.outputs]
     return all(number is not None and int(number[1]) < last for number in numbers)
-
-
-def _fitted(study: Study, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
-    """A batch with its fitted parameters, and which of its designs keep the limits on parameters."""
-    designs, status = batch.designs, batch.status.copy()
-    goes_on = np.ones(status.size, np.bool_)
-    if study.fit is not None:
-        designs, fate = fit_line(study.family, designs, study.fit, study.window)
-        status[:] = fate
-        goes_on = fate == codes.OK
-    for limit in study.parameter_limits:
-        exceeds = goes_on & ~meets(limit, designs[:, study.family.parameter_names.index(limit.output)])
-        status[exceeds] = codes.LIMIT_EXCEEDED
-        goes_on &= ~exceeds
-    return Batch(batch.index, designs, batch.outputs, status), goes_on
 
 
 def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:

@@ -28,10 +28,14 @@ NS_LOCUS = 140.0
 
 @dataclass(frozen=True)
 class ChunkResult:
-    """Rows of a chunk, and how many of its designs ended with which status (dropped rows included)."""
+    """Rows of a chunk, how many of its designs ended with which status (dropped rows included), and on which limit.
+
+    A design counts with the first limit it misses, in the order in which they are tested.
+    """
 
     columns: Columns
     counts_by_status: dict[int, int]
+    missed_by_limit: dict[str, int]
 
 
 def output_columns(study: Study) -> dict[str, str]:
@@ -122,4 +126,5 @@ def compute_chunk(study: Study, start: int, stop: int, should_stop: Callable[[],
     columns |= {name: found.designs[:, k] for k, name in enumerate(study.family.parameter_names)}
     columns |= {name: found.outputs[name].astype(dtype) for name, dtype in output_columns(study).items()}
     columns |= {"status": found.status}
-    return ChunkResult(columns, {code: int(cascade.counts[code]) for code in np.flatnonzero(cascade.counts).tolist()})
+    counts = {code: int(cascade.counts[code]) for code in np.flatnonzero(cascade.counts).tolist()}
+    return ChunkResult(columns, counts, {name: count for name, count in cascade.missed.items() if count})

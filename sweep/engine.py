@@ -126,7 +126,8 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
     if failure is not None:
         raise failure
     _raise_if_signalled(stop, folder)
-    note = _plan_note(study, folder, plan) | {"counts": store.total_counts(folder), "complete": True}
+    counts, missed = store.totals(folder)
+    note = _plan_note(study, folder, plan) | {"counts": counts, "missed": missed, "complete": True}
     store.write_plan(folder, note)
     return len(missing)
 
@@ -174,6 +175,7 @@ def _plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
         "optimised": noted.get("optimised"),
         "pareto": study.pareto is not None,
         "counts": noted.get("counts"),
+        "missed": noted.get("missed"),
         "complete": False,
     }
 

@@ -108,6 +108,7 @@ def encode(plan: Plan, index: int, result: ChunkResult) -> bytes:
     about = {
         "format": 1, "name": plan.name, "study": plan.study, "code": plan.code, "identity": plan.identity,
         "chunk": index, "start": start, "stop": stop, "counts": named_counts(result.counts_by_status),
+        "missed": result.missed_by_limit,
         "data": plan.chunk_data,
     }  # fmt: skip
     fields = [
@@ -291,15 +292,18 @@ def append_run(folder: Path, event: Mapping[str, Any]) -> None:
         os.fsync(file.fileno())
 
 
-def total_counts(folder: Path) -> dict[str, int]:
-    """Designs by the name of their status over all chunks, from the chunks' own metadata."""
+def totals(folder: Path) -> tuple[dict[str, int], dict[str, int]]:
+    """Designs by the name of their status, and by the limit they miss, over all chunks, from the chunks' metadata."""
     import pyarrow.parquet as pq
 
-    total: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
+    missed: Counter[str] = Counter()
     for part in parts(folder):
         with store_errors(part.path):
-            total.update(json.loads(pq.read_metadata(part.path).metadata[METADATA])["counts"])
-    return {name: total[name] for name in STATUS_NAMES.values() if name in total}
+            about = json.loads(pq.read_metadata(part.path).metadata[METADATA])
+        counts.update(about["counts"])
+        missed.update(about["missed"])
+    return {name: counts[name] for name in STATUS_NAMES.values() if name in counts}, dict(missed)
 
 
 def is_complete(folder: str | Path) -> bool:

@@ -84,17 +84,21 @@ def write_dataset(folder: Path, data: dict[str, Any] | None = None, *, optimum: 
         start, stop = plan.bounds(index)
         columns, status = designs(study, start, stop)
         kept = status == 0
+        bent = (status == 5) & (columns["max_abs_dev"] > 0.05)
         table = {"design": np.arange(start, stop), **columns, "status": status}
         result = ChunkResult(
             {c.name: table[c.name][kept].astype(c.dtype) for c in plan.columns},
             {int(code): int((status == code).sum()) for code in np.unique(status)},
+            {"max_abs_dev": int(bent.sum()), "max_pressure_angle1": int(((status == 5) & ~bent).sum())},
         )
         store.write_chunk(folder, plan, index, result)
     note = plan.as_dict() | {"about": data["study"], "data": study.data, "optimise": "optimise" in data}
     if optimum is not None:
         write_optimum(folder, study, optimum)
         note["optimised"] = "yes"
-    store.write_plan(folder, note | {"counts": store.total_counts(folder), "complete": True})
+    store.write_plan(
+        folder, note | dict(zip(("counts", "missed"), store.totals(folder), strict=True)) | {"complete": True}
+    )
     store.append_run(folder, {"event": "start", "time": "2026-01-02T03:04:05Z", "versions": {"numpy": "2"}, "jobs": 2})
     return folder
 

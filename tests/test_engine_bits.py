@@ -123,6 +123,8 @@ def test_cascade_runs_a_route_only_on_survivors(
     assert ran == {"x": len(a), "y": int(go_on.sum()), "z": int(last.sum())}
     assert cascade.reached == list(ran.values())
     assert cascade.counts.tolist() == np.bincount(expected, minlength=256).tolist()
+    # A design counts with the first limit it misses.
+    assert cascade.missed == {"x": int(((a >= 15.0) & (a < 20.0)).sum()), "y": int((after_x & (b > 100.0)).sum())}
     assert 0 < last.sum() < go_on.sum() < len(a), "every route must lose some designs"
     np.testing.assert_array_equal(np.isnan(found.outputs["y"]), ~go_on)
     np.testing.assert_array_equal(np.isnan(found.outputs["z"]), ~last)
@@ -181,6 +183,8 @@ def test_keep_feasible_drops_and_counts_the_others(tmp_path: Path) -> None:
     names = {getattr(codes, name): number for name, number in (read_plan(feasible) or {})["counts"].items()}
     assert names == counts == {getattr(codes, k): v for k, v in (read_plan(every) or {})["counts"].items()}
     assert sum(counts.values()) == len(frame)
+    missed = (read_plan(every) or {})["missed"]
+    assert missed == (read_plan(feasible) or {})["missed"] == {"max_pressure_angle": counts[codes.LIMIT_EXCEEDED]}
 
 
 def test_float32_is_for_results_only(tmp_path: Path) -> None:

@@ -207,3 +207,12 @@ def test_report_that_cannot_be_written_is_a_store_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(StoreError, match="cannot be written"):
         write_report(folder, tmp_path / "file" / "out")
+
+
+def test_funnel_names_the_limit_that_designs_miss(full: Path) -> None:
+    words = text_of(full / "_report" / "report.html")
+    data, _, _ = gather(full)
+    count = data.missed["max_pressure_angle1"]
+    assert count == data.counts[5] > 0 == data.missed["max_abs_dev"]
+    assert f"largest pressure angle of stage 1: not at most 45° {count:,}".replace(",", " ") in words
+    assert "a limit of the study is exceeded" not in words

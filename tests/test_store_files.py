@@ -23,7 +23,7 @@ from sweep.store import (
     load,
     parts,
     read_runs,
-    total_counts,
+    totals,
     write_atomically,
     write_chunk,
 )
@@ -54,7 +54,9 @@ def rows(start: int, stop: int) -> ChunkResult:
         "status": (index % 3 == 0).astype(np.uint8) * np.uint8(5),
     }
     counts = np.bincount(columns["status"])
-    return ChunkResult(columns, {int(code): int(counts[code]) for code in np.flatnonzero(counts)})
+    return ChunkResult(
+        columns, {int(code): int(counts[code]) for code in np.flatnonzero(counts)}, {"swing": int(counts[5])}
+    )
 
 
 def fill(folder: Path) -> list[Path]:
@@ -110,7 +112,7 @@ def test_load_is_in_design_order_and_counts_add_up(tmp_path: Path) -> None:
     for index in (2, 0, 1):
         write_chunk(tmp_path, PLAN, index, rows(*PLAN.bounds(index)))
     assert load(tmp_path)["design"].tolist() == list(range(2500))
-    assert total_counts(tmp_path) == {"OK": 1666, "LIMIT_EXCEEDED": 834}
+    assert totals(tmp_path) == ({"OK": 1666, "LIMIT_EXCEEDED": 834}, {"swing": 834})
 
 
 def test_parquet_file_that_is_no_chunk_is_refused(tmp_path: Path) -> None:

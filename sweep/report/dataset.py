@@ -49,6 +49,11 @@ class Dataset:
         return {codes[name]: count for name, count in self.plan.get("counts", {}).items() if name in codes}
 
     @property
+    def missed(self) -> dict[str, int]:
+        """Designs by the limit they miss first."""
+        return {str(name): int(count) for name, count in (self.plan.get("missed") or {}).items()}
+
+    @property
     def designs(self) -> int:
         """Number of designs in the design space."""
         return self.study.space.count

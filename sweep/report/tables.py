@@ -121,9 +121,28 @@ def fates(data: Dataset, found: Scan) -> list[Fate]:
     failed = sorted(
         (c for c in counts if c != codes.OK), key=lambda c: order.index(c) if c in order else len(order) + c
     )
-    rows = [Fate(c, codes.MEANING.get(c, f"status {c}"), counts[c], 100.0 * counts[c] / total) for c in failed]
+    rows: list[Fate] = []
+    for code in failed:
+        if code == codes.LIMIT_EXCEEDED and sum(data.missed.values()) == counts[code]:
+            rows += [Fate(code, words, count, 100.0 * count / total) for words, count in _by_limit(data)]
+        else:
+            rows.append(
+                Fate(code, codes.MEANING.get(code, f"status {code}"), counts[code], 100.0 * counts[code] / total)
+            )
     kept = counts.get(codes.OK, 0)
     return [*rows, Fate(codes.OK, "within all limits", kept, 100.0 * kept / total)]
+
+
+def _by_limit(data: Dataset) -> list[tuple[str, int]]:
+    """The limits that designs miss, in words, those of the study file's order."""
+    from sweep.report.answer import bound_words, limited
+
+    shown = [(limited(data, limit.output), limit) for limit in data.study.limits]
+    return [
+        (f"{quantity.words}: not {bound_words(limit, quantity)}", data.missed[limit.output])
+        for quantity, limit in shown
+        if data.missed.get(limit.output)
+    ]
 
 
 def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
