@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: bench-estimates bench-optimise help setup test lint types imports check smoke bench bench-effects bench-peers study-accuracy smoke-accuracy search-worse docs clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: bench-estimates bench-extrema bench-optimise help setup test lint types imports check smoke bench bench-effects bench-peers study-accuracy smoke-accuracy search-worse docs clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -74,6 +74,9 @@ bench-effects: $(VENV)/ready  ## cost of every effect, and of all of them togeth
 
 bench-estimates: $(VENV)/ready  ## what sweep check expects of every study against what a slice of it takes
 	$(BIN)/python -m tests.bench.estimates
+
+bench-extrema: $(VENV)/ready  ## errors and times of the search for true extrema, as in docs/extrema.md
+	$(BIN)/python -m tests.bench.extrema
 
 bench-optimise: $(VENV)/ready  ## 20 specifications of a crank-rocker against a 50 times larger search; an hour
 	$(BIN)/python -m tests.bench.optimise
