@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: bench-estimates bench-extrema bench-optimise help setup test lint types imports check smoke bench bench-effects bench-peers study-accuracy smoke-accuracy search-worse docs clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: bench-estimates bench-extrema bench-optimise help setup test lint types imports check smoke bench bench-effects bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -69,7 +69,7 @@ bench: $(VENV)/ready  ## ns per sample against numpy and C, one run
 docs: $(VENV)/ready  ## make docs/effects.md from the register
 	$(SWEEP) effects --markdown > docs/effects.md
 
-bench-effects: $(VENV)/ready  ## cost of every effect, and of all of them together
+bench-effects: $(VENV)/ready  ## cost of every effect, written into the register; then make docs
 	$(BIN)/python -m tests.bench.effects
 
 bench-estimates: $(VENV)/ready  ## what sweep check expects of every study against what a slice of it takes
@@ -77,6 +77,9 @@ bench-estimates: $(VENV)/ready  ## what sweep check expects of every study again
 
 bench-extrema: $(VENV)/ready  ## errors and times of the search for true extrema, as in docs/extrema.md
 	$(BIN)/python -m tests.bench.extrema
+
+bench-scene: $(VENV)/ready  ## all effects on 10^5 designs x 360 angles: rate, its parts, memory; about 5 minutes
+	$(BIN)/python -m tests.bench.effects --scene 100000
 
 bench-optimise: $(VENV)/ready  ## 20 specifications of a crank-rocker against a 50 times larger search; an hour
 	$(BIN)/python -m tests.bench.optimise

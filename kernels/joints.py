@@ -47,27 +47,23 @@ class Joints(NamedTuple):
 
 
 @inline
-def _vector(record: Array, first: int) -> Vector:
-    return record[first], record[first + 1], record[first + 2]
-
-
-@inline
 def read(poses: Array, designs: Array) -> Joints:
     """Joints of one pose from its record ``poses`` (PER_POSE,) and its design's record ``designs`` (PER_DESIGN,)."""
+    # Written out: numba compiles a helper anew for every literal index it is called with.
     return Joints(
-        _vector(poses, 0),
-        _vector(poses, 3),
-        _vector(poses, 6),
-        _vector(poses, 9),
-        _vector(poses, 12),
-        _vector(poses, 15),
-        _vector(poses, 18),
+        (poses[0], poses[1], poses[2]),
+        (poses[3], poses[4], poses[5]),
+        (poses[6], poses[7], poses[8]),
+        (poses[9], poses[10], poses[11]),
+        (poses[12], poses[13], poses[14]),
+        (poses[15], poses[16], poses[17]),
+        (poses[18], poses[19], poses[20]),
         poses[21],
         poses[22],
-        _vector(designs, 0),
-        _vector(designs, 3),
-        _vector(designs, 6),
-        _vector(designs, 9),
+        (designs[0], designs[1], designs[2]),
+        (designs[3], designs[4], designs[5]),
+        (designs[6], designs[7], designs[8]),
+        (designs[9], designs[10], designs[11]),
         designs[12],
         designs[13],
         designs[14],

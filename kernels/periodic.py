@@ -11,27 +11,47 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels._jit import inline
+from kernels._jit import inline, kernel
 
 Array = NDArray[np.float64]
 
 NOTHING = 1e-14
 
 
-@inline
-def coefficients(values: Array, cosines: Array, sines: Array) -> None:
-    """Fourier coefficients of N = 2 K + 1 samples: mean in cosines[0], harmonics 1..K in cosines[k], sines[k]."""
-    n = values.size
-    for k in range((n + 1) // 2):
-        # Rotation by exact table angles would be cheaper; the recurrence below drifts by 1e-14 at most for N < 1000.
-        c, s, total_c, total_s = 1.0, 0.0, 0.0, 0.0
-        step_c, step_s = math.cos(2.0 * math.pi * k / n), math.sin(2.0 * math.pi * k / n)
-        for j in range(n):
-            total_c += values[j] * c
-            total_s += values[j] * s
-            c, s = c * step_c - s * step_s, s * step_c + c * step_s
-        factor = (1.0 if k == 0 else 2.0) / n
-        cosines[k], sines[k] = factor * total_c, factor * total_s
+@kernel
+def coefficients(values: Array, turn: Array, cosines: Array, sines: Array) -> None:
+    """Fourier coefficients of N = 2 K + 1 samples: mean in cosines[0], harmonics 1..K in cosines[k], sines[k].
+
+    ``turn`` (4, K + 1) is room for the rotations of all harmonics, which go side by side so that the loop vectorises;
+    they drift by 1e-14 at most for N < 1000.
+    """
+    n, half = values.size, cosines.size
+    for k in range(half):
+        angle = 2.0 * math.pi * k / n
+        turn[0, k], turn[1, k], turn[2, k], turn[3, k] = 1.0, 0.0, math.cos(angle), math.sin(angle)
+        cosines[k], sines[k] = 0.0, 0.0
+    for j in range(n):
+        value = 2.0 / n * values[j]
+        for k in range(half):
+            c, s = turn[0, k], turn[1, k]
+            cosines[k] += value * c
+            sines[k] += value * s
+            turn[0, k], turn[1, k] = c * turn[2, k] - s * turn[3, k], s * turn[2, k] + c * turn[3, k]
+    cosines[0] *= 0.5
+
+
+@kernel
+def on_grid(cosines: Array, sines: Array, turn: Array, values: Array) -> None:
+    """Values of a series at 2 pi j / M, j = 0 .. M - 1, M = values.size; ``turn`` (4, M) is room, as above."""
+    for j in range(values.size):
+        angle = 2.0 * math.pi * j / values.size
+        turn[2, j], turn[3, j] = math.cos(angle), math.sin(angle)
+        turn[0, j], turn[1, j], values[j] = turn[2, j], turn[3, j], cosines[0]
+    for k in range(1, cosines.size):
+        for j in range(values.size):
+            c, s = turn[0, j], turn[1, j]
+            values[j] += cosines[k] * c + sines[k] * s
+            turn[0, j], turn[1, j] = c * turn[2, j] - s * turn[3, j], s * turn[2, j] + c * turn[3, j]
 
 
 @inline

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels._jit import inline, kernel
-from kernels.periodic import coefficients, series, significant, tail
+from kernels.periodic import coefficients, on_grid, series, significant, tail
 
 Array = NDArray[np.float64]
 
@@ -31,9 +31,9 @@ def turn_extremes(
     """
     n = values.shape[1]
     half = (n + 1) // 2
-    c, s = np.empty(half), np.empty(half)
+    c, s, turn = np.empty(half), np.empty(half), np.empty((4, half))
     for i in range(values.shape[0]):
-        coefficients(values[i], c, s)
+        coefficients(values[i], turn, c, s)
         square = c[0] * c[0]
         for k in range(1, half):
             square += 0.5 * (c[k] * c[k] + s[k] * s[k])
@@ -41,22 +41,22 @@ def turn_extremes(
         missed[i] = tail(c, s, 0.0)
         count = significant(c, s)
         short_c, short_s = c[:count], s[:count]
-        phi_largest[i] = _peak(short_c, short_s, 1.0)
-        phi_least[i] = _peak(short_c, short_s, -1.0)
+        look, room = np.empty(FINER * count), np.empty((4, FINER * count))
+        on_grid(short_c, short_s, room, look)
+        phi_largest[i] = _peak(short_c, short_s, 1.0, look)
+        phi_least[i] = _peak(short_c, short_s, -1.0, look)
         largest[i] = series(short_c, short_s, phi_largest[i])[0]
         least[i] = series(short_c, short_s, phi_least[i])[0]
 
 
 @inline
-def _peak(c: Array, s: Array, sign: float) -> float:
+def _peak(c: Array, s: Array, sign: float, look: Array) -> float:
     """Crank angle in [0, 2 pi) where sign times the series is largest: best of the finer looks, then bisection."""
-    looks = FINER * c.size
-    step = 2.0 * math.pi / looks
+    step = 2.0 * math.pi / look.size
     best, where = -math.inf, 0.0
-    for j in range(looks):
-        value = sign * series(c, s, step * j)[0]
-        if value > best:
-            best, where = value, step * j
+    for j in range(look.size):
+        if sign * look[j] > best:
+            best, where = sign * look[j], step * j
     low, high = where - step, where + step
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from sweep.effects import offered
+from sweep.effects import elsewhere, offered
 from sweep.errors import InputError, nearest
 from sweep.extrema import Mode, Request
 from sweep.families.base import Accuracy, Family, Output, Step
@@ -123,6 +123,7 @@ def output(family: Family, name: str) -> Output:
         if name in family.pose_names:
             near = f"; {name} is one of a single pose, ask `evaluate`"
         known = f"{known}{special}, and those of effects (sweep effects)" if of_effects else f"{known}{special}"
+        near = elsewhere(family, name) or near
         raise InputError("output", name, f"{known}{near}", f"design outputs of {family.name}")
     return way.output
 
@@ -210,10 +211,13 @@ def _last(family: Family) -> str:
 
 
 def _reduction_way(family: Family, name: str) -> Way | None:
-    for pose in family.pose_outputs:
-        for base, text in REDUCTIONS.items():
-            if name == f"{base}_{pose.name}":
-                unit = "rad" if base == "phi_max_abs" else pose.unit
-                of_turn = Output(name, unit, f"{text} {pose.name}: {pose.text}", pose.equation)
-                return Way(of_turn, "mean" if base == "rms" else "reduction", base, pose.name)
+    for base, text in REDUCTIONS.items():
+        if not name.startswith(f"{base}_"):
+            continue
+        of = name.removeprefix(f"{base}_")
+        pose = next((o for o in family.pose_outputs if o.name == of), None)
+        if pose is not None:
+            unit = "rad" if base == "phi_max_abs" else pose.unit
+            of_turn = Output(name, unit, f"{text} {pose.name}: {pose.text}", pose.equation)
+            return Way(of_turn, "mean" if base == "rms" else "reduction", base, pose.name)
     return None

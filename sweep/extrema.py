@@ -104,7 +104,7 @@ def true_extrema(
     search = _Search(family, designs, tuple(requests), target, locate, anywhere, window)
     pending, samples = np.arange(len(designs)), START
     while pending.size:
-        for rows in blocks(pending[search.needed[pending] <= samples], samples):
+        for rows in blocks(pending[search.needed[pending] <= samples], samples, len(search.names)):
             search.block(rows, samples)
         pending = pending[search.needed[pending] > samples]
         if samples == LIMIT:

@@ -60,8 +60,9 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
 
 def _on_grid(family: Family, designs: Array, rows: Index, samples: int, poses: Sequence[str]) -> tuple[Array, Status]:
     found, status = np.full((rows.size, len(poses)), np.nan), np.empty(rows.size, np.uint8)
-    for part in blocks(np.arange(rows.size), samples):
-        columns, worst, winds = sample_turn(family, designs[rows[part]], samples, list(dict.fromkeys(poses)))
+    names = list(dict.fromkeys(poses))
+    for part in blocks(np.arange(rows.size), samples, len(names)):
+        columns, worst, winds = sample_turn(family, designs[rows[part]], samples, names)
         state = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst]).astype(np.uint8)
         status[part] = state
         for k, pose in enumerate(poses):

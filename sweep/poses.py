@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sweep.catalogue import output_names
-from sweep.effects import extended, input_names, offered
+from sweep.effects import elsewhere, extended, input_names, offered
 from sweep.errors import InputError, nearest
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Family
@@ -74,6 +74,7 @@ def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:
         if name not in mechanism.pose_names and name != "status":
             known = ", ".join(mechanism.pose_names)
             guess = nearest(name, [*mechanism.pose_names, *(o.name for o in offered(mechanism))])
+            guess = elsewhere(mechanism, name) or guess
             if name in output_names(mechanism):
                 guess = f"; {name} is one of a whole turn, ask `summarise`"
             raise InputError("want", name, f"{known}{guess}", f"pose outputs of {mechanism.name}")

@@ -18,6 +18,7 @@ Mask: TypeAlias = NDArray[np.bool_]
 Status: TypeAlias = NDArray[np.uint8]
 
 BLOCK = 2**17  # samples handled at once: a few columns of that many stay in the cache
+FEW = 4  # columns from which on there are fewer samples at once
 TWO_PI = 2.0 * np.pi
 
 
@@ -31,9 +32,9 @@ def turn(samples: int) -> Angles:
     return angles
 
 
-def blocks(rows: Index, samples: int) -> Iterator[Index]:
-    """Pieces of ``rows`` small enough that their samples stay in the cache."""
-    size = max(1, BLOCK // samples)
+def blocks(rows: Index, samples: int, columns: int = 1) -> Iterator[Index]:
+    """Pieces of ``rows`` small enough that their samples of so many columns stay in the cache."""
+    size = max(1, BLOCK * FEW // (samples * max(columns, FEW)))
     for start in range(0, rows.size, size):
         yield rows[start : start + size]
 

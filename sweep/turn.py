@@ -152,13 +152,14 @@ def sampled_extrema(
     n = len(designs)
     found = {request: Extremum.unknown(n) for request in requests}
     status = np.zeros(n, np.uint8)
-    names = [*(r.pose for r in requests), *([family.position] if window is not None else [])]
-    for rows in blocks(np.arange(n), samples):
-        columns, worst, winds = sample_turn(family, designs[rows], samples, list(dict.fromkeys(names)))
+    names = list(dict.fromkeys([*(r.pose for r in requests), *([family.position] if window is not None else [])]))
+    for rows in blocks(np.arange(n), samples, len(names)):
+        columns, worst, winds = sample_turn(family, designs[rows], samples, names)
         state = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst]).astype(np.uint8)
         good = state == st.OK
         status[rows] = state
-        rows, columns = rows[good], {name: values[good] for name, values in columns.items()}
+        if not good.all():
+            rows, columns = rows[good], {name: values[good] for name, values in columns.items()}
         for request in requests:
             allowed = None
             if window is not None and request.windowed:

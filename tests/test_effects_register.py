@@ -9,8 +9,9 @@ from click.testing import CliRunner
 
 from sweep.cli import main
 from sweep.cli.effects import page
-from sweep.effects import NAMES, applicable, effect, outputs
+from sweep.effects import NAMES, effect, offered
 from sweep.effects.advice import closure
+from sweep.effects.placing import Placed
 from sweep.families import NAMES as FAMILIES
 from sweep.families import family
 from sweep.study.units import factor, internal_unit
@@ -29,9 +30,10 @@ def test_an_entry_is_complete(name):
     assert entry.name == name
     assert entry.title and entry.formulas and entry.called_for and entry.negligible
     assert entry.ns_per_pose > 0.0 or entry.design_result is not None
-    for o in outputs(entry):
+    outputs = Placed(entry).outputs
+    for o in outputs:
         assert o.text and o.equation, o.name
-    for item in (*outputs(entry), *entry.inputs):
+    for item in (*outputs, *entry.inputs):
         assert factor(internal_unit(item.unit), internal_unit(item.unit)) == 1.0
     for needed in entry.needs:
         assert needed in NAMES
@@ -41,7 +43,7 @@ def test_an_entry_is_complete(name):
 def test_no_two_outputs_of_a_family_share_a_name(name):
     found = family(name)
     names = [*found.pose_names, *found.parameter_names, *(o.name for step in found.steps for o in step.provides)]
-    of_effects = [o.name for entry in applicable(found) for o in outputs(entry)]
+    of_effects = [o.name for o in offered(found)]
     assert len(set(of_effects)) == len(of_effects)
     assert not set(of_effects) & set(names)
     assert (found.joints is None) == (not of_effects)

@@ -12,8 +12,8 @@ from kernels import status as st
 from kernels.effects import bearings, permissible
 from kernels.effects.pressure_extrema import pressure_extrema
 from sweep.effects import extended
+from sweep.effects.costs import designs as bench_designs
 from sweep.families import family
-from tests.bench.effects import designs as bench_designs
 
 DENSE = 4096
 PHI = 2.0 * np.pi * np.arange(DENSE) / DENSE

@@ -18,8 +18,7 @@ Status = NDArray[np.uint8]
 
 @kernel
 def bearing_loads(
-    force: Array,
-    moment: Array,
+    forces: Array,
     axis: Array,
     bearings: Array,
     status: Status,
@@ -33,16 +32,16 @@ def bearing_loads(
 
     Parameters
     ----------
-    force, moment : (n, m, 3), force at D and moment about it;  axis : (n, 3) axis of the rocker
+    forces : (n, m, 18) as of :func:`kernels.effects.kinetostatics`;  axis : (n, 3) axis of the rocker
     bearings : (n, 11) columns of :class:`kernels.effects.bearings.Rolling`; c is not read
     status : (n, m), in; nan where it is not OK
     radial1, radial2, axial, equivalent1, equivalent2 : (n, m) or None
     """
-    for i in range(force.shape[0]):
+    for i in range(forces.shape[0]):
         k = (axis[i, 0], axis[i, 1], axis[i, 2])
-        for j in range(force.shape[1]):
-            f = (force[i, j, 0], force[i, j, 1], force[i, j, 2])
-            m = (moment[i, j, 0], moment[i, j, 1], moment[i, j, 2])
+        for j in range(forces.shape[1]):
+            f = (forces[i, j, 9], forces[i, j, 10], forces[i, j, 11])
+            m = (forces[i, j, 15], forces[i, j, 16], forces[i, j, 17])
             first, second, along = supports(f, m, k, bearings[i, 1], bearings[i, 2])
             good = 1.0 if status[i, j] == st.OK else math.nan
             thrust = abs(along)

@@ -76,6 +76,13 @@ def sliding_data(data: Array, i: int) -> Sliding:
 
 
 @inline
+def in_plane(t_tau: float, t_rho: float, t_k: float) -> tuple[float, float, float]:
+    """cos(theta1), sin(theta1) and sin(theta1) tan(theta2) of a coupler direction."""
+    size = math.hypot(t_tau, t_rho)
+    return abs(t_tau) / size, t_rho / size, t_k / size
+
+
+@inline
 def support_arms(c: float, z1: float, z2: float, cos1: float, sin1: float, axial: float) -> tuple[float, float]:
     """Pi_1, Pi_2: support force times the distance of the supports, per unit of P; the axial force turns about c."""
     return math.hypot(z2 * cos1, z2 * sin1 + c * axial), math.hypot(z1 * cos1, z1 * sin1 + c * axial)
@@ -95,9 +102,9 @@ def sliding_criteria(s: Sliding, moment: float, cos1: float, sin1: float, axial:
 
 @kernel
 def sliding_bearings(
-    cos_theta1: Array,
-    sin_theta1: Array,
-    axial: Array,
+    t_tau: Array,
+    t_rho: Array,
+    t_k: Array,
     moment: Array,
     bearings: Array,
     status: Status,
@@ -112,17 +119,18 @@ def sliding_bearings(
 
     Parameters
     ----------
-    cos_theta1, sin_theta1, axial : (n, m) direction of the coupler force, see the module
+    t_tau, t_rho, t_k : (n, m) components of the coupler direction at the rocker
     moment : (n,) resisting torque M_c on the rocker
     bearings : (n, 10) columns of :class:`Sliding`
     status : (n, m), in and out; JAMMED where friction leaves no driving arm
     support1, support2, thrust : (n, m) or None; radial forces and axial force
     pressure1, pressure2, pressure3 : (n, m) or None; mean pressures of the journals and the collar
     """
-    for i in range(cos_theta1.shape[0]):
+    for i in range(t_tau.shape[0]):
         data = sliding_data(bearings, i)
-        for j in range(cos_theta1.shape[1]):
-            r = sliding_criteria(data, moment[i], cos_theta1[i, j], sin_theta1[i, j], axial[i, j])
+        for j in range(t_tau.shape[1]):
+            cos1, sin1, axial = in_plane(t_tau[i, j], t_rho[i, j], t_k[i, j])
+            r = sliding_criteria(data, moment[i], cos1, sin1, axial)
             if status[i, j] == st.OK and not r.arm > 0.0:
                 status[i, j] = st.JAMMED
             good = 1.0 if status[i, j] == st.OK else math.nan
@@ -142,9 +150,9 @@ def sliding_bearings(
 
 @kernel
 def rolling_bearings(
-    cos_theta1: Array,
-    sin_theta1: Array,
-    axial: Array,
+    t_tau: Array,
+    t_rho: Array,
+    t_k: Array,
     moment: Array,
     bearings: Array,
     status: Status,
@@ -157,22 +165,22 @@ def rolling_bearings(
 
     Parameters
     ----------
-    cos_theta1, sin_theta1, axial : (n, m) direction of the coupler force, see the module
+    t_tau, t_rho, t_k : (n, m) components of the coupler direction at the rocker
     moment : (n,) resisting torque on the rocker
     bearings : (n, 11) columns of :class:`Rolling`
     status : (n, m), in and out; JAMMED at cos(theta1) <= 0
     equivalent1, equivalent2, life1, life2 : (n, m) or None
     """
-    for i in range(cos_theta1.shape[0]):
+    for i in range(t_tau.shape[0]):
         c, z1, z2 = bearings[i, 0], bearings[i, 1], bearings[i, 2]
-        for j in range(cos_theta1.shape[1]):
-            cos1 = cos_theta1[i, j]
-            pi1, pi2 = support_arms(c, z1, z2, cos1, sin_theta1[i, j], axial[i, j])
+        for j in range(t_tau.shape[1]):
+            cos1, sin1, axial = in_plane(t_tau[i, j], t_rho[i, j], t_k[i, j])
+            pi1, pi2 = support_arms(c, z1, z2, cos1, sin1, axial)
             if status[i, j] == st.OK and not cos1 > 0.0:
                 status[i, j] = st.JAMMED
             good = 1.0 if status[i, j] == st.OK else math.nan
             force = moment[i] / (c * cos1)
-            thrust = abs(force * axial[i, j])
+            thrust = abs(force * axial)
             span = abs(z2 - z1)
             first = equivalent_load(bearings, i, abs(force) * pi1 / span, thrust if bearings[i, 10] == 1.0 else 0.0)
             second = equivalent_load(bearings, i, abs(force) * pi2 / span, thrust if bearings[i, 10] == 2.0 else 0.0)

@@ -25,7 +25,7 @@ from kernels.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
 
-DRIVEN, DRIVING = 0, 1
+DRIVEN, DRIVING = 0.0, 1.0
 
 # Below this sine of the angle between coupler and finger axis the axis n has no direction left in float64.
 LEAST_SINE = 1e-13
@@ -45,7 +45,7 @@ class Coupler(NamedTuple):
 
 
 @inline
-def orientation(j: Joints, construction: int) -> Coupler:
+def orientation(j: Joints, construction: float) -> Coupler:
     """Orientation and rates of the coupler for one pose (sheet 4.1, 4.2, primes with respect to the crank angle)."""
     v_b, a_b = scale(j.a, j.tau_b), scale(-j.a, j.rho_b)
     v_c = scale(j.c * j.dpsi, j.tau)
@@ -80,7 +80,7 @@ def coupler_point(
     poses: Array,
     designs: Array,
     point: Array,
-    construction: int,
+    finger: Array,
     status: Status,
     position: Array | None,
     velocity: Array | None,
@@ -95,7 +95,7 @@ def coupler_point(
     ----------
     poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.joints`
     point : (n, 3), coordinates along (s, n x s, n) from B [length]
-    construction : DRIVEN or DRIVING, which ball joint carries the finger
+    finger : (n,) DRIVEN or DRIVING, which ball joint carries the finger
     status : (n, m), in and out; poses that are not OK give nan, SINGULAR where the finger axis meets the coupler
     position, velocity, acceleration : (n, m, 3) or None, with respect to the crank angle [length]
     orientation_n, omega, eps : (n, m, 3) or None; unit vector n, angular velocity and acceleration per unit crank speed
@@ -104,7 +104,7 @@ def coupler_point(
         p = (point[i, 0], point[i, 1], point[i, 2])
         for j in range(poses.shape[1]):
             joints = read(poses[i, j], designs[i])
-            body = orientation(joints, construction)
+            body = orientation(joints, finger[i])
             if status[i, j] == st.OK and not body.sine > LEAST_SINE:
                 status[i, j] = st.SINGULAR
             good = 1.0 if status[i, j] == st.OK else math.nan

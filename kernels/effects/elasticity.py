@@ -4,8 +4,9 @@ Dynamics sheet, section 5.  With p = c t_tau (signed) and eta = psi - psi_0 of t
 
     J w^2 eta'' + h w p^2 eta' + (k p^2 + h w p p') eta = M - J w^2 psi_0''
 
-The linkage enters only through p and psi_0''.  The quasi-static effect is pointwise; the steady state couples the whole
-turn, so it is computed on a uniform odd grid by Fourier collocation and carried to any angle by its series.
+The linkage enters only through p and psi_0''.  A slider has c = 1, a mass for J, a force for M, and eta is a length.
+The quasi-static effect is pointwise.  The steady state couples the whole turn: its Fourier coefficients solve a linear
+system with as many bands as p^2 has harmonics, two for a linkage of one crank and one follower.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ def quasi_static(
     p: Array,
     d2psi: Array,
     c: Array,
+    reach: Array,
     data: Array,
     status: Status,
     eta: Array | None,
@@ -47,15 +49,16 @@ def quasi_static(
     Parameters
     ----------
     p : (n, m), c t_tau, signed [length];  d2psi : (n, m), acceleration analogue of the rigid linkage
-    c : (n,), radius of the driven joint;  data : (n, 5), see COLUMNS
-    status : (n, m), in and out; NOT_LINEAR where |eta| > 0.1 cos(pressure angle); the number stays
+    c : (n,), radius of the driven joint, 1 of a slider;  data : (n, 5), see COLUMNS
+    reach : (n,), what a lag is compared with: 1 of an angle, the coupler's length of a displacement
+    status : (n, m), in and out; NOT_LINEAR where |eta| > 0.1 reach cos(pressure angle); the number stays
     eta, displacement, frequency_ratio : (n, m) or None; [rad], c eta [length], sqrt(k/J) |p| / speed
     """
     for i in range(p.shape[0]):
         inertia, stiffness, speed, torque = data[i, 0], data[i, 1], data[i, 3], data[i, 4]
         for j in range(p.shape[1]):
             lag = (torque - inertia * speed * speed * d2psi[i, j]) / (stiffness * p[i, j] * p[i, j])
-            if status[i, j] == st.OK and not abs(lag) <= LINEAR * abs(p[i, j]) / c[i]:
+            if status[i, j] == st.OK and not abs(lag) <= LINEAR * reach[i] * abs(p[i, j]) / c[i]:
                 status[i, j] = st.NOT_LINEAR
             good = 1.0 if status[i, j] == st.OK or status[i, j] == st.NOT_LINEAR else math.nan
             if eta is not None:
@@ -68,86 +71,128 @@ def quasi_static(
 
 @kernel
 def steady_state(
-    p: Array, d2psi: Array, c: Array, data: Array, phi: Array, last: bool, status: Status, eta: Array,
+    p: Array, d2psi: Array, c: Array, reach: Array, data: Array, phi: Array, last: bool, status: Status, eta: Array,
     elongation: Array, floquet: Array,
 ) -> None:  # fmt: skip
     """Periodic steady state of the lag and the largest Floquet multiplier.
 
     Parameters
     ----------
-    p, d2psi : (n, N) on the grid phi_j = 2 pi j / N, N odd;  c : (n,);  data : (n, 5), see COLUMNS
+    p, d2psi : (n, N) on the grid phi_j = 2 pi j / N, N odd;  c, reach : (n,), see `quasi_static`;  data : (n, 5)
     phi : (n, m) or (1, m), where eta and elongation are wanted
     last : whether no finer grid follows
     status : (n,) out; NOT_CONVERGED where N does not resolve the solution (tail above 1e-9) or a multiplier reaches 1,
-        NOT_LINEAR where |eta| > 0.1 cos(pressure angle) somewhere (the numbers stay), NOT_ROTATABLE where p is nan
+        NOT_LINEAR where |eta| > 0.1 reach cos(pressure angle) somewhere (the numbers stay), NOT_ROTATABLE where p is
+        nan
     eta, elongation : (n, m) out [rad], [length];  floquet : (n,) out, largest modulus or nan
     """
     n = p.shape[1]
-    first = np.empty((n, n))
-    for j in range(n):
-        for k in range(n):
-            sign = 1.0 if (j - k) % 2 == 0 else -1.0
-            first[j, k] = 0.0 if j == k else 0.5 * sign / math.sin(math.pi * (j - k) / n)
-    second = first @ first
     half = (n + 1) // 2
-    all_pc, all_ps, all_ec, all_es = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
-    matrix, right = np.empty((n, n)), np.empty(n)
+    all_qc, all_qs, all_ec, all_es = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
+    square, right, turn = np.empty(n), np.empty(n), np.empty((4, half))
     for i in range(p.shape[0]):
-        inertia, stiffness, damping, speed, torque = data[i, 0], data[i, 1], data[i, 2], data[i, 3], data[i, 4]
-        row = i if phi.shape[0] > 1 else 0
+        mass, row = data[i, 0] * data[i, 3] * data[i, 3], i if phi.shape[0] > 1 else 0
+        stiffness, damping = data[i, 1] / mass, data[i, 2] * data[i, 3] / mass
         bad = False
         for j in range(n):
-            bad = bad or not math.isfinite(p[i, j] * d2psi[i, j])
+            square[j] = p[i, j] * p[i, j]
+            right[j] = data[i, 4] / mass - d2psi[i, j]
+            bad = bad or not math.isfinite(square[j] * right[j])
         if bad:
             status[i], floquet[i] = st.NOT_ROTATABLE, math.nan
             eta[i, :], elongation[i, :] = math.nan, math.nan
             continue
-        coefficients(p[i], all_pc, all_ps)
-        count = significant(all_pc, all_ps)
-        pc, ps = all_pc[:count], all_ps[:count]
-        mass = inertia * speed * speed
-        for j in range(n):
-            slope = series(pc, ps, 2.0 * math.pi * j / n)[1]
-            square = p[i, j] * p[i, j]
-            for k in range(n):
-                matrix[j, k] = second[j, k] + damping * speed / mass * square * first[j, k]
-            matrix[j, j] += (stiffness * square + damping * speed * p[i, j] * slope) / mass
-            right[j] = torque / mass - d2psi[i, j]
-        lag = np.linalg.solve(matrix, right)
-        coefficients(lag, all_ec, all_es)  # type: ignore[arg-type]
+        coefficients(square, turn, all_qc, all_qs)
+        count = significant(all_qc, all_qs)
+        qc, qs = all_qc[:count], all_qs[:count]
+        coefficients(right, turn, all_ec, all_es)
+        periodic_solution(qc, qs, stiffness, damping, all_ec, all_es)
         count = significant(all_ec, all_es)
         ec, es = all_ec[:count], all_es[:count]
         resolved = tail(all_ec, all_es, 0.0) < RESOLVED
         # The multiplier asks only that p be resolved; a grid that is too coarse for the lag is left before it.
         floquet[i] = math.nan
         if resolved or last:
-            floquet[i] = _largest_multiplier(pc, ps, stiffness / mass, damping * speed / mass)
+            floquet[i] = largest_multiplier(qc, qs, stiffness, damping)
         status[i] = st.OK if resolved and floquet[i] < 1.0 else st.NOT_CONVERGED
         for j in range(n):
-            if status[i] == st.OK and not abs(lag[j]) <= LINEAR * abs(p[i, j]) / c[i]:
+            lag = series(ec, es, 2.0 * math.pi * j / n)[0] if status[i] == st.OK else 0.0
+            if not abs(lag) <= LINEAR * reach[i] * abs(p[i, j]) / c[i]:
                 status[i] = st.NOT_LINEAR
         for j in range(phi.shape[1]):
             value = series(ec, es, phi[row, j])[0] if status[i] != st.NOT_CONVERGED else math.nan
             eta[i, j] = value
-            elongation[i, j] = value * series(pc, ps, phi[row, j])[0]
+            # p keeps its sign over a turn.
+            lever = math.sqrt(series(qc, qs, phi[row, j])[0])
+            elongation[i, j] = value * math.copysign(lever, p[i, 0])
 
 
-@inline
-def _largest_multiplier(pc: Array, ps: Array, stiffness: float, damping: float) -> float:
-    """Largest modulus of the multipliers of eta'' + damping p^2 eta' + (stiffness p^2 + damping p p') eta = 0.
+@kernel
+def periodic_solution(qc: Array, qs: Array, stiffness: float, damping: float, c: Array, s: Array) -> None:
+    """Solve eta'' + damping q eta' + (stiffness q + damping q'/2) eta = right for the series of eta.
 
-    Fourth-order Magnus steps: exact for constant p, so stiff couplers need no smaller step than the phase asks for.
+    ``qc``, ``qs`` (w + 1,) series of q;  ``c``, ``s`` (K + 1,) series of the right side in, of eta out.  Gaussian
+    elimination with row pivoting in the band of the complex coefficients -K..K.
+    """
+    order, w = c.size - 1, qc.size - 1
+    size, width = 2 * order + 1, 3 * w + 1
+    band, x = np.zeros((size, width), np.complex128), np.empty(size, np.complex128)
+    for row in range(size):
+        m = row - order
+        x[row] = 0.5 * complex(c[abs(m)], -s[abs(m)] if m > 0 else s[abs(m)]) if m != 0 else complex(c[0], 0.0)
+        for step in range(-w, w + 1):
+            if 0 <= row - step < size:
+                k = abs(step)
+                q = complex(0.5 * qc[k], -0.5 * qs[k] if step > 0 else 0.5 * qs[k]) if k > 0 else complex(qc[0], 0.0)
+                # The band starts w columns left of the diagonal and has room for the rows that pivoting brings up.
+                band[row, w - step] = q * complex(stiffness, damping * (m - 0.5 * step))
+        band[row, w] -= m * m
+    for column in range(size):
+        low, right = min(column + w, size - 1), min(column + 2 * w, size - 1)
+        pivot, best = column, -1.0
+        for row in range(column, low + 1):
+            entry = band[row, column - row + w]
+            square = entry.real * entry.real + entry.imag * entry.imag
+            if square > best:
+                pivot, best = row, square
+        if pivot != column:
+            for k in range(column, right + 1):
+                here, there = k - column + w, k - pivot + w
+                band[column, here], band[pivot, there] = band[pivot, there], band[column, here]
+            x[column], x[pivot] = x[pivot], x[column]
+        per = band[column, w].conjugate() * (1.0 / best)
+        band[column, w] = per
+        for row in range(column + 1, low + 1):
+            factor = band[row, column - row + w] * per
+            for k in range(column + 1, right + 1):
+                band[row, k - row + w] -= factor * band[column, k - column + w]
+            x[row] -= factor * x[column]
+    for back in range(size):
+        row = size - 1 - back
+        for k in range(row + 1, min(row + 2 * w, size - 1) + 1):
+            x[row] -= band[row, k - row + w] * x[k]
+        x[row] *= band[row, w]
+    for k in range(order + 1):
+        value = x[order + k]
+        c[k], s[k] = (2.0 * value.real, -2.0 * value.imag) if k > 0 else (value.real, 0.0)
+
+
+@kernel
+def largest_multiplier(qc: Array, qs: Array, stiffness: float, damping: float) -> float:
+    """Largest modulus of the multipliers of eta'' + damping q eta' + (stiffness q + damping q'/2) eta = 0.
+
+    Fourth-order Magnus steps: exact for constant q, so stiff couplers need no smaller step than the phase asks for.
     """
     largest = 0.0
-    for k in range(pc.size):
-        largest += math.hypot(pc[k], ps[k])
-    steps = int(2.0 * math.pi * max(math.sqrt(stiffness) * largest, float(pc.size)) / PHASE_STEP) + 1
+    for k in range(qc.size):
+        largest += math.hypot(qc[k], qs[k])
+    steps = int(2.0 * math.pi * max(math.sqrt(stiffness * largest), float(qc.size)) / PHASE_STEP) + 1
     step = 2.0 * math.pi / steps
     m11, m12, m21, m22 = 1.0, 0.0, 0.0, 1.0
-    q0, d0 = _rates(pc, ps, 0.0, stiffness, damping)
+    q0, d0 = _rates(qc, qs, 0.0, stiffness, damping)
     for j in range(steps):
-        q1, d1 = _rates(pc, ps, step * (j + 0.5), stiffness, damping)
-        q2, d2 = _rates(pc, ps, step * (j + 1.0), stiffness, damping)
+        q1, d1 = _rates(qc, qs, step * (j + 0.5), stiffness, damping)
+        q2, d2 = _rates(qc, qs, step * (j + 1.0), stiffness, damping)
         q, d = (q0 + 4.0 * q1 + q2) / 6.0, (d0 + 4.0 * d1 + d2) / 6.0
         # A = [[0, 1], [-q, -d]]; [A1, A2 - A0] = [[-dq, -dd], [d1 dq - q1 dd, dq]].
         dq, dd = q2 - q0, d2 - d0
@@ -177,6 +222,6 @@ def _largest_multiplier(pc: Array, ps: Array, stiffness: float, damping: float) 
 
 
 @inline
-def _rates(pc: Array, ps: Array, phi: float, stiffness: float, damping: float) -> tuple[float, float]:
-    value, slope = series(pc, ps, phi)
-    return stiffness * value * value + damping * value * slope, damping * value * value
+def _rates(qc: Array, qs: Array, phi: float, stiffness: float, damping: float) -> tuple[float, float]:
+    value, slope = series(qc, qs, phi)
+    return stiffness * value + 0.5 * damping * slope, damping * value

@@ -28,7 +28,8 @@ Status = NDArray[np.uint8]
 LEAST_COSINE = 5e-7
 
 BODY = 10  # m, centre of mass (3), inertia xx xy xz yy yz zz about it, all in the body frame
-LOADS = 3 * BODY + 6  # crank, coupler, rocker; gravity (3), torque on the rocker, crank speed, crank acceleration
+BODIES = 3 * BODY + 3  # crank, coupler, follower; gravity (3)
+LOAD, SPEED, CHANGE = 0, 1, 2  # columns of the drive: torque or force on the follower, crank speed, its rate
 
 Tensor = tuple[float, float, float, float, float, float]
 
@@ -79,12 +80,9 @@ class Reactions(NamedTuple):
 
 
 @inline
-def _body(loads: Array, first: int, x: Vector, y: Vector, z: Vector) -> Body:
-    centre = turned(x, y, z, (loads[first + 1], loads[first + 2], loads[first + 3]))
-    tensor = (
-        loads[first + 4], loads[first + 5], loads[first + 6], loads[first + 7], loads[first + 8], loads[first + 9],
-    )  # fmt: skip
-    return Body(loads[first], centre, tensor, x, y, z)
+def _body(data: Array, x: Vector, y: Vector, z: Vector) -> Body:
+    centre = turned(x, y, z, (data[1], data[2], data[3]))
+    return Body(data[0], centre, (data[4], data[5], data[6], data[7], data[8], data[9]), x, y, z)
 
 
 @inline
@@ -103,13 +101,13 @@ def _torque(body: Body, omega: Vector, eps: Vector) -> Vector:
 
 
 @inline
-def inertia_loads(j: Joints, coupler: Coupler, loads: Array) -> Loads:
+def inertia_loads(j: Joints, coupler: Coupler, bodies: Array, drive: Array) -> Loads:
     """Inertia forces and torques of the three bodies, reduced inertia and its derivative, for one pose."""
-    gravity = (loads[3 * BODY], loads[3 * BODY + 1], loads[3 * BODY + 2])
-    torque, speed, change = loads[3 * BODY + 3], loads[3 * BODY + 4], loads[3 * BODY + 5]
-    crank = _body(loads, 0, j.rho_b, j.tau_b, j.u)
-    rod = _body(loads, BODY, j.s, coupler.across, coupler.n)
-    rocker = _body(loads, 2 * BODY, j.rho, j.tau, j.k)
+    gravity = (bodies[3 * BODY], bodies[3 * BODY + 1], bodies[3 * BODY + 2])
+    torque, speed, change = drive[LOAD], drive[SPEED], drive[CHANGE]
+    crank = _body(bodies[:BODY], j.rho_b, j.tau_b, j.u)
+    rod = _body(bodies[BODY : 2 * BODY], j.s, coupler.across, coupler.n)
+    rocker = _body(bodies[2 * BODY : 3 * BODY], j.rho, j.tau, j.k)
     square = speed * speed
     omega1, eps1 = scale(speed, j.u), scale(change, j.u)
     omega2 = scale(speed, coupler.omega)
@@ -146,9 +144,12 @@ def _about_axis(body: Body, axis: Vector) -> float:
 
 @inline
 def solve(
-    j: Joints, coupler: Coupler, on: Loads, construction: int, e_b: Vector, e_c: Vector, t_d: float, t_a: float
+    j: Joints, coupler: Coupler, on: Loads, construction: float, e_b: Vector, e_c: Vector, t_d: float, t_a: float
 ) -> Reactions:
-    """Reactions of one pose; e_b, e_c friction couples on the coupler, t_d, t_a friction torques on the shafts."""
+    """Reactions of one pose; e_b, e_c friction couples on the coupler, t_d, t_a friction torques on the shafts.
+
+    On a slider t_d is the friction force of its way along tau.
+    """
     q_c = sub(sub(sub(add(on.t2, cross(on.d2, on.f2)), scale(j.b, cross(j.s, on.f2))), e_b), e_c)
     q = cross(coupler.n, coupler.w)
     finger = dot(q_c, j.s) / dot(q, j.s)
@@ -159,7 +160,7 @@ def solve(
     if j.turns > 0.0:
         needed = (dot(moment3, j.k) - on.torque - t_d + dot(e_c, j.k) + on_rocker * dot(q, j.k)) / j.c
     else:
-        needed = dot(on.f3, j.tau) - on.torque
+        needed = dot(on.f3, j.tau) - on.torque - t_d
     axial = (needed - dot(sub(normal, on.f2), j.tau)) / j.t_tau
     r_b = add(normal, scale(axial, j.s))
     r_c = sub(r_b, on.f2)
@@ -176,35 +177,29 @@ def solve(
 def kinetostatics(
     poses: Array,
     designs: Array,
-    loads: Array,
-    construction: int,
+    bodies: Array,
+    drive: Array,
+    finger: Array,
     status: Status,
-    r_a: Array | None,
-    r_b: Array | None,
-    r_c: Array | None,
-    r_d: Array | None,
-    m_a: Array | None,
-    m_d: Array | None,
-    m_finger: Array | None,
-    m_drive: Array | None,
-    j_red: Array | None,
-    dj_red: Array | None,
+    forces: Array | None,
+    couples: Array | None,
+    inertia: Array | None,
 ) -> None:
     """Frictionless joint reactions, driving torque and reduced inertia.
 
     Parameters
     ----------
     poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.joints`
-    loads : (n, LOADS): per body m, centre of mass, inertia about it (body axes: crank rho_B, tau_B, u from A; coupler
-        s, n x s, n from B; follower rho, tau, k from D); gravity; torque on the rocker about k or force on the slider
-        along tau; crank speed; its rate
-    construction : DRIVEN or DRIVING, which ball joint carries the finger
+    bodies : (n, BODIES): per body m, centre of mass, inertia about it (body axes: crank rho_B, tau_B, u from A; coupler
+        s, n x s, n from B; follower rho, tau, k from D); gravity
+    drive : (n, m, 3) or (n, 1, 3): torque on the rocker about k or force on the slider along tau; crank speed; its rate
+    finger : (n,) DRIVEN or DRIVING, which ball joint carries the finger
     status : (n, m), in and out; DEAD_POINT where cos(pressure angle) < LEAST_COSINE, SINGULAR where the finger axis
         meets the coupler: both give nan
-    r_a, r_b, r_c, r_d : (n, m, 3) or None; force frame on crank, crank on coupler, coupler and frame on follower
-    m_a, m_d : (n, m, 3) or None; moment of the frame on crank (about A) and follower (about D), fixed axes
-    m_finger, m_drive : (n, m) or None; couple of the finger along n x w, torque on the crank about u
-    j_red, dj_red : (n, m) or None; inertia reduced to the crank and its derivative
+    forces : (n, m, 18) or None, fixed axes; force frame on crank, crank on coupler, coupler and frame on follower;
+        moment of the frame on crank (about A) and follower (about D)
+    couples : (n, m, 2) or None; couple of the finger along n x w, torque on the crank about u
+    inertia : (n, m, 2) or None; inertia reduced to the crank and its derivative
 
     Notes
     -----
@@ -214,16 +209,18 @@ def kinetostatics(
     for i in range(poses.shape[0]):
         for k in range(poses.shape[1]):
             j = read(poses[i, k], designs[i])
-            coupler = orientation(j, construction)
+            coupler = orientation(j, finger[i])
             status[i, k] = pose_status(status[i, k], j, coupler)
             good = 1.0 if status[i, k] == st.OK else math.nan
-            load = inertia_loads(j, coupler, loads[i])
-            if j_red is not None:
-                j_red[i, k] = good * load.j_red
-            if dj_red is not None:
-                dj_red[i, k] = good * load.dj_red
-            r = solve(j, coupler, load, construction, zero, zero, 0.0, 0.0)
-            store_reactions(r, good, i, k, r_a, r_b, r_c, r_d, m_a, m_d, m_finger, m_drive)
+            load = inertia_loads(j, coupler, bodies[i], drive[i, k if drive.shape[1] > 1 else 0])
+            if inertia is not None:
+                inertia[i, k, 0], inertia[i, k, 1] = good * load.j_red, good * load.dj_red
+            if forces is not None or couples is not None:
+                r = solve(j, coupler, load, finger[i], zero, zero, 0.0, 0.0)
+                if forces is not None:
+                    store_forces(forces[i, k], good, r)
+                if couples is not None:
+                    couples[i, k, 0], couples[i, k, 1] = good * r.finger, good * r.drive
 
 
 @inline
@@ -239,34 +236,8 @@ def pose_status(code: int, j: Joints, coupler: Coupler) -> int:
 
 
 @inline
-def store_reactions(
-    r: Reactions,
-    good: float,
-    i: int,
-    k: int,
-    r_a: Array | None,
-    r_b: Array | None,
-    r_c: Array | None,
-    r_d: Array | None,
-    m_a: Array | None,
-    m_d: Array | None,
-    m_finger: Array | None,
-    m_drive: Array | None,
-) -> None:
-    """Write the wanted reactions of one pose; ``good`` is 1 or nan."""
-    if r_a is not None:
-        r_a[i, k, 0], r_a[i, k, 1], r_a[i, k, 2] = good * r.r_a[0], good * r.r_a[1], good * r.r_a[2]
-    if r_b is not None:
-        r_b[i, k, 0], r_b[i, k, 1], r_b[i, k, 2] = good * r.r_b[0], good * r.r_b[1], good * r.r_b[2]
-    if r_c is not None:
-        r_c[i, k, 0], r_c[i, k, 1], r_c[i, k, 2] = good * r.r_c[0], good * r.r_c[1], good * r.r_c[2]
-    if r_d is not None:
-        r_d[i, k, 0], r_d[i, k, 1], r_d[i, k, 2] = good * r.r_d[0], good * r.r_d[1], good * r.r_d[2]
-    if m_a is not None:
-        m_a[i, k, 0], m_a[i, k, 1], m_a[i, k, 2] = good * r.m_a[0], good * r.m_a[1], good * r.m_a[2]
-    if m_d is not None:
-        m_d[i, k, 0], m_d[i, k, 1], m_d[i, k, 2] = good * r.m_d[0], good * r.m_d[1], good * r.m_d[2]
-    if m_finger is not None:
-        m_finger[i, k] = good * r.finger
-    if m_drive is not None:
-        m_drive[i, k] = good * r.drive
+def store_forces(out: Array, good: float, r: Reactions) -> None:
+    """Write the six vectors of one pose, (18,); ``good`` is 1 or nan."""
+    for k in range(3):
+        out[k], out[3 + k], out[6 + k] = good * r.r_a[k], good * r.r_b[k], good * r.r_c[k]
+        out[9 + k], out[12 + k], out[15 + k] = good * r.r_d[k], good * r.m_a[k], good * r.m_d[k]

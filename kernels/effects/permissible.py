@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.effects.bearings import equivalent_load, sliding_criteria, sliding_data, support_arms
+from kernels.effects.bearings import equivalent_load, in_plane, sliding_criteria, sliding_data, support_arms
 
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
@@ -52,10 +52,12 @@ def rolling_utilisation(
 
 
 @inline
-def _at(utilisation: Any, bearings: Array, limits: Array, i: int, moment: float, theta1: float, tan2: float) -> float:
-    sin1 = math.sin(theta1)
-    value: float = utilisation(bearings, limits, i, moment, math.cos(theta1), sin1, sin1 * tan2)
-    return value
+def _spare(utilisation: Any, bearings: Array, limits: Array, i: int, moment: float, half: float, tan2: float) -> float:
+    """1/utilisation - 1 at theta1 = 2 arctan(half): near to linear, finite where friction locks."""
+    per = 1.0 / (1.0 + half * half)
+    sin1 = 2.0 * half * per
+    used: float = utilisation(bearings, limits, i, moment, (1.0 - half) * (1.0 + half) * per, sin1, sin1 * tan2)
+    return 1.0 / used - 1.0
 
 
 @inline
@@ -63,37 +65,37 @@ def _first_crossing(
     utilisation: Any, looks: int, bearings: Array, limits: Array, i: int, moment: float, tan2: float
 ) -> float:
     """Largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none."""
-    # 1/utilisation - 1 is near to linear, finite where friction locks, and falls through zero at the crossing.
-    low, high, at_high = 0.0, 0.5 * math.pi, -1.0
-    at_low = 1.0 / _at(utilisation, bearings, limits, i, moment, 0.0, tan2) - 1.0
+    # In half = tan(theta1/2) there is no sine to call; what is spare falls through zero at the crossing.
+    low, high, at_high = 0.0, 1.0, -1.0
+    at_low = _spare(utilisation, bearings, limits, i, moment, 0.0, tan2)
     if at_low < 0.0:
         return 0.0
     for k in range(1, looks):
-        theta = 0.5 * math.pi * k / looks
-        value = 1.0 / _at(utilisation, bearings, limits, i, moment, theta, tan2) - 1.0
+        half = k / looks
+        value = _spare(utilisation, bearings, limits, i, moment, half, tan2)
         if value < 0.0:
-            high, at_high = theta, value
+            high, at_high = half, value
             break
-        low, at_low = theta, value
-    side, before = 0, math.inf
+        low, at_low = half, value
+    side, before, half = 0, math.inf, low
     for _ in range(STEPS):
         # Regula falsi that halves the value of an end which stays (Illinois), in the bracket always.
-        theta = (low * at_high - high * at_low) / (at_high - at_low)
-        if not low < theta < high:
-            theta = 0.5 * (low + high)
-        value = 1.0 / _at(utilisation, bearings, limits, i, moment, theta, tan2) - 1.0
+        half = (low * at_high - high * at_low) / (at_high - at_low)
+        if not low < half < high:
+            half = 0.5 * (low + high)
+        value = _spare(utilisation, bearings, limits, i, moment, half, tan2)
         if value < 0.0:
-            high, at_high = theta, value
+            high, at_high = half, value
             at_low = 0.5 * at_low if side == -1 else at_low
             side = -1
         else:
-            low, at_low = theta, value
+            low, at_low = half, value
             at_high = 0.5 * at_high if side == 1 else at_high
             side = 1
-        if abs(theta - before) <= 2.0 * EPS * theta or value == 0.0:
-            return theta
-        before = theta
-    return low
+        if abs(half - before) <= 2.0 * EPS * half or value == 0.0:
+            break
+        before = half
+    return 2.0 * math.atan(half)
 
 
 @inline
@@ -105,11 +107,9 @@ def _fill(
         for j in range(t_tau.shape[1]):
             good = 1.0 if status[i, j] == st.OK else math.nan
             rho, along = t_rho[i, j], t_k[i, j]
-            in_plane = math.hypot(t_tau[i, j], rho)
             if used is not None:
-                value = utilisation(
-                    bearings, limits, i, moment[i], abs(t_tau[i, j]) / in_plane, rho / in_plane, along / in_plane
-                )
+                cos1, sin1, axial = in_plane(t_tau[i, j], rho, along)
+                value = utilisation(bearings, limits, i, moment[i], cos1, sin1, axial)
                 if status[i, j] == st.OK and not value < math.inf:
                     status[i, j] = st.JAMMED
                     value = math.nan
@@ -150,19 +150,9 @@ def sliding_limits(
     reserve : (n, m) or None [rad]; permissible minus actual theta1, negative where a bearing is overloaded
     """
     _fill(
-        sliding_utilisation,
-        SLIDING_LOOKS,
-        t_tau,
-        t_rho,
-        t_k,
-        moment,
-        bearings,
-        limits,
-        status,
-        used,
-        permissible,
+        sliding_utilisation, SLIDING_LOOKS, t_tau, t_rho, t_k, moment, bearings, limits, status, used, permissible,
         reserve,
-    )
+    )  # fmt: skip
 
 
 @kernel
@@ -184,16 +174,6 @@ def rolling_limits(
     equivalent load as the one column of ``limits``.
     """
     _fill(
-        rolling_utilisation,
-        ROLLING_LOOKS,
-        t_tau,
-        t_rho,
-        t_k,
-        moment,
-        bearings,
-        limits,
-        status,
-        used,
-        permissible,
+        rolling_utilisation, ROLLING_LOOKS, t_tau, t_rho, t_k, moment, bearings, limits, status, used, permissible,
         reserve,
-    )
+    )  # fmt: skip

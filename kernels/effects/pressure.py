@@ -31,9 +31,6 @@ def directions(
     theta1: Array | None,
     theta2: Array | None,
     theta3: Array | None,
-    cos_theta1: Array | None,
-    sin_theta1: Array | None,
-    axial: Array | None,
 ) -> None:
     """Components of the coupler direction and the radial, axial and crank-side pressure angles.
 
@@ -44,14 +41,12 @@ def directions(
     t_tau, t_rho, t_k : (n, m) or None; t_tau carries the sign of the branch
     theta1 : (n, m) or None; radial angle in [0, pi/2], tan = |t_rho/t_tau|
     theta2, theta3 : (n, m) or None; axial angles in (-pi/2, pi/2], tan = t_k/t_rho (follower), n_u/n_rho (crank)
-    cos_theta1, sin_theta1, axial : (n, m) or None; what :mod:`kernels.effects.bearings` takes
     """
     for i in range(poses.shape[0]):
         for k in range(poses.shape[1]):
             j = read(poses[i, k], designs[i])
             good = 1.0 if status[i, k] == st.OK else math.nan
             rho, along = dot(j.s, j.rho), dot(j.s, j.k)
-            in_plane = math.hypot(j.t_tau, rho)
             if t_tau is not None:
                 t_tau[i, k] = good * j.t_tau
             if t_rho is not None:
@@ -67,9 +62,3 @@ def directions(
                 radial = dot(j.s, j.rho_b)
                 side = 1.0 if radial >= 0.0 else -1.0
                 theta3[i, k] = good * math.atan2(side * dot(j.s, j.u), abs(radial))
-            if cos_theta1 is not None:
-                cos_theta1[i, k] = good * abs(j.t_tau) / in_plane
-            if sin_theta1 is not None:
-                sin_theta1[i, k] = good * rho / in_plane
-            if axial is not None:
-                axial[i, k] = good * along / in_plane

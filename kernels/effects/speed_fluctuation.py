@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.periodic import coefficients, series, significant, tail
+from kernels.periodic import coefficients, on_grid, series, significant, tail
 
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
 
 NEWTON = 60
 RESOLVED = 1e-9
+FINER = 4  # looks per sample before an extreme speed is refined
 
 
 @kernel
@@ -53,11 +54,12 @@ def speed_fluctuation(
     n = inertia.shape[1]
     half = (n + 1) // 2
     all_jc, all_js, all_wc, all_ws = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
-    work = np.empty(n)
+    work, turn = np.empty(n), np.empty((4, half))
+    fine_j, fine_w, looks = np.empty(FINER * n), np.empty(FINER * n), np.empty((4, FINER * n))
     for i in range(inertia.shape[0]):
         row = i if phi.shape[0] > 1 else 0
-        coefficients(inertia[i], all_jc, all_js)
-        coefficients(excess[i], all_wc, all_ws)
+        coefficients(inertia[i], turn, all_jc, all_js)
+        coefficients(excess[i], turn, all_wc, all_ws)
         code = st.OK if math.isfinite(all_jc[0] + all_wc[0]) else st.NOT_ROTATABLE
         # A torque excess far below the inertia torque moves no speed: its noise need not be resolved.
         energy_scale = all_jc[0] * mean_speed[i] * mean_speed[i]
@@ -70,16 +72,18 @@ def speed_fluctuation(
         jc, js = all_jc[:count], all_js[:count]
         count = significant(all_wc, all_ws)
         wc, ws = all_wc[:count], all_ws[:count]
+        on_grid(wc, ws, looks, work)
         least = math.inf
         for j in range(n):
-            work[j] = series(wc, ws, 2.0 * math.pi * j / n)[0]
             least = min(least, work[j])
         e = _energy(inertia[i], work, least, mean_speed[i], jc[0]) if code == st.OK else math.nan
         if code == st.OK and not math.isfinite(e):
             code = st.JAMMED
         status[i], energy[i] = code, e
-        high = _extreme(jc, js, wc, ws, e, 1.0, n) if code == st.OK else math.nan
-        low = _extreme(jc, js, wc, ws, e, -1.0, n) if code == st.OK else math.nan
+        on_grid(jc, js, looks, fine_j)
+        on_grid(wc, ws, looks, fine_w)
+        high = _extreme(jc, js, wc, ws, e, 1.0, fine_j, fine_w) if code == st.OK else math.nan
+        low = _extreme(jc, js, wc, ws, e, -1.0, fine_j, fine_w) if code == st.OK else math.nan
         fastest[i], slowest[i], delta[i] = high, low, (high - low) / mean_speed[i]
         if speed is not None or acceleration is not None:
             for j in range(phi.shape[1]):
@@ -120,15 +124,14 @@ def _energy(inertia: Array, work: Array, least: float, mean_speed: float, mean_i
 
 
 @inline
-def _extreme(jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float, n: int) -> float:
-    """Largest (sign +1) or smallest (-1) speed: best of 4 N samples, then bisection on the slope beside it."""
-    best, where = -math.inf, 0.0
-    for j in range(4 * n):
-        angle = 0.5 * math.pi * j / n
-        value = sign * (e + series(wc, ws, angle)[0]) / series(jc, js, angle)[0]
+def _extreme(jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float, inertia: Array, work: Array) -> float:
+    """Largest (sign +1) or smallest (-1) speed: best of the finer samples, then bisection on the slope beside it."""
+    best, where, step = -math.inf, 0.0, 2.0 * math.pi / work.size
+    for j in range(work.size):
+        value = sign * (e + work[j]) / inertia[j]
         if value > best:
-            best, where = value, angle
-    low, high = where - 0.5 * math.pi / n, where + 0.5 * math.pi / n
+            best, where = value, step * j
+    low, high = where - step, where + step
     # The slope of (E + W)/J has the sign of W' J - (E + W) J'.
     for _ in range(60):
         middle = 0.5 * (low + high)

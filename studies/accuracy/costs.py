@@ -14,16 +14,16 @@ from kernels.families import rssr
 from studies.accuracy.reference import RSSR
 from studies.accuracy.timing import seconds
 from sweep.effects import NAMES, effect
+from sweep.effects import costs as effects
 from sweep.families.base import Accuracy, Array
 from sweep.sampling import turn
 from sweep.summaries import design_outputs
-from tests.bench import effects as bench
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Names: TypeAlias = tuple[tuple[str, ...], ...]
-POSES = bench.POSES  # of a turn
+POSES = effects.POSES  # of a turn
 MOTION = ("dpsi", "d2psi", "d3psi")
 GRIDS: Names = ((), ("dpsi",), ("d2psi",), ("d3psi",), MOTION)
 POSE_SETS: Names = (
@@ -61,18 +61,19 @@ def output_costs(designs: Array, smoke: bool) -> pd.DataFrame:
     rows = [_row("largest over a grid", names, _dense(designs, names), "pose") for names in GRIDS[few]]
     rows += [_row("poses", names, _poses(designs, names), "pose") for names in POSE_SETS[few]]
     rows += [_row("whole turn, exact", names, _turn(designs, names), "design") for names in TURNS[few]]
-    for name, output, unit, cost in bench.costs(16 if smoke else 64, names=NAMES[:1] if smoke else NAMES, each=False):
-        entry, per = effect(name), unit.removeprefix("us/").removeprefix("ns/")
-        count = (
-            len(entry.outputs) if output == "all" else len(entry.design_result.outputs if entry.design_result else ())
-        )
+    for cost in effects.costs(NAMES[:1] if smoke else NAMES, n=16 if smoke else 64):
+        if cost.effect == effects.MOTION:
+            continue
+        entry = effect(cost.effect)
+        design = entry.design_result.outputs if entry.design_result else ()
+        count = len(entry.outputs if cost.per == "pose" else design)
         rows.append(
             {
                 "kind": "effect",
-                "what": f"{name}: {count} {'pose' if per == 'pose' else 'design'} outputs",
+                "what": f"{cost.effect}: {count} {cost.per} outputs",
                 "family": entry.families[0],
-                "per": per,
-                "nanoseconds": cost if per == "pose" else 1e3 * cost,
+                "per": cost.per,
+                "nanoseconds": cost.ns,
             }
         )
     frame = pd.DataFrame(rows)

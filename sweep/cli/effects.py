@@ -40,8 +40,14 @@ def cost_words(entry: Effect) -> str:
     """Measured cost in words."""
     words = [f"{entry.ns_per_pose:.0f} ns per pose"] if entry.ns_per_pose else []
     if entry.design_result:
-        words.append(f"{entry.design_result.ns_per_design / 1000.0:.3g} us per design")
+        words.append(f"{entry.ns_per_design / 1000.0:.3g} us per design")
     return ", ".join(words)
+
+
+def chain_words(entry: Effect) -> str:
+    """Which stages of a chain the effect can be asked of."""
+    stages = "the first stage" if entry.even_crank else "any stage"
+    return f"{stages}; the load of the stages behind it enters" if entry.takes_load else stages
 
 
 def explain(entry: Effect) -> list[str]:
@@ -51,6 +57,7 @@ def explain(entry: Effect) -> list[str]:
     lines += aligned(
         [
             ("families", ", ".join(entry.families)),
+            ("in a chain", chain_words(entry)),
             ("needs", ", ".join(entry.needs) or "the motion"),
             ("kind", kind),
             ("cost", cost_words(entry)),
@@ -97,8 +104,14 @@ def page() -> str:
         "centre, crank pin, driven joint, rocker centre; (rho_B, tau_B, u) and (rho, tau, k) the triads of crank and",
         "follower, s the unit vector from B to C.",
         "",
+        "In a chain inputs and outputs carry the number of their stage (`m_crank2`, `force_c2`), `speed` and",
+        "`speed_change` that of the first; a later stage turns as the one before drives it, and its driving torque",
+        "loads that one. The four-bar of a `guide` is a plane crank-rocker whose guided point bears no load of its",
+        "own. What is not listed for a family the theory does not give: geared dwells have no effects, sliders no",
+        "shaft bearings.",
+        "",
         "Units are any consistent set; in studies and datasets mm, t, s, hence N, N mm, MPa. Costs are measured on one",
-        "core (`make bench-effects`), each effect alone, the motion it needs not counted.",
+        "core (`make bench-effects`), each effect alone with all its outputs, the motion it needs not counted.",
         "",
         "| effect | key | families | what | needs | cost |",
         "|---|---|---|---|---|---|",
@@ -110,6 +123,7 @@ def page() -> str:
         kind = "Whole turn: it couples the crank angles." if e.whole_turn else "Pointwise in the crank angle."
         lines += ["", f"## {e.name}", "", f"{e.title[0].upper()}{e.title[1:]}. {kind}", ""]
         lines += [*(f"    {line}" for line in e.formulas), ""]
+        lines += [f"Families: {', '.join(e.families)}; in a chain {chain_words(e)}.", ""]
         lines += [f"Called for: {e.called_for}.", "", f"Negligible: {e.negligible}.", ""]
         outputs = [*e.outputs, *(e.design_result.outputs if e.design_result else ())]
         lines += ["| output | unit | definition | equation |", "|---|---|---|---|"]

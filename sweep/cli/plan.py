@@ -128,7 +128,7 @@ def _effects(study: Study) -> list[str]:
     if bare is not study.family:
         lines += ["", "effects, with their share of the cost at equal numbers of poses"]
         lines += aligned(tree(bare, study.want, POSES))
-    lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(e.name for e in out)}"]
+    lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(out)}"]
     found = findings(bare, study.family, spread_designs(study, ADVISED), study.want)
     if found:
         lines += ["", f"what matters here, from {ADVISED} designs spread over the space; the choice is yours"]

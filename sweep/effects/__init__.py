@@ -14,8 +14,9 @@ from importlib import import_module
 
 from sweep.effects.base import Effect
 from sweep.effects.evaluation import effect_poses, on_own_columns, run_design
+from sweep.effects.placing import Placed, stages_of
 from sweep.families.base import Family, Output, Parameter, Step
-from sweep.families.chain import Chain, chain
+from sweep.families.chain import Chain
 
 # Name of each effect's entry: module and constant.  A new effect is a kernel file, an entry file and its line here.
 _ENTRIES = {
@@ -25,19 +26,25 @@ _ENTRIES = {
     "kinetostatics": ("kinetostatics", "EFFECT"),
     "slider_kinetostatics": ("kinetostatics", "SLIDER"),
     "friction": ("friction", "EFFECT"),
+    "slider_friction": ("friction", "SLIDER"),
     "speed_fluctuation": ("speed", "EFFECT"),
+    "slider_speed_fluctuation": ("speed", "SLIDER"),
     "sliding_bearings": ("bearings", "SLIDING"),
     "rolling_bearings": ("bearings", "ROLLING"),
     "sliding_limits": ("bearings", "SLIDING_LIMIT"),
     "rolling_limits": ("bearings", "ROLLING_LIMIT"),
     "bearing_life": ("bearing_life", "EFFECT"),
     "elasticity": ("elasticity", "STATIC"),
+    "slider_elasticity": ("elasticity", "SLIDER_STATIC"),
     "dynamic_elasticity": ("elasticity", "DYNAMIC"),
+    "slider_dynamic_elasticity": ("elasticity", "SLIDER_DYNAMIC"),
 }
 NAMES = tuple(_ENTRIES)
 
 # Prefixes of the general reductions over the turn (sweep/catalogue.py): max_abs_force_d asks for force_d.
 _REDUCTIONS = ("phi_max_abs_", "max_abs_", "max_", "min_", "range_", "rms_", "")
+# In the stages behind the first, speed and acceleration are those of the first stage's crank.
+_FIRST_ONLY = ("speed", "speed_change")
 
 
 @lru_cache
@@ -48,34 +55,59 @@ def effect(name: str) -> Effect:
     return entry
 
 
-def applicable(family: Family) -> tuple[Effect, ...]:
-    """Effects that can be asked of a family, in the order of the register."""
-    return tuple(entry for entry in map(effect, NAMES) if family.name in entry.families)
+def applicable(family: Family) -> tuple[Placed, ...]:
+    """Effects that can be asked of a family or of the stages of a chain, in the order of the register.
+
+    A later stage of a chain turns unevenly; a stage whose load comes from stages behind it needs them to hand it back.
+    """
+    stages = stages_of(family)
+    found = [
+        Placed(entry, k, number, k == len(stages) - 1)
+        for k, (stage, number) in enumerate(stages)
+        for entry in map(effect, NAMES)
+        if stage.name in entry.families and not (k > 0 and entry.even_crank)
+    ]
+    return tuple(p for p in found if not p.entry.takes_load or len(_carriers(family, p)) == len(stages) - 1 - p.stage)
 
 
-def called_for(family: Family, wanted: Iterable[str]) -> tuple[Effect, ...]:
+def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
     """The effects that some wanted pose output, design output or reduction belongs to, in the order of the register."""
     names = {name[len(prefix) :] for name in wanted for prefix in _REDUCTIONS if name.startswith(prefix)}
-    return tuple(entry for entry in applicable(family) if not names.isdisjoint(o.name for o in outputs(entry)))
+    return tuple(p for p in applicable(family) if not names.isdisjoint(o.name for o in p.outputs))
 
 
-def outputs(entry: Effect) -> tuple[Output, ...]:
-    """Pose and design outputs of an effect."""
-    return (*entry.outputs, *(entry.design_result.outputs if entry.design_result else ()))
+def _carriers(family: Family, placed: Placed) -> list[Placed]:
+    """The effects of the later stages that hand back the load of this one."""
+    stages, key = stages_of(family), placed.entry.takes_load
+    return [
+        Placed(entry, k, number, False)
+        for k, (stage, number) in enumerate(stages)
+        for entry in map(effect, NAMES)
+        if key and k > placed.stage and entry.key == key and stage.name in entry.families
+    ]
 
 
 def input_names(family: Family) -> frozenset[str]:
     """Inputs of all effects that can be asked of a family, or of the stages of a chain."""
-    if isinstance(family, Chain):
-        return frozenset(f"{name}{s.number}" for s in family.stages for name in input_names(s.family))
-    return frozenset(p.name for entry in applicable(family) for p in entry.inputs)
+    return frozenset(p.name for p in inputs(family, applicable(family)))
 
 
 def offered(family: Family) -> tuple[Output, ...]:
-    """Pose and design outputs of all effects that can be asked of a family, or of a chain's first stage."""
+    """Pose and design outputs of all effects that can be asked of a family, or of the stages of a chain."""
+    return tuple(o for placed in applicable(family) for o in placed.outputs)
+
+
+def elsewhere(family: Family, name: str) -> str:
+    """Words for an error: which effects have an output that this family, or this stage of a chain, cannot be asked."""
+    plain = {name[len(prefix) :] for prefix in _REDUCTIONS if name.startswith(prefix)}
     if isinstance(family, Chain):
-        return tuple(replace(o, name=f"{o.name}1") for o in offered(family.stages[0].family))
-    return tuple(o for entry in applicable(family) for o in outputs(entry))
+        plain |= {n.removesuffix(number) for _, number in stages_of(family) for n in plain}
+    found = [entry for entry in map(effect, NAMES) if not plain.isdisjoint(o.name for o in Placed(entry).outputs)]
+    if not found:
+        return ""
+    words = ", ".join(f"{entry.name} ({', '.join(entry.families)})" for entry in found)
+    even = " at the first stage of a chain only" if all(entry.even_crank for entry in found) else ""
+    return f"; {name} is an output of the effects{even}, families in brackets: {words}"
 
 
 def extended(family: Family, wanted: Iterable[str]) -> Family:
@@ -84,64 +116,51 @@ def extended(family: Family, wanted: Iterable[str]) -> Family:
     The inputs of the effects become further parameters, after the family's own.  In a chain an effect belongs to a
     stage, and its inputs and outputs carry the stage's number.
     """
-    names = tuple(wanted)
-    if isinstance(family, Chain):
-        stages = tuple(_extended_stage(family, k, names) for k in range(len(family.stages)))
-        same = all(new is stage.family for new, stage in zip(stages, family.stages, strict=True))
-        return family if same else chain(stages)
-    return with_effects(family, called_for(family, names))
+    return with_effects(family, called_for(family, wanted))
 
 
-def _extended_stage(family: Chain, k: int, wanted: tuple[str, ...]) -> Family:
-    stage = family.stages[k]
-    number = str(stage.number)
-    own = [name.removesuffix(number) for name in wanted if name.endswith(number)]
-    if k == len(family.stages) - 1:
-        own += [name for name in wanted if not name.endswith(number)]
-    return with_effects(stage.family, tuple(e for e in called_for(stage.family, own) if k == 0 or _any_crank(e)))
-
-
-def _any_crank(entry: Effect) -> bool:
-    """Whether an effect also holds where the crank does not turn evenly, as in the later stages of a chain."""
-    steady = any(p.name == "speed" for p in entry.inputs)
-    return not (steady or entry.whole_turn or entry.design_result)
-
-
-def with_effects(family: Family, effects: tuple[Effect, ...]) -> Family:
+def with_effects(family: Family, effects: tuple[Placed, ...]) -> Family:
     """The family with the outputs and inputs of these effects."""
     if not effects:
         return family
-    added = _inputs(effects)
+    added = inputs(family, effects)
     own = len(family.parameters)
     steps = tuple(
         Step(
-            name=entry.name,
-            provides=entry.design_result.outputs,
-            run=partial(run_design, family, entry, added, own),
-            ns_per_design=entry.design_result.ns_per_design,
+            name=placed.name,
+            provides=placed.design_outputs,
+            run=partial(run_design, family, placed, added, own),
+            ns_per_design=placed.entry.ns_per_design,
         )
-        for entry in effects
-        if entry.design_result is not None
+        for placed in effects
+        if placed.design_outputs
     )
     return replace(
         family,
         parameters=(*family.parameters, *added),
-        pose_outputs=(*family.pose_outputs, *(o for entry in effects for o in entry.outputs)),
+        pose_outputs=(*family.pose_outputs, *(o for placed in effects for o in placed.pose_outputs)),
         poses=partial(effect_poses, family, effects, added, own),
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
-        dear={o.name: (entry.name, entry.ns_per_pose) for entry in effects for o in entry.outputs},
+        dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )
 
 
-def _inputs(effects: tuple[Effect, ...]) -> tuple[Parameter, ...]:
-    """Inputs of all effects; one that several share stands once, and is required if any of them requires it."""
+def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:
+    """Inputs of these effects and of those that hand back their load, with their stage's number.
+
+    One that several share stands once, and is required if any of them requires it.
+    """
     merged: dict[str, Parameter] = {}
-    for entry in effects:
-        for p in entry.inputs:
-            kept = merged.get(p.name)
-            if kept is None:
-                merged[p.name] = replace(p, text=f"{p.text}; for {entry.name}")
-            else:
-                default = kept.default if p.default is not None else None
-                merged[p.name] = replace(kept, text=f"{kept.text}, {entry.name}", default=default)
-    return tuple(merged.values())
+    users: dict[str, list[str]] = {}
+    first = stages_of(family)[0][1]
+    for placed in effects:
+        for source in (placed, *_carriers(family, placed)):
+            for p in source.entry.inputs:
+                name = f"{p.name}{first if p.name in _FIRST_ONLY else source.number}"
+                kept = merged.get(name, p)
+                merged[name] = kept if p.default is not None else replace(kept, default=None)
+                users.setdefault(name, []).append(placed.name)
+    return tuple(
+        replace(p, name=name, text=f"{p.text}; for {', '.join(dict.fromkeys(users[name]))}")
+        for name, p in merged.items()
+    )

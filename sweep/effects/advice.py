@@ -7,20 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sweep.effects import applicable, called_for, effect
-from sweep.effects.base import Advice, Effect, Scene
+from sweep.effects import applicable, called_for, effect, inputs
+from sweep.effects.base import Advice, Effect
+from sweep.effects.measured import COSTS
+from sweep.effects.placing import Placed, first_scene
 from sweep.families.base import Angles, Array, Family
-from sweep.families.chain import Chain
 
 SAMPLES = 64
-# The motion with what the joint records take of it [ns per pose], measured (tests/bench/effects.py).
-MOTION_NS = 60.0
+# The motion with the joint records made of it [ns per pose].
+MOTION_NS = COSTS["motion"][0]
 
 
 class Finding(NamedTuple):
     """What an effect's rule of negligibility says of a scene."""
 
-    effect: Effect
+    name: str
     wanted: bool
     advice: Advice
 
@@ -35,14 +36,7 @@ class Finding(NamedTuple):
             (False, False): "not wanted, but will matter",
         }[self.wanted, self.advice.negligible]
         numbers = f"{self.advice.quantity} {self.advice.worst:.3g}, {side} {self.advice.threshold:.3g}"
-        return f"{self.effect.name}: {verdict}: {numbers}"
-
-
-def wanted_effects(family: Family, wanted: Iterable[str]) -> tuple[Effect, ...]:
-    """The effects that a family, or the first stage of a chain, computes for these names."""
-    if isinstance(family, Chain):
-        return called_for(family.stages[0].family, [name.removesuffix("1") for name in wanted if name.endswith("1")])
-    return called_for(family, wanted)
+        return f"{self.name}: {verdict}: {numbers}"
 
 
 def closure(effects: Iterable[Effect]) -> tuple[Effect, ...]:
@@ -64,45 +58,39 @@ def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str,
 
     ``poses`` is the number of poses of one design, for the cost of what is computed per design.
     """
-    names = tuple(wanted)
-    own = wanted_effects(family, names)
-    costs = {entry.name: cost(entry, names, poses) for entry in own}
+    names = frozenset(wanted)
+    own = called_for(family, names)
+    costs = {placed.name: cost(placed, names, poses) for placed in own}
     total = poses * MOTION_NS + sum(costs.values())
     rows = [("motion", "K0", f"{MOTION_NS:.3g} ns per pose", f"{100.0 * poses * MOTION_NS / total:.0f} %")]
-    for entry in own:
-        whole = costs[entry.name] > poses * entry.ns_per_pose
-        unit = f"{costs[entry.name] / 1e3:.3g} us per design" if whole else f"{entry.ns_per_pose:.0f} ns per pose"
-        rows.append((entry.name, entry.key, unit, f"{100.0 * costs[entry.name] / total:.0f} %"))
-        for depth, need in _needs(entry, 1):
+    for placed in own:
+        whole = costs[placed.name] > poses * placed.entry.ns_per_pose
+        per_pose = f"{placed.entry.ns_per_pose:.0f} ns per pose"
+        unit = f"{costs[placed.name] / 1e3:.3g} us per design" if whole else per_pose
+        rows.append((placed.name, placed.entry.key, unit, f"{100.0 * costs[placed.name] / total:.0f} %"))
+        for depth, need in _needs(placed.entry, 1):
             rows.append(("  " * depth + need.name, need.key, "part of it", ""))
     return rows
 
 
-def cost(entry: Effect, wanted: Iterable[str], poses: float) -> float:
+def cost(placed: Placed, wanted: frozenset[str], poses: float) -> float:
     """Nanoseconds per design of what is wanted of an effect."""
-    design = {o.name for o in entry.design_result.outputs} if entry.design_result else set()
-    names = {name.removesuffix("1") if name not in design else name for name in wanted}
-    whole = entry.design_result.ns_per_design if entry.design_result and names & design else 0.0
-    per_pose = entry.ns_per_pose * poses
-    return whole + (per_pose if not whole or called_for_poses(entry, names) else 0.0)
-
-
-def called_for_poses(entry: Effect, names: Iterable[str]) -> bool:
-    """Whether a pose output of the effect is wanted by itself or through a general reduction."""
-    if entry.whole_turn:
-        return False
-    return any(name.endswith(o.name) for name in names for o in entry.outputs)
+    per_design = not wanted.isdisjoint(o.name for o in placed.design_outputs)
+    reduced = (name for name in wanted if not any(name == o.name for o in placed.design_outputs))
+    per_pose = any(name.endswith(o.name) for name in reduced for o in placed.pose_outputs)
+    return per_design * placed.entry.ns_per_design + per_pose * poses * placed.entry.ns_per_pose
 
 
 def _needs(entry: Effect, depth: int) -> list[tuple[int, Effect]]:
     return [pair for name in entry.needs for pair in [(depth, effect(name)), *_needs(effect(name), depth + 1)]]
 
 
-def left_out(family: Family, wanted: Iterable[str]) -> tuple[Effect, ...]:
-    """Effects that could be asked for and are not needed here."""
-    first = family.stages[0].family if isinstance(family, Chain) else family
-    used = {entry.name for entry in closure(wanted_effects(family, wanted))}
-    return tuple(entry for entry in applicable(first) if entry.name not in used)
+def left_out(family: Family, wanted: Iterable[str]) -> tuple[str, ...]:
+    """Names of the effects that could be asked for and are not needed here."""
+    used = {
+        f"{entry.name}{placed.number}" for placed in called_for(family, wanted) for entry in closure([placed.entry])
+    }
+    return tuple(placed.name for placed in applicable(family) if placed.name not in used)
 
 
 def findings(bare: Family, full: Family, designs: Array, wanted: Iterable[str]) -> list[Finding]:
@@ -110,28 +98,23 @@ def findings(bare: Family, full: Family, designs: Array, wanted: Iterable[str]) 
 
     Parameters
     ----------
-    bare : the family without effects, or the chain, whose first stage counts
+    bare : the family without effects, or the chain
     full : the family the design matrix belongs to;  designs : (n, P)
     wanted : names of outputs
     """
-    names = tuple(wanted)
-    suffix = "1" if isinstance(bare, Chain) else ""
-    first = bare.stages[0].family if isinstance(bare, Chain) else bare
-    if first.joints is None:
-        return []
     columns = {name: np.ascontiguousarray(designs[:, k]) for k, name in enumerate(full.parameter_names)}
-    own = np.column_stack([columns[f"{name}{suffix}"] for name in first.parameter_names])
+    own = np.column_stack([columns[name] for name in bare.parameter_names])
     angles = Angles.of(2.0 * np.pi * np.arange(SAMPLES)[None] / SAMPLES)
-    computed = {entry.name for entry in wanted_effects(bare, names)}
+    computed = {placed.name for placed in called_for(bare, wanted)}
     found = []
-    for entry in applicable(first):
-        inputs = {p.name: columns.get(f"{p.name}{suffix}", _default(p.default, len(designs))) for p in entry.inputs}
-        if entry.advise is None or any(x is None for x in inputs.values()):
+    for placed in applicable(bare):
+        given = {p.name: columns.get(p.name, _default(p.default, len(designs))) for p in inputs(bare, [placed])}
+        known = {name: x for name, x in given.items() if x is not None}
+        if placed.entry.advise is None or len(known) < len(given):
             continue
-        known = {name: x for name, x in inputs.items() if x is not None}
-        advice = entry.advise(Scene(first, own, angles, known))
+        advice = placed.entry.advise(first_scene(bare, own, angles, known).stage(placed.stage))
         if advice is not None:
-            found.append(Finding(entry, entry.name in computed, advice))
+            found.append(Finding(placed.name, placed.name in computed, advice))
     return found
 
 

@@ -3,28 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels import status as st
 from kernels.joints import PER_DESIGN, PER_POSE
+from sweep.effects.measured import COSTS
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
+from sweep.families.chain import drive
 
 Status: TypeAlias = NDArray[np.uint8]
 Rows: TypeAlias = NDArray[np.intp]
 
 
+class Driven(NamedTuple):
+    """A later stage of a chain, as the stage before it drives it: phi = kappa psi + offset."""
+
+    family: Family
+    designs: Array
+    kappa: Array
+    offset: Array
+    inputs: dict[str, Array]
+
+    def only(self, rows: Rows) -> Driven:
+        """Some of the designs."""
+        given = {name: x[rows] for name, x in self.inputs.items()}
+        return Driven(self.family, self.designs[rows], self.kappa[rows], self.offset[rows], given)
+
+
 @dataclass
 class Scene:
-    """One block of designs at their crank angles, as the effects see it; what two effects share is computed once."""
+    """One block of designs at their crank angles, as the effects see it; what two effects share is computed once.
+
+    In a chain it is one stage: ``after`` are the stages behind it, ``before`` the scene that drives it.
+    """
 
     family: Family
     designs: Array  # (n, P) of the bare family
     angles: Angles
     inputs: dict[str, Array]  # input name -> (n,)
+    after: tuple[Driven, ...] = ()
+    before: Scene | None = None
+    memo: dict[str, Any] = field(default_factory=dict)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -45,9 +69,60 @@ class Scene:
         self.family.joints(self.designs, self.angles, self.motion, per_pose, per_design)
         return per_pose, per_design
 
+    @cached_property
+    def driven(self) -> Scene | None:
+        """The stage that this one drives, at its own crank angles; None at the end of the chain."""
+        if not self.after:
+            return None
+        following, *rest = self.after
+        names = {"psi"} if following.family.uses_phi else {"cos_psi", "sin_psi"}
+        names &= set(self.family.pose_names)
+        turn = self.family.poses(self.designs, self.angles, frozenset(names or {"psi"}))
+        angles = drive(turn, following.kappa, following.offset)
+        return Scene(following.family, following.designs, angles, following.inputs, tuple(rest), self)
+
+    def stage(self, index: int) -> Scene:
+        """The scene of the stage ``index`` places behind this one."""
+        scene = self
+        for _ in range(index):
+            assert scene.driven is not None
+            scene = scene.driven
+        return scene
+
+    @cached_property
+    def gear(self) -> tuple[Array, Array]:
+        """First and second derivative of the next stage's crank angle with respect to this stage's, (n, m)."""
+        turn = self.family.poses(self.designs, self.angles, frozenset({"dpsi", "d2psi"}))
+        kappa = self.after[0].kappa[:, None]
+        first, second = (kappa * np.asarray(turn[name], np.float64) for name in ("dpsi", "d2psi"))
+        return first, second
+
+    @cached_property
+    def rates(self) -> tuple[Array, Array] | None:
+        """First and second derivative of the crank angle with respect to that of stage 1; None where it is that one."""
+        if self.before is None:
+            return None
+        first, second = self.before.gear
+        if self.before.rates is not None:
+            inner, bend = self.before.rates
+            first, second = first * inner, second * inner * inner + first * bend
+        return first, second
+
+    def crank(self) -> tuple[Array, Array]:
+        """Speed and angular acceleration of this stage's crank, (n, m), or (n, 1) where it turns evenly."""
+        speed, change = self.inputs["speed"][:, None], self.inputs["speed_change"][:, None]
+        if self.rates is None:
+            return speed, change
+        first, second = self.rates
+        return speed * first, speed * speed * second + change * first
+
     def status(self) -> Status:
-        """Return a fresh copy of the motion's status for a kernel to write on."""
-        return np.array(self.motion["status"], dtype=np.uint8)
+        """Return a fresh copy of the motion's status for a kernel to write on; stages before speak first."""
+        status = np.array(self.motion["status"], dtype=np.uint8)
+        if self.before is not None:
+            earlier = self.before.status()
+            np.copyto(status, earlier, where=earlier != st.OK)
+        return status
 
     def table(self, names: tuple[str, ...]) -> Array:
         """Inputs side by side, (n, len(names))."""
@@ -58,27 +133,29 @@ class Scene:
         if rows.size == len(self.designs):
             return self
         angles = Angles(*(x[rows] for x in self.angles)) if self.angles.cos.shape[0] > 1 else self.angles
-        return Scene(self.family, self.designs[rows], angles, {name: x[rows] for name, x in self.inputs.items()})
+        given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
+        return Scene(self.family, self.designs[rows], angles, given, after)
 
     def on_grid(self, size: int) -> Scene:
         """The same designs at ``size`` equidistant crank angles of one turn: what a whole-turn effect samples."""
-        return Scene(self.family, self.designs, Angles.of(2.0 * np.pi * np.arange(size)[None] / size), self.inputs)
+        angles = Angles.of(2.0 * np.pi * np.arange(size)[None] / size)
+        return Scene(self.family, self.designs, angles, self.inputs, self.after)
 
 
 ComputeFunction: TypeAlias = Callable[[Scene, frozenset[str]], Columns]
-DesignFunction: TypeAlias = Callable[[Family, Array, dict[str, Array], frozenset[str], Accuracy], Columns]
+DesignFunction: TypeAlias = Callable[[Scene, frozenset[str], Accuracy], Columns]
 
 
 @dataclass(frozen=True)
 class DesignResult:
     """Outputs an effect gives per design instead of per pose: a whole-turn effect's, or a closed form.
 
-    ``run(family, designs, inputs, wanted, accuracy)`` returns the wanted ones, perhaps their ``err_``, and ``status``.
+    ``run(scene, wanted, accuracy)`` gets a scene of a single crank angle, whose ``on_grid`` makes whole turns; it
+    returns the wanted outputs, perhaps their ``err_``, and ``status``.
     """
 
     outputs: tuple[Output, ...]
     run: DesignFunction
-    ns_per_design: float
 
 
 @dataclass(frozen=True)
@@ -108,7 +185,10 @@ class Effect:
     """One row of the register; ``compute(scene, wanted)`` returns the wanted outputs (n, m) and ``status`` (n, m).
 
     ``whole_turn`` effects couple different crank angles: they sample the turn themselves, whatever is asked for.
-    ``advise(scene)`` applies the effect's rule of negligibility to some designs over a turn; None where none turns.
+    ``even_crank`` effects presume a crank that turns evenly, so they are no effects of a chain's later stages.
+    ``takes_load`` is the key of the effect that hands back the load of a chain's later stages; without it their load
+    does not enter.  ``advise(scene)`` applies the effect's rule of negligibility to some designs over a turn; None
+    where none turns.
     """
 
     key: str
@@ -121,9 +201,37 @@ class Effect:
     inputs: tuple[Parameter, ...]
     outputs: tuple[Output, ...]
     compute: ComputeFunction
-    ns_per_pose: float
     called_for: str
     negligible: str
     whole_turn: bool = False
+    even_crank: bool = False
+    takes_load: str = ""
     design_result: DesignResult | None = None
     advise: AdviceFunction | None = None
+
+    @property
+    def ns_per_pose(self) -> float:
+        """Measured cost of all pose outputs together (`make bench-effects`); 0 where there are none."""
+        return COSTS[self.name][0]
+
+    @property
+    def ns_per_design(self) -> float:
+        """Measured cost of all design outputs together; 0 where there are none."""
+        return COSTS[self.name][1]
+
+
+def take_over(status: Status, later: NDArray[np.generic]) -> None:
+    """Make ``later`` the status of what is OK so far, in place."""
+    np.copyto(status, later, where=status == st.OK)
+
+
+def no_poses(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """What an effect computes per pose that has no outputs per pose: the motion's status."""
+    return {"status": scene.status()}
+
+
+def largest(scene: Scene, compute: ComputeFunction, name: str, quantity: str, threshold: float) -> Advice | None:
+    """Advice from the largest magnitude of one output over the turn, of the designs where it is known all the way."""
+    found = np.abs(np.asarray(compute(scene, frozenset({name}))[name], np.float64))
+    turning = np.isfinite(found).all(axis=1)
+    return Advice(quantity, found[turning].max(axis=1), threshold) if turning.any() else None

@@ -10,7 +10,7 @@ from sweep.effects import kinetostatics, loads
 from sweep.effects.base import DesignResult, Effect, Scene
 from sweep.effects.bearings import CATALOGUE, SUPPORTS
 from sweep.effects.turn import chosen
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, optional_outputs
+from sweep.families.base import Accuracy, Array, Columns, Output, filled
 
 EQUATION = "B2 (1)-(3)"
 FORMULAS = (
@@ -38,34 +38,26 @@ PER_TURN = tuple(
     )
 )
 _NAMES = tuple(o.name for o in OUTPUTS)
-_VECTORS = tuple(f"{name}_{axis}" for name in ("force_d", "moment_d") for axis in "xyz")
 # |dpsi| has a kink at each limit position: the error of the sum falls with the square of the number of samples.
 SAMPLES = 720
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted loads of every pose."""
-    found = kinetostatics.compute(loads.ROCKER.columns, scene, frozenset(_VECTORS))
-    force, moment = (
-        np.stack([np.asarray(found[f"{name}_{axis}"], np.float64) for axis in "xyz"], axis=2)
-        for name in ("force_d", "moment_d")
-    )
-    status = np.asarray(found["status"], np.uint8)
-    outputs = optional_outputs(_NAMES, wanted, scene.shape)
-    bearing_loads(force, moment, np.ascontiguousarray(scene.records[1][:, 3:6]), _data(scene), status, *outputs)
-    columns: Columns = {name: out for name, out in zip(_NAMES, outputs, strict=True) if out is not None}
-    return columns | {"status": status}
+    if "forces" not in scene.memo:
+        kinetostatics.compute(scene, frozenset({"force_d", "moment_d"}))
+    forces, status = scene.memo["forces"]
+    axis = np.ascontiguousarray(scene.records[1][:, 3:6])
+    return filled(bearing_loads, (forces, axis, _data(scene)), _NAMES, wanted, status.copy())
 
 
 def _data(scene: Scene) -> Array:
     return np.column_stack([scene.records[1][:, 14], scene.table(tuple(p.name for p in (*SUPPORTS, *CATALOGUE)))])
 
 
-def per_turn(
-    family: Family, designs: Array, inputs: dict[str, Array], wanted: frozenset[str], accuracy: Accuracy
-) -> Columns:
+def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Mean loads and lives; the error is what half the samples would change."""
-    scene = Scene(family, designs, Angles.of(np.zeros((1, 1))), inputs).on_grid(SAMPLES)
+    scene = scene.on_grid(SAMPLES)
     found = compute(scene, frozenset({"equivalent_load_d1", "equivalent_load_d2"}))
     status = np.where((found["status"] == st.OK).all(axis=1), st.OK, st.NOT_ROTATABLE).astype(np.uint8)
     dpsi, exponent = np.ascontiguousarray(scene.records[0][:, :, 22]), scene.inputs["life_exponent"]
@@ -93,13 +85,14 @@ EFFECT = Effect(
     title="rolling bearings of the rocker under the joint reactions: loads, mean load over the turn, life",
     equation=EQUATION,
     formulas=FORMULAS,
-    families=("rssr",),
+    families=loads.ROCKER.families,
     needs=("kinetostatics",),
     inputs=(*loads.ROCKER.parameters, *SUPPORTS, *CATALOGUE),
     outputs=OUTPUTS,
     compute=compute,
-    ns_per_pose=300.0,
     called_for="life of the rocker's bearings",
     negligible="sliding bearings; elsewhere never, the life is what is asked for",
-    design_result=DesignResult(PER_TURN, per_turn, 330_000.0),
+    even_crank=True,
+    takes_load=kinetostatics.KEY,
+    design_result=DesignResult(PER_TURN, per_turn),
 )

@@ -8,11 +8,10 @@ from functools import partial
 import numpy as np
 
 from kernels.effects import bearings, permissible
-from sweep.effects.base import Advice, AdviceFunction, ComputeFunction, Effect, Scene
+from sweep.effects.base import ComputeFunction, Effect, Scene, largest
 from sweep.effects.loads import SPEED
-from sweep.effects.pressure import bearing_directions
-from sweep.effects.pressure import compute as compute_pressure
-from sweep.families.base import Array, Columns, Output, Parameter, optional_outputs
+from sweep.effects.pressure import components
+from sweep.families.base import Array, Columns, Output, Parameter, filled
 
 EQUATION = "B1 (1)-(4)"
 FORMULAS = (
@@ -96,32 +95,15 @@ def _data(scene: Scene, inputs: tuple[Parameter, ...]) -> Array:
     return np.column_stack([scene.records[1][:, 14], scene.table(tuple(p.name for p in inputs[1:]))])
 
 
-def _loads(
-    kernel: Callable[..., None], inputs: tuple[Parameter, ...], results: tuple[Output, ...], scene: Scene,
-    wanted: frozenset[str],
-) -> Columns:  # fmt: skip
-    cos1, sin1, axial, status = bearing_directions(scene)
-    names = tuple(o.name for o in results)
-    found = optional_outputs(names, wanted, scene.shape)
-    kernel(cos1, sin1, axial, scene.inputs["resisting_torque"], _data(scene, inputs), status, *found)
-    columns: Columns = {name: out for name, out in zip(names, found, strict=True) if out is not None}
-    return columns | {"status": status}
-
-
-def _limits(
+def _compute(
     kernel: Callable[..., None], inputs: tuple[Parameter, ...], results: tuple[Output, ...],
-    permissible: Callable[[Scene], Array], scene: Scene, wanted: frozenset[str],
+    permissible: Callable[[Scene], Array] | None, scene: Scene, wanted: frozenset[str],
 ) -> Columns:  # fmt: skip
-    components = compute_pressure(scene, frozenset({"t_tau", "t_rho", "t_k"}))
-    status = components["status"]
-    names = tuple(o.name for o in results)
-    found = optional_outputs(names, wanted, scene.shape)
-    kernel(
-        *(components[name] for name in ("t_tau", "t_rho", "t_k")), scene.inputs["resisting_torque"],
-        _data(scene, inputs), permissible(scene), status, *found,
-    )  # fmt: skip
-    columns: Columns = {name: out for name, out in zip(names, found, strict=True) if out is not None}
-    return columns | {"status": status}
+    direction, status = components(scene)
+    arguments = [*direction, scene.inputs["resisting_torque"], _data(scene, inputs)]
+    if permissible is not None:
+        arguments.append(permissible(scene))
+    return filled(kernel, arguments, tuple(o.name for o in results), wanted, status)
 
 
 def _pressures(scene: Scene) -> Array:
@@ -136,56 +118,48 @@ def permissible_load(scene: Scene) -> Array:
     return load[:, None]
 
 
-def _advise(compute: ComputeFunction, name: str, words: str, scene: Scene) -> Advice | None:
-    found = compute(scene, frozenset({name}))
-    turning = np.isfinite(found[name]).all(axis=1)
-    if not turning.any():
-        return None
-    return Advice(words, found[name][turning].max(axis=1), 0.5)
-
-
 def _effect(
     name: str, title: str, inputs: tuple[Parameter, ...], results: tuple[Output, ...], compute: ComputeFunction,
-    ns: float, advise: AdviceFunction | None = None,
+    kind: str = "",
 ) -> Effect:  # fmt: skip
+    words = f"largest utilisation of the {kind} bearings"
+    advise = partial(largest, compute=compute, name=f"{kind}_utilisation", quantity=words, threshold=0.5)
     return Effect(
         key="B1",
         name=name,
         title=title,
         equation=EQUATION,
         formulas=FORMULAS,
-        families=("rssr",),
+        families=("rssr", "guide"),
         needs=("pressure",),
         inputs=inputs,
         outputs=results,
         compute=compute,
-        ns_per_pose=ns,
         called_for="bearing choice while the linkage is being synthesised",
         negligible="other members govern: utilisation below 0.5",
-        advise=advise,
+        even_crank=SPEED in inputs,
+        advise=advise if kind else None,
     )
 
 
-_SLIDING = partial(_loads, bearings.sliding_bearings, SLIDING_INPUTS, SLIDING_OUTPUTS)
-_ROLLING = partial(_loads, bearings.rolling_bearings, ROLLING_INPUTS, ROLLING_OUTPUTS)
-_SLIDING_LIMITS = partial(_limits, permissible.sliding_limits, SLIDING_INPUTS, SLIDING_LIMITS, _pressures)
-_ROLLING_LIMITS = partial(_limits, permissible.rolling_limits, ROLLING_INPUTS, ROLLING_LIMITS, permissible_load)
+_SLIDING = partial(_compute, bearings.sliding_bearings, SLIDING_INPUTS, SLIDING_OUTPUTS, None)
+_ROLLING = partial(_compute, bearings.rolling_bearings, ROLLING_INPUTS, ROLLING_OUTPUTS, None)
+_SLIDING_LIMITS = partial(_compute, permissible.sliding_limits, SLIDING_INPUTS, SLIDING_LIMITS, _pressures)
+_ROLLING_LIMITS = partial(_compute, permissible.rolling_limits, ROLLING_INPUTS, ROLLING_LIMITS, permissible_load)
 
 SLIDING = _effect(
     "sliding_bearings", "sliding bearings of the rocker: loads and mean pressures, massless estimate",
-    SLIDING_INPUTS, SLIDING_OUTPUTS, _SLIDING, 60.0,
+    SLIDING_INPUTS, SLIDING_OUTPUTS, _SLIDING,
 )  # fmt: skip
 ROLLING = _effect(
     "rolling_bearings", "rolling bearings of the rocker: equivalent loads and lives, massless estimate",
-    ROLLING_INPUTS, ROLLING_OUTPUTS, _ROLLING, 75.0,
+    ROLLING_INPUTS, ROLLING_OUTPUTS, _ROLLING,
 )  # fmt: skip
 SLIDING_LIMIT = _effect(
     "sliding_limits", "utilisation of the sliding bearings and the pressure angle they permit",
-    (*SLIDING_INPUTS, *PERMISSIBLE), SLIDING_LIMITS, _SLIDING_LIMITS, 1900.0,
-    partial(_advise, _SLIDING_LIMITS, "sliding_utilisation", "largest utilisation of the sliding bearings"),
+    (*SLIDING_INPUTS, *PERMISSIBLE), SLIDING_LIMITS, _SLIDING_LIMITS, "sliding",
 )  # fmt: skip
 ROLLING_LIMIT = _effect(
     "rolling_limits", "utilisation of the rolling bearings and the pressure angle they permit",
-    (*ROLLING_INPUTS, *LIFE), ROLLING_LIMITS, _ROLLING_LIMITS, 2700.0,
-    partial(_advise, _ROLLING_LIMITS, "rolling_utilisation", "largest utilisation of the rolling bearings"),
+    (*ROLLING_INPUTS, *LIFE), ROLLING_LIMITS, _ROLLING_LIMITS, "rolling",
 )  # fmt: skip

@@ -41,26 +41,22 @@ OUTPUTS = tuple(
     for axis in "xyz"
 )
 
+_POINT = ("x_point", "y_point", "z_point")
+
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted components; each group of three costs what one of them does."""
-    columns: Columns = {}
-    total = np.empty(scene.shape, np.uint8)
-    for finger in np.unique(scene.inputs["finger"]):
-        rows = np.flatnonzero(scene.inputs["finger"] == finger)
-        part = scene.only(rows)
-        status, point = part.status(), part.table(("x_point", "y_point", "z_point"))
-        out = [
-            np.empty((*status.shape, 3)) if any(name.format(axis=axis) in wanted for axis in "xyz") else None
-            for name, _, _ in _GROUPS.values()
-        ]
-        coupler_point(*part.records, point, int(finger), status, *out)
-        total[rows] = status
-        for (name, _, _), values in zip(_GROUPS.values(), out, strict=True):
-            for k, axis in enumerate("xyz"):
-                if values is not None and name.format(axis=axis) in wanted:
-                    columns.setdefault(name.format(axis=axis), np.empty(scene.shape))[rows] = values[:, :, k]
-    return columns | {"status": total}
+    status = scene.status()
+    groups = [[name.format(axis=axis) for axis in "xyz"] for name, _, _ in _GROUPS.values()]
+    out = [None if wanted.isdisjoint(names) else np.empty((*scene.shape, 3)) for names in groups]
+    coupler_point(*scene.records, scene.table(_POINT), scene.inputs["finger"], status, *out)
+    columns: Columns = {
+        name: values[:, :, k]
+        for names, values in zip(groups, out, strict=True)
+        for k, name in enumerate(names)
+        if values is not None and name in wanted
+    }
+    return columns | {"status": status}
 
 
 EFFECT = Effect(
@@ -69,12 +65,11 @@ EFFECT = Effect(
     title="motion of a coupler point, orientation and rates of the coupler",
     equation=EQUATION,
     formulas=FORMULAS,
-    families=("rssr", "rssp"),
+    families=("rssr", "rssp", "guide"),
     needs=(),
     inputs=INPUTS,
     outputs=OUTPUTS,
     compute=compute,
-    ns_per_pose=60.0,
     called_for="a tool on the coupler, a coupler whose centre of mass is off the line B-C",
     negligible="coupler mass much below the rocker's inertia over c^2, and balanced",
 )

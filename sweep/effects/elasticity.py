@@ -6,38 +6,59 @@ import numpy as np
 
 from kernels import status as st
 from kernels.effects.elasticity import quasi_static, steady_state
+from sweep.effects import loads
 from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status
 from sweep.effects.loads import SPEED
-from sweep.effects.turn import chosen, reduction_outputs, reductions
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, optional_outputs
+from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
+from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, filled
 
 EQUATION = "E1 (1), (2), E2 (3), (4)"
 FORMULAS = (
     "(1) lag = (M - J omega^2 psi'')/(k p^2), p = c t_tau; elongation = p lag",
     "(2) frequency ratio nu = sqrt(k/J) |p|/omega",
     "(3) J omega^2 eta'' + h omega p^2 eta' + (k p^2 + h omega p p') eta = M - J omega^2 psi'', 2 pi periodic,",
-    "    by Fourier collocation",
+    "    by its Fourier coefficients; slider: J is the driven mass, c = 1, eta a length (ours)",
     "(4) stable while the largest Floquet multiplier stays below 1",
 )
 
-INPUTS = (
-    Parameter("driven_inertia", "inertia", "inertia of rocker and all it drives about its axis", positive=True),
+_SHARED = (
     Parameter("stiffness", "stiffness", "stiffness of the coupler along B-C", positive=True),
     Parameter("damping", "damping", "damping of the coupler along B-C", default=0.0),
     SPEED,
-    Parameter("load_torque", "torque", "constant torque on the rocker about its axis", default=0.0),
 )
-_NAMES = ("driven_inertia", "stiffness", "damping", "speed", "load_torque")
+INPUTS = {
+    "rocker": (
+        Parameter("driven_inertia", "inertia", "inertia of rocker and all it drives about its axis", positive=True),
+        *_SHARED,
+        Parameter("load_torque", "torque", "constant torque on the rocker about its axis", default=0.0),
+    ),
+    "slider": (
+        Parameter("driven_mass", "mass", "mass of slider and all it moves", positive=True),
+        *_SHARED,
+        Parameter("load_force", "force", "constant force on the slider along the slide", default=0.0),
+    ),
+}
 
-STATIC_OUTPUTS = (
-    Output("lag", "rad", "quasi-static deflection of the rocker, eta", EQUATION),
-    Output("lag_displacement", "length", "the same at the joint C, c eta", EQUATION),
-    Output("frequency_ratio", "1", "natural frequency over crank speed", EQUATION),
-)
-DYNAMIC_OUTPUTS = (
-    Output("lag_dynamic", "rad", "deflection of the rocker in the periodic steady state", EQUATION),
-    Output("elongation_dynamic", "length", "elongation of the coupler in the periodic steady state", EQUATION),
-)
+
+def _static_outputs(kind: loads.Follower) -> tuple[Output, ...]:
+    unit = "rad" if kind is loads.ROCKER else "length"
+    at_joint = Output("lag_displacement", "length", "the same at the joint C, c eta", EQUATION)
+    return (
+        Output("lag", unit, f"quasi-static deflection of the {kind.name}, eta", EQUATION),
+        *((at_joint,) if kind is loads.ROCKER else ()),
+        Output("frequency_ratio", "1", "natural frequency over crank speed", EQUATION),
+    )
+
+
+def _dynamic_outputs(kind: loads.Follower) -> tuple[Output, ...]:
+    unit = "rad" if kind is loads.ROCKER else "length"
+    return (
+        Output("lag_dynamic", unit, f"deflection of the {kind.name} in the periodic steady state", EQUATION),
+        Output("elongation_dynamic", "length", "elongation of the coupler in the periodic steady state", EQUATION),
+    )
+
+
+_KERNEL_NAMES = ("lag", "lag_displacement", "frequency_ratio")
 FLOQUET = Output("floquet", "1", "largest modulus of the Floquet multipliers; stable below 1", EQUATION)
 
 # Odd grids of the steady state: the next one is tried for designs that the one before does not resolve.
@@ -45,76 +66,57 @@ MULTIPLIER_ERROR = 1e-6
 GRIDS = (31, 61, 121, 241)
 
 
-def _lever(scene: Scene) -> tuple[Array, Array, Array]:
-    """Give p = c t_tau, the rigid acceleration analogue, and c."""
+def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
+    """Give p = c t_tau, the rigid acceleration analogue, c, what a lag is compared with, and the inputs."""
     per_pose, per_design = scene.records
-    c = np.ascontiguousarray(per_design[:, 14])
-    return per_pose[:, :, 21] * c[:, None], np.ascontiguousarray(per_pose[:, :, 23]), c
+    c, turns = np.ascontiguousarray(per_design[:, 14]), per_design[:, 16]
+    reach = np.where(turns == 1.0, 1.0, per_design[:, 13])
+    inertia, stiffness, damping, speed, load = (p.name for p in INPUTS[loads.follower(scene).name])
+    data = scene.table((inertia, stiffness, damping, speed, load))
+    return per_pose[:, :, 21] * c[:, None], np.ascontiguousarray(per_pose[:, :, 23]), c, reach, data
 
 
 def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted pointwise quantities; status NOT_LINEAR where the deflection is no longer small."""
-    names = tuple(o.name for o in STATIC_OUTPUTS)
-    outputs = optional_outputs(names, wanted, scene.shape)
-    status = scene.status()
-    quasi_static(*_lever(scene), scene.table(_NAMES), status, *outputs)
-    found: Columns = {name: out for name, out in zip(names, outputs, strict=True) if out is not None}
-    return found | {"status": status}
+    return filled(quasi_static, _arguments(scene), _KERNEL_NAMES, wanted, scene.status())
 
 
 def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Steady state on its own grid, carried to the wanted angles."""
-    eta, elongation, _, turn = _steady(scene, scene.angles.phi)
-    status = scene.status()
-    np.copyto(status, turn[:, None], where=(status == st.OK) & (turn[:, None] != st.OK))
-    found: Columns = {"lag_dynamic": eta, "elongation_dynamic": elongation}
-    return {name: values for name, values in found.items() if name in wanted} | {"status": status}
+    return at_poses(scene, *on_finer_grids(scene, scene.angles.phi, GRIDS, _solve), wanted)
 
 
-def _steady(scene: Scene, phi: Array) -> tuple[Array, Array, Array, Status]:
-    """Lag and elongation at the angles phi, Floquet multiplier and status of every design."""
-    n = len(scene.designs)
-    eta, elongation = np.empty((n, phi.shape[1])), np.empty((n, phi.shape[1]))
-    floquet = np.empty(n)
-    status: Status = np.full(n, st.NOT_CONVERGED, np.uint8)
-    rows = np.arange(n)
-    for size in GRIDS:
-        grid = scene.only(rows).on_grid(size)
-        own = np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi)
-        parts = np.empty((rows.size, phi.shape[1])), np.empty((rows.size, phi.shape[1])), np.empty(rows.size)
-        found = np.empty(rows.size, np.uint8)
-        steady_state(*_lever(grid), grid.table(_NAMES), own, size == GRIDS[-1], found, *parts)
-        eta[rows], elongation[rows], floquet[rows], status[rows] = *parts, found
-        rows = rows[found == st.NOT_CONVERGED]
-        if rows.size == 0:
-            break
-    return eta, elongation, floquet, status
+def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
+    n = len(grid.designs)
+    status, floquet = np.empty(n, np.uint8), np.empty(n)
+    lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
+    p, d2psi, c, reach, data = _arguments(grid)
+    steady_state(p, d2psi, c, reach, data, phi, last, status, lag, elongation, floquet)
+    return {"lag_dynamic": lag, "elongation_dynamic": elongation, "floquet": floquet}, status
 
 
-def per_turn(
-    family: Family, designs: Array, inputs: dict[str, Array], wanted: frozenset[str], accuracy: Accuracy
-) -> Columns:
+def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Floquet multiplier and the reductions of lag and elongation."""
-    scene = Scene(family, designs, Angles.of(np.zeros((1, 1))), inputs)
-    curves = wanted != {"floquet"}
-    eta, elongation, floquet, status = _steady(scene, scene.on_grid(GRIDS[-1] if curves else 1).angles.phi)
-    columns: Columns = {"floquet": floquet, "err_floquet": np.full(len(designs), MULTIPLIER_ERROR)}
+    phi = scene.on_grid(1 if wanted == {"floquet"} else GRIDS[-1]).angles.phi
+    found, status = on_finer_grids(scene, phi, GRIDS, _solve)
+    floquet = found["floquet"]
     if wanted == {"floquet"}:
         # A multiplier is known even where the forced solution is not resolved or not linear.
         status[np.isfinite(floquet)] = st.OK
-    for o, values in zip(DYNAMIC_OUTPUTS, (eta, elongation), strict=True):
-        if any(name.endswith(f"_{o.name}") for name in wanted):
-            columns |= reductions(o.name, values, status)
-    return chosen(columns, wanted, status)
+    numbers: Columns = {"floquet": floquet, "err_floquet": np.full(len(floquet), MULTIPLIER_ERROR)}
+    return per_turn(found, status, numbers, _dynamic_outputs(loads.follower(scene)), wanted)
 
 
 def advise_static(scene: Scene) -> Advice | None:
-    """Largest quasi-static lag over the turn [rad]."""
+    """Largest quasi-static lag over the turn: an angle, or the share of the coupler's length."""
     found = compute_static(scene, frozenset({"lag"}))
-    turning = np.isfinite(found["lag"]).all(axis=1)
+    lag = np.abs(np.asarray(found["lag"], np.float64))
+    turning = np.isfinite(lag).all(axis=1)
     if not turning.any():
         return None
-    return Advice("largest quasi-static lag of the rocker [rad]", np.abs(found["lag"][turning]).max(axis=1), 1e-4)
+    reach = _arguments(scene)[3][turning]
+    words = "[rad]" if loads.follower(scene) is loads.ROCKER else "over the coupler's length"
+    return Advice(f"largest quasi-static lag {words}", lag[turning].max(axis=1) / reach, 1e-4)
 
 
 def advise_dynamic(scene: Scene) -> Advice | None:
@@ -132,37 +134,47 @@ def advise_dynamic(scene: Scene) -> Advice | None:
     return Advice("estimated share that vibration adds to the lag", estimate, 0.01 / 3.0)
 
 
-STATIC = Effect(
-    key="E1",
-    name="elasticity",
-    title="quasi-static elasticity of the coupler",
-    equation=EQUATION,
-    formulas=FORMULAS,
-    families=("rssr",),
-    needs=("pressure",),
-    inputs=INPUTS,
-    outputs=STATIC_OUTPUTS,
-    compute=compute_static,
-    ns_per_pose=30.0,
-    called_for="a fast machine, a precise meeting of hook and needle",
-    negligible="largest lag times the lever of the working point below the tolerance (1e-4 rad: 0.01 mm at 100 mm)",
-    advise=advise_static,
-)
-DYNAMIC = Effect(
-    key="E2",
-    name="dynamic_elasticity",
-    title="periodic steady state of the elastic coupler and its stability",
-    equation=EQUATION,
-    formulas=FORMULAS,
-    families=("rssr",),
-    needs=("elasticity",),
-    inputs=INPUTS,
-    outputs=DYNAMIC_OUTPUTS,
-    compute=compute_dynamic,
-    ns_per_pose=1260.0,
-    called_for="max|lag''/nu^2|/max|lag| above a third of the tolerance",
-    negligible="max|lag''/nu^2|/max|lag| below 1/300 for a tolerance of 1 %; as a rule nu above 10 times the harmonics",
-    whole_turn=True,
-    design_result=DesignResult((FLOQUET, *reduction_outputs(DYNAMIC_OUTPUTS)), per_turn, 930_000.0),
-    advise=advise_dynamic,
-)
+def _static(kind: loads.Follower) -> Effect:
+    return Effect(
+        key="E1",
+        name=f"{kind.prefix}elasticity",
+        title="quasi-static elasticity of the coupler",
+        equation=EQUATION,
+        formulas=FORMULAS,
+        families=kind.families,
+        needs=("pressure",),
+        inputs=INPUTS[kind.name],
+        outputs=_static_outputs(kind),
+        compute=compute_static,
+        called_for="a fast machine, a precise meeting of hook and needle",
+        negligible="largest lag times the lever of the working point below the tolerance (1e-4 rad: 0.01 mm at 100 mm)",
+        even_crank=True,
+        advise=advise_static,
+    )
+
+
+def _dynamic(kind: loads.Follower) -> Effect:
+    outputs = _dynamic_outputs(kind)
+    return Effect(
+        key="E2",
+        name=f"{kind.prefix}dynamic_elasticity",
+        title="periodic steady state of the elastic coupler and its stability",
+        equation=EQUATION,
+        formulas=FORMULAS,
+        families=kind.families,
+        needs=(f"{kind.prefix}elasticity",),
+        inputs=INPUTS[kind.name],
+        outputs=outputs,
+        compute=compute_dynamic,
+        called_for="max|lag''/nu^2|/max|lag| above a third of the tolerance",
+        negligible="max|lag''/nu^2|/max|lag| below 1/300 for a tolerance of 1 %; as a rule nu above 10 times the "
+        "harmonics",
+        whole_turn=True,
+        even_crank=True,
+        design_result=DesignResult((FLOQUET, *reduction_outputs(outputs)), turn),
+        advise=advise_dynamic,
+    )
+
+
+STATIC, SLIDER_STATIC = _static(loads.ROCKER), _static(loads.SLIDER)
+DYNAMIC, SLIDER_DYNAMIC = _dynamic(loads.ROCKER), _dynamic(loads.SLIDER)

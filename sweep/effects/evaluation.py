@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kernels.status import OK
-from sweep.effects.base import Effect, Scene, Status
+from sweep.effects.base import Status, take_over
+from sweep.effects.placing import Placed, first_scene
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Parameter, Step
 
 # Poses per block: their joint records, 24 numbers each, fill about half a second-level cache.
@@ -21,7 +21,7 @@ DIFFERENCE = 1e-5
 
 def effect_poses(
     family: Family,
-    effects: tuple[Effect, ...],
+    effects: tuple[Placed, ...],
     inputs: tuple[Parameter, ...],
     own: int,
     designs: Array,
@@ -32,7 +32,7 @@ def effect_poses(
 
     Parameters
     ----------
-    family : without effects;  own : number of its parameters
+    family : without effects, or the chain;  own : number of its parameters
     effects, inputs : what extends it
     designs : (n, P) with the inputs behind the family's own columns;  angles : (n, m) or (1, m)
     wanted : pose outputs of family and effects
@@ -41,32 +41,32 @@ def effect_poses(
     columns = family.poses(bare, angles, wanted & frozenset(family.pose_names))
     if np.iscomplexobj(designs) or np.iscomplexobj(angles.cos):
         return _differenced(family, effects, inputs, own, designs, angles, wanted) | columns
-    asked = [(entry, wanted & frozenset(o.name for o in entry.outputs)) for entry in effects]
-    asked = [(entry, names) for entry, names in asked if names]
+    asked = [(placed, [name for name in placed.own if name in wanted]) for placed in effects]
+    asked = [(placed, names) for placed, names in asked if names]
     if not asked:
         return columns
     shape = columns["status"].shape
     status: Status = np.array(columns["status"], dtype=np.uint8)
     columns |= {name: np.empty(shape) for _, names in asked for name in names}
     given = input_columns(inputs, designs, own)
-    pointwise = [pair for pair in asked if not pair[0].whole_turn]
-    whole = [pair for pair in asked if pair[0].whole_turn]
+    pointwise = [pair for pair in asked if not pair[0].entry.whole_turn]
+    whole = [pair for pair in asked if pair[0].entry.whole_turn]
     # A whole-turn effect solves the turn of a design once, however many poses are asked for.
     for parts, blocks in ((pointwise, _blocks(shape, BLOCK)), (whole, _row_blocks(shape))):
         for rows, poses in blocks if parts else ():
-            scene = Scene(family, bare[rows], _part(angles, rows, poses), {n: x[rows] for n, x in given.items()})
-            for entry, names in parts:
-                found = entry.compute(scene, names)
-                block = status[rows, poses]
-                np.copyto(block, found["status"], where=block == OK)
+            part = _part(angles, rows, poses)
+            scene = first_scene(family, bare[rows], part, {n: x[rows] for n, x in given.items()})
+            for placed, names in parts:
+                found = placed.entry.compute(scene.stage(placed.stage), frozenset(placed.own[name] for name in names))
+                take_over(status[rows, poses], found["status"])
                 for name in names:
-                    columns[name][rows, poses] = found[name]
+                    columns[name][rows, poses] = found[placed.own[name]]
     return columns | {"status": status}
 
 
 def _differenced(
     family: Family,
-    effects: tuple[Effect, ...],
+    effects: tuple[Placed, ...],
     inputs: tuple[Parameter, ...],
     own: int,
     designs: Array,
@@ -77,7 +77,7 @@ def _differenced(
 
     Along the direction of the imaginary parts; measured, its relative error is about 1e-9.
     """
-    names = wanted & frozenset(o.name for entry in effects for o in entry.outputs)
+    names = wanted & frozenset(o.name for placed in effects for o in placed.pose_outputs)
     if not names:
         return {}
     steps = [np.abs(x.imag) / np.maximum(np.abs(x.real), 1e-3) for x in (designs, angles.cos, angles.sin)]
@@ -97,7 +97,7 @@ def _differenced(
 
 def run_design(
     family: Family,
-    entry: Effect,
+    placed: Placed,
     inputs: tuple[Parameter, ...],
     own: int,
     designs: Array,
@@ -105,15 +105,23 @@ def run_design(
     accuracy: Accuracy,
 ) -> Columns:
     """Design outputs of an effect, block by block."""
-    assert entry.design_result is not None
+    assert placed.entry.design_result is not None
     bare = np.ascontiguousarray(designs[:, :own])
     given = input_columns(inputs, designs, own)
-    size = TURNS if entry.whole_turn else BLOCK
-    parts = [
-        entry.design_result.run(family, bare[rows], {n: x[rows] for n, x in given.items()}, wanted, accuracy)
-        for rows in (slice(start, start + size) for start in range(0, max(len(bare), 1), size))
-    ]
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    names = frozenset(placed.own[name] for name in wanted)
+    at_rest = Angles.of(np.zeros((1, 1)))
+    parts = []
+    for start in range(0, max(len(bare), 1), TURNS):
+        rows = slice(start, start + TURNS)
+        scene = first_scene(family, bare[rows], at_rest, {n: x[rows] for n, x in given.items()})
+        parts.append(placed.entry.design_result.run(scene, names, accuracy))
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    columns: Columns = {"status": whole["status"]}
+    for name in wanted:
+        columns |= {
+            f"{e}{name}": whole[f"{e}{placed.own[name]}"] for e in ("", "err_") if f"{e}{placed.own[name]}" in whole
+        }
+    return columns
 
 
 def on_own_columns(step: Step, own: int) -> Step:

@@ -1,111 +1,148 @@
-"""D2: joint reactions and driving torque with friction."""
+"""D2: joint reactions and driving torque with friction, for a rocker and for a slider."""
 
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 
 from kernels.effects.friction import friction_loads
 from sweep.effects import loads
-from sweep.effects.base import Advice, Effect, Scene, Status
-from sweep.effects.kinetostatics import FORCES, by_construction, force_outputs, needed_vectors, vector_columns
+from sweep.effects.base import Effect, Scene, largest, take_over
+from sweep.effects.kinetostatics import bodies, drive, force_outputs, vector_columns, wanted_groups
 from sweep.families.base import Columns, Output, Parameter, optional_outputs
 
+KEY = "D2"
 EQUATION = "D2 (1)-(3)"
 FORMULAS = (
     "(1) ball joints: E = -mu r |R| w/|w|, w the speed of the coupler relative to crank or rocker",
-    "(2) shafts: t = -sign(speed) mu [r (F1 + F2) + r_t |F_axial|], F1 and F2 the loads of the two supports",
+    "(2) shafts: t = -sign(speed) mu [r (F1 + F2) + r_t |F_axial|], F1 and F2 the loads of the two supports;",
+    "    slider: two shoes that move with it, force -sign(s') mu (F1 + F2), ours",
     "(3) iterated until the couples change by less than 1e-14; L_ij = mu_i r_i |d R_i/d couple_j|,",
     "    rho(L) < 1 proves one solution",
 )
 SUFFIX = "_friction"
 
-_JOINTS = {"a": "crank bearing", "b": "ball joint at B", "c": "ball joint at C", "d": "rocker bearing"}
-# In the order of the columns that kernels.effects.friction takes.
-DATA = (
-    *(Parameter(f"mu_{j}", "ratio", f"coefficient of friction of the {text}") for j, text in _JOINTS.items()),
-    *(Parameter(f"radius_{j}", "length", f"friction radius of the {text}") for j, text in _JOINTS.items()),
-    Parameter("thrust_radius_a", "length", "mean thrust radius of the crank bearing", default=0.0),
-    Parameter("thrust_radius_d", "length", "mean thrust radius of the rocker bearing", default=0.0),
-    Parameter("support_a1", "length", "first support along the crank axis, from A"),
-    Parameter("support_a2", "length", "second support along the crank axis, from A"),
-    Parameter("support_d1", "length", "first support along the rocker axis, from D"),
-    Parameter("support_d2", "length", "second support along the rocker axis, from D"),
-)
-DATA_NAMES = tuple(p.name for p in DATA)
-
+_JOINTS = {"a": "crank bearing", "b": "ball joint at B", "c": "ball joint at C"}
 _TEXT = ", friction included"
-_SCALARS = {
+
+
+def _data(kind: loads.Follower) -> tuple[Parameter, ...]:
+    rocker = kind is loads.ROCKER
+    joints = _JOINTS | {"d": f"{kind.name} bearing" if rocker else "slide"}
+    along, place = ("rocker axis", "D") if rocker else ("slide, moving with the slider", "C")
+    thrust = Parameter("thrust_radius_d", "length", "mean thrust radius of the rocker bearing", default=0.0)
+    return (
+        *(Parameter(f"mu_{j}", "ratio", f"coefficient of friction of the {text}") for j, text in joints.items()),
+        *(
+            Parameter(f"radius_{j}", "length", f"friction radius of the {text}")
+            for j, text in joints.items()
+            if rocker or j != "d"
+        ),
+        Parameter("thrust_radius_a", "length", "mean thrust radius of the crank bearing", default=0.0),
+        *((thrust,) if rocker else ()),
+        Parameter("support_a1", "length", "first support along the crank axis, from A"),
+        Parameter("support_a2", "length", "second support along the crank axis, from A"),
+        Parameter("support_d1", "length", f"first support along the {along}, from {place}"),
+        Parameter("support_d2", "length", f"second support along the {along}, from {place}"),
+    )
+
+
+# In the order of the columns of kernels.effects.friction.Friction; a slide has an arm of 1 and no thrust.
+COLUMNS = tuple(p.name for p in _data(loads.ROCKER))
+_OF_A_SLIDE = {"radius_d": 1.0, "thrust_radius_d": 0.0}
+_COUPLES = {
     "finger_couple_friction": ("torque", "couple of the finger along n x w" + _TEXT),
     "drive_torque_friction": ("torque", "torque that drives the crank" + _TEXT),
-    "shaft_torque_a": ("torque", "friction torque on the crank about its axis"),
-    "shaft_torque_d": ("torque", "friction torque on the rocker about its axis"),
 }
-_COUPLES = {"ball_couple_b": "friction couple of the ball joint at B", "ball_couple_c": "the same at C"}
-_SUPPORTS = ("load_support_a1", "load_support_a2", "load_support_d1", "load_support_d2")
-OUTPUTS = (
-    *force_outputs("rocker", SUFFIX, _TEXT, EQUATION),
-    *(Output(name, unit, text, EQUATION) for name, (unit, text) in _SCALARS.items()),
-    *(Output(name, "torque", f"magnitude: {text}", EQUATION) for name, text in _COUPLES.items()),
-    *(Output(name, "force", f"radial load of the support {name[-2:]}" + _TEXT, EQUATION) for name in _SUPPORTS),
-    Output("friction_passes", "1", "passes of the friction iteration", EQUATION),
-    Output("friction_contraction", "1", "rho(L), bound of its rate; below 1 the solution is unique", EQUATION),
-)
+
+
+def _losses(kind: loads.Follower) -> dict[str, tuple[str, str]]:
+    """What the kernel gives as losses, in its order."""
+    rocker = kind is loads.ROCKER
+    follower = ("torque", "friction torque on the rocker about its axis")
+    found = {
+        "shaft_torque_a": ("torque", "friction torque on the crank about its axis"),
+        **({"shaft_torque_d": follower} if rocker else {"slide_friction": ("force", "friction force on the slider")}),
+        "ball_couple_b": ("torque", "magnitude: friction couple of the ball joint at B"),
+        "ball_couple_c": ("torque", "magnitude: friction couple of the ball joint at C"),
+    }
+    supports = ("load_support_a1", "load_support_a2", "load_support_d1", "load_support_d2")
+    found |= {name: ("force", f"load across the axis of the support {name[-2:]}{_TEXT}") for name in supports}
+    return found | {"friction_passes": ("1", "passes of the friction iteration")}
+
+
+def _outputs(kind: loads.Follower) -> tuple[Output, ...]:
+    scalars = _COUPLES | _losses(kind)
+    return (
+        *force_outputs(kind.name, SUFFIX, _TEXT, EQUATION),
+        *(Output(name, unit, text, EQUATION) for name, (unit, text) in scalars.items()),
+        Output("friction_contraction", "1", "rho(L), bound of its rate; below 1 the solution is unique", EQUATION),
+    )
+
+
+def behind(scene: Scene) -> Columns | None:
+    """Driving torque with friction and status of the next stage; None at the end of the chain."""
+    if scene.driven is None:
+        return None
+    if "behind friction" not in scene.memo:
+        scene.memo["behind friction"] = compute(scene.driven, frozenset({"drive_torque_friction"}))
+    found: Columns = scene.memo["behind friction"]
+    return found
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted quantities with friction; status JAMMED where the iteration does not contract."""
-
-    def run(part: Scene, finger: int) -> tuple[Columns, Status]:
-        status = part.status()
-        shape = status.shape
-        vectors = {name: np.empty((*shape, 3)) for name in needed_vectors(wanted, SUFFIX)}
-        scalars = {name: np.empty(shape) for name in _SCALARS if name in wanted}
-        couples = {name: np.empty((*shape, 3)) for name in _COUPLES if name in wanted}
-        supports = np.empty((*shape, 4)) if wanted & set(_SUPPORTS) else None
-        passes, contraction = optional_outputs(("friction_passes", "friction_contraction"), wanted, shape)
-        friction_loads(
-            *part.records, part.table(loads.ROCKER.columns), part.table(DATA_NAMES), finger, status,
-            *[
-                *(vectors.get(name) for name in FORCES), *(scalars.get(name) for name in _SCALARS),
-                *(couples.get(name) for name in _COUPLES), supports, passes, contraction,
-            ],
-        )  # fmt: skip
-        columns = vector_columns(vectors, wanted, SUFFIX)
-        columns |= scalars
-        columns |= {name: np.sqrt(np.einsum("ijk,ijk->ij", x, x)) for name, x in couples.items()}
-        if supports is not None:
-            columns |= {name: supports[:, :, k] for k, name in enumerate(_SUPPORTS) if name in wanted}
-        if passes is not None:
-            columns["friction_passes"] = passes
-        if contraction is not None:
-            columns["friction_contraction"] = contraction
-        return columns, status
-
-    return by_construction(scene, run)
+    status, handed_back, kind = scene.status(), behind(scene), loads.follower(scene)
+    losses = tuple(_losses(kind))
+    forces, couples, _ = wanted_groups(wanted, SUFFIX)
+    asked = ((18, forces), (2, couples), (len(losses), not wanted.isdisjoint(losses)))
+    out = [np.empty((*scene.shape, size)) if some else None for size, some in asked]
+    (contraction,) = optional_outputs(("friction_contraction",), wanted, scene.shape)
+    data = np.column_stack(
+        [scene.inputs.get(name, np.full(len(scene.designs), _OF_A_SLIDE.get(name, np.nan))) for name in COLUMNS]
+    )
+    load = drive(scene, handed_back, "drive_torque_friction")
+    poses, designs = scene.records
+    finger = scene.inputs["finger"]
+    friction_loads(
+        poses, designs, bodies(scene), load, data, finger, status, out[0], out[1], out[2], contraction
+    )  # fmt: skip
+    if handed_back is not None:
+        take_over(status, handed_back["status"])
+    columns = vector_columns(out[0], wanted, SUFFIX)
+    for names, values in ((tuple(_COUPLES), out[1]), (losses, out[2])):
+        if values is not None:
+            columns |= {name: values[:, :, k] for k, name in enumerate(names) if name in wanted}
+    if contraction is not None:
+        columns["friction_contraction"] = contraction
+    return columns | {"status": status}
 
 
-def advise(scene: Scene) -> Advice | None:
-    """Largest bound of the contraction over the turn: it is the share by which friction changes the joint loads."""
-    found = compute(scene, frozenset({"friction_contraction"}))
-    turning = np.isfinite(found["friction_contraction"]).all(axis=1)
-    if not turning.any():
-        return None
-    return Advice("largest contraction rho(L)", found["friction_contraction"][turning].max(axis=1), 0.01)
+def _effect(kind: loads.Follower) -> Effect:
+    return Effect(
+        key=KEY,
+        name=f"{kind.prefix}friction",
+        title=f"friction of ball joints, crank shaft and {kind.name} by successive approximations",
+        equation=EQUATION,
+        formulas=FORMULAS,
+        families=kind.families,
+        needs=(f"{kind.prefix}kinetostatics",),
+        inputs=(*kind.parameters, *_data(kind)),
+        outputs=_outputs(kind),
+        compute=compute,
+        called_for="losses, drive sizing, a check against jamming",
+        negligible="contraction rho(L) below 0.01: joint loads change by less than 1 %",
+        takes_load=KEY,
+        advise=partial(
+            largest,
+            compute=compute,
+            name="friction_contraction",
+            quantity="largest contraction rho(L)",
+            threshold=0.01,
+        ),
+    )
 
 
-EFFECT = Effect(
-    key="D2",
-    name="friction",
-    title="friction of ball joints and shafts by successive approximations",
-    equation=EQUATION,
-    formulas=FORMULAS,
-    families=("rssr",),
-    needs=("kinetostatics",),
-    inputs=(*loads.ROCKER.parameters, *DATA),
-    outputs=OUTPUTS,
-    compute=compute,
-    ns_per_pose=850.0,
-    called_for="losses, drive sizing, a check against jamming; on samples, as it jumps where the rocker reverses",
-    negligible="contraction rho(L) below 0.01: joint loads change by less than 1 %",
-    advise=advise,
-)
+EFFECT = _effect(loads.ROCKER)
+SLIDER = _effect(loads.SLIDER)

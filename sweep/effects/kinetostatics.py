@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-
 import numpy as np
 
 from kernels import status as st
 from kernels.effects.kinetostatics import kinetostatics
 from sweep.effects import loads
-from sweep.effects.base import Advice, Effect, Scene, Status
+from sweep.effects.base import Advice, Effect, Scene, take_over
 from sweep.families.base import Array, Columns, Output
 
-EQUATION = "D1 (1)-(4), D3 (5), (6)"
+KEY = "D1, D3"
+EQUATION = "D1 (1)-(4), D3 (5)-(7)"
 FORMULAS = (
     "(1) F_i = m_i (a_Gi - gravity), T_i = J_i eps_i + omega_i x J_i omega_i; Q = T2 + (d2 - b s) x F2; q = n x w",
     "(2) finger couple m = Q . s/(q . s); R_B = s x (Q - m q)/b + S s",
@@ -24,6 +22,8 @@ FORMULAS = (
     "    drive_torque = M_A . u",
     "(5) J = J_A + m2 v2^2 + omega2 . J2 omega2 + J_D psi'^2 at unit crank speed (slider: m3 s'^2)",
     "(6) drive_torque = J eps + J' omega^2/2 - sum m_i gravity . v_Gi - load psi'",
+    "(7) chain: the next stage turns by phi2 = kappa psi + offset, loads the rocker with -kappa drive_torque2 and adds",
+    "    psi'^2 J2 to J",
 )
 
 
@@ -41,10 +41,12 @@ def forces(follower: str) -> dict[str, str]:
 
 
 FORCES = tuple(forces("rocker"))
-SCALARS = {
+COUPLES = {
     "finger_couple": ("torque", "couple of the finger along n x w"),
     "drive_torque": ("torque", "torque that drives the crank, about its axis"),
-    "reduced_inertia": ("inertia", "inertia of all links reduced to the crank"),
+}
+INERTIAS = {
+    "reduced_inertia": ("inertia", "inertia of all links, of later stages too, reduced to the crank"),
     "dreduced_inertia": ("inertia", "derivative of the reduced inertia by the crank angle"),
 }
 
@@ -63,73 +65,105 @@ def force_outputs(follower: str, suffix: str = "", text: str = "", equation: str
 def _outputs(follower: str) -> tuple[Output, ...]:
     return (
         *force_outputs(follower),
-        *(Output(name, unit, text, EQUATION) for name, (unit, text) in SCALARS.items()),
+        *(Output(name, unit, text, EQUATION) for name, (unit, text) in (COUPLES | INERTIAS).items()),
     )
 
 
-def needed_vectors(wanted: frozenset[str], suffix: str = "") -> list[str]:
-    """Which of the six vectors some wanted output is made of."""
-    shaking = {"force_a", "force_d"} if f"shaking_force{suffix}" in wanted else set()
-    return [
-        name
-        for name in FORCES
-        if name in shaking or any(w in wanted for w in (f"{name}{suffix}", *(f"{name}{suffix}_{x}" for x in "xyz")))
-    ]
+def wanted_groups(wanted: frozenset[str], suffix: str = "") -> tuple[bool, bool, bool]:
+    """Whether any force or moment, any couple, any inertia is wanted: what is not is not compiled."""
+    vectors = (f"{name}{suffix}{tail}" for name in (*FORCES, "shaking_force") for tail in ("", "_x", "_y", "_z"))
+    couples, inertias = ({f"{name}{suffix}" for name in names} for names in (COUPLES, INERTIAS))
+    return not wanted.isdisjoint(vectors), not wanted.isdisjoint(couples), not wanted.isdisjoint(inertias)
 
 
-def vector_columns(vectors: dict[str, Array], wanted: frozenset[str], suffix: str = "") -> Columns:
-    """Wanted magnitudes and components of the computed vectors."""
+def vector_columns(forces: Array | None, wanted: frozenset[str], suffix: str = "") -> Columns:
+    """Wanted magnitudes and components of the six vectors, (n, m, 18), and of the force on the frame."""
     columns: Columns = {}
-    for name, values in vectors.items():
+    if forces is None:
+        return columns
+    for k, name in enumerate(FORCES):
+        values = forces[:, :, 3 * k : 3 * k + 3]
         if f"{name}{suffix}" in wanted:
-            columns[f"{name}{suffix}"] = np.sqrt(np.einsum("ijk,ijk->ij", values, values))
-        for k, axis in enumerate("xyz"):
+            columns[f"{name}{suffix}"] = magnitude(values)
+        for at, axis in enumerate("xyz"):
             if f"{name}{suffix}_{axis}" in wanted:
-                columns[f"{name}{suffix}_{axis}"] = values[:, :, k]
+                columns[f"{name}{suffix}_{axis}"] = values[:, :, at]
     if f"shaking_force{suffix}" in wanted:
-        total = vectors["force_a"] + vectors["force_d"]
-        columns[f"shaking_force{suffix}"] = np.sqrt(np.einsum("ijk,ijk->ij", total, total))
+        columns[f"shaking_force{suffix}"] = magnitude(forces[:, :, 0:3] + forces[:, :, 9:12])
     return columns
 
 
-def by_construction(scene: Scene, run: Callable[[Scene, int], tuple[Columns, Status]]) -> Columns:
-    """Run ``run(scene, finger)`` for the designs of each finger construction and put the rows together."""
-    columns: Columns = {}
-    for finger in np.unique(scene.inputs["finger"]):
-        rows = np.flatnonzero(scene.inputs["finger"] == finger)
-        found, status = run(scene.only(rows), int(finger))
-        found["status"] = status
-        if rows.size == len(scene.designs):
-            return found
-        for name, values in found.items():
-            columns.setdefault(name, np.empty((len(scene.designs), *values.shape[1:]), values.dtype))[rows] = values
-    return columns
+def magnitude(vectors: Array) -> Array:
+    """Length of vectors (n, m, 3)."""
+    x, y, z = vectors[:, :, 0], vectors[:, :, 1], vectors[:, :, 2]
+    length: Array = np.sqrt(x * x + y * y + z * z)
+    return length
 
 
-def compute(names: tuple[str, ...], scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted reactions and inertias; a vector none of whose outputs is wanted is not compiled.
+def drive(scene: Scene, handed_back: Columns | None, name: str = "drive_torque") -> Array:
+    """Load of the follower, speed of the crank and its rate, (n, m or 1, 3), as the kernels of loads take them.
 
-    ``names`` are the load inputs in the order of the kernel's columns.
+    In a chain the crank turns as the stage before drives it, and the next stage's driving torque, column ``name`` of
+    ``handed_back``, acts on the rocker besides its own load.
     """
-
-    def run(part: Scene, finger: int) -> tuple[Columns, Status]:
-        status = part.status()
-        vectors = {name: np.empty((*status.shape, 3)) for name in needed_vectors(wanted)}
-        scalars = {name: np.empty(status.shape) for name in SCALARS if name in wanted}
-        kinetostatics(
-            *part.records, part.table(names), finger, status,
-            *[vectors.get(name) for name in FORCES], *[scalars.get(name) for name in SCALARS],
-        )  # fmt: skip
-        return vector_columns(vectors, wanted) | dict(scalars), status
-
-    return by_construction(scene, run)
+    speed, change = scene.crank()
+    load = scene.inputs[loads.follower(scene).load.name][:, None]
+    if handed_back is not None:
+        load = load - scene.after[0].kappa[:, None] * np.asarray(handed_back[name], np.float64)
+    return np.stack(np.broadcast_arrays(load, speed, change), axis=2)
 
 
-def advise(names: tuple[str, ...], load: str, scene: Scene) -> Advice | None:
+def bodies(scene: Scene) -> Array:
+    """Masses, centres, inertias and gravity in the order of the kernels."""
+    return scene.table(loads.follower(scene).bodies)
+
+
+def behind(scene: Scene) -> Columns | None:
+    """Driving torque, reduced inertia and status of the next stage; None at the end of the chain."""
+    if scene.driven is None:
+        return None
+    if "behind" not in scene.memo:
+        scene.memo["behind"] = compute(scene.driven, frozenset({"drive_torque", *INERTIAS}))
+    found: Columns = scene.memo["behind"]
+    return found
+
+
+def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Wanted reactions and inertias; a group none of whose outputs is wanted is not compiled."""
+    status, handed_back = scene.status(), behind(scene)
+    sizes = zip((18, 2, 2), wanted_groups(wanted), strict=True)
+    forces, couples, inertia = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
+    load = drive(scene, handed_back)
+    kinetostatics(
+        *scene.records, bodies(scene), load, scene.inputs["finger"], status, forces, couples, inertia
+    )  # fmt: skip
+    if handed_back is not None:
+        take_over(status, handed_back["status"])
+        if inertia is not None:
+            inertia += _carried(scene, handed_back)
+    if forces is not None:
+        scene.memo["forces"] = forces, status
+    columns = vector_columns(forces, wanted)
+    for names, values in ((COUPLES, couples), (INERTIAS, inertia)):
+        if values is not None:
+            columns |= {name: values[:, :, k] for k, name in enumerate(names) if name in wanted}
+    return columns | {"status": status}
+
+
+def _carried(scene: Scene, handed_back: Columns) -> Array:
+    """Inertia of the later stages reduced to this crank and its derivative, (n, m, 2)."""
+    inertia, slope = (np.asarray(handed_back[name], np.float64) for name in INERTIAS)
+    first, second = scene.gear
+    return np.stack([first * first * inertia, 2.0 * first * second * inertia + first**3 * slope], axis=2)
+
+
+def advise(scene: Scene) -> Advice | None:
     """Share of the largest force at C that inertia and weight make; 1 where there is no useful load."""
-    whole = compute(names, scene, frozenset({"force_c"}))
+    load = loads.follower(scene).load.name
+    whole = compute(scene, frozenset({"force_c"}))
     still = {name: np.zeros_like(x) if name.startswith(("m_", "j_")) else x for name, x in scene.inputs.items()}
-    useful = compute(names, Scene(scene.family, scene.designs, scene.angles, still), frozenset({"force_c"}))
+    alone = Scene(scene.family, scene.designs, scene.angles, still, scene.after, scene.before)
+    useful = compute(alone, frozenset({"force_c"}))
     turning = (whole["status"] == st.OK).all(axis=1)
     if not turning.any():
         return None
@@ -138,24 +172,24 @@ def advise(names: tuple[str, ...], load: str, scene: Scene) -> Advice | None:
     return Advice(f"share of the largest force at C that is not due to {load}", share, 0.1)
 
 
-def _effect(name: str, follower: str, inputs: loads.LoadInputs) -> Effect:
+def _effect(kind: loads.Follower) -> Effect:
     return Effect(
-        key="D1, D3",
-        name=name,
-        title=f"joint reactions of crank, coupler and {follower}, finger couple, driving torque, reduced inertia",
+        key=KEY,
+        name=f"{kind.prefix}kinetostatics",
+        title=f"joint reactions of crank, coupler and {kind.name}, finger couple, driving torque, reduced inertia",
         equation=EQUATION,
         formulas=FORMULAS,
-        families=("rssr",) if follower == "rocker" else ("rssp",),
+        families=kind.families,
         needs=("coupler",),
-        inputs=inputs.parameters,
-        outputs=_outputs(follower),
-        compute=partial(compute, inputs.columns),
-        ns_per_pose=160.0,
+        inputs=kind.parameters,
+        outputs=_outputs(kind.name),
+        compute=compute,
         called_for="joint loads, drive torque, shaking force, balancing",
         negligible="inertia and weight make less than 10 % of the joint load (low speed): then statics, pressure",
-        advise=partial(advise, inputs.columns, inputs.load),
+        takes_load=KEY,
+        advise=advise,
     )
 
 
-EFFECT = _effect("kinetostatics", "rocker", loads.ROCKER)
-SLIDER = _effect("slider_kinetostatics", "slider", loads.SLIDER)
+EFFECT = _effect(loads.ROCKER)
+SLIDER = _effect(loads.SLIDER)

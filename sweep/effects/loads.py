@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sweep.effects.base import Scene
 from sweep.effects.coupler import CONSTRUCTION
 from sweep.families.base import Parameter
 
@@ -33,28 +34,36 @@ GRAVITY = tuple(
     for axis in "xyz"
 )
 SPEED = Parameter("speed", "speed", "speed of the crank (scene.speed of a study)", positive=True)
-LOAD_TORQUE = Parameter(
+CHANGE = Parameter("speed_change", "angular_acceleration", "angular acceleration of the crank", default=0.0)
+_TORQUE = Parameter(
     "load_torque", "torque", "torque on the rocker about its axis; a resisting one opposes dpsi", default=0.0
 )
-LOAD_FORCE = Parameter(
+_FORCE = Parameter(
     "load_force", "force", "force on the slider along the slide; a resisting one opposes ds", default=0.0
 )
-ACCELERATION = Parameter("speed_change", "angular_acceleration", "angular acceleration of the crank", default=0.0)
 
 
-class LoadInputs(NamedTuple):
-    """Inputs of kinetostatics: all of them, those that are columns of its kernel in order, the useful load."""
+class Follower(NamedTuple):
+    """What the load effects of one kind of follower take: its name, its useful load, its bodies, all their inputs."""
 
+    name: str
+    prefix: str  # of the names of its effects
+    families: tuple[str, ...]
+    load: Parameter
+    bodies: tuple[str, ...]  # columns of kernels.effects.kinetostatics in order
     parameters: tuple[Parameter, ...]
-    columns: tuple[str, ...]
-    load: str
 
 
-def _inputs(follower: str, load: Parameter) -> LoadInputs:
-    bodies = (*_body("crank"), *_body("coupler"), *_body(follower))
-    columns = (*bodies, *GRAVITY, load, SPEED, ACCELERATION)
-    return LoadInputs((*columns, CONSTRUCTION), tuple(p.name for p in columns), load.name)
+def _follower(name: str, prefix: str, families: tuple[str, ...], load: Parameter) -> Follower:
+    bodies = (*_body("crank"), *_body("coupler"), *_body(name), *GRAVITY)
+    parameters = (*bodies, load, SPEED, CHANGE, CONSTRUCTION)
+    return Follower(name, prefix, families, load, tuple(p.name for p in bodies), parameters)
 
 
-ROCKER = _inputs("rocker", LOAD_TORQUE)
-SLIDER = _inputs("slider", LOAD_FORCE)
+ROCKER = _follower("rocker", "", ("rssr", "guide"), _TORQUE)
+SLIDER = _follower("slider", "slider_", ("rssp",), _FORCE)
+
+
+def follower(scene: Scene) -> Follower:
+    """The kind of follower of a scene's family."""
+    return SLIDER if scene.family.name in SLIDER.families else ROCKER

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
+from functools import partial
 
-from kernels import status as st
 from kernels.effects.pressure import directions
-from sweep.effects.base import Advice, Effect, Scene
-from sweep.families.base import Columns, Output, optional_outputs
+from sweep.effects.base import Effect, Scene, Status, largest
+from sweep.families.base import Array, Columns, Output, filled
 
 EQUATION = "P2, P3 (1)-(3)"
 FORMULAS = (
@@ -31,32 +30,17 @@ OUTPUTS = (
 _NAMES = tuple(o.name for o in OUTPUTS)
 
 
-def advise(scene: Scene) -> Advice | None:
-    """Largest axial share of the coupler direction."""
-    found = compute(scene, frozenset({"t_k"}))
-    turning = (found["status"] == st.OK).all(axis=1)
-    if not turning.any():
-        return None
-    return Advice("largest axial component of the coupler direction", np.abs(found["t_k"][turning]).max(axis=1), 0.05)
-
-
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted directions and angles of every pose."""
-    status = scene.status()
-    outputs = optional_outputs(_NAMES, wanted, scene.shape)
-    per_pose, per_design = scene.records
-    directions(per_pose, per_design, status, *[*outputs, None, None, None])
-    found: Columns = {name: out for name, out in zip(_NAMES, outputs, strict=True) if out is not None}
-    return found | {"status": status}
+    return filled(directions, scene.records, _NAMES, wanted, scene.status())
 
 
-def bearing_directions(scene: Scene) -> tuple[np.ndarray, ...]:
-    """cos(theta1), sin(theta1), sin(theta1) tan(theta2) and status: what the bearing criteria take."""
-    status = scene.status()
-    cos1, sin1, axial = (np.empty(scene.shape) for _ in range(3))
-    per_pose, per_design = scene.records
-    directions(per_pose, per_design, status, None, None, None, None, None, None, cos1, sin1, axial)
-    return cos1, sin1, axial, status
+def components(scene: Scene) -> tuple[tuple[Array, ...], Status]:
+    """t_tau, t_rho and t_k, which the bearing criteria take, and a fresh status."""
+    if "direction" not in scene.memo:
+        scene.memo["direction"] = compute(scene, frozenset({"t_tau", "t_rho", "t_k"}))
+    found = scene.memo["direction"]
+    return tuple(found[name] for name in ("t_tau", "t_rho", "t_k")), found["status"].copy()
 
 
 EFFECT = Effect(
@@ -65,13 +49,18 @@ EFFECT = Effect(
     title="direction of the coupler force: radial, axial and crank-side pressure angles",
     equation=EQUATION,
     formulas=FORMULAS,
-    families=("rssr", "rssp"),
+    families=("rssr", "rssp", "guide"),
     needs=(),
     inputs=(),
     outputs=OUTPUTS,
     compute=compute,
-    ns_per_pose=40.0,
     called_for="choice of the follower's and the crank's bearings",
     negligible="axial component of the coupler direction below 0.05 (planar linkage: theta2 = theta3 = 0)",
-    advise=advise,
+    advise=partial(
+        largest,
+        compute=compute,
+        name="t_k",
+        quantity="largest axial component of the coupler direction",
+        threshold=0.05,
+    ),
 )

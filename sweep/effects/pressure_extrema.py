@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.effects.pressure_extrema import pressure_extrema
-from sweep.effects.base import DesignResult, Effect, Scene
-from sweep.families.base import Accuracy, Array, Columns, Family, Output
+from sweep.effects.base import DesignResult, Effect, Scene, no_poses
+from sweep.effects.turn import chosen
+from sweep.families.base import Accuracy, Columns, Output
 
 EQUATION = "P1 (1)-(3)"
 FORMULAS = (
@@ -38,25 +39,18 @@ OUTPUTS = (
 ERROR = 1e-14
 
 
-def extrema(
-    family: Family, designs: Array, inputs: dict[str, Array], wanted: frozenset[str], accuracy: Accuracy
-) -> Columns:
+def extrema(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Wanted extrema and status, each (n,)."""
-    if family.ellipse is None:
-        raise TypeError(f"{family.name} has no ellipse of the coupler direction")
-    n = len(designs)
+    if scene.family.ellipse is None:
+        raise TypeError(f"{scene.family.name} has no ellipse of the coupler direction")
+    n = len(scene.designs)
     status, count = np.empty(n, np.uint8), np.empty(n)
     phi, theta, highest, lowest = (np.empty((n, 4)) for _ in range(4))
-    pressure_extrema(family.ellipse(designs), status, count, phi, theta, highest, lowest)
+    pressure_extrema(scene.family.ellipse(scene.designs), status, count, phi, theta, highest, lowest)
     columns: Columns = {"pressure_extrema": count, "err_pressure_extrema": 0.0 * count}
     for name, values in zip(_ANGLES, np.hstack([highest, lowest]).T, strict=True):
         columns |= {name: values, f"err_{name}": ERROR / np.cos(highest[:, 0])}
-    return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
-
-
-def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """The motion's status: there are no outputs per pose."""
-    return {"status": scene.status()}
+    return chosen(columns, wanted, status)
 
 
 EFFECT = Effect(
@@ -65,13 +59,13 @@ EFFECT = Effect(
     title="all extrema of the pressure angle over the turn, in closed form",
     equation=EQUATION,
     formulas=FORMULAS,
-    families=("rssr", "rssp"),
+    families=("rssr", "rssp", "guide"),
     needs=(),
     inputs=(),
     outputs=(),
-    compute=compute,
-    ns_per_pose=0.0,
+    compute=no_poses,
     called_for="transmission constraints that need more than the largest pressure angle (margin, max_pressure_angle)",
     negligible="never as a guard near dead points; the largest angle alone is cheaper from the margin",
-    design_result=DesignResult(OUTPUTS, extrema, 2100.0),
+    even_crank=True,
+    design_result=DesignResult(OUTPUTS, extrema),
 )

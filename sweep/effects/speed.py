@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels import status as st
-from kernels.effects.kinetostatics import kinetostatics
 from kernels.effects.speed_fluctuation import speed_fluctuation
-from sweep.effects import loads
+from sweep.effects import kinetostatics, loads
 from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status
-from sweep.effects.turn import chosen, reduction_outputs, reductions
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
+from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
+from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
 
 EQUATION = "D4 (1)-(3)"
 FORMULAS = (
@@ -34,69 +32,45 @@ _PER_TURN = (
 # Odd grids: the next one is tried for designs that the one before does not resolve.
 GRIDS = (65, 129, 257)
 ERROR = 1e-9
+_NEEDED_NAMES = ("reduced_inertia", "dreduced_inertia", "drive_torque")
+_NEEDED = frozenset(_NEEDED_NAMES)
 
 
-def steady(scene: Scene, phi: Array) -> tuple[dict[str, Array], Status]:
-    """Steady state of every design, and its curves at the angles phi, (n, m) or (1, m)."""
-    n = len(scene.designs)
-    found = {name: np.empty(n) for name in ("unevenness", "fastest", "slowest", "energy")}
-    found |= {name: np.empty((n, phi.shape[1])) for name in ("crank_speed", "crank_acceleration")}
-    status: Status = np.full(n, st.NOT_CONVERGED, np.uint8)
-    rows = np.arange(n)
-    for size in GRIDS:
-        grid = scene.only(rows).on_grid(size)
-        inertia, excess = _samples(grid)
-        own = np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi)
-        part = {name: np.empty((rows.size, *values.shape[1:])) for name, values in found.items()}
-        codes = np.empty(rows.size, np.uint8)
-        speed_fluctuation(inertia, excess, grid.inputs["speed"], own, codes, *part.values())
-        for name, values in part.items():
-            found[name][rows] = values
-        status[rows] = codes
-        rows = rows[codes == st.NOT_CONVERGED]
-        if rows.size == 0:
-            break
-    return found, status
+def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
+    inertia, excess = _samples(grid)
+    n = len(grid.designs)
+    numbers = {name: np.empty(n) for name in ("unevenness", "fastest", "slowest", "energy")}
+    curves = {o.name: np.empty((n, phi.shape[1])) for o in OUTPUTS}
+    status = np.empty(n, np.uint8)
+    speed_fluctuation(
+        inertia, excess, grid.inputs["speed"], phi, status, *numbers.values(), *curves.values()
+    )  # fmt: skip
+    return numbers | curves, status
 
 
 def _samples(grid: Scene) -> tuple[Array, Array]:
     """Reduced inertia and torque excess J'w^2/2 - M_drive(w, 0): weights and load reduced to the crank."""
-    inertia, slope, drive = (np.empty(grid.shape) for _ in range(3))
-    # The finger's construction moves the coupler's spin, so it enters the inertia; each is sampled on its own.
-    for finger in np.unique(grid.inputs["finger"]):
-        rows = np.flatnonzero(grid.inputs["finger"] == finger)
-        scene = grid.only(rows)
-        table, status = scene.table(loads.ROCKER.columns), scene.status()
-        table[:, loads.ROCKER.columns.index("speed_change")] = 0.0
-        part = [np.empty(status.shape) for _ in range(3)]
-        kinetostatics(*scene.records, table, int(finger), status, *[*[None] * 7, *part])
-        drive[rows], inertia[rows], slope[rows] = part
+    even = grid.inputs | {"speed_change": np.zeros(len(grid.designs))}
+    after = tuple(d._replace(inputs=d.inputs | {"speed_change": even["speed_change"]}) for d in grid.after)
+    found = kinetostatics.compute(Scene(grid.family, grid.designs, grid.angles, even, after), _NEEDED)
+    inertia, slope, drive = (np.asarray(found[name], np.float64) for name in _NEEDED_NAMES)
     speed = grid.inputs["speed"][:, None]
     return inertia + grid.inputs["flywheel"][:, None], 0.5 * slope * speed * speed - drive
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Speed and acceleration of the crank at the wanted angles."""
-    found, turn = steady(scene, scene.angles.phi)
-    status = scene.status()
-    np.copyto(status, turn[:, None], where=(status == st.OK) & (turn[:, None] != st.OK))
-    columns: Columns = {name: found[name] for name in wanted}
-    return columns | {"status": status}
+    return at_poses(scene, *on_finer_grids(scene, scene.angles.phi, GRIDS, _solve), wanted)
 
 
-def per_turn(
-    family: Family, designs: Array, inputs: dict[str, Array], wanted: frozenset[str], accuracy: Accuracy
-) -> Columns:
+def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Unevenness, extreme speeds and the reductions of speed and acceleration."""
-    scene = Scene(family, designs, Angles.of(np.zeros((1, 1))), inputs)
-    found, status = steady(scene, scene.on_grid(GRIDS[-1]).angles.phi)
-    columns: Columns = {o.name: found[o.name] for o in _PER_TURN}
-    relative = {"unevenness": found["slowest"], "fastest": np.ones(len(designs)), "slowest": np.ones(len(designs))}
-    columns |= {f"err_{name}": ERROR * found["fastest"] / size for name, size in relative.items()}
-    for o in OUTPUTS:
-        if any(name.endswith(f"_{o.name}") for name in wanted):
-            columns |= reductions(o.name, found[o.name], status)
-    return chosen(columns, wanted, status)
+    found, status = on_finer_grids(scene, scene.on_grid(GRIDS[-1]).angles.phi, GRIDS, _solve)
+    numbers: Columns = {o.name: found[o.name] for o in _PER_TURN}
+    one = np.ones(len(scene.designs))
+    relative = {"unevenness": found["slowest"], "fastest": one, "slowest": one}
+    numbers |= {f"err_{name}": ERROR * found["fastest"] / size for name, size in relative.items()}
+    return per_turn(found, status, numbers, OUTPUTS, wanted)
 
 
 def advise(scene: Scene) -> Advice | None:
@@ -116,21 +90,27 @@ def advise(scene: Scene) -> Advice | None:
     return Advice("estimated unevenness of the crank speed", estimate, 0.01)
 
 
-EFFECT = Effect(
-    key="D4",
-    name="speed_fluctuation",
-    title="fluctuation of the crank speed at constant mean speed",
-    equation=EQUATION,
-    formulas=FORMULAS,
-    families=("rssr",),
-    needs=("kinetostatics",),
-    inputs=(*loads.ROCKER.parameters, FLYWHEEL),
-    outputs=OUTPUTS,
-    compute=compute,
-    ns_per_pose=1050.0,
-    called_for="unevenness of the speed asked for, a light drive",
-    negligible="estimated unevenness below 1 %",
-    whole_turn=True,
-    design_result=DesignResult((*_PER_TURN, *reduction_outputs(OUTPUTS)), per_turn, 940_000.0),
-    advise=advise,
-)
+def _effect(kind: loads.Follower) -> Effect:
+    return Effect(
+        key="D4",
+        name=f"{kind.prefix}speed_fluctuation",
+        title="fluctuation of the crank speed at constant mean speed",
+        equation=EQUATION,
+        formulas=FORMULAS,
+        families=kind.families,
+        needs=(f"{kind.prefix}kinetostatics",),
+        inputs=(*kind.parameters, FLYWHEEL),
+        outputs=OUTPUTS,
+        compute=compute,
+        called_for="unevenness of the speed asked for, a light drive",
+        negligible="estimated unevenness below 1 %",
+        whole_turn=True,
+        even_crank=True,
+        takes_load=kinetostatics.KEY,
+        design_result=DesignResult((*_PER_TURN, *reduction_outputs(OUTPUTS)), turn),
+        advise=advise,
+    )
+
+
+EFFECT = _effect(loads.ROCKER)
+SLIDER = _effect(loads.SLIDER)

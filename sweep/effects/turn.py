@@ -2,16 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
 from kernels import status as st
 from kernels.turn_series import turn_extremes
-from sweep.effects.base import Status
+from sweep.effects.base import Scene, Status, take_over
 from sweep.families.base import Array, Columns, Output
 
 RESOLVED = 1e-9
+
+Solver: TypeAlias = Callable[[Scene, Array, bool], tuple[dict[str, Array], Status]]
+"""``solve(scene, phi, last)``: numbers (n,) and curves (n, m) at phi from a scene on a grid, and status (n,)."""
+
+
+def on_finer_grids(scene: Scene, phi: Array, grids: Sequence[int], solve: Solver) -> tuple[dict[str, Array], Status]:
+    """Solve every design on the first of the ``grids`` that resolves it.
+
+    ``phi`` is (n, m) or (1, m); what ``solve`` calls NOT_CONVERGED is tried again on the next grid.
+    """
+    found: dict[str, Array] = {}
+    status: Status = np.full(len(scene.designs), st.NOT_CONVERGED, np.uint8)
+    rows = np.arange(len(scene.designs))
+    for size in grids:
+        own = np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi)
+        part, codes = solve(scene.only(rows).on_grid(size), own, size == grids[-1])
+        for name, values in part.items():
+            found.setdefault(name, np.empty((len(scene.designs), *values.shape[1:])))[rows] = values
+        status[rows] = codes
+        rows = rows[codes == st.NOT_CONVERGED]
+        if rows.size == 0:
+            break
+    return found, status
+
+
+def at_poses(scene: Scene, found: dict[str, Array], turn: Status, wanted: frozenset[str]) -> Columns:
+    """Wanted curves of a whole-turn effect at the scene's poses; a turn that is not OK speaks for all of them."""
+    status = scene.status()
+    take_over(status, np.broadcast_to(turn[:, None], status.shape))
+    columns: Columns = {name: found[name] for name in wanted}
+    return columns | {"status": status}
+
+
+def per_turn(
+    found: dict[str, Array], status: Status, numbers: Columns, curves: Sequence[Output], wanted: frozenset[str]
+) -> Columns:
+    """The wanted ones of ``numbers`` and of the reductions of ``curves``, sampled on an odd grid in ``found``."""
+    columns = dict(numbers)
+    for o in curves:
+        if any(name.endswith(f"_{o.name}") for name in wanted):
+            columns |= reductions(o.name, found[o.name], status)
+    return chosen(columns, wanted, status)
+
 
 _TEXTS = {
     "max": "largest value over one turn of",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -126,10 +127,46 @@ class Family:
         """Column names of the design matrix in order."""
         return tuple(p.name for p in self.parameters)
 
-    @property
+    @cached_property
     def pose_names(self) -> tuple[str, ...]:
         """Names of the pose outputs."""
         return tuple(o.name for o in self.pose_outputs)
+
+
+def filled(
+    kernel: Callable[..., object],
+    arguments: Sequence[object],
+    names: tuple[str, ...],
+    wanted: frozenset[str],
+    status: NDArray[np.uint8],
+    dtype: DTypeLike = np.float64,
+) -> Columns:
+    """Call ``kernel(*arguments, status, *outputs)``; the wanted outputs, shaped like ``status``, and ``status``."""
+    outputs = optional_outputs(names, wanted, status.shape, dtype)
+    kernel(*arguments, status, *outputs)
+    columns: Columns = {name: out for name, out in zip(names, outputs, strict=True) if out is not None}
+    return columns | {"status": status}
+
+
+def filled_with_places(
+    kernel: Callable[..., object],
+    designs: Array,
+    angles: Angles,
+    names: tuple[str, ...],
+    places: tuple[str, ...],
+    wanted: frozenset[str],
+) -> Columns:
+    """Call a kernel of poses whose last output is one array (k, n, m) of all joint coordinates ``places`` or None."""
+    shape, dtype = (len(designs), angles.cos.shape[1]), np.result_type(designs, angles.cos)
+    room = None if wanted.isdisjoint(places) else np.empty((len(places), *shape), dtype)
+
+    def with_places(*given: object) -> None:
+        kernel(*given, room)
+
+    columns = filled(with_places, (designs, angles.cos, angles.sin), names, wanted, np.empty(shape, np.uint8), dtype)
+    if room is not None:
+        columns |= {name: x for name, x in zip(places, room, strict=True) if name in wanted}
+    return columns
 
 
 def optional_outputs(

@@ -219,7 +219,7 @@ def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angle
         is_last = k == len(stages) - 1
         if k > 0:
             kappa = np.ascontiguousarray(designs[:, stage.kappa])
-            angles = _drive(results[-1], kappa, np.ascontiguousarray(designs[:, stage.offset]))
+            angles = drive(results[-1], kappa, np.ascontiguousarray(designs[:, stage.offset]))
         result: dict[str, Any] = stage.family.poses(stage.designs(designs), angles, frozenset(needed))
         np.copyto(status, result["status"], where=status == OK)
         results.append(result)
@@ -237,8 +237,8 @@ def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angle
     return columns | {"status": status}
 
 
-def _drive(result: dict[str, Any], kappa: Array, offset: Array) -> Angles:
-    """The input angles of the stage driven by ``result``."""
+def drive(result: dict[str, Any], kappa: Array, offset: Array) -> Angles:
+    """The input angles of the stage driven by ``result``: status, and psi or cos_psi and sin_psi."""
     shape = result["status"].shape
     # a family that says it works from cos and sin alone gets no angle at all
     phi: Array = np.broadcast_to(np.float64(np.nan), shape)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.families import guide
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, optional_outputs
+from sweep.families import rssr as crank_rocker
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -46,17 +47,26 @@ _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    shape = (designs.shape[0], angles.cos.shape[1])
-    dtype = np.result_type(designs, angles.cos)
-    status = np.empty(shape, np.uint8)
-    values = optional_outputs(_VALUES, wanted, shape, dtype)
-    joints = None if wanted.isdisjoint(_JOINTS) else np.empty((len(_JOINTS), *shape), dtype)
-    outputs = [*values, joints]
-    guide.poses(designs, angles.cos, angles.sin, status, *outputs)
-    columns: Columns = {name: out for name, out in zip(_VALUES, values, strict=True) if out is not None}
-    if joints is not None:
-        columns |= {name: out for name, out in zip(_JOINTS, joints, strict=True) if name in wanted}
-    return columns | {"status": status}
+    return filled_with_places(guide.poses, designs, angles, _VALUES, _JOINTS, wanted)
+
+
+def _as_crank_rocker(designs: Array) -> Array:
+    """Design matrix of the same four-bar as a crank-rocker with parallel axes and all links in one plane."""
+    matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)))
+    matrix[:, :4], matrix[:, -1] = designs[:, :4], designs[:, -1]
+    return matrix
+
+
+def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
+    """Fill the joint records that effects work from: those of the four-bar; the guided point bears no load."""
+    matrix = _as_crank_rocker(designs)
+    turned = crank_rocker.poses(matrix, angles, frozenset(crank_rocker.JOINT_NEEDS))
+    crank_rocker.joint_records(matrix, angles, turned, per_pose, per_design)
+
+
+def ellipse(designs: Array) -> Array:
+    """The curve of the coupler direction across the rocker's motion, (n, 7)."""
+    return crank_rocker.ellipse(_as_crank_rocker(designs))
 
 
 FAMILY = Family(
@@ -68,4 +78,6 @@ FAMILY = Family(
     poses=poses,
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s", "dev": "ddev", "ddev": "d2dev"},
     uses_phi=False,
+    joints=joint_records,
+    ellipse=ellipse,
 )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.families import rssp
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, optional_outputs
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -58,17 +58,7 @@ _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    shape = (designs.shape[0], angles.cos.shape[1])
-    dtype = np.result_type(designs, angles.cos)
-    status = np.empty(shape, np.uint8)
-    values = optional_outputs(_VALUES, wanted, shape, dtype)
-    joints = None if wanted.isdisjoint(_JOINTS) else np.empty((len(_JOINTS), *shape), dtype)
-    outputs = [*values, joints]
-    rssp.poses(designs, angles.cos, angles.sin, status, *outputs)
-    columns: Columns = {name: out for name, out in zip(_VALUES, values, strict=True) if out is not None}
-    if joints is not None:
-        columns |= {name: out for name, out in zip(_JOINTS, joints, strict=True) if name in wanted}
-    return columns | {"status": status}
+    return filled_with_places(rssp.poses, designs, angles, _VALUES, _JOINTS, wanted)
 
 
 def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:

@@ -8,7 +8,18 @@ import numpy as np
 
 from kernels import status as st
 from kernels.families import rssr
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, optional_outputs
+from sweep.families.base import (
+    Accuracy,
+    Angles,
+    Array,
+    Columns,
+    Family,
+    Output,
+    Parameter,
+    Step,
+    filled,
+    optional_outputs,
+)
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -73,31 +84,25 @@ _POSE_NAMES = tuple(o.name for o in POSE_OUTPUTS)
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    shape = (designs.shape[0], angles.cos.shape[1])
-    status = np.empty(shape, np.uint8)
-    outputs = optional_outputs(_POSE_NAMES, wanted, shape, np.result_type(designs, angles.cos))
-    rssr.poses(designs, angles.cos, angles.sin, status, *outputs)
-    columns: Columns = {name: out for name, out in zip(_POSE_NAMES, outputs, strict=True) if out is not None}
-    return columns | {"status": status}
+    arguments = designs, angles.cos, angles.sin
+    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
+    return filled(rssr.poses, arguments, _POSE_NAMES, wanted, status, np.result_type(designs, angles.cos))
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """As :func:`poses`, with the closure in twice the working precision; for float64 only."""
-    shape = (designs.shape[0], angles.cos.shape[1])
-    status, constants = np.empty(shape, np.uint8), np.empty((shape[0], rssr.PRECISE_COLUMNS))
-    outputs = optional_outputs(_POSE_NAMES, wanted, shape)
+    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
+    constants = np.empty((len(designs), rssr.PRECISE_COLUMNS))
     rssr.precise_constants(designs, constants)
-    rssr.precise_poses(designs, constants, angles.cos, angles.sin, status, *outputs)
-    columns: Columns = {name: out for name, out in zip(_POSE_NAMES, outputs, strict=True) if out is not None}
-    return columns | {"status": status}
+    return filled(rssr.precise_poses, (designs, constants, angles.cos, angles.sin), _POSE_NAMES, wanted, status)
 
 
-_JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
+JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
 
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
     """Fill the joint records that effects work from; ``motion`` holds the pose outputs they are made of."""
-    cos_psi, sin_psi, dpsi, d2psi, discriminant = (np.asarray(motion[name], dtype=np.float64) for name in _JOINT_NEEDS)
+    cos_psi, sin_psi, dpsi, d2psi, discriminant = (np.asarray(motion[name], dtype=np.float64) for name in JOINT_NEEDS)
     rssr.joints(designs, angles.cos, angles.sin, cos_psi, sin_psi, dpsi, d2psi, discriminant, per_pose, per_design)
 
 
@@ -238,7 +243,7 @@ FAMILY = Family(
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     uses_phi=False,
     joints=joint_records,
-    joint_needs=_JOINT_NEEDS,
+    joint_needs=JOINT_NEEDS,
     ellipse=ellipse,
     precise_poses=precise_poses,
 )

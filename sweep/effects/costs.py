@@ -1,0 +1,108 @@
+"""What the effects cost: the one place that measures it, for the register, `make bench-effects` and docs/accuracy.md.
+
+:func:`costs` times effects on a few ordinary linkages; :mod:`sweep.effects.measured` keeps what it found last.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from sweep.effects import NAMES, effect, with_effects
+from sweep.effects.placing import Placed, first_scene
+from sweep.families import family
+from sweep.families.base import Accuracy, Angles, Array, Family
+
+POSES = 360
+MOTION = "motion"
+CENTRE = {"a": 20.0, "b": 95.0, "c": 60.0, "e": 70.0, "f": 12.0, "g": 8.0, "alpha": 1.2, "branch": 1.0}
+# A small machine in mm, t, s; ours.
+INPUTS = {
+    "m_crank": 2e-4, "m_coupler": 1e-4, "m_rocker": 3e-4, "m_slider": 3e-4, "com_coupler_x": 45.0, "com_coupler_y": 2.0,
+    "com_rocker_x": 25.0, "j_coupler_xx": 0.004, "j_coupler_yy": 0.08, "j_coupler_zz": 0.08, "j_rocker_zz": 0.3,
+    "j_rocker_xx": 0.3, "j_rocker_yy": 0.1, "j_crank_zz": 0.2, "speed": 520.0, "load_torque": -500.0,
+    "load_force": -50.0, "gravity_z": -9810.0, "flywheel": 5.0, "mu_a": 0.05, "mu_b": 0.08, "mu_c": 0.08, "mu_d": 0.05,
+    "radius_a": 8.0, "radius_b": 5.0, "radius_c": 5.0, "radius_d": 7.0, "support_a1": -30.0, "support_a2": -60.0,
+    "support_d1": -20.0, "support_d2": 30.0, "resisting_torque": 500.0, "journal_diameter": 12.0,
+    "journal_length1": 15.0, "journal_length2": 15.0, "collar_diameter": 20.0, "permissible_pressure1": 1.0,
+    "permissible_pressure2": 1.0, "permissible_pressure3": 0.5, "radial_factor": 0.56, "axial_factor": 1.5,
+    "e_limit": 0.3, "dynamic_capacity": 6000.0, "required_life": 2e7, "driven_inertia": 0.6, "driven_mass": 3e-4,
+    "stiffness": 20000.0, "damping": 1.0, "x_point": 40.0,
+}  # fmt: skip
+
+
+class Cost(NamedTuple):
+    """Processor time of some outputs of an effect, per "pose" or per "design"; the motion it needs is counted apart."""
+
+    effect: str
+    outputs: str
+    per: str
+    ns: float
+
+
+def designs(full: Family, n: int, seed: int = 0) -> Array:
+    """Crank-rockers or slider-cranks a few percent round a regular one, with the inputs of the family's effects."""
+    noise = np.random.default_rng(seed).uniform(-0.05, 0.05, (n, len(full.parameters)))
+    values = [CENTRE.get(p.name, INPUTS.get(p.name, p.default)) for p in full.parameters]
+    matrix = np.array(values, dtype=np.float64) * (1.0 + noise)
+    for k, p in enumerate(full.parameters):
+        if p.choices is not None or p.name not in CENTRE:
+            matrix[:, k] = values[k]
+    return matrix
+
+
+def least_time(run: Callable[[], object], repeats: int = 5) -> float:
+    """Least processor time of several runs [s], the first one, which compiles, not counted."""
+    run()
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def costs(names: Sequence[str] = NAMES, *, n: int = 64, each: bool = False, repeats: int = 5) -> list[Cost]:
+    """Measure effects on one core, ``n`` designs at 360 angles each; a few milliseconds to a second per effect.
+
+    Parameters
+    ----------
+    names : of effects
+    n : designs
+    each : every pose output alone too, besides all of them together
+    repeats : of which the least time counts
+
+    Returns
+    -------
+    list of Cost
+        the motion of the crank-rocker with its joint records first (outputs "all", per "pose"), then per effect "all"
+        (pose outputs together), each pose output by its name, "design outputs" together
+    """
+    angles = Angles.of(2.0 * np.pi * np.arange(POSES)[None] / POSES)
+    rows = [Cost(MOTION, "all", "pose", motion_ns("rssr", n, repeats))]
+    for name in names:
+        entry = effect(name)
+        full = with_effects(family(entry.families[0]), (Placed(entry),))
+        matrix = designs(full, n)
+        motion = motion_ns(entry.families[0], n, repeats) if entry.outputs else 0.0
+        sets = {"all": frozenset(o.name for o in entry.outputs)} if entry.outputs else {}
+        singles = [o.name for o in entry.outputs if each and not o.name.endswith(("_x", "_y", "_z"))]
+        for label, wanted in (sets | {single: frozenset({single}) for single in singles}).items():
+            took = least_time(lambda wanted=wanted: full.poses(matrix, angles, wanted), repeats)  # type: ignore[misc] # noqa: B023
+            rows.append(Cost(name, label, "pose", took * 1e9 / (n * POSES) - motion))
+        if entry.design_result is not None:
+            step, all_of_them = full.steps[-1], frozenset(o.name for o in entry.design_result.outputs)
+            took = least_time(lambda: step.run(matrix, all_of_them, Accuracy(target=1e-8)), repeats)  # noqa: B023
+            rows.append(Cost(name, "design outputs", "design", took * 1e9 / n))
+    return rows
+
+
+def motion_ns(name: str, n: int, repeats: int) -> float:
+    """Nanoseconds per pose of a family's motion and the joint records made of it."""
+    bare = family(name)
+    matrix, angles = designs(bare, n), Angles.of(2.0 * np.pi * np.arange(POSES)[None] / POSES)
+    took = least_time(lambda: first_scene(bare, matrix, angles, {}).records, repeats)
+    return took * 1e9 / (n * POSES)

@@ -1,0 +1,85 @@
+"""Where an effect stands: at a family, or at one stage of a chain, whose number its inputs and outputs carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from sweep.effects.base import Driven, Effect, Scene
+from sweep.families.base import Angles, Array, Family, Output
+from sweep.families.chain import Chain
+
+
+@dataclass(frozen=True)
+class Placed:
+    """An effect at the stage of index ``stage``; the outputs of the last stage also stand without its number."""
+
+    entry: Effect
+    stage: int = 0
+    number: str = ""
+    last: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name of the effect with the stage's number."""
+        return f"{self.entry.name}{self.number}"
+
+    @property
+    def pose_outputs(self) -> tuple[Output, ...]:
+        """Pose outputs under all the names they have."""
+        return self._numbered(self.entry.outputs)
+
+    @property
+    def design_outputs(self) -> tuple[Output, ...]:
+        """Design outputs under all the names they have."""
+        return self._numbered(self.entry.design_result.outputs if self.entry.design_result else ())
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Pose and design outputs."""
+        return (*self.pose_outputs, *self.design_outputs)
+
+    @cached_property
+    def own(self) -> dict[str, str]:
+        """The effect's own names of its outputs by the names they have here."""
+        names = [o.name for o in (*self.entry.outputs, *_design(self.entry))]
+        found = {f"{name}{self.number}": name for name in names}
+        return found | {name: name for name in names} if self.last else found
+
+    def _numbered(self, outputs: tuple[Output, ...]) -> tuple[Output, ...]:
+        if not self.number:
+            return outputs
+        numbered = tuple(
+            replace(o, name=f"{o.name}{self.number}", text=f"stage {self.number}: {o.text}") for o in outputs
+        )
+        return (*numbered, *outputs) if self.last else numbered
+
+
+def _design(entry: Effect) -> tuple[Output, ...]:
+    return entry.design_result.outputs if entry.design_result else ()
+
+
+def stages_of(family: Family) -> tuple[tuple[Family, str], ...]:
+    """The stages of a chain with their numbers; a family alone is one stage without a number."""
+    if isinstance(family, Chain):
+        return tuple((stage.family, str(stage.number)) for stage in family.stages)
+    return ((family, ""),)
+
+
+def first_scene(family: Family, designs: Array, angles: Angles, given: dict[str, Array]) -> Scene:
+    """The scene of a family, or of a chain's first stage with those behind it, from the inputs by name, each (n,)."""
+    if not isinstance(family, Chain):
+        return Scene(family, designs, angles, {"speed_change": 0.0 * designs[:, 0]} | given)
+    still = {"speed_change": 0.0 * designs[:, 0]}
+    crank = still | {name: given[f"{name}1"] for name in ("speed", "speed_change") if f"{name}1" in given}
+    parts = []
+    for stage in family.stages:
+        number = str(stage.number)
+        own = {name.removesuffix(number): x for name, x in given.items() if name.endswith(number)}
+        parts.append((stage.family, stage.designs(designs), own | crank))
+    after = tuple(
+        Driven(bare, matrix, designs[:, stage.kappa], designs[:, stage.offset], own)
+        for stage, (bare, matrix, own) in zip(family.stages[1:], parts[1:], strict=True)
+    )
+    bare, matrix, own = parts[0]
+    return Scene(bare, matrix, angles, own, after)
