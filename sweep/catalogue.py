@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -36,6 +37,8 @@ MARGIN_TEXTS = {
     "margin": ("1", "smallest cos^2(pressure angle) over one turn; negative if the crank does not turn fully"),
     "max_pressure_angle": ("rad", "largest pressure angle over one turn"),
 }
+
+TARGET_OF_PROOF = 1e-8  # any: it decides nothing about what can be proven
 
 STAY = Output("window_angle", "rad", "crank angle over which the position lies in the window of the stroke: its dwell")
 
@@ -94,6 +97,37 @@ def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, 
     """The cheapest own route to an output that serves this accuracy."""
     able = [(step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy)]
     return min(able, key=lambda pair: pair[0].cost(accuracy), default=None)
+
+
+def certified_names(family: Family) -> tuple[str, ...]:
+    """Outputs whose maxima can be proven, those of a chain's first stage included."""
+    names = [o.name for step in family.steps if step.certifies for o in step.provides]
+    if isinstance(family, Chain):
+        names += [f"{o.name}1" for step in family.stages[0].family.steps if step.certifies for o in step.provides]
+    return tuple(names)
+
+
+def check_certifiable(family: Family, wanted: Sequence[str]) -> None:
+    """Refuse a proof for what has none.
+
+    Exact outputs need no proof; limit positions, margins and means are no maxima that a search could miss a peak of.
+
+    Raises
+    ------
+    InputError
+        for an unknown name, if an extremum is wanted that is searched for on poses, or if no wanted maximum can be
+        proven; the message names those that can.
+    """
+    names, accuracy = certified_names(family), Accuracy(target=TARGET_OF_PROOF, certify=True)
+    known = ", ".join(name for name in names if not name.startswith("phi_")) or "none"
+    allowed = f"a proof of the maxima that have one; of {family.name}: {known}"
+    for name in wanted:
+        output(family, name)  # unknown names end here
+        way = general_way(family, name)
+        if applying_step(family, name, accuracy) is None and way is not None and way.kind == "reduction":
+            raise InputError("certify", True, f"{allowed}; not of {name}", f"design outputs of {family.name}")
+    if not set(names) & set(wanted):
+        raise InputError("certify", True, f"{allowed}; none of them is wanted", f"design outputs of {family.name}")
 
 
 def general_way(family: Family, name: str) -> Way | None:

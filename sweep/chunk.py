@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.cascade import BLOCK, Cascade, levels
+from sweep.catalogue import certified_names
 from sweep.errors import InputError
 from sweep.families.base import Array, Columns
 from sweep.fit import fit_line
@@ -41,13 +42,14 @@ class ChunkResult:
 def output_columns(study: Study) -> dict[str, str]:
     """Names and types of the result columns: what the study wants, each number with its error estimate if there is one.
 
-    An estimate is stored in float32 always; whether a crank turns is not a number and has none.
+    An estimate is stored in float32 always, a proven bound is not; whether a crank turns is no number and has none.
     """
     columns: dict[str, str] = {}
+    proven = certified_names(study.family) if study.accuracy.certify else ()
     for name in study.want:
         columns[name] = study.output.dtype
         if study.accuracy.target is not None and not name.startswith("rotatable"):
-            columns[f"err_{name}"] = "float32"
+            columns[f"err_{name}"] = "float64" if name in proven else "float32"
     return columns
 
 

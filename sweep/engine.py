@@ -37,6 +37,7 @@ def run(
     smoke: bool = False,
     force: bool = False,
     accuracy: float | None = None,
+    certify: bool | None = None,
     progress: bool = False,
 ) -> Path:
     """Compute a study's designs into a folder, continuing where an earlier run stopped; then its optimum if it asks.
@@ -52,6 +53,7 @@ def run(
     smoke : take the study's tiny version
     force : run even over the budget, and set data of another study or code in the folder aside into ``_old/``
     accuracy : relative accuracy of the extrema in place of the study's own
+    certify : whether the wanted maxima are proven, in place of the study's own word
     progress : bar on a terminal, lines in a log
 
     Returns
@@ -72,7 +74,7 @@ def run(
         raise InputError("backend", backend, f"{' or '.join(BACKENDS)}{nearest(str(backend), BACKENDS)}", "run")
     if isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1:
         raise InputError("jobs", jobs, "a whole number from 1", "run")
-    model = _model(study, smoke, accuracy)
+    model = _model(study, smoke, accuracy, certify)
     _check_budget(model, jobs, force)
     folder = Path(out) if out is not None else Path("results", *(["smoke"] if smoke else []), model.name, "designs")
     with store.locked(folder):
@@ -92,11 +94,11 @@ def run(
     return folder
 
 
-def _model(study: str | Path | Study, smoke: bool, accuracy: float | None) -> Study:
+def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certify: bool | None) -> Study:
     from sweep.study.load import load_study, with_accuracy
 
     model = load_study(study, smoke=smoke) if isinstance(study, (str, Path)) else study
-    return model if accuracy is None else with_accuracy(model, accuracy)
+    return model if accuracy is None and certify is None else with_accuracy(model, accuracy, certify)
 
 
 def _check_budget(study: Study, jobs: int, force: bool) -> None:

@@ -14,8 +14,9 @@ import numpy as np
 
 from kernels.status import OK
 from sweep.cascade import BLOCK, CALL_SECONDS, Cascade, levels
+from sweep.catalogue import certified_names
 from sweep.chunk import output_columns, parameter_matrix, parameter_ns
-from sweep.families.base import Array, Family, Unit
+from sweep.families.base import Array, Unit
 from sweep.study.units import internal_unit
 from sweep.summaries import output
 
@@ -186,14 +187,21 @@ def describe_columns(study: Study) -> tuple[Column, ...]:
     columns += [
         Column(p.name, "float64", PARAMETER_UNITS[p.unit], p.text, "parameter") for p in study.family.parameters
     ]
-    columns += [_output_column(study.family, name, dtype) for name, dtype in output_columns(study).items()]
+    columns += [_output_column(study, name, dtype) for name, dtype in output_columns(study).items()]
     columns.append(Column("status", "uint8", "1", "0 = ok, others say why a value is missing", "status"))
     return tuple(columns)
 
 
-def _output_column(family: Family, name: str, dtype: str) -> Column:
-    definition = output(family, name.removeprefix("err_"))
-    text = f"absolute error estimate of {definition.name}" if name.startswith("err_") else definition.text
+def error_words(study: Study, name: str) -> str:
+    """What the error column of an output holds."""
+    proven = study.accuracy.certify and name in certified_names(study.family) and not name.startswith("phi_")
+    return "proven bound of the absolute error" if proven else "absolute error estimate"
+
+
+def _output_column(study: Study, name: str, dtype: str) -> Column:
+    plain = name.removeprefix("err_")
+    definition = output(study.family, plain)
+    text = f"{error_words(study, plain)} of {definition.name}" if name.startswith("err_") else definition.text
     return Column(name, dtype, internal_unit(definition.unit), text, "output")
 
 

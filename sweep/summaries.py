@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from sweep.catalogue import applying_step, general_way, is_position, output, output_names
+from sweep.catalogue import applying_step, check_certifiable, general_way, is_position, output, output_names
 from sweep.effects import extended, input_names
 from sweep.errors import InputError
 from sweep.families import family as find_family
@@ -65,6 +65,7 @@ def summarise(
     *,
     samples: int | None = None,
     accuracy: float | None = None,
+    certify: bool = False,
     window: tuple[float, float] | None = None,
 ) -> pd.DataFrame:
     """Design outputs of mechanisms, one row per design, in the order of the input.
@@ -78,6 +79,8 @@ def summarise(
         ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``)
     samples : extrema on a dense grid of so many crank angles
     accuracy : true extrema, refined to this relative error; 1e-8 if neither is given
+    certify : prove that no peak of the wanted maxima was missed (docs/extrema.md, section 5); their ``err_`` are then
+        bounds instead of estimates
     window : ``max_abs_dev`` and the other reductions of ``dev`` count only poses whose position lies between these
         fractions of the stroke, measured from its smallest position; default the whole turn
 
@@ -85,13 +88,14 @@ def summarise(
     -------
     DataFrame
         the wanted columns in order, with ``accuracy`` an ``err_<name>`` for each (estimate of its absolute error, same
-        unit), and ``status``; indexed like the table.  Where a value is nan, ``status`` says why
-        (see :mod:`kernels.status`).
+        unit), and ``status``; indexed like the table.  Where a value is nan, ``status`` says why (see
+        :mod:`kernels.status`); a maximum that ``certify`` could not prove keeps the searched value, with NOT_CONVERGED
+        and nan as its error.
 
     Raises
     ------
     InputError
-        for an unknown name or a bad value, with column and row.
+        for an unknown name or a bad value, with column and row; for ``certify`` with a maximum that cannot be proven.
     """
     import pandas as pd
 
@@ -99,7 +103,9 @@ def summarise(
     wanted = wanted_names(want, f"design outputs of {bare.name}")
     mechanism = extended(bare, wanted)
     wanted = [name for name in wanted if name != "status"]
-    chosen = _accuracy(samples, accuracy)
+    chosen = _accuracy(samples, accuracy, certify)
+    if certify:
+        check_certifiable(mechanism, wanted)
     matrix, _ = design_matrix(mechanism, table, unused=input_names(bare))
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
     errors = [f"err_{name}" for name in wanted] if chosen.target is not None else []
@@ -231,9 +237,13 @@ def _with_errors(wanted: Sequence[str], accuracy: Accuracy) -> list[str]:
     return [*wanted, *(f"err_{name}" for name in wanted if accuracy.target is not None)]
 
 
-def _accuracy(samples: int | None, accuracy: float | None) -> Accuracy:
+def _accuracy(samples: int | None, accuracy: float | None, certify: bool = False) -> Accuracy:
     if samples is not None and accuracy is not None:
         raise InputError("samples", samples, "either samples= or accuracy=, not both", "summarise")
+    if not isinstance(certify, bool):
+        raise InputError("certify", certify, "True or False", "summarise")
+    if samples is not None and certify:
+        raise InputError("certify", certify, "accuracy=, not samples=: a grid proves nothing", "summarise")
     if samples is not None:
         if not (isinstance(samples, Real) and FEWEST_SAMPLES <= samples <= MOST_SAMPLES and int(samples) == samples):
             raise InputError("samples", samples, f"a whole number from {FEWEST_SAMPLES} to {MOST_SAMPLES}", "summarise")
@@ -241,7 +251,7 @@ def _accuracy(samples: int | None, accuracy: float | None) -> Accuracy:
     target = DEFAULT_TARGET if accuracy is None else accuracy
     if not (isinstance(target, Real) and FINEST_TARGET <= target <= 0.1):
         raise InputError("accuracy", accuracy, f"a relative error from {FINEST_TARGET:g} to 0.1", "summarise")
-    return Accuracy(target=float(target))
+    return Accuracy(target=float(target), certify=certify)
 
 
 def _check_window(window: tuple[float, float] | None) -> None:

@@ -16,6 +16,7 @@ STUDY = click.argument("study", type=click.Path(exists=True, path_type=Path))
 @click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers.")
 @click.option("--backend", type=click.Choice(["threading", "loky"]), default="threading", show_default=True)
 @click.option("--accuracy", type=float, help="Relative error of the extrema, instead of the study's own target.")
+@click.option("--certify", is_flag=True, help="Prove that no peak of the wanted maxima is missed.")
 @click.option("--smoke", is_flag=True, help="The tiny version: smoke.toml beside the study.")
 @click.option(
     "--force", is_flag=True, help="Start although over the budget; set data of another study in the folder aside."
@@ -26,6 +27,7 @@ def run(
     jobs: int,
     backend: Literal["threading", "loky"],
     accuracy: float | None,
+    certify: bool,
     smoke: bool,
     force: bool,
 ) -> None:
@@ -36,7 +38,10 @@ def run(
     """
     from sweep.engine import run as run_study
 
-    folder = run_study(study, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, progress=True)
+    proof = True if certify else None
+    folder = run_study(
+        study, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
+    )
     click.echo(f"dataset: {folder}")
 
 

@@ -62,6 +62,7 @@ def evaluate_table(family: str, table: Path, want: tuple[str, ...], poses: int |
 @click.option(
     "--accuracy", type=float, help="Extrema refined to this relative error (default 1e-8), with err_ columns."
 )
+@click.option("--certify", is_flag=True, help="Prove that no peak is missed: err_ columns of maxima are bounds then.")
 @click.option(
     "--window", type=(float, float), help="Part of the stroke that max_abs_dev covers, two fractions such as 0 0.6."
 )
@@ -72,6 +73,7 @@ def summarise_table(
     want: tuple[str, ...],
     samples: int | None,
     accuracy: float | None,
+    certify: bool,
     window: tuple[float, float] | None,
     out: Path | None,
 ) -> None:
@@ -84,9 +86,10 @@ def summarise_table(
     from sweep.summaries import summarise
 
     designs = read_table(table)
-    write_table(
-        summarise(family_names(family), designs, wanted(want), samples=samples, accuracy=accuracy, window=window), out
+    found = summarise(
+        family_names(family), designs, wanted(want), samples=samples, accuracy=accuracy, certify=certify, window=window
     )
+    write_table(found, out)
 
 
 def wanted(texts: tuple[str, ...]) -> list[str]:

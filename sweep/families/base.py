@@ -56,10 +56,14 @@ class Output:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How extrema over the turn are found: on a dense grid of ``samples``, or refined to relative error ``target``."""
+    """How extrema over the turn are found: on a dense grid of ``samples``, or refined to relative error ``target``.
+
+    With ``certify`` it is also proven that no peak of a maximum was missed (docs/extrema.md, section 5).
+    """
 
     samples: int | None = None
     target: float | None = None
+    certify: bool = False
 
 
 PoseFunction: TypeAlias = Callable[[Array, Angles, frozenset[str]], Columns]
@@ -73,7 +77,8 @@ class Step:
     """A family's own route to some design outputs: exact, or faster than the general reductions over sampled poses.
 
     ``run(designs, wanted, accuracy)`` returns the wanted ones of ``provides`` and ``status``, each of shape (n,).
-    ``applies`` says for which accuracy it serves (a dense kernel does not serve ``accuracy=``).
+    ``applies`` says for which accuracy it serves (a dense kernel does not serve ``accuracy=``).  ``certifies``: its
+    maxima are proven, and serve ``Accuracy.certify`` only.
     """
 
     name: str
@@ -82,6 +87,7 @@ class Step:
     ns_per_design: float
     applies: Callable[[Accuracy], bool] = field(default=lambda accuracy: True)
     ns_per_sample: float = 0.0
+    certifies: bool = False
 
     def cost(self, accuracy: Accuracy) -> float:
         """Estimated time [ns per design]; a step that works through the samples says what each one costs."""

@@ -77,7 +77,7 @@ def write(
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    from sweep.plan import PARAMETER_UNITS
+    from sweep.plan import PARAMETER_UNITS, error_words
     from sweep.summaries import output
 
     family = study.family
@@ -88,8 +88,9 @@ def write(
     texts |= own_texts
     for name in columns:
         if name not in texts:
-            wanted = output(family, name.removeprefix("err_"))
-            text = f"error estimate of {wanted.text}" if name.startswith("err_") else wanted.text
+            plain = name.removeprefix("err_")
+            wanted = output(family, plain)
+            text = f"{error_words(study, plain)} of {wanted.text}" if name.startswith("err_") else wanted.text
             texts[name] = (wanted.unit.replace("length", "mm"), text)
     arrays = {name: pa.array(_plain(values)) for name, values in columns.items()}
     fields = [

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sweep.errors import BudgetError
+from sweep.errors import BudgetError, InputError
 from sweep.study.study import Study
 
 # With no survivor in the pilot, this share is assumed.
@@ -98,22 +98,37 @@ def other_accuracies(study: Study, jobs: int) -> tuple[tuple[str, float], ...]:
 def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
     """The same study with one digit less and one more, or with half and twice the samples; in words, and the study.
 
-    An accuracy outside the range of `sweep.summarise` is left out.
+    With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range of `sweep.summarise` is left out.
     """
     from sweep.study.load import study_from_data
     from sweep.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
 
     target, samples = study.accuracy.target, study.accuracy.samples
     settings: list[tuple[str, dict[str, float]]] = []
+    proof = {"certify": True} if study.accuracy.certify else {}
     if target is not None:
         digits = (("one digit less", 10.0 * target), ("one digit more", 0.1 * target))
-        settings = [(words, {"target": t}) for words, t in digits if FINEST_TARGET <= t <= COARSEST_TARGET]
+        settings = [(words, {"target": t} | proof) for words, t in digits if FINEST_TARGET <= t <= COARSEST_TARGET]
+        if study.accuracy.certify:
+            settings.append(("without the proof", {"target": target}))
+        elif _certifiable(study):
+            settings.append(("with the proof that no peak is missed", {"target": target, "certify": True}))
     elif samples is not None:
         counts = (("half the samples", samples // 2), ("twice the samples", 2 * samples))
         settings = [(words, {"samples": n}) for words, n in counts if FEWEST_SAMPLES <= n <= MOST_SAMPLES]
     return tuple(
         (words, study_from_data(study.data | {"accuracy": setting}, study.path)) for words, setting in settings
     )
+
+
+def _certifiable(study: Study) -> bool:
+    from sweep.catalogue import check_certifiable
+
+    try:
+        check_certifiable(study.family, study.want)
+    except InputError:
+        return False
+    return True
 
 
 def check_budget(study: Study, cost: Estimate) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sweep.catalogue import check_certifiable
 from sweep.effects import extended
 from sweep.errors import InputError, StudyError, closest, nearest
 from sweep.families import NAMES
@@ -82,15 +83,19 @@ def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
     return _build(data, Path(path), {Path(path).name: data})
 
 
-def with_accuracy(study: Study, target: float) -> Study:
-    """The same study with its extrema refined to another relative error.
+def with_accuracy(study: Study, target: float | None = None, certify: bool | None = None) -> Study:
+    """The same study with its extrema refined to another relative error, or with or without the proof of its maxima.
 
     Raises
     ------
     StudyError
-        if the target is not between 1e-15 and 1.
+        if the target is not between 1e-15 and 1, or what is wanted cannot be proven.
     """
-    return study_from_data(study.data | {"accuracy": {"target": target}}, study.path)
+    target = study.accuracy.target if target is None else target
+    setting = {"target": target, "certify": study.accuracy.certify if certify is None else certify}
+    if target is None:
+        setting = {"samples": study.accuracy.samples, "certify": certify}
+    return study_from_data(study.data | {"accuracy": _set_keys(setting)}, study.path)
 
 
 def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -194,13 +199,22 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     if space is not None:
         given |= {name: x for name, x in space.fixed.items() if name not in (*bare.parameter_names, *prescribed)}
     reference = None if reference_design is None else read_reference(family, reference_design, faults, given)
+    if accuracy.certify and not faults.lines:
+        asked = [
+            *scene.want,
+            *prescribed,
+            *(bounds or {}),
+            *([goal] if goal else []),
+            *([pareto.output] if pareto else []),
+        ]
+        _check_certifiable(family, [name for name in asked if name not in family.parameter_names], faults)
     _check_curves(report, [*prescribed, *(name for name in design or () if name in family.parameter_names)], faults)
     if faults.lines or space is None or disk_bytes is None or seconds is None:
         raise StudyError(str(path), faults.lines)
 
     wanted = [*scene.want, *prescribed, *(limit.output for limit in limits), *([goal] if goal else [])]
     wanted += [pareto.output] if pareto else []
-    defaults = {"accuracy": _without_none(accuracy.__dict__), "output": output.model_dump()}
+    defaults = {"accuracy": _set_keys(accuracy.__dict__), "output": output.model_dump()}
     return Study(
         name=about.name or "",
         title=about.title,
@@ -299,12 +313,21 @@ def _accuracy(section: AccuracySection, faults: Faults) -> Accuracy:
     if section.target is not None and section.samples is not None:
         faults.value(("accuracy", "samples"), section.samples, "either target or samples, not both")
     if section.samples is not None:
+        if section.certify:
+            faults.value(("accuracy", "certify"), True, "false where samples is given: a grid proves nothing")
         return Accuracy(samples=section.samples)
-    return Accuracy(target=DEFAULT_TARGET if section.target is None else section.target)
+    return Accuracy(target=DEFAULT_TARGET if section.target is None else section.target, certify=section.certify)
 
 
-def _without_none(table: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in table.items() if value is not None}
+def _set_keys(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if value is not None and value is not False}
+
+
+def _check_certifiable(family: Family, wanted: Sequence[str], faults: Faults) -> None:
+    try:
+        check_certifiable(family, wanted)
+    except InputError as error:
+        faults.value(("accuracy", "certify"), error.value, error.allowed)
 
 
 def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults) -> tuple[str, ...]:

@@ -118,6 +118,7 @@ class AccuracySection(Section):
     samples: Annotated[int, Field(ge=4, le=1_000_000)] | None = Field(
         None, description="a whole number of crank angles, 4 to 1000000"
     )
+    certify: bool = Field(False, description="true or false: whether the wanted maxima are proven")
 
 
 class OptimiseSection(Section):

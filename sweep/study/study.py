@@ -170,7 +170,7 @@ class Study:
             "fit": self.fit and asdict(self.fit),
             "limits": sorted((limit.output, limit.minimum, limit.maximum) for limit in self.limits),
             "objective": self.objective and self.objective.output,
-            "accuracy": asdict(self.accuracy),
+            "accuracy": {"samples": self.accuracy.samples, "target": self.accuracy.target},
             "window": self.window,
             "optimise": self.optimise and asdict(self.optimise),
             "reference": self.reference,
@@ -178,6 +178,8 @@ class Study:
         }
         if self.pareto is not None:
             content["pareto"] = asdict(self.pareto)
+        if self.accuracy.certify:
+            content["certify"] = True
         if self.tolerance is not None:
             content["tolerance"] = asdict(self.tolerance)
         return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()

@@ -1,10 +1,11 @@
 """Spatial crank-rocker with two revolute and two ball joints (RSSR); planar four-bar for alpha = 0, f = g.
 
 ``closure`` reduces a design to its constants, ``motion`` evaluates poses (``precise`` in twice the working precision),
-``dense`` sweeps a grid of crank angles, ``margin`` decides rotatability, ``limits`` finds the limit positions and
-``maxima`` the true maxima over the turn.
+``dense`` sweeps a grid of crank angles, ``margin`` decides rotatability, ``limits`` finds the limit positions,
+``maxima`` the true maxima over the turn, and ``certify`` proves them on the ``enclosure`` of the motion.
 """
 
+from kernels.families.rssr.certify import certify_maxima as certify_maxima
 from kernels.families.rssr.closure import Design as Design
 from kernels.families.rssr.dense import dense_maxima as dense_maxima
 from kernels.families.rssr.ellipse import pressure_ellipse as pressure_ellipse
