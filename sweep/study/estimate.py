@@ -98,7 +98,8 @@ def other_accuracies(study: Study, jobs: int) -> tuple[tuple[str, float], ...]:
 def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
     """The same study with one digit less and one more, or with half and twice the samples; in words, and the study.
 
-    With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range of `sweep.summarise` is left out.
+    With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range
+    of `sweep.summarise` is left out.
     """
     from sweep.study.load import study_from_data
     from sweep.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES

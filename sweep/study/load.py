@@ -199,21 +199,15 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     if space is not None:
         given |= {name: x for name, x in space.fixed.items() if name not in (*bare.parameter_names, *prescribed)}
     reference = None if reference_design is None else read_reference(family, reference_design, faults, given)
-    if accuracy.certify and not faults.lines:
-        asked = [
-            *scene.want,
-            *prescribed,
-            *(bounds or {}),
-            *([goal] if goal else []),
-            *([pareto.output] if pareto else []),
-        ]
-        _check_certifiable(family, [name for name in asked if name not in family.parameter_names], faults)
     _check_curves(report, [*prescribed, *(name for name in design or () if name in family.parameter_names)], faults)
     if faults.lines or space is None or disk_bytes is None or seconds is None:
         raise StudyError(str(path), faults.lines)
 
     wanted = [*scene.want, *prescribed, *(limit.output for limit in limits), *([goal] if goal else [])]
     wanted += [pareto.output] if pareto else []
+    want = tuple(name for name in dict.fromkeys(wanted) if name not in family.parameter_names)
+    if accuracy.certify:
+        _check_certifiable(family, want, path, faults)
     defaults = {"accuracy": _set_keys(accuracy.__dict__), "output": output.model_dump()}
     return Study(
         name=about.name or "",
@@ -222,7 +216,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         path=path,
         families=families,
         speed=speed,
-        want=tuple(name for name in dict.fromkeys(wanted) if name not in family.parameter_names),
+        want=want,
         space=space,
         locus=locus,
         fit=fit,
@@ -323,11 +317,12 @@ def _set_keys(table: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in table.items() if value is not None and value is not False}
 
 
-def _check_certifiable(family: Family, wanted: Sequence[str], faults: Faults) -> None:
+def _check_certifiable(family: Family, wanted: Sequence[str], path: Path, faults: Faults) -> None:
     try:
         check_certifiable(family, wanted)
     except InputError as error:
         faults.value(("accuracy", "certify"), error.value, error.allowed)
+        raise StudyError(str(path), faults.lines) from None
 
 
 def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults) -> tuple[str, ...]:
