@@ -163,6 +163,15 @@ def test_task2_swing_and_phi0_are_found_with_the_least_acceleration():
         assert all(o.objective > solution.objective for o in others if o.feasible)
 
 
+def test_task2_free_offset_and_angle_buy_acceleration():
+    free = best(Case(Task2, **TASK2.numbers, g_range=(0.2, 2.0), alpha_range=(0.4, 1.5)))
+    turn = check_limits(rocker(free), free.unknowns["swing"], free.unknowns["phi0"], 1.2)
+    for position in TASK2.numbers["positions"]:
+        check_position(rocker(free), turn, position)
+    assert free.mechanism["g"] == free.unknowns["g"] and free.mechanism["alpha"] == free.unknowns["alpha"]
+    assert free.objective < best(TASK2).objective
+
+
 def test_task3_one_dimension_makes_the_second_setting():
     solution = best(TASK3)
     table = rocker(solution)

@@ -47,7 +47,7 @@ class LocusPoint:
     rho2: Array
 
     @classmethod
-    def of(cls, swing: Array, phi0: Array, phi1: Array, e: float, g: float, alpha: float) -> LocusPoint:
+    def of(cls, swing: Array, phi0: Array, phi1: Array, e: float, g: float | Array, alpha: float | Array) -> LocusPoint:
         """The points at crank angles phi1."""
         columns = np.broadcast_arrays(swing, phi0, phi1, e, 0.0, g, alpha)
         requirements = np.column_stack(columns).astype(np.float64)

@@ -35,7 +35,14 @@ class Through(NamedTuple):
 
 
 def through_positions(
-    swing: Array, phi0: Array, phi1: Array, e: float, g: float, alpha: float, positions: tuple[Position, ...], f: float
+    swing: Array,
+    phi0: Array,
+    phi1: Array,
+    e: float,
+    g: float | Array,
+    alpha: float | Array,
+    positions: tuple[Position, ...],
+    f: float,
 ) -> Through:
     """Crank-rockers on the locus whose f makes them pass the first position exactly, and how they miss the others.
 
@@ -55,7 +62,7 @@ def through_positions(
         angle = phi1 + position.dphi
         ahead = np.cos(angle) * (e + x) + np.sin(angle) * (ca * y - h) - point.rho1
         moved.append((e * (x - point.x) - a0 * ahead, sa * (y - point.y) + a1 * ahead))
-    free = abs(sa) > PLANAR
+    free = bool((np.abs(sa) > PLANAR).all())
     with np.errstate(divide="ignore", invalid="ignore"):
         offset = moved[0][0] / moved[0][1] if free else np.full(len(phi1), f)
     offset = np.where(np.abs(offset) < 1e100, offset, np.nan)
