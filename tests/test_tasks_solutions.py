@@ -328,3 +328,16 @@ def test_task8_dwells_within_its_tolerance():
     assert free.feasible
     assert free.mechanism["dwell_deviation"] > 0.004
     assert free.objective < solution.objective
+
+
+def test_task8_spatial_slider_dwells_too():
+    solution = best(Case(Task8, **TASK8.numbers, f2_ratio=0.4, alpha2=0.5))
+    columns = chain_columns(solution, "rssp")
+    assert columns["alpha2"] == [0.5] and columns["f2"][0] == pytest.approx(0.4 * columns["a2"][0], rel=1e-12)
+    turn = check_limits({name: [solution.mechanism[f"{name}1"]] for name in RSSR}, 0.8, 3.2, np.radians(60.0))
+    phi = turn["phi_ext"] + np.linspace(-0.5, 0.5, 2001)
+    s = sweep.evaluate(["rssr", "rssp"], columns, "s", phi=phi)["s"].to_numpy()
+    assert np.abs(s - s[1000]).max() <= 0.004 * (1.0 + 1e-8)
+    assert sweep.summarise(["rssr", "rssp"], columns, "stroke")["stroke"][0] == pytest.approx(1.0, abs=1e-7)
+    middle = sweep.evaluate(["rssr", "rssp"], columns, ["ds", "d2s", "d3s"], phi=[turn["phi_ext"]]).iloc[0]
+    assert middle[["ds", "d2s", "d3s"]].abs().max() < 1e-7

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from sweep.families import family
-from sweep.families.base import Angles, Array
+from sweep.families.base import Accuracy, Angles, Array
+from sweep.summaries import design_outputs
 from sweep.synthesis.tasks.crank_rocker import (
     RSSR,
     designs_on_locus,
@@ -22,6 +23,7 @@ from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 from sweep.synthesis.tasks.second_stage import chain_motion, chain_of, second_pressure_limit
 
 RSSP = family("rssp")
+EXACT = Accuracy(target=1e-12)
 WINDOW = 33  # poses of the dwell; the deviation is largest at its ends, but this is not taken for granted
 
 
@@ -40,7 +42,8 @@ class Task8:
     tolerance : largest deviation from the dwell position during it [length]
     limit : in which of its limit positions stage 2 stands during the dwell
     kappa, branch : sense of the connection of the stages, assembly mode of the slider-crank
-    coupler_range, offset_range : where b2/a2 and e2/a2 are looked for; b2 > a2 + |e2| is kept
+    coupler_range, offset_range : where b2/a2 and e2/a2 are looked for
+    f2_ratio, alpha2 : f2/a2 and the angle of a spatial slider-crank [1, rad]; 0 for a planar one
     max_pressure_angle : limit of both stages over the whole turn [rad]
     bounds : of the lengths found, by name (a1, b1, c1, a2, b2, e2)
     """
@@ -59,6 +62,8 @@ class Task8:
     branch: int = 1
     coupler_range: tuple[float, float] = (1.5, 6.0)
     offset_range: tuple[float, float] = (-2.0, 2.0)
+    f2_ratio: float = 0.0
+    alpha2: float = 0.0
     max_pressure_angle: float = np.radians(60.0)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -77,8 +82,8 @@ class Task8:
 
     @property
     def limits(self) -> tuple[str, ...]:
-        """Dwell, pressure angles of both stages, a slider-crank that turns, one way per stroke, bounds."""
-        own = ("dwell", "pressure angle 1", "pressure angle 2", "coupler reaches", "no return of the slider")
+        """Dwell, pressure angles of both stages, one way per stroke, bounds."""
+        own = ("dwell", "pressure angle 1", "pressure angle 2", "no return of the slider")
         return (*own, *size_names(self.bounds))
 
     def evaluate(self, x: Array) -> Candidates:
@@ -87,12 +92,10 @@ class Task8:
         phi1, coupler, offset = x[:, 0], x[:, 2], x[:, 3]
         fixed = (self.swing * ones, self.phi0 * ones, phi1, self.e * ones, x[:, 1])
         designs, psi1 = designs_on_locus(*fixed, self.g * ones, self.alpha * ones)
-        crank = 1.0 if self.limit == "extended" else -1.0
-        reach = coupler + crank
-        with np.errstate(invalid="ignore"):
-            place = self.branch * np.sqrt((reach - offset) * (reach + offset))
-        theta = np.arctan2(crank * place, crank * offset)
-        shape = np.column_stack([ones, coupler, offset, 0.0 * ones, 0.0 * ones, self.branch * ones])
+        shape = np.column_stack([ones, coupler, offset, self.f2_ratio * ones, self.alpha2 * ones, self.branch * ones])
+        # nan where the slider-crank does not turn fully and so has no limit positions
+        place = "phi_ext" if self.limit == "extended" else "phi_fold"
+        theta = np.asarray(design_outputs(RSSP, shape, [place], EXACT)[place], np.float64)
         span = np.linspace(0.0, self.kappa * self.swing, 9)
         slide = np.asarray(RSSP.poses(shape, Angles.of(theta[:, None] + span), frozenset("s"))["s"], np.float64)
         travel = slide[:, -1] - slide[:, 0]
@@ -101,19 +104,18 @@ class Task8:
             "a2": a2,
             "b2": a2 * coupler,
             "e2": a2 * offset,
-            "f2": 0.0 * ones,
-            "alpha2": 0.0 * ones,
+            "f2": a2 * self.f2_ratio,
+            "alpha2": self.alpha2 * ones,
             "branch2": self.branch * ones,
             "kappa2": self.kappa * ones,
             "offset2": theta - self.kappa * psi1,
         }
-        deviation = self._deviation(designs, phi1, psi1, theta, np.column_stack([a2, a2 * coupler, a2 * offset]))
+        deviation = self._deviation(designs, phi1, psi1, theta, a2[:, None] * shape[:, :4])
         motion = chain_motion(chain_of("rssp"), columns, "d2s", "pressure_angle2")
         slacks = [
             np.log(self.tolerance / deviation),
             pressure_limit(designs, self.max_pressure_angle),
             second_pressure_limit(motion, self.max_pressure_angle),
-            coupler - 1.0 - np.abs(offset),
             # all steps of the slider go the way of the whole stroke
             (np.diff(slide, axis=1) * np.sign(travel)[:, None]).min(axis=1),
         ]
@@ -126,8 +128,8 @@ class Task8:
         window = np.linspace(-0.5 * self.dwell, 0.5 * self.dwell, WINDOW)
         law = RSSR.poses(designs, Angles.of(phi1[:, None] + window), frozenset(("psi",)))
         turned = np.asarray(law["psi"], np.float64) - psi1[:, None]
-        zero = np.zeros(len(designs))
-        stage = np.column_stack([lengths, zero, zero, np.full(len(designs), float(self.branch))])
+        rest = np.full((len(designs), 2), [self.alpha2, float(self.branch)])
+        stage = np.column_stack([lengths, rest])
         s = RSSP.poses(stage, Angles.of(theta[:, None] + self.kappa * turned), frozenset("s"))["s"]
         away = np.abs(np.asarray(s, np.float64) - np.asarray(s, np.float64)[:, [WINDOW // 2]])
         largest: Array = away.max(axis=1)
