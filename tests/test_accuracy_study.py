@@ -99,7 +99,8 @@ def made_up(
 ):
     """Two curves of a quantity: a grid and the house's own method."""
     rows = [("max_abs_d2psi", region, "grid, float64", *point, 0) for point in grid]
-    return rows + [("max_abs_d2psi", region, "accuracy=", *point, 0) for point in own]
+    rows += [("max_abs_d2psi", region, "accuracy=", *point, 0) for point in own]
+    return rows + [("max_abs_d2psi", region, "certified, accuracy=", at, error, 20.0 * ns, 0) for at, error, ns in own]
 
 
 def test_coarsest_setting_within_the_bound_is_named():
@@ -107,7 +108,7 @@ def test_coarsest_setting_within_the_bound_is_named():
         [*made_up("here"), ("max_abs_d2psi", "there", "grid, float64", 128, 1e-6, 40.0, 3)], columns=COLUMNS
     )
     lines = tables.reached_table(work, 1e-3)
-    assert lines[2:] == ["| here | N 64: 20 ns, x 4 | 1e-3: 5 ns |", "| there | - | - |"]
+    assert lines[2:] == ["| here | N 64: 20 ns, x 4 | 1e-3: 5 ns | 1e-3: 100 ns, x 20 |", "| there | - | - | - |"]
 
 
 def test_advice_names_the_cheapest_method_that_keeps_the_bound_everywhere():
@@ -118,10 +119,14 @@ def test_advice_names_the_cheapest_method_that_keeps_the_bound_everywhere():
         {"dtype": ["float64", "float32"], "bytes_per_row": [80.0, 60.0], "margin": [0.0, 6e-8]}
         | {key: [0.0, 5e-8] for key in ("max_pressure_angle", "max_abs_d2psi")}
     )
-    coarse, fine, *_, edge, disk = answer.advice(work, storage)
+    coarse, fine, *_, proof, edge, disk = answer.advice(work.assign(designs=10), storage)
     assert "use `accuracy = 1e-3`. 6 ns a design on average, 7 ns in the dearest region (long coupler)" in coarse
     assert "Next best: grid, float64, N 64, 3.3 times as long." in coarse
-    assert "use `accuracy = 1e-8`" in fine and "Nothing else measured" in fine
+    assert "use `accuracy = 1e-8`" in fine and "Next best: `accuracy = 1e-8`, certified, 20 times as long." in fine
+    assert (
+        "140 ns a design on average at `accuracy = 1e-8`, 20 times as long" in proof
+        and "0 of 20 proofs failed" in proof
+    )
     assert "A grid of 32 is off by 100 %" in edge
     assert "saves 25 % of the bytes and adds 6.0e-08" in disk
 

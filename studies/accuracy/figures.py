@@ -34,6 +34,7 @@ LOOKS = {
     "direct, twice float64": ("#332288", "P"),
     "accuracy=": ("#D55E00", "D"),
     "direct, float64": ("#D55E00", "D"),
+    "certified, accuracy=": ("#332288", "P"),
 }
 KINDS = {
     "largest over a grid": "#0072B2",
@@ -123,7 +124,7 @@ def _prices(costs: pd.DataFrame) -> Figure:
     figure = new_figure(WIDTH * 1.25, 0.6 + 0.21 * longest)
     for axes, part, per in zip(figure.subplots(1, 2), parts, ("pose", "design"), strict=True):
         names = [
-            str(what) + ("" if family == "rssr" else f" ({family})")
+            str(what) + (" (rssp)" if family.startswith("rssp") else "")
             for what, family in zip(part["what"], part["family"], strict=True)
         ]
         places = range(len(part))

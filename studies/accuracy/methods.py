@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from kernels import status as st
 from kernels.families import rssr
 from kernels.families.rssr.single import dense_acceleration_single
 from studies.accuracy.reference import RSSR
@@ -37,6 +38,7 @@ def acceleration_methods(samples: tuple[int, ...], targets: tuple[float, ...]) -
     found += [Method("grid + parabola", n, _grid_parabola(n)) for n in samples if n <= 4096]
     found += [Method("grid + refined top sample", n, _grid_refined(n)) for n in samples if n <= 4096]
     found += [Method("accuracy=", target, _adaptive(target)) for target in targets]
+    found += [Method("certified, accuracy=", target, _certified(target)) for target in targets]
     return found
 
 
@@ -133,6 +135,16 @@ def _adaptive(target: float) -> Way:
         status, found = np.empty(len(designs), np.uint8), np.empty(len(designs))
         rssr.true_maxima(designs, cos, sin, target, status, None, None, None, None, found, None)
         return found
+
+    return run
+
+
+def _certified(target: float) -> Way:
+    accuracy = Accuracy(target=target, certify=True)
+
+    def run(designs: Array) -> Array:
+        columns = design_outputs(RSSR, designs, ["max_abs_d2psi"], accuracy)
+        return np.where(columns["status"] == st.OK, np.asarray(columns["max_abs_d2psi"], np.float64), np.nan)
 
     return run
 
