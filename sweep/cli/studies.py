@@ -72,7 +72,8 @@ def report(folder: Path, out: Path | None) -> None:
     """Write report.html, figures and tables about a dataset.
 
     report.html holds everything in one file and needs no network.  Beside it: figures/, optimum.parquet and
-    curves.parquet (if the study optimises) and survivors.parquet, the designs within all limits.
+    curves.parquet (if the study optimises), pareto.parquet (if it asks for a front) and survivors.parquet, the designs
+    within all limits.
     """
     from sweep.report import write_report
 

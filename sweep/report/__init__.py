@@ -17,7 +17,7 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Path:
     -------
     Path
         of ``report.html``.  Beside it: ``figures/*.svg``, ``survivors.parquet`` (the designs within all limits) and,
-        if the study optimises, ``optimum.parquet`` and ``curves.parquet``.
+        if the study optimises, the tables the optimiser left (``optimum.parquet``, ``curves.parquet`` ...).
 
     Raises
     ------
