@@ -131,3 +131,13 @@ def test_budget_and_stop_leave_the_front_so_far() -> None:
 def test_second_output_that_cannot_be_is_named(output: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         pareto(bowl(), settings(output, 1.0), BOWL_START)
+
+
+def test_a_feasible_start_is_not_lost_when_time_is_up() -> None:
+    problem, starts = linkage()
+    good = pareto(problem, settings("max_pressure_angle", 0.9), starts)[0]
+    hurried = settings("max_pressure_angle", 0.9, time_budget=1e-9)
+    assert pareto(problem, hurried, starts[:1])[0].status == st.LIMIT_EXCEEDED
+    # There is time for the first design of the first start only, but the second one is a result already.
+    (found,) = pareto(problem, hurried, np.stack([starts[0], good.design]))
+    assert found.status != st.LIMIT_EXCEEDED and found.objective == pytest.approx(good.objective, rel=1e-9)

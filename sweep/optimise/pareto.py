@@ -198,8 +198,14 @@ def _search(
 ) -> Result:
     from sweep.study import OptimiseSettings
 
+    own = bounded(problem, settings, bound)
     shared = OptimiseSettings(len(begin), 0, None if math.isinf(seconds) else seconds)
-    return minimise(bounded(problem, settings, bound), begin, shared, stop, jobs)[0]
+    best = minimise(own, begin, shared, stop, jobs)[0]
+    if best.ended == "time":
+        # Some starts were never begun, and the sweep knows them as good designs: none of them may be lost.
+        known = [minimise(own, start, OptimiseSettings(1, 0, LEAST_SECONDS), stop)[0] for start in begin]
+        best = min([best, *known], key=_order)
+    return best
 
 
 def _with(front: Front, step: Step, number: int, result: Result) -> Front:
