@@ -163,6 +163,25 @@ def test_scale_changes_no_bit(name, exponent):
             np.testing.assert_array_equal(np.ldexp(plain[output], power * exponent), big[output], err_msg=output)
 
 
+@pytest.mark.parametrize("exponent", [-1000, -332, 332, 1000])  # 1e-300, 1e-100, 1e100, 1e300
+@pytest.mark.parametrize("name", LINKED)
+def test_a_scale_that_leaves_float64_gives_the_same_numbers_or_a_status(name, exponent):
+    mechanism, design = built(name)
+    lengths = np.array([p.unit == "length" for p in mechanism.parameters])
+    scaled = np.where(lengths, np.ldexp(design, exponent), design)
+    plain, big = poses(mechanism, design), poses(mechanism, scaled)
+    units = {o.name: o.unit for o in mechanism.pose_outputs}
+    same = big["status"] == st.OK
+    for output in (n for n in wanted(mechanism) if units[n] not in ("length^2", "length^4")):
+        power = exponent if units[output] == "length" else 0
+        np.testing.assert_array_equal(np.ldexp(plain[output], power)[same], big[output][same], err_msg=output)
+    assert explained(big, [n for n in wanted(mechanism) if n != "discriminant"])
+    found = summary(mechanism, scaled)
+    assert explained(found, of_turn(mechanism))
+    if found["status"][0] == st.OK:
+        np.testing.assert_array_equal(found["margin"], summary(mechanism, design)["margin"])
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_order_company_and_cut_of_the_grid_change_no_bit(name):
     mechanism, design = built(name)

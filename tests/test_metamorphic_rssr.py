@@ -155,6 +155,15 @@ def test_a_grid_cut_otherwise_gives_the_same_bits():
         np.testing.assert_array_equal(whole[name], single[name])
 
 
+def test_a_grid_that_contains_another_finds_no_less():
+    names = ["max_abs_dpsi", "max_abs_d2psi", "max_abs_d3psi"]
+    coarse, fine, finer = (design_outputs(RSSR, DESIGNS, names, Accuracy(samples=90 * k)) for k in (1, 2, 6))
+    for name in names:
+        # the same angle of two grids may differ by a rounding of its cosine
+        assert (fine[name] >= coarse[name] * (1.0 - 1e-9)).all() and (fine[name] > coarse[name]).any()
+        assert (finer[name] >= fine[name] * (1.0 - 1e-9)).all()
+
+
 def test_parallel_axes_are_the_limit_of_nearly_parallel_ones():
     """alpha -> 0 meets the planar four-bar, written out on its own, linearly in alpha for offsets f = g."""
     generator = np.random.default_rng(4)
