@@ -174,8 +174,9 @@ def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None
     seen = step.neighbour < step.target and front.found[step.neighbour] < len(front.bounds)
     worse = near.status == st.LIMIT_EXCEEDED and held.status != st.LIMIT_EXCEEDED
     offers = not (seen or worse or np.array_equal(near.design, held.design))
-    # A search that did not settle goes on from where it ended.
-    begin = [near.design] * offers + [held.design] * (held.status == st.NOT_CONVERGED)
+    # A search that did not settle, or was cut short, goes on from where it ended.
+    unfinished = held.status == st.NOT_CONVERGED or held.ended == "time"
+    begin = [near.design] * offers + [held.design] * unfinished
     return np.array(begin) if begin else None
 
 
