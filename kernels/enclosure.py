@@ -106,6 +106,19 @@ def add(at: Array, a: int, b: int, out: int) -> None:
 
 
 @inline
+def combine(at: Array, c: float, p: float, a: int, q: float, b: int, error: float, out: int) -> None:
+    """A sum c + p a + q b; ``error`` bounds the size of what the constants are off by; ``out`` may be a or b."""
+    noise = abs(p) * at[a + NOISE] + abs(q) * at[b + NOISE] + error
+    noise += 3.0 * EPS * (abs(c) + abs(p) * at[a + NORM] + abs(q) * at[b + NORM])
+    tail = abs(p) * at[a + TAIL] + abs(q) * at[b + TAIL]
+    for k in range(ORDER + 1):
+        at[out + k] = p * at[a + k] + q * at[b + k]
+    at[out] += c
+    settle(at, out)
+    at[out + NOISE], at[out + TAIL] = noise * GUARD, tail * GUARD
+
+
+@inline
 def beyond(at: Array, a: int, b: int) -> float:
     """Size of the part of the product of two polynomials that begins with x^(ORDER + 1)."""
     total, last = 0.0, 0.0

@@ -86,6 +86,24 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     )  # fmt: skip
 
 
+@kernel
+def travel_shares(designs: Array, shares: Array) -> None:
+    """The travel as a combination of the two turning angles, (4): s = p1 u - p2 v + q1 C - q2 S + constant.
+
+    Parameters
+    ----------
+    designs : (n, 9) columns of :class:`Design`
+    shares : (n, 6) out; p1, p2, q1, q2 [length], and bounds of the rounding errors of the p and of the q
+    """
+    for i in range(designs.shape[0]):
+        r = reduce_design(designs, i)
+        reach = abs(r.xi) + abs(r.eta)
+        shares[i, 0], shares[i, 1] = r.p_along * r.unit, r.p_across * r.unit
+        shares[i, 2], shares[i, 3] = r.q_along * r.unit, r.q_across * r.unit
+        # l/b is rounded once, sine and cosine to one unit in the last place, then two products and two sums.
+        shares[i, 4], shares[i, 5] = 10.0 * EPS * r.a * (1.0 + reach) * r.unit, 8.0 * EPS * r.c * reach * r.unit
+
+
 @inline
 def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
     """Rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (7)."""

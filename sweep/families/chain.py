@@ -13,6 +13,7 @@ from kernels.chain import chain_rule, input_angle
 from kernels.status import OK
 from sweep.errors import InputError
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from sweep.families.travel import certified_travel
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
 
@@ -79,7 +80,7 @@ def chain(families: tuple[Family, ...]) -> Chain:
             if stage.number == 1 or o.name not in stage.family.derivative_of.values()
         ]
     own = {f"{name}1": f"{derivative}1" for name, derivative in families[0].derivative_of.items()}
-    return Chain(
+    searched = Chain(
         name="+".join(f.name for f in families),
         title=" driving ".join(f.title for f in families),
         parameters=parameters,
@@ -94,6 +95,11 @@ def chain(families: tuple[Family, ...]) -> Chain:
         | dict(last.dear),
         stages=stages,
     )
+    if [family.name for family in families] != ["rssr"] * (len(families) - 1) + ["guide"]:
+        return searched
+    couplings = [stage.kappa for stage in stages if stage.kappa is not None]
+    step = certified_travel(searched, [stage.columns.start for stage in stages], couplings)
+    return replace(searched, steps=(step,))
 
 
 def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Parameter, ...]]:

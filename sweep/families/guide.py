@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
 from kernels.families import guide
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
+from sweep.families.travel import as_crank_rocker, certified_travel
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -50,26 +51,19 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return filled_with_places(guide.poses, designs, angles, _VALUES, _JOINTS, wanted)
 
 
-def _as_crank_rocker(designs: Array) -> Array:
-    """Design matrix of the same four-bar as a crank-rocker with parallel axes and all links in one plane."""
-    matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)))
-    matrix[:, :4], matrix[:, -1] = designs[:, :4], designs[:, -1]
-    return matrix
-
-
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
     """Fill the joint records that effects work from: those of the four-bar; the guided point bears no load."""
-    matrix = _as_crank_rocker(designs)
+    matrix = as_crank_rocker(designs)
     turned = crank_rocker.poses(matrix, angles, frozenset(crank_rocker.JOINT_NEEDS))
     crank_rocker.joint_records(matrix, angles, turned, per_pose, per_design)
 
 
 def ellipse(designs: Array) -> Array:
     """The curve of the coupler direction across the rocker's motion, (n, 7)."""
-    return crank_rocker.ellipse(_as_crank_rocker(designs))
+    return crank_rocker.ellipse(as_crank_rocker(designs))
 
 
-FAMILY = Family(
+_SEARCHED = Family(
     name="guide",
     title="planar four-bar with a guided coupler point",
     parameters=PARAMETERS,
@@ -81,3 +75,5 @@ FAMILY = Family(
     joints=joint_records,
     ellipse=ellipse,
 )
+
+FAMILY = replace(_SEARCHED, steps=(certified_travel(_SEARCHED, (0,), ()),))
