@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from sweep.errors import InputError, LinksweepError, StudyError
 
 if TYPE_CHECKING:
+    from sweep.comparison import compare
     from sweep.engine import run
     from sweep.poses import evaluate
     from sweep.store import is_complete, load
@@ -18,6 +19,7 @@ __all__ = [
     "InputError",
     "LinksweepError",
     "StudyError",
+    "compare",
     "evaluate",
     "is_complete",
     "load",
@@ -28,6 +30,7 @@ __all__ = [
 
 # Imported when first used, so that the command line answers at once: numba alone takes a quarter of a second.
 _HOMES = {
+    "compare": "sweep.comparison",
     "evaluate": "sweep.poses",
     "is_complete": "sweep.store",
     "load": "sweep.store",

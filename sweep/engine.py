@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import signal
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from sweep import store
-from sweep.errors import InputError, Interrupted, StoreError, WorkerDied, nearest
+from sweep.errors import InputError, Interrupted, StoreError, TimeUsedUp, WorkerDied, nearest
 from sweep.signals import Stop, stop_on_signal
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def run(
     jobs : workers
     backend : "threading" (the kernels release the lock) or "loky" (processes)
     smoke : take the study's tiny version
-    force : run even over the budget, and set data of another study or code in the folder aside into ``_old/``
+    force : run whatever the budget says, and set data of another study or code in the folder aside into ``_old/``
     accuracy : relative accuracy of the extrema in place of the study's own
     certify : whether the wanted maxima are proven, in place of the study's own word
     progress : bar on a terminal, lines in a log
@@ -67,8 +68,9 @@ def run(
         for a bad study, accuracy or argument, or a folder with data of another study (exit code 2)
     BudgetError
         if the estimate exceeds the study's budget (3)
-    WorkerDied, StoreError, LockedError, Interrupted
-        worker killed (70), disk full or forbidden (74), folder in use (75), signal (130, 143); finished chunks stay.
+    WorkerDied, StoreError, LockedError, TimeUsedUp, Interrupted
+        worker killed (70), disk full or forbidden (74), folder in use (75), the budget's time over (124), signal (130,
+        143); finished chunks stay.
     """
     if backend not in BACKENDS:
         raise InputError("backend", backend, f"{' or '.join(BACKENDS)}{nearest(str(backend), BACKENDS)}", "run")
@@ -113,6 +115,7 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
     from sweep.progress import Progress
 
     failure: Exception | None = None
+    deadline = math.inf if force else time.monotonic() + study.budget.seconds
     with stop_on_signal() as stop:
         store.remove_temporary(folder)
         plan = _open_plan(study, folder, force)
@@ -120,7 +123,9 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
         missing = [index for index in range(plan.chunks) if index not in finished]
         done = plan.designs - sum(len(range(*plan.bounds(index))) for index in missing)
         with Progress(study.name, plan.designs, done, progress) as shown:
-            for result in _results(study, plan, folder, missing, jobs, backend, stop):
+            results = 0
+            for result in _results(study, plan, folder, missing, jobs, backend, stop, deadline):
+                results += 1
                 if result.error is not None:
                     failure = failure or result.error
                     stop.event.set()
@@ -128,6 +133,10 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
     if failure is not None:
         raise failure
     _raise_if_signalled(stop, folder)
+    if results < len(missing):
+        left = f"{len(missing) - results} of {plan.chunks} chunks to go"
+        way_out = "finished chunks are kept, run again to continue, or force it to have no limit"
+        raise TimeUsedUp(f"{folder}: the {study.budget.seconds:g} s of budget.time are used up, {left}; {way_out}")
     counts, missed = store.totals(folder)
     note = _plan_note(study, folder, plan) | {"counts": counts, "missed": missed, "complete": True}
     store.write_plan(folder, note)
@@ -183,7 +192,14 @@ def _plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
 
 
 def _results(
-    study: Study, plan: Plan, folder: Path, missing: list[int], jobs: int, backend: str, stop: Stop
+    study: Study,
+    plan: Plan,
+    folder: Path,
+    missing: list[int],
+    jobs: int,
+    backend: str,
+    stop: Stop,
+    deadline: float,
 ) -> Iterator[Done]:
     """Finished chunks in the order they become ready."""
     from sweep.chunk import warm
@@ -191,7 +207,7 @@ def _results(
 
     if missing:
         warm(study)  # one process compiles, the others load the machine code
-    todo = (index for index in missing if not stop)
+    todo = (index for index in missing if not stop and time.monotonic() < deadline)
     if jobs == 1 or len(missing) < 2:
         for index in todo:
             yield work(study, plan, folder, index, os.getpid(), stop.event)

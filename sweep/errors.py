@@ -67,6 +67,12 @@ class WorkerDied(LinksweepError):
     exit_code = 70
 
 
+class TimeUsedUp(LinksweepError):
+    """The time that the study allows is over; finished chunks are kept and the next run continues."""
+
+    exit_code = 124
+
+
 class Interrupted(LinksweepError):
     """A signal stopped the run; finished chunks are kept and the next run continues with the missing ones."""
 

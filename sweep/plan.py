@@ -40,7 +40,7 @@ PARAMETER_UNITS = {word: internal_unit(word) for word in get_args(Unit)}
 # Parts of the package that decide no value in a chunk; everything else does.
 NOT_VALUES = frozenset(
     ["optimise", "report", "cli", "templates", "__init__.py", "__main__.py", "engine.py", "progress.py"]
-) | {"signals.py", "poses.py", "compare.py"}
+) | {"signals.py", "poses.py", "comparison.py"}
 
 # Sections of the study file that decide no value in a chunk.
 NOT_IN_CHUNKS = ("study", "optimise", "pareto", "tolerance", "reference", "budget", "report")

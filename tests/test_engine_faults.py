@@ -10,7 +10,9 @@ import subprocess
 import sys
 import time
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -19,9 +21,18 @@ import sweep.engine
 import sweep.plan
 from sweep.chunk import ChunkResult, compute_chunk
 from sweep.engine import run
-from sweep.errors import InputError, Interrupted, LinksweepError, LockedError, StoreError, StudyError, WorkerDied
+from sweep.errors import (
+    InputError,
+    Interrupted,
+    LinksweepError,
+    LockedError,
+    StoreError,
+    StudyError,
+    TimeUsedUp,
+    WorkerDied,
+)
 from sweep.store import BAD, LOCK, OLD, PLAN, is_complete, load, locked, parts, read_runs
-from sweep.study import Study, load_study
+from sweep.study import Budget, Study, load_study
 from tests.engine_study import CHUNK, ROOT, SMALL, SMALL_CHUNKS, chunk_bytes, write_study
 
 PAUSE = 0.05
@@ -307,3 +318,23 @@ def test_errors_come_back_whole_from_a_worker_process(error: LinksweepError) -> 
 
 def test_interrupted_knows_its_exit_code() -> None:
     assert (Interrupted(2, "").exit_code, Interrupted(15, "").exit_code) == (130, 143)
+
+
+def test_a_sweep_that_outlasts_its_budget_stops_with_124_and_continues(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = load_study(write_study(tmp_path / "study", count=40))
+    expected = chunk_bytes(run(study, tmp_path / "whole", jobs=1))
+    clock = iter(float(second) for second in range(10**6))
+    short = replace(study, budget=Budget(disk_bytes=1e9, seconds=4.0))
+    with monkeypatch.context() as patch:
+        ticking = SimpleNamespace(monotonic=lambda: next(clock), strftime=time.strftime, gmtime=time.gmtime)
+        patch.setattr(sweep.engine, "time", ticking)
+        with pytest.raises(TimeUsedUp, match=r"the 4 s of budget.time are used up, \d of 5 chunks to go") as caught:
+            run(short, tmp_path / "out", jobs=1)
+    assert caught.value.exit_code == 124
+    some = chunk_bytes(tmp_path / "out")
+    assert 0 < len(some) < len(expected)
+    assert read_runs(tmp_path / "out")[-1]["outcome"] == "TimeUsedUp"
+    assert not is_complete(tmp_path / "out")
+    assert chunk_bytes(run(short, tmp_path / "out", jobs=1)) == expected

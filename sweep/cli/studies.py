@@ -1,4 +1,4 @@
-"""The verbs that take a study or the dataset it left behind: run, check, report."""
+"""The verbs that take a study or the dataset it left behind: run, check, report, compare."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ STUDY = click.argument("study", type=click.Path(exists=True, path_type=Path))
 @click.option("--certify", is_flag=True, help="Prove that no peak of the wanted maxima is missed.")
 @click.option("--smoke", is_flag=True, help="The tiny version: smoke.toml beside the study.")
 @click.option(
-    "--force", is_flag=True, help="Start although over the budget; set data of another study in the folder aside."
+    "--force",
+    is_flag=True,
+    help="No budget: start and go on whatever it costs; set data of another study in the folder aside.",
 )
 def run(
     study: Path,
@@ -78,3 +80,26 @@ def report(folder: Path, out: Path | None) -> None:
     from sweep.report import write_report
 
     click.echo(f"report: {write_report(folder, out)}")
+
+
+@click.command()
+@click.argument("old", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("new", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option(
+    "--rtol", type=float, default=0.0, help="Relative change of a value that counts as none; default: any bit."
+)
+@click.option(
+    "--slower", type=float, default=1.5, show_default=True, help="How many times as long the new run may take."
+)
+def compare(old: Path, new: Path, rtol: float, slower: float) -> None:
+    """Say what moved between two datasets of one study: values, rows, time.
+
+    Ends with 11 if rows, a status or the pattern of missing values changed, else with 10 if values changed, else with
+    12 if the new run was slower; with 0 if nothing moved.
+    """
+    from sweep.comparison import compare as compare_datasets
+
+    found = compare_datasets(old, new, rtol, slower)
+    for line in found.lines():
+        click.echo(line)
+    click.get_current_context().exit(found.exit_code)

@@ -1,0 +1,253 @@
+"""``compare``: what moved between two datasets of one study, row by row: values, rows and missing values, time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep import store
+from sweep.errors import InputError, StoreError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+VALUES_CHANGED, ROWS_CHANGED, SLOWER = 10, 11, 12
+DEFAULT_SLOWER = 1.5
+# A run shorter than this tells nothing about speed [s].
+LEAST_SECONDS = 5.0
+ROLES = ("optimum", "reference")
+
+
+@dataclass
+class Moved:
+    """What moved in one column: how many values and by how much at most, how many appeared or went missing."""
+
+    name: str
+    changed: int = 0
+    missing: int = 0
+    absolute: float = 0.0
+    relative: float = 0.0
+    where: str = ""
+    kind: str = "design"
+
+    def look(self, old: NDArray[Any], new: NDArray[Any], places: NDArray[Any], rtol: float) -> None:
+        """Take in some rows; ``places`` (n,) are their names."""
+        a, b = np.asarray(old, np.float64), np.asarray(new, np.float64)
+        self.missing += int((np.isnan(a) != np.isnan(b)).sum())
+        with np.errstate(invalid="ignore"):
+            absolute = np.where(a == b, 0.0, np.abs(a - b))
+        size = np.maximum(np.abs(a), np.abs(b))
+        # nan against a number is no distance; it is counted above
+        far = absolute > rtol * size
+        self.changed += int(far.sum())
+        if far.any():
+            relative = np.where(far, absolute / np.where(size > 0.0, size, 1.0), 0.0)
+            worst = int(relative.argmax())
+            if relative[worst] >= self.relative:
+                self.relative, self.where = float(relative[worst]), f"{self.kind} {places[worst]}".strip()
+            self.absolute = max(self.absolute, float(absolute[far].max()))
+
+
+@dataclass
+class Comparison:
+    """What :func:`compare` found; ``exit_code`` is what ``sweep compare`` ends with."""
+
+    rows: int = 0
+    only_old: int = 0
+    only_new: int = 0
+    status_changed: int = 0
+    columns_only_old: tuple[str, ...] = ()
+    columns_only_new: tuple[str, ...] = ()
+    moved: dict[str, Moved] = field(default_factory=dict)
+    seconds: tuple[float, float] | None = None
+    slower: float = DEFAULT_SLOWER
+    notes: tuple[str, ...] = ()
+
+    @property
+    def values_changed(self) -> bool:
+        """Whether a value moved by more than was allowed."""
+        return any(column.changed for column in self.moved.values())
+
+    @property
+    def rows_changed(self) -> bool:
+        """Whether rows, columns, a status or the pattern of missing values changed."""
+        lost = any(column.missing for column in self.moved.values())
+        return lost or bool(self.only_old or self.only_new or self.status_changed or self.columns_only_old)
+
+    @property
+    def is_slower(self) -> bool:
+        """Whether the new run took so many times as long as the old."""
+        if self.seconds is None or max(self.seconds) < LEAST_SECONDS:
+            return False
+        return self.seconds[1] > self.slower * self.seconds[0]
+
+    @property
+    def exit_code(self) -> int:
+        """11 if rows or missing values changed, else 10 if values did, else 12 if it was slower, else 0."""
+        if self.rows_changed:
+            return ROWS_CHANGED
+        return VALUES_CHANGED if self.values_changed else SLOWER if self.is_slower else 0
+
+    def lines(self) -> list[str]:
+        """The findings in words."""
+        found = [*self.notes, f"{self.rows} rows in both"]
+        for count, words in ((self.only_old, "only in the old"), (self.only_new, "only in the new")):
+            found += [f"{count} rows {words} dataset"] if count else []
+        for names, words in ((self.columns_only_old, "old"), (self.columns_only_new, "new")):
+            found += [f"columns only in the {words} dataset: {', '.join(names)}"] if names else []
+        found += [f"{self.status_changed} rows with another status"] if self.status_changed else []
+        for column in self.moved.values():
+            if column.changed:
+                found.append(
+                    f"{column.name}: {column.changed} values changed, at most by {column.absolute:.3g}, "
+                    f"relative {column.relative:.3g} (worst: {column.where})"
+                )
+            if column.missing:
+                found.append(f"{column.name}: {column.missing} values appeared or went missing")
+        if not (self.values_changed or self.rows_changed):
+            found.append("no value changed")
+        if self.seconds is not None:
+            old, new = self.seconds
+            verdict = f", more than {self.slower:g} times as long" if self.is_slower else ""
+            found.append(f"time {old:.3g} s before, {new:.3g} s now{verdict}")
+        return found
+
+
+def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float = DEFAULT_SLOWER) -> Comparison:
+    """Compare two datasets of one study, design by design, in bounded memory.
+
+    Parameters
+    ----------
+    old, new : folders that ``sweep run`` left behind
+    rtol : relative change of a value that counts as none; 0 compares the bits
+    slower : how many times as long the new run may take
+
+    Returns
+    -------
+    Comparison
+        Parameters, outputs and status of every design, and the optimum and the reference if both studies optimise.
+        Error estimates are no results and are left out.  Times are those of all runs into a folder together, and are
+        compared only if both ended complete and one took 5 s or more.
+
+    Raises
+    ------
+    InputError
+        if a folder holds no dataset, or ``rtol`` or ``slower`` is out of range
+    StoreError
+        if a chunk is damaged.
+    """
+    if not rtol >= 0.0:
+        raise InputError("rtol", rtol, "a relative change from 0", "compare")
+    if not slower >= 1.0:
+        raise InputError("slower", slower, "a factor from 1", "compare")
+    folders = Path(old), Path(new)
+    sides = _Rows(folders[0]), _Rows(folders[1])
+    result = Comparison(slower=slower, notes=_notes(*folders), seconds=_seconds(*folders))
+    names = [side.columns for side in sides]
+    result.columns_only_old = tuple(name for name in names[0] if name not in names[1])
+    result.columns_only_new = tuple(name for name in names[1] if name not in names[0])
+    shared = [name for name in names[0] if name in names[1] and name not in ("design", "status")]
+    result.moved = {name: Moved(name) for name in shared}
+    for stop in sides[0].stops:
+        _look(result, sides[0].until(stop), sides[1].until(stop), rtol)
+    _look(result, sides[0].until(None), sides[1].until(None), rtol)
+    _compare_optima(result, *folders, rtol)
+    return result
+
+
+class _Rows:
+    """The rows of a dataset in design order, a chunk at a time."""
+
+    def __init__(self, folder: Path) -> None:
+        import pyarrow.parquet as pq
+
+        chunks = store.parts(folder) if folder.is_dir() else []
+        if not chunks:
+            raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "compare")
+        with store.store_errors(folder):
+            about = [json.loads(pq.read_metadata(part.path).metadata[store.METADATA]) for part in chunks]
+            schema = pq.read_schema(chunks[0].path)
+        self.stops = [chunk["stop"] for chunk in about]
+        self.columns = [name for name in schema.names if not name.startswith("err_")]
+        self._chunks: Iterator[tuple[int, store.Part]] = iter(zip(self.stops, chunks, strict=True))
+        self._rows: pd.DataFrame | None = None
+        self._reached = 0
+
+    def until(self, stop: int | None) -> pd.DataFrame:
+        """The next rows, up to a design; all that are left without one."""
+        import pandas as pd
+
+        pieces = [] if self._rows is None else [self._rows]
+        while stop is None or self._reached < stop:
+            following = next(self._chunks, None)
+            if following is None:
+                break
+            self._reached, part = following
+            if not store.is_whole(part):
+                raise StoreError(f"{part.path}: damaged chunk; run the study again to have it computed anew")
+            pieces.append(pd.read_parquet(part.path, columns=self.columns))
+        if not pieces:
+            return pd.DataFrame({name: [] for name in self.columns})
+        rows = pd.concat(pieces, ignore_index=True)
+        now = rows["design"] < (np.inf if stop is None else stop)
+        self._rows = rows[~now]
+        return rows[now]
+
+
+def _look(result: Comparison, old: pd.DataFrame, new: pd.DataFrame, rtol: float) -> None:
+    designs, in_old, in_new = np.intersect1d(old["design"], new["design"], assume_unique=True, return_indices=True)
+    result.rows += designs.size
+    result.only_old += len(old) - designs.size
+    result.only_new += len(new) - designs.size
+    before, after = old["status"].to_numpy()[in_old], new["status"].to_numpy()[in_new]
+    result.status_changed += int((before != after).sum())
+    for name, moved in result.moved.items():
+        moved.look(old[name].to_numpy()[in_old], new[name].to_numpy()[in_new], designs, rtol)
+
+
+def _compare_optima(result: Comparison, old: Path, new: Path, rtol: float) -> None:
+    import pandas as pd
+
+    paths = old / store.OPTIMUM, new / store.OPTIMUM
+    if not all(path.is_file() for path in paths):
+        return
+    tables = [pd.read_parquet(path).drop_duplicates("role").set_index("role") for path in paths]
+    shared = tuple(result.moved)
+    for role in ROLES:
+        if not all(role in table.index for table in tables):
+            continue
+        for name in shared:
+            if all(name in table.columns for table in tables):
+                before, after = (np.array([table.loc[role, name]], np.float64) for table in tables)
+                key = f"{name} of the {role}"
+                result.moved[key] = moved = Moved(key, kind="")
+                moved.look(before, after, np.array([role]), rtol)
+
+
+def _notes(old: Path, new: Path) -> tuple[str, ...]:
+    plans = [store.read_plan(folder) or {} for folder in (old, new)]
+    notes = [
+        f"{folder}: not complete" for folder, plan in zip((old, new), plans, strict=True) if not plan.get("complete")
+    ]
+    if plans[0].get("study") != plans[1].get("study"):
+        notes.append("the studies differ in what determines the values")
+    if plans[0].get("code") != plans[1].get("code"):
+        notes.append("computed by different versions of the code or its libraries")
+    return tuple(notes)
+
+
+def _seconds(old: Path, new: Path) -> tuple[float, float] | None:
+    """Time of all runs into each folder [s], if both came to their end."""
+    times = []
+    for folder in (old, new):
+        ends = [line for line in store.read_runs(folder) if line.get("event") == "end"]
+        if not ends or ends[-1]["outcome"] != "complete":
+            return None
+        times.append(sum(line["seconds"] for line in ends))
+    return times[0], times[1]
