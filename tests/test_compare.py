@@ -42,7 +42,7 @@ def written(study: Study, rows: pd.DataFrame, folder: Path, chunk_size: int = 30
         start, stop = plan.bounds(index)
         part = rows[(rows["design"] >= start) & (rows["design"] < stop)]
         columns = {c.name: part[c.name].to_numpy().astype(c.dtype) for c in plan.columns}
-        store.write_chunk(folder, plan, index, ChunkResult(columns, {0: len(part)}))
+        store.write_chunk(folder, plan, index, ChunkResult(columns, {0: len(part)}, {}))
     about = {"optimise": False, "complete": True}
     store.write_plan(folder, plan.as_dict() | about)
     return folder
