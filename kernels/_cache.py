@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import hashlib
 import marshal
+import struct
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -90,8 +91,10 @@ def _is_as_hashed(module: ModuleType) -> bool:
     compiled = Path((module.__spec__ and module.__spec__.cached) or "")
     if not compiled.is_file() or compiled.stat().st_ctime_ns - path.stat().st_ctime_ns > YOUNGER:
         return True
-    code = marshal.loads(compiled.read_bytes()[PYC_HEADER:])
-    return bool(code == compile(text, str(module.__file__), "exec", dont_inherit=True))
+    header, code = compiled.read_bytes()[:PYC_HEADER], compiled.read_bytes()[PYC_HEADER:]
+    if header[8:] != struct.pack("<II", int(path.stat().st_mtime) & 0xFFFFFFFF, len(text) & 0xFFFFFFFF):
+        return True  # of an older source: Python did not take it
+    return bool(marshal.loads(code) == compile(text, str(module.__file__), "exec", dont_inherit=True))
 
 
 class _Place(UserProvidedCacheLocator):

@@ -95,6 +95,14 @@ def test_an_edit_that_python_itself_overlooks_leaves_no_trace(tree: Path) -> Non
     assert report(tree, PYTHONPYCACHEPREFIX=str(tree.parent / "none"))[:2] == ["8.0", "0"]
 
 
+def test_a_pyc_that_python_does_not_take_is_no_reason_for_doubt(tree: Path) -> None:
+    """Edited where no .pyc may be written: the old ones stay behind and are older than their sources."""
+    report(tree)
+    edit(tree, 55)
+    assert report(tree, PYTHONDONTWRITEBYTECODE="1") == ["56.0", "0", "KernelCache"]
+    assert report(tree, PYTHONDONTWRITEBYTECODE="1") == ["56.0", "1", "KernelCache"]
+
+
 def test_sources_edited_while_they_are_imported_are_not_kept(tree: Path) -> None:
     """The helper changes between the hash and its import; then it changes back."""
     during = f"""
