@@ -252,6 +252,6 @@ def _reduction_way(family: Family, name: str) -> Way | None:
         pose = next((o for o in family.pose_outputs if o.name == of), None)
         if pose is not None:
             unit = "rad" if base == "phi_max_abs" else pose.unit
-            of_turn = Output(name, unit, f"{text} {pose.name}: {pose.text}", pose.equation)
+            of_turn = Output(name, unit, f"{text} {pose.name}: {pose.text}", pose.equation, pose.jumps)
             return Way(of_turn, "mean" if base == "rms" else "reduction", base, pose.name)
     return None

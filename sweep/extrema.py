@@ -13,6 +13,7 @@ import numpy as np
 
 from kernels import scan
 from kernels import status as st
+from sweep.breaks import jumps, near_jumps, search
 from sweep.families.base import Array, Family
 from sweep.refine import EPS, Peaks, polish_places, refine_peaks
 from sweep.sampling import (
@@ -35,6 +36,7 @@ LIMIT = 32768  # samples beyond which a design is given up as NOT_CONVERGED
 SHARE = 0.6  # a peak below this share of the best sample is not refined
 ROUGH = 0.1  # fourth difference of samples against their size, above which they do not resolve the curve
 PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
+BREAKING = 512  # samples from which on what is still rough may be a jump
 DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
 
 
@@ -171,7 +173,7 @@ class _Search:
             rows, columns = rows[good], {name: values[good] for name, values in columns.items()}
         if not rows.size:
             return
-        candidates, scales, needed = self._candidates(rows, columns, samples)
+        candidates, scales, needed, breaks = self._candidates(rows, columns, samples)
         needed = np.maximum(needed, self._samples_by_singularity(columns, samples, needed))
         resolved = (needed <= samples) | (samples == LIMIT)
         candidates = candidates.only(resolved[candidates.row])
@@ -181,6 +183,8 @@ class _Search:
             row, found = candidates.row[mine], Peaks(*(column[mine] for column in peaks))
             if self.window is not None and request.windowed:
                 row, found = self._within_window(rows, columns, request, row, found, resolved)
+            elif request in breaks:
+                row, found = self._beside_jumps(rows, samples, request, row, found, breaks[request], resolved)
             moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[request]
             needed = np.where(moved & resolved, np.maximum(needed, 2 * samples), needed)
         # Everything is looked at with LIMIT samples before it is given up.
@@ -188,9 +192,9 @@ class _Search:
 
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
-    ) -> tuple[Candidates, dict[Request, Array], Index]:
-        """Candidates of all requests, the sizes of their curves, and samples needed by the look of the curves."""
-        needed, pieces, scales = np.full(rows.size, START), [], {}
+    ) -> tuple[Candidates, dict[Request, Array], Index, dict[Request, Mask]]:
+        """Candidates of all requests, sizes and jumps of their curves, samples needed by the look of the curves."""
+        needed, pieces, scales, breaks = np.full(rows.size, START), [], {}, {}
         for number, request in enumerate(self.requests):
             values = columns[request.pose]
             allowed = None
@@ -201,12 +205,19 @@ class _Search:
             row, column = (np.empty(rows.size * (samples // 2 + 1), np.int64) for _ in range(2))
             count = scan.peaks(values, request.mode, SHARE, allowed, scale, rough, row, column)
             row, column = row[:count], column[:count]
+            if samples >= BREAKING and allowed is None and (rough > ROUGH).any():
+                between, smooth = jumps(values, scale, ROUGH)
+                between[~smooth] = False
+                rough[smooth] = 0.0
+                breaks[request] = between
+                away = ~near_jumps(between, row, column)
+                row, column, count = row[away], column[away], int(away.sum())
             sign = np.sign(values[row, column]) if request.mode == 0 else np.full(count, float(request.mode))
             pieces.append(Candidates(np.full(count, number), row, column, sign))
             scales[request] = scale
             needed[rough > ROUGH] = 2 * samples
         joined = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
-        return Candidates(*joined), scales, needed
+        return Candidates(*joined), scales, needed, breaks
 
     def _samples_by_singularity(self, columns: dict[str, Array], samples: int, needed: Index) -> Index:
         distance = np.full(needed.size, np.inf)
@@ -284,6 +295,27 @@ class _Search:
         added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height)
         joined = Peaks(*(np.concatenate([p[inside], q]) for p, q in zip(peaks, added, strict=True)))
         return np.concatenate([row[inside], edge.row]), joined
+
+    def _beside_jumps(
+        self, rows: Index, samples: int, request: Request, row: Index, peaks: Peaks, between: Mask, resolved: Mask
+    ) -> tuple[Index, Peaks]:
+        """Add the highest points of the arcs that end at a jump."""
+        at, column = np.nonzero(between & resolved[:, None])
+        if not at.size:
+            return row, peaks
+
+        def curve(phi: Array) -> Array:
+            return pose_columns(self.family, self.designs[rows[at]], phi[:, None], [request.pose])[0][request.pose][
+                :, 0
+            ]
+
+        def measured(phi: Array) -> Array:
+            return np.abs(curve(phi)) if request.mode == 0 else request.mode * curve(phi)
+
+        arcs = search(curve, measured, column, samples)
+        added = Peaks(arcs.phi, arcs.value, np.full(arcs.phi.size, TWO_PI / samples), arcs.err, arcs.value)
+        joined = Peaks(*(np.concatenate(pair) for pair in zip(peaks, added, strict=True)))
+        return np.concatenate([row, at, at]), joined
 
     def _keep_best(self, rows: Index, request: Request, row: Index, peaks: Peaks) -> Array:
         """Store the best candidate of each row; by how much refinement moved it from the guess (0 where none)."""

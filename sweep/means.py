@@ -16,6 +16,7 @@ from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.sampling import Index, Status, blocks, sample_turn
 
 EPS = 2.0**-53
+KINKED = 1e-2  # relative change of a mean from which on its convergence tells kinks from smooth curves
 PREFIX = "rms_"
 
 
@@ -32,7 +33,8 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
     -------
     Columns
         the names and ``err_<name>`` (nan on samples), each (n,), and ``status``: as of extrema, NOT_CONVERGED where
-        32768 samples do not settle the value, which stays
+        32768 samples do not settle the value, or it settles only as fast as that of a curve with kinks or jumps; the
+        value stays, with its error
     """
     poses = [name.removeprefix(PREFIX) for name in names]
     n = len(designs)
@@ -43,14 +45,26 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
     before, status = _on_grid(family, designs, np.arange(n), START, poses)
     found, err = before.copy(), np.full_like(before, np.nan)
     pending, samples = np.flatnonzero(status == st.OK), 2 * START
+    changes = np.full((2, n, len(names)), np.nan)
     while pending.size and samples <= LIMIT:
         now, state = _on_grid(family, designs, pending, samples, poses)
         change = np.abs(now - before[pending])
         found[pending], status[pending] = now, state
         err[pending] = change + 4.0 * EPS * now
         before[pending] = now
-        unsettled = (change > np.maximum(accuracy.target * now, 16.0 * EPS * now)).any(axis=1)
-        pending = pending[(state == st.OK) & unsettled]
+        unsettled = change > np.maximum(accuracy.target * now, 16.0 * EPS * now)
+        first, second = changes[:, pending]
+        # A smooth curve that is settled to a hundredth gains more than a factor of eight per doubling; a kink or jump
+        # gains four or two, and twice the last changes bounds what is left of such a series.
+        kinked = (first < KINKED * now) & (second > first / 8.0) & (change > second / 8.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gain = np.clip(np.sqrt(change / first), 0.2, 0.6)
+        kinked &= change * gain ** np.log2(LIMIT / samples) > accuracy.target * now  # no hope to get there
+        bound = 4.0 * np.maximum(change, np.maximum(0.5 * second, 0.25 * first))
+        err[pending] = np.where(kinked & unsettled, bound, err[pending])
+        status[pending[(kinked & unsettled).any(axis=1) & (state == st.OK)]] = st.NOT_CONVERGED
+        changes[:, pending] = second, change
+        pending = pending[(state == st.OK) & unsettled.any(axis=1) & ~(kinked & unsettled).any(axis=1)]
         samples *= 2
     status[pending] = st.NOT_CONVERGED
     lost = (status != st.OK) & (status != st.NOT_CONVERGED)

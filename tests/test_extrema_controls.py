@@ -119,17 +119,30 @@ def zero(designs, angles):
     return {"y": np.zeros(shape), "status": np.zeros(shape, np.uint8)}
 
 
-def test_curve_that_no_sampling_resolves_says_so():
-    def jump(designs, angles, wanted):
-        y = np.where(np.mod(angles.phi, 2.0 * np.pi) > 1.0 / 3.0, 1.0, 0.0) + np.cos(angles.phi) * 0.1
+def stepped(jumps):
+    """A family whose only output is a square wave with so many jumps on a small cosine."""
+
+    def poses(designs, angles, wanted):
+        y = np.where(np.sin(0.5 * jumps * angles.phi - 1.0) > 0.0, 1.0, 0.0) + np.cos(angles.phi) * 0.1
         return {
             "y": np.broadcast_to(y, (len(designs), y.shape[1])),
             "status": np.zeros((len(designs), y.shape[1]), np.uint8),
         }
 
-    family = Family("jump", "", BUMPS.parameters, "y", BUMPS.pose_outputs, jump)
-    _, status = true_extrema(family, np.zeros((1, 5)), [Request("y", 0)], 1e-6)
+    return Family("stepped", "", BUMPS.parameters, "y", BUMPS.pose_outputs, poses)
+
+
+def test_curve_that_no_sampling_resolves_says_so():
+    _, status = true_extrema(stepped(64), np.zeros((1, 5)), [Request("y", 0)], 1e-6)
     assert status[0] == st.NOT_CONVERGED
+
+
+def test_a_few_jumps_are_bracketed():
+    """The largest value is the limit of the cosine where the wave switches on, at phi = 1."""
+    found, status = true_extrema(stepped(2), np.zeros((1, 5)), [Request("y", 0)], 1e-6)
+    assert status[0] == st.OK
+    assert found[Request("y", 0)].value[0] == pytest.approx(1.0 + 0.1 * np.cos(1.0), rel=1e-12)
+    assert found[Request("y", 0)].phi[0] == pytest.approx(1.0, abs=1e-9)
 
 
 def test_an_angle_that_makes_full_turns_has_no_extremum():

@@ -22,6 +22,7 @@ FORMULAS = (
     "    rho(L) < 1 proves one solution",
 )
 SUFFIX = "_friction"
+PASSES = "friction_passes"
 
 _JOINTS = {"a": "crank bearing", "b": "ball joint at B", "c": "ball joint at C"}
 _TEXT = ", friction included"
@@ -69,14 +70,14 @@ def _losses(kind: loads.Follower) -> dict[str, tuple[str, str]]:
     }
     supports = ("load_support_a1", "load_support_a2", "load_support_d1", "load_support_d2")
     found |= {name: ("force", f"load across the axis of the support {name[-2:]}{_TEXT}") for name in supports}
-    return found | {"friction_passes": ("1", "passes of the friction iteration")}
+    return found | {PASSES: ("1", "passes of the friction iteration")}
 
 
 def _outputs(kind: loads.Follower) -> tuple[Output, ...]:
     scalars = _COUPLES | _losses(kind)
     return (
         *force_outputs(kind.name, SUFFIX, _TEXT, EQUATION),
-        *(Output(name, unit, text, EQUATION) for name, (unit, text) in scalars.items()),
+        *(Output(name, unit, text, EQUATION, name == PASSES) for name, (unit, text) in scalars.items()),
         Output("friction_contraction", "1", "rho(L), bound of its rate; below 1 the solution is unique", EQUATION),
     )
 

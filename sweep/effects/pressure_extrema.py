@@ -30,9 +30,7 @@ _ANGLES = {
     "phi_pressure_min2": "crank angle of the other minimum",
 }
 OUTPUTS = (
-    Output(
-        "pressure_extrema", "1", "number of extrema of the pressure angle: 2 or 4; 0 where it is constant", EQUATION
-    ),
+    Output("pressure_extrema", "1", "number of extrema of the pressure angle, 0, 2 or 4", EQUATION, jumps=True),
     *(Output(name, "rad", text, EQUATION) for name, text in _ANGLES.items()),
 )
 # Accepted for pressure angles below 89 degrees: rounding of the components through the arcsine.

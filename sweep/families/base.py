@@ -46,12 +46,16 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Output:
-    """One quantity that can be wanted: unit in SI words ("rad", "length", "1"), definition, equation of its page."""
+    """One quantity that can be wanted: unit in SI words ("rad", "length", "1"), definition, equation of its page.
+
+    ``jumps`` says that it is a whole number or otherwise constant in pieces: no slope leads an optimiser to it.
+    """
 
     name: str
     unit: str
     text: str
     equation: str = ""
+    jumps: bool = False
 
 
 @dataclass(frozen=True)

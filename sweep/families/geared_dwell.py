@@ -26,7 +26,7 @@ POSE_OUTPUTS = (
 )
 
 DWELL_OUTPUTS = (
-    Output("turns", "1", "turns of the output per turn of the carrier, 0, 1 or 2", "section 2"),
+    Output("turns", "1", "turns of the output per turn of the carrier, 0, 1 or 2", "section 2", jumps=True),
     Output("dwell_angle", "rad", "return dwell: carrier angle between first and third passage of mid-dwell", "(10)"),
     Output("dwell_deviation", "rad", "largest deviation of psi from mid-dwell, half the peak to peak", "(11)"),
     Output("dwell_band", "rad", "carrier angle during which psi stays within +-dwell_deviation", "(12)"),

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sweep.catalogue import output
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.optimise.measures import Measure, Series, margins, measure
@@ -117,6 +118,10 @@ class Program:
         self.objective = measure(problem.family, problem.objective, problem.window)
         if self.objective.inner == "rotatable":
             raise InputError("objective", problem.objective, "a quantity that changes steadily", PLACE)
+        for name in (problem.objective, *(limit.output for limit in problem.limits)):
+            measure(problem.family, name, problem.window)  # unknown names end here
+            if output(problem.family, name).jumps:
+                raise InputError(name, "constant in pieces", "a quantity that changes steadily", PLACE)
         turning = Measure("rotatable", "min", margins(problem.family), "rotatable")
         self.requirements = [Requirement(turning, turning.to_inner(1.0), None)] if turning.series else []
         for limit in problem.limits:

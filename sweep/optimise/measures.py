@@ -15,6 +15,7 @@ from typing import Literal, TypeAlias
 from sweep.catalogue import STAY
 from sweep.errors import InputError
 from sweep.families.base import Family
+from sweep.means import PREFIX
 
 # A crank that turns must keep this much of Delta/b^2 at its worst pose: cos^2 of 89.94 degrees.
 ROTATABLE_MARGIN = 1e-6
@@ -98,8 +99,8 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     family : whose output it is
     name : ``margin``, ``rotatable``, ``max_pressure_angle``, ``swing``, ``stroke``, ``phi0``, ``stroke_ratio``,
         positions and angles of the limit positions, ``max_abs_x``, ``phi_max_abs_x``, ``max_x``, ``min_x``, ``range_x``
-        of any pose output x; chains: with a stage number.  What only a step of the family computes is taken as a number
-        without inner structure.
+        of any pose output x; chains: with a stage number.  ``rms_x``, and what only a step of the family computes, are
+        taken as numbers without inner structure.
     window : see :class:`sweep.optimise.problem.Problem`
 
     Raises
@@ -130,10 +131,12 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
         if x != name and x in family.pose_names:
             inside = window if x == "dev" and kind in ("max_abs", "phi_max_abs") else None
             return Measure(name, kind, (curve(family, x, inside),))
-    if name == STAY.name or name in {output.name for step in family.steps for output in step.provides}:
+    mean = name.startswith(PREFIX) and name.removeprefix(PREFIX) in family.pose_names
+    if mean or name == STAY.name or name in {output.name for step in family.steps for output in step.provides}:
         return Measure(name, "scalar", ())
     known = (
-        "margin, rotatable, max_pressure_angle, swing or stroke, phi0, stroke_ratio, max_abs_x, max_x, min_x, range_x"
+        "margin, rotatable, max_pressure_angle, swing or stroke, phi0, stroke_ratio, max_abs_x, max_x, min_x, range_x, "
+        "rms_x"
     )
     raise InputError(
         "output", name, f"{known} for x = {', '.join(family.pose_names)}", f"design outputs of {family.name}"
