@@ -38,8 +38,6 @@ MARGIN_TEXTS = {
     "max_pressure_angle": ("rad", "largest pressure angle over one turn"),
 }
 
-TARGET_OF_PROOF = 1e-8  # any: it decides nothing about what can be proven
-
 STAY = Output("window_angle", "rad", "crank angle over which the position lies in the window of the stroke: its dwell")
 
 
@@ -95,7 +93,7 @@ def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | Non
 
 def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
     """The cheapest own route to an output that serves this accuracy."""
-    able = [(step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy)]
+    able = [(step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy.of(name))]
     return min(able, key=lambda pair: pair[0].cost(accuracy), default=None)
 
 
@@ -107,10 +105,24 @@ def certified_names(family: Family) -> tuple[str, ...]:
     return tuple(names)
 
 
-def check_certifiable(family: Family, wanted: Sequence[str]) -> None:
+def proofs(certify: bool | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
+    """What ``certify=`` asks for, as ``certify`` and ``proven`` of `Accuracy`."""
+    if isinstance(certify, bool):
+        return certify, ()
+    names = (certify,) if isinstance(certify, str) else tuple(dict.fromkeys(certify))
+    return bool(names), names
+
+
+def is_proven(family: Family, name: str, accuracy: Accuracy) -> bool:
+    """Whether the error of an output is a proven bound."""
+    return accuracy.of(name).certify and name in certified_names(family) and not name.startswith("phi_")
+
+
+def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> None:
     """Refuse a proof for what has none.
 
     Exact outputs need no proof; limit positions, margins and means are no maxima that a search could miss a peak of.
+    Where ``accuracy.proven`` names outputs, it is they that must have one.
 
     Raises
     ------
@@ -118,14 +130,21 @@ def check_certifiable(family: Family, wanted: Sequence[str]) -> None:
         for an unknown name, if an extremum is wanted that is searched for on poses, or if no wanted maximum can be
         proven; the message names those that can.
     """
-    names, accuracy = certified_names(family), Accuracy(target=TARGET_OF_PROOF, certify=True)
+    names = certified_names(family)
     known = ", ".join(name for name in names if not name.startswith("phi_")) or "none"
     allowed = f"a proof of the maxima that have one; of {family.name}: {known}"
-    for name in wanted:
+    for name in accuracy.proven:
+        if name not in names or name not in wanted:
+            raise InputError(
+                "certify", name, f"{allowed}, as far as they are wanted", f"design outputs of {family.name}"
+            )
+    for name in accuracy.proven or wanted:
         output(family, name)  # unknown names end here
         way = general_way(family, name)
         if applying_step(family, name, accuracy) is None and way is not None and way.kind == "reduction":
-            raise InputError("certify", True, f"{allowed}; not of {name}", f"design outputs of {family.name}")
+            raise InputError(
+                "certify", True, f"{allowed}; not of {name}: name those to prove", f"design outputs of {family.name}"
+            )
     if not set(names) & set(wanted):
         raise InputError("certify", True, f"{allowed}; none of them is wanted", f"design outputs of {family.name}")
 

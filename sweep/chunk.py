@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.cascade import BLOCK, Cascade, levels
-from sweep.catalogue import certified_names
+from sweep.catalogue import is_proven
 from sweep.errors import InputError
 from sweep.families.base import Array, Columns
 from sweep.fit import fit_line
@@ -45,11 +45,10 @@ def output_columns(study: Study) -> dict[str, str]:
     An estimate is stored in float32 always, a proven bound is not; whether a crank turns is no number and has none.
     """
     columns: dict[str, str] = {}
-    proven = certified_names(study.family) if study.accuracy.certify else ()
     for name in study.want:
         columns[name] = study.output.dtype
         if study.accuracy.target is not None and not name.startswith("rotatable"):
-            columns[f"err_{name}"] = "float64" if name in proven else "float32"
+            columns[f"err_{name}"] = "float64" if is_proven(study.family, name, study.accuracy) else "float32"
     return columns
 
 

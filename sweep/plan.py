@@ -14,7 +14,7 @@ import numpy as np
 
 from kernels.status import OK
 from sweep.cascade import BLOCK, CALL_SECONDS, Cascade, levels
-from sweep.catalogue import certified_names
+from sweep.catalogue import is_proven
 from sweep.chunk import output_columns, parameter_matrix, parameter_ns
 from sweep.families.base import Array, Unit
 from sweep.study.units import internal_unit
@@ -194,8 +194,11 @@ def describe_columns(study: Study) -> tuple[Column, ...]:
 
 def error_words(study: Study, name: str) -> str:
     """What the error column of an output holds."""
-    proven = study.accuracy.certify and name in certified_names(study.family) and not name.startswith("phi_")
-    return "proven bound of the absolute error" if proven else "absolute error estimate"
+    return (
+        "proven bound of the absolute error"
+        if is_proven(study.family, name, study.accuracy)
+        else "absolute error estimate"
+    )
 
 
 def _output_column(study: Study, name: str, dtype: str) -> Column:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from sweep.catalogue import applying_step, check_certifiable, general_way, is_position, output, output_names
+from sweep.catalogue import applying_step, check_certifiable, general_way, is_position, output, output_names, proofs
 from sweep.effects import extended, input_names
 from sweep.errors import InputError
 from sweep.families import family as find_family
@@ -65,7 +65,7 @@ def summarise(
     *,
     samples: int | None = None,
     accuracy: float | None = None,
-    certify: bool = False,
+    certify: bool | Sequence[str] = False,
     window: tuple[float, float] | None = None,
 ) -> pd.DataFrame:
     """Design outputs of mechanisms, one row per design, in the order of the input.
@@ -79,8 +79,8 @@ def summarise(
         ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``)
     samples : extrema on a dense grid of so many crank angles
     accuracy : true extrema, refined to this relative error; 1e-8 if neither is given
-    certify : prove that no peak of the wanted maxima was missed (docs/extrema.md, section 5); their ``err_`` are then
-        bounds instead of estimates
+    certify : prove that no peak of the wanted maxima was missed, or of those named (docs/extrema.md, section 5); their
+        ``err_`` are then bounds instead of estimates
     window : ``max_abs_dev`` and the other reductions of ``dev`` count only poses whose position lies between these
         fractions of the stroke, measured from its smallest position; default the whole turn
 
@@ -105,7 +105,7 @@ def summarise(
     wanted = [name for name in wanted if name != "status"]
     chosen = _accuracy(samples, accuracy, certify)
     if certify:
-        check_certifiable(mechanism, wanted)
+        check_certifiable(mechanism, wanted, chosen)
     matrix, _ = design_matrix(mechanism, table, unused=input_names(bare))
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
     errors = [f"err_{name}" for name in wanted] if chosen.target is not None else []
@@ -237,11 +237,13 @@ def _with_errors(wanted: Sequence[str], accuracy: Accuracy) -> list[str]:
     return [*wanted, *(f"err_{name}" for name in wanted if accuracy.target is not None)]
 
 
-def _accuracy(samples: int | None, accuracy: float | None, certify: bool = False) -> Accuracy:
+def _accuracy(samples: int | None, accuracy: float | None, certify: bool | Sequence[str] = False) -> Accuracy:
     if samples is not None and accuracy is not None:
         raise InputError("samples", samples, "either samples= or accuracy=, not both", "summarise")
-    if not isinstance(certify, bool):
-        raise InputError("certify", certify, "True or False", "summarise")
+    if not isinstance(certify, (bool, str)) and not (
+        isinstance(certify, Sequence) and all(isinstance(name, str) for name in certify)
+    ):
+        raise InputError("certify", certify, "True, False, or names of maxima", "summarise")
     if samples is not None and certify:
         raise InputError("certify", certify, "accuracy=, not samples=: a grid proves nothing", "summarise")
     if samples is not None:
@@ -251,7 +253,8 @@ def _accuracy(samples: int | None, accuracy: float | None, certify: bool = False
     target = DEFAULT_TARGET if accuracy is None else accuracy
     if not (isinstance(target, Real) and FINEST_TARGET <= target <= 0.1):
         raise InputError("accuracy", accuracy, f"a relative error from {FINEST_TARGET:g} to 0.1", "summarise")
-    return Accuracy(target=float(target), certify=certify)
+    prove, proven = proofs(certify)
+    return Accuracy(target=float(target), certify=prove, proven=proven)
 
 
 def _check_window(window: tuple[float, float] | None) -> None:

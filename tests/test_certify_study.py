@@ -160,6 +160,30 @@ def test_study_that_asks_for_what_has_no_proof_is_refused(tmp_path):
         load_study(write(tmp_path, STUDY.replace("certify = true", "certify = 1")))
 
 
+def test_proof_of_some_maxima_only(tmp_path):
+    designs = table(MISSED[2])
+    wanted = ["max_abs_dpsi", "max_abs_d2psi", "max_abs_psi"]
+    proven = sweep.summarise("rssr", designs, wanted, certify=["max_abs_d2psi"])
+    searched = sweep.summarise("rssr", designs, wanted)
+    assert (proven["max_abs_d2psi"] > searched["max_abs_d2psi"]).all()
+    for name in ("max_abs_dpsi", "max_abs_psi", "err_max_abs_dpsi"):
+        assert (proven[name] == searched[name]).all()
+    for names in (["max_abs_psi"], ["max_abs_d3psi"], ["max_abs_d2psy"]):
+        with pytest.raises(InputError, match=f"certify = '{names[0]}'; allowed: .* as far as they are wanted"):
+            sweep.summarise("rssr", designs, wanted, certify=names)
+    with pytest.raises(InputError, match="certify = 1; allowed: True, False, or names of maxima"):
+        sweep.summarise("rssr", designs, wanted, certify=1)
+    text = STUDY.replace('"max_abs_d2psi"', '"max_abs_psi", "max_abs_d2psi"')
+    study = load_study(write(tmp_path, text.replace("certify = true", 'certify = ["max_abs_d2psi"]')))
+    assert study.accuracy == Accuracy(target=1e-8, certify=True, proven=("max_abs_d2psi",))
+    assert study.data["accuracy"] == {"target": 1e-8, "certify": ["max_abs_d2psi"]}
+    assert with_accuracy(study, 1e-6).accuracy.proven == ("max_abs_d2psi",)
+    assert dict(other_accuracies(study, 1))["without the proof"] > 0.0
+    assert "with the proof that no peak is missed" in dict(other_accuracies(with_accuracy(study, certify=False), 1))
+    with pytest.raises(StudyError, match=r"accuracy.certify = 'max_abs_psi'; allowed: a proof"):
+        load_study(write(tmp_path, text.replace("certify = true", 'certify = ["max_abs_psi"]')))
+
+
 def test_proof_is_part_of_the_study_and_its_price_is_named(tmp_path):
     proven = load_study(write(tmp_path, STUDY))
     assert proven.accuracy == Accuracy(target=1e-8, certify=True)

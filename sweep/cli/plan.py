@@ -145,7 +145,8 @@ def _axis(axis: Axis) -> str:
 
 def _accuracy(study: Study) -> str:
     if study.accuracy.target is not None:
-        proof = ", with the proof that no peak is missed" if study.accuracy.certify else ""
+        of = f" of {', '.join(study.accuracy.proven)}" if study.accuracy.proven else ""
+        proof = f", with the proof that no peak{of} is missed" if study.accuracy.certify else ""
         return f"extrema to a relative error of {study.accuracy.target:g}{proof}"
     return f"extrema on a grid of {study.accuracy.samples} crank angles"
 

@@ -62,12 +62,18 @@ class Output:
 class Accuracy:
     """How extrema over the turn are found: on a dense grid of ``samples``, or refined to relative error ``target``.
 
-    With ``certify`` it is also proven that no peak of a maximum was missed (docs/extrema.md, section 5).
+    With ``certify`` it is also proven that no peak of a maximum was missed (docs/extrema.md, section 5): of all wanted
+    maxima, or of those that ``proven`` names.
     """
 
     samples: int | None = None
     target: float | None = None
     certify: bool = False
+    proven: tuple[str, ...] = ()
+
+    def of(self, name: str) -> Accuracy:
+        """The accuracy of one output: without proof where only others are to be proven."""
+        return replace(self, certify=False) if self.certify and self.proven and name not in self.proven else self
 
 
 PoseFunction: TypeAlias = Callable[[Array, Angles, frozenset[str]], Columns]

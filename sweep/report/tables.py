@@ -173,7 +173,8 @@ def provenance(data: Dataset) -> list[tuple[str, str]]:
     rows += [(key, str(data.plan[key])) for key in ("code", "identity", "designs", "chunks") if key in data.plan]
     accuracy = data.study.accuracy
     if accuracy.target is not None:
-        proof = ", no peak missed: proven" if accuracy.certify else ""
+        of = f" of {', '.join(accuracy.proven)}" if accuracy.proven else ""
+        proof = f", no peak{of} missed: proven" if accuracy.certify else ""
         rows.append(("extrema over the turn", f"refined, relative error {number(accuracy.target, 2)}{proof}"))
     else:
         rows.append(("extrema over the turn", f"on a grid of {accuracy.samples} crank angles"))

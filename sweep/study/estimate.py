@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sweep.errors import BudgetError, InputError
+from sweep.errors import BudgetError
 from sweep.study.study import Study
 
 # With no survivor in the pilot, this share is assumed.
@@ -101,35 +101,27 @@ def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
     With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range
     of `sweep.summarise` is left out.
     """
-    from sweep.study.load import study_from_data
+    from sweep.catalogue import certified_names
+    from sweep.study.load import study_from_data, with_accuracy
     from sweep.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
 
     target, samples = study.accuracy.target, study.accuracy.samples
-    settings: list[tuple[str, dict[str, float]]] = []
-    proof = {"certify": True} if study.accuracy.certify else {}
     if target is not None:
         digits = (("one digit less", 10.0 * target), ("one digit more", 0.1 * target))
-        settings = [(words, {"target": t} | proof) for words, t in digits if FINEST_TARGET <= t <= COARSEST_TARGET]
+        found = [(words, with_accuracy(study, t)) for words, t in digits if FINEST_TARGET <= t <= COARSEST_TARGET]
+        provable = [name for name in certified_names(study.family) if name in study.want]
         if study.accuracy.certify:
-            settings.append(("without the proof", {"target": target}))
-        elif _certifiable(study):
-            settings.append(("with the proof that no peak is missed", {"target": target, "certify": True}))
-    elif samples is not None:
-        counts = (("half the samples", samples // 2), ("twice the samples", 2 * samples))
-        settings = [(words, {"samples": n}) for words, n in counts if FEWEST_SAMPLES <= n <= MOST_SAMPLES]
+            found.append(("without the proof", with_accuracy(study, certify=False)))
+        elif provable:
+            found.append(("with the proof that no peak is missed", with_accuracy(study, certify=provable)))
+        return tuple(found)
+    assert samples is not None
+    counts = (("half the samples", samples // 2), ("twice the samples", 2 * samples))
     return tuple(
-        (words, study_from_data(study.data | {"accuracy": setting}, study.path)) for words, setting in settings
+        (words, study_from_data(study.data | {"accuracy": {"samples": n}}, study.path))
+        for words, n in counts
+        if FEWEST_SAMPLES <= n <= MOST_SAMPLES
     )
-
-
-def _certifiable(study: Study) -> bool:
-    from sweep.catalogue import check_certifiable
-
-    try:
-        check_certifiable(study.family, study.want)
-    except InputError:
-        return False
-    return True
 
 
 def check_budget(study: Study, cost: Estimate) -> None:

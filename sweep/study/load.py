@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sweep.catalogue import check_certifiable
+from sweep.catalogue import check_certifiable, proofs
 from sweep.effects import extended
 from sweep.errors import InputError, StudyError, closest, nearest
 from sweep.families import NAMES
@@ -83,7 +83,7 @@ def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
     return _build(data, Path(path), {Path(path).name: data})
 
 
-def with_accuracy(study: Study, target: float | None = None, certify: bool | None = None) -> Study:
+def with_accuracy(study: Study, target: float | None = None, certify: bool | Sequence[str] | None = None) -> Study:
     """The same study with its extrema refined to another relative error, or with or without the proof of its maxima.
 
     Raises
@@ -91,11 +91,12 @@ def with_accuracy(study: Study, target: float | None = None, certify: bool | Non
     StudyError
         if the target is not between 1e-15 and 1, or what is wanted cannot be proven.
     """
-    target = study.accuracy.target if target is None else target
-    setting = {"target": target, "certify": study.accuracy.certify if certify is None else certify}
-    if target is None:
-        setting = {"samples": study.accuracy.samples, "certify": certify}
-    return study_from_data(study.data | {"accuracy": _set_keys(setting)}, study.path)
+    setting = accuracy_table(study.accuracy)
+    if target is not None:
+        setting = {"target": target} | {key: setting[key] for key in ("certify",) if key in setting}
+    if certify is not None:
+        setting["certify"] = certify if isinstance(certify, bool) else list(certify)
+    return study_from_data(study.data | {"accuracy": setting}, study.path)
 
 
 def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -207,8 +208,8 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     wanted += [pareto.output] if pareto else []
     want = tuple(name for name in dict.fromkeys(wanted) if name not in family.parameter_names)
     if accuracy.certify:
-        _check_certifiable(family, want, path, faults)
-    defaults = {"accuracy": _set_keys(accuracy.__dict__), "output": output.model_dump()}
+        _check_certifiable(family, want, accuracy, path, faults)
+    defaults = {"accuracy": accuracy_table(accuracy), "output": output.model_dump()}
     return Study(
         name=about.name or "",
         title=about.title,
@@ -310,16 +311,23 @@ def _accuracy(section: AccuracySection, faults: Faults) -> Accuracy:
         if section.certify:
             faults.value(("accuracy", "certify"), True, "false where samples is given: a grid proves nothing")
         return Accuracy(samples=section.samples)
-    return Accuracy(target=DEFAULT_TARGET if section.target is None else section.target, certify=section.certify)
+    prove, proven = proofs(section.certify)
+    return Accuracy(target=DEFAULT_TARGET if section.target is None else section.target, certify=prove, proven=proven)
 
 
-def _set_keys(table: Mapping[str, Any]) -> dict[str, Any]:
+def accuracy_table(accuracy: Accuracy) -> dict[str, Any]:
+    """[accuracy] as a study file has it."""
+    table = {
+        "target": accuracy.target,
+        "samples": accuracy.samples,
+        "certify": list(accuracy.proven) or accuracy.certify,
+    }
     return {key: value for key, value in table.items() if value is not None and value is not False}
 
 
-def _check_certifiable(family: Family, wanted: Sequence[str], path: Path, faults: Faults) -> None:
+def _check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy, path: Path, faults: Faults) -> None:
     try:
-        check_certifiable(family, wanted)
+        check_certifiable(family, wanted, accuracy)
     except InputError as error:
         faults.value(("accuracy", "certify"), error.value, error.allowed)
         raise StudyError(str(path), faults.lines) from None

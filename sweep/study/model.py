@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator
 
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e100, le=1e100)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+def _proofs(value: object) -> object:
+    # Not by the type: of a union of types pydantic reports each one's complaint.
+    if isinstance(value, bool) or (isinstance(value, list) and all(isinstance(name, str) for name in value)):
+        return value
+    raise ValueError("neither a truth value nor names")
+
+
+Proofs = Annotated[bool | list[str], PlainValidator(_proofs)]
 
 
 class Section(BaseModel):
@@ -118,7 +128,7 @@ class AccuracySection(Section):
     samples: Annotated[int, Field(ge=4, le=1_000_000)] | None = Field(
         None, description="a whole number of crank angles, 4 to 1000000"
     )
-    certify: bool = Field(False, description="true or false: whether the wanted maxima are proven")
+    certify: Proofs = Field(False, description="true or false, or a list of the wanted maxima to prove")
 
 
 class OptimiseSection(Section):

@@ -179,7 +179,7 @@ class Study:
         if self.pareto is not None:
             content["pareto"] = asdict(self.pareto)
         if self.accuracy.certify:
-            content["certify"] = True
+            content["certify"] = self.accuracy.proven or True
         if self.tolerance is not None:
             content["tolerance"] = asdict(self.tolerance)
         return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()
