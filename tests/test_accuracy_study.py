@@ -138,6 +138,10 @@ def test_one_digit_more_multiplies_the_time_of_a_grid_by_what_was_measured():
     assert grid.endswith("| x 3.00 |")
     (own,) = (line for line in lines if "**`accuracy=`**" in line)
     assert own.endswith("| x 1.00 |")
+    told = answer.in_short(pd.DataFrame(rows, columns=COLUMNS))
+    assert (
+        "a plain grid gives 1e-3 for 10 ns, 1e-6 for 270 ns; `accuracy=` gives 1e-3 for 5 ns, 1e-6 for 5 ns a" in told
+    )
 
 
 def test_marks_in_the_readme_are_those_of_the_page():

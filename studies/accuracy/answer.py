@@ -38,6 +38,17 @@ PURPOSES = (
 )
 
 
+def in_short(work: pd.DataFrame) -> str:
+    """The page in a sentence: the largest acceleration of ordinary designs by a grid and by the package's own way."""
+    part = work[(work["quantity"] == "max_abs_d2psi") & (work["region"] == EASY)]
+    told = []
+    for method, words in (("grid, float64", "a plain grid"), (HOUSE["max_abs_d2psi"], "`accuracy=`")):
+        cells = [(bound, coarsest(part[part["method"] == method], bound)) for bound in BOUNDS]
+        reached = [f"{power(bound)} for {duration(at['ns_per_design'])}" for bound, at in cells if at is not None]
+        told.append(f"{words} gives {', '.join(reached) or 'none of these'}")
+    return f"In short, for the largest acceleration of an ordinary crank-rocker: {'; '.join(told)} a design."
+
+
 def answer(work: pd.DataFrame) -> list[str]:
     """The table of times by error, and what it says in words."""
     rows, named = [], ""

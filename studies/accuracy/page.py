@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.accuracy.answer import BOUNDS, QUANTITIES, advice, answer
+from studies.accuracy.answer import BOUNDS, QUANTITIES, advice, answer, in_short
 from studies.accuracy.reference import ORDERS
 from studies.accuracy.tables import HOUSE, duration, html_body, pipe_table, power, prose, reached_table
 from studies.accuracy.tables import significant as sig
@@ -56,6 +56,8 @@ def markdown(m: Measured) -> str:
             f"Machine: {m.machine}. Ratios travel between machines, nanoseconds do not. `make study-accuracy` writes",
             "this page and the tables behind it, `results/accuracy/*.parquet`; what is promised is in promises.md.",
         ),
+        "",
+        *prose(in_short(m.work)),
         "",
         *_picture("accuracy", "Time per design against largest error, ordinary crank-rockers, one curve per method"),
         *answer(m.work),
@@ -338,7 +340,8 @@ def html(page: str, figures: list[Saved]) -> str:
     images = {f"figures/{figure.path.name}": figure.uri for figure in figures}
     style = "body{font:15px/1.45 system-ui,sans-serif;max-width:1150px;margin:2em auto;padding:0 1em;color:#222}" \
         "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.15em .7em;border-bottom:1px solid #e4e7eb;" \
-        "text-align:left;font-variant-numeric:tabular-nums}img{width:100%}code{background:#f3f4f6}"  # fmt: skip
+        "text-align:left;font-variant-numeric:tabular-nums}td:nth-child(n+3){white-space:nowrap}" \
+        "img{width:100%}code{background:#f3f4f6}"  # fmt: skip
     head = (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Accuracy and time</title><style>{style}</style>'
     )
