@@ -172,7 +172,6 @@ def test_report_shows_the_front(whole: tuple[Study, Path], tmp_path: Path) -> No
         ('[pareto]\noutput = "max_abs_d2psi"\nat_most = 1.0\n', "another output than the objective"),
         ('[pareto]\noutput = "swig"\nat_most = "40 deg"\n', "did you mean 'swing'"),
         ('[pareto]\noutput = "rotatable"\nat_least = 1\n', "changes steadily"),
-        ('[pareto]\noutput = "rms_d2psi"\nat_most = 1\n', "max_abs_x"),
         ('[pareto]\noutput = "max_pressure_angle"\nat_most = "95 deg"\n', "between 0 and 90 deg"),
         ('[pareto]\noutput = "swing"\nat_most = "40 deg"\nstart = 2\n', "did you mean 'starts'"),
         ('[pareto]\noutput = "swing"\nat_most = "40 deg"\ntime_budget = "0 s"\n', "positive"),
