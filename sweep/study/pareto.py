@@ -52,7 +52,7 @@ def read_pareto(
         return None
     key: Key = ("pareto", given[0])
     bounds = _bounds(output, raw[given[0]], key, faults)
-    if bounds is None or not _searchable(family, output.name, bounds, given[0], faults):
+    if bounds is None or not _searchable(family, output, bounds, given[0], faults):
         return None
     return ParetoSettings(output.name, bounds, given[0] == "at_least", section.starts, time_budget)
 
@@ -70,17 +70,17 @@ def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[floa
     return tuple(float(bound) for bound in bounds)
 
 
-def _searchable(family: Family, name: str, bounds: tuple[float, ...], side: str, faults: Faults) -> bool:
+def _searchable(family: Family, output: Output, bounds: tuple[float, ...], side: str, faults: Faults) -> bool:
     """Whether the optimiser can hold such bounds."""
     from sweep.optimise.measures import measure
 
     try:
-        found = measure(family, name)
+        found = measure(family, output.name)
     except InputError as error:
-        faults.value(("pareto", "output"), name, error.allowed)
+        faults.value(("pareto", "output"), output.name, error.allowed)
         return False
-    if found.inner == "rotatable":
-        faults.value(("pareto", "output"), name, "a quantity that changes steadily")
+    if found.inner == "rotatable" or output.jumps:
+        faults.value(("pareto", "output"), output.name, "a quantity that changes steadily")
         return False
     if found.inner == "pressure" and not all(0.0 < bound < 0.5 * math.pi for bound in bounds):
         faults.value(("pareto", side), list(bounds), "angles between 0 and 90 deg")
