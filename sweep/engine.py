@@ -115,7 +115,7 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
     from sweep.progress import Progress
 
     failure: Exception | None = None
-    deadline = math.inf if force else time.monotonic() + study.budget.seconds
+    allowed = math.inf if force else study.budget.seconds
     with stop_on_signal() as stop:
         store.remove_temporary(folder)
         plan = _open_plan(study, folder, force)
@@ -124,7 +124,7 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
         done = plan.designs - sum(len(range(*plan.bounds(index))) for index in missing)
         with Progress(study.name, plan.designs, done, progress) as shown:
             results = 0
-            for result in _results(study, plan, folder, missing, jobs, backend, stop, deadline):
+            for result in _results(study, plan, folder, missing, jobs, backend, stop, allowed):
                 results += 1
                 if result.error is not None:
                     failure = failure or result.error
@@ -199,14 +199,15 @@ def _results(
     jobs: int,
     backend: str,
     stop: Stop,
-    deadline: float,
+    allowed: float,
 ) -> Iterator[Done]:
-    """Finished chunks in the order they become ready."""
+    """Finished chunks in the order they become ready; no new one is begun when the allowed time [s] is over."""
     from sweep.chunk import warm
     from sweep.worker import work
 
     if missing:
         warm(study)  # one process compiles, the others load the machine code
+    deadline = time.monotonic() + allowed  # compiling does not count, so that every run gets on
     todo = (index for index in missing if not stop and time.monotonic() < deadline)
     if jobs == 1 or len(missing) < 2:
         for index in todo:

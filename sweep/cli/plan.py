@@ -83,7 +83,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     lines += ["", "estimated cost, without the first compilation of the kernels"]
     lines += aligned(
         [
-            ("chunks", f"{cost.chunks} of {cost.chunk_size} designs"),
+            ("chunks", f"{cost.chunks} of {min(cost.chunk_size, cost.designs)} designs"),
             ("rows kept", f"{cost.kept:.3g} of all designs ({study.output.keep}, {study.output.dtype})"),
             ("memory", size(cost.memory_bytes)),
             ("disk", f"{size(cost.disk_bytes)}, allowed {size(study.budget.disk_bytes)}"),
