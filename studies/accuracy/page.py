@@ -338,8 +338,8 @@ def _known(m: Measured) -> list[str]:
 def html(page: str, figures: list[Saved]) -> str:
     """The page with its diagrams, self-contained."""
     images = {f"figures/{figure.path.name}": figure.uri for figure in figures}
-    style = "body{font:15px/1.45 system-ui,sans-serif;max-width:1150px;margin:2em auto;padding:0 1em;color:#222}" \
-        "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.15em .7em;border-bottom:1px solid #e4e7eb;" \
+    style = "body{font:15px/1.45 system-ui,sans-serif;max-width:1350px;margin:2em auto;padding:0 1em;color:#222}" \
+        "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.15em .5em;border-bottom:1px solid #e4e7eb;" \
         "text-align:left;font-variant-numeric:tabular-nums}td:nth-child(n+3){white-space:nowrap}" \
         "img{width:100%}code{background:#f3f4f6}"  # fmt: skip
     head = (
