@@ -105,7 +105,7 @@ def add(at: Array, a: int, b: int, out: int) -> None:
     at[out + NOISE], at[out + TAIL] = noise * GUARD, tail * GUARD
 
 
-@inline
+@kernel
 def combine(at: Array, c: float, p: float, a: int, q: float, b: int, error: float, out: int) -> None:
     """A sum c + p a + q b; ``error`` bounds the size of what the constants are off by; ``out`` may be a or b."""
     noise = abs(p) * at[a + NOISE] + abs(q) * at[b + NOISE] + error

@@ -31,7 +31,7 @@ def _crank(at: Array, phi: float, reach: float) -> None:
     trigonometric(at, SIN, reach, v, u, -v, 0.0, 0.0, 0.0, 0.0, 6.0 * EPS)
 
 
-@inline
+@kernel
 def _rocker(at: Array, r: Reduced) -> bool:
     """Cosine and sine of the rocker from those of its crank, (2*); the errors of the constants are those of 4.2."""
     u, v = size(at, COS), size(at, SIN)
@@ -57,7 +57,7 @@ def _rocker(at: Array, r: Reduced) -> bool:
     return True
 
 
-@inline
+@kernel
 def enclose_travel(
     at: Array, stages: Stages, couplings: Array, shares: Array, i: int, phi: float, reach: float
 ) -> bool:

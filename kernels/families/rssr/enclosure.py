@@ -8,9 +8,7 @@ which is (3) with cos psi and sin psi written out, so everything is made of trig
 
 from __future__ import annotations
 
-import math
-
-from kernels._jit import inline
+from kernels._jit import kernel
 from kernels.enclosure import EPS, GUARD, WIDTH, add, inverse, multiply, root, trigonometric
 from kernels.families.rssr.closure import Array, Reduced
 
@@ -19,21 +17,7 @@ PER_R = T  # which is needed for 1/T only
 SIZE = 7 * WIDTH
 
 
-@inline
-def reach_of(r: Reduced, u: float, v: float) -> float:
-    """About how far from (u, v) = (cos phi, sin phi) Delta and R have no zero: a guess that steers, no bound."""
-    x, y, w = r.e - u, r.y0 + r.ca * v, r.k0 + r.k1 * v - r.k2 * u
-    x1, y1, w1 = v, r.ca * u, r.k1 * u + r.k2 * v
-    x2, y2, w2 = u, -r.ca * v, r.k2 * u - r.k1 * v
-    r0, r1, r2 = x * x + y * y, 2.0 * abs(x * x1 + y * y1), abs(x * x2 + y * y2 + x1 * x1 + y1 * y1)
-    d0, d1 = r0 - w * w, 2.0 * abs(x * x1 + y * y1 - w * w1)
-    d2 = abs(x * x2 + y * y2 + x1 * x1 + y1 * y1 - w * w2 - w1 * w1)
-    by_r = 2.0 * r0 / (r1 + math.sqrt(r1 * r1 + 4.0 * r0 * r2))
-    by_delta = 2.0 * d0 / (d1 + math.sqrt(d1 * d1 + 4.0 * abs(d0) * d2))
-    return min(by_r, by_delta)
-
-
-@inline
+@kernel
 def enclose(at: Array, r: Reduced, u: float, v: float, reach: float) -> bool:
     """Velocity of the mirrored mechanism on |z| <= reach <= 1 into VELOCITY; false if it cannot be enclosed.
 
