@@ -9,8 +9,9 @@ from click.testing import CliRunner
 
 from sweep.cli import main
 from sweep.cli.effects import page
-from sweep.effects import NAMES, effect, offered
-from sweep.effects.advice import closure
+from sweep.effects import NAMES, applicable, effect, extended, offered
+from sweep.effects.advice import closure, findings
+from sweep.effects.costs import designs
 from sweep.effects.placing import Placed
 from sweep.families import NAMES as FAMILIES
 from sweep.families import family
@@ -52,6 +53,33 @@ def test_no_two_outputs_of_a_family_share_a_name(name):
 def test_an_effect_comes_after_what_it_needs():
     order = [entry.name for entry in closure([effect("bearing_life"), effect("dynamic_elasticity")])]
     assert order == ["coupler", "kinetostatics", "bearing_life", "pressure", "elasticity", "dynamic_elasticity"]
+
+
+@pytest.mark.parametrize(("stiffness", "wanted", "verdict"), [
+    (1e3, ["max_lag"], "dynamic_elasticity: not wanted, but will matter"),
+    (1e8, ["max_lag"], "dynamic_elasticity: rightly left out"),
+    (1e8, ["max_lag", "floquet"], "dynamic_elasticity: wanted, but will not matter"),
+    (1e3, ["max_lag", "floquet"], "dynamic_elasticity: matters"),
+])  # fmt: skip
+def test_a_rule_says_whether_an_effect_matters_here(stiffness, wanted, verdict):
+    """The rule of section 9 for E2, estimated from the designs: max|lag''/nu^2|/max|lag| against 1/300."""
+    bare = family("rssr")
+    full = extended(bare, wanted)
+    matrix = designs(full, 4)
+    matrix[:, full.parameter_names.index("stiffness")] = stiffness
+    words = [finding.words for finding in findings(bare, full, matrix, wanted)]
+    assert any(line.startswith(verdict) for line in words), words
+
+
+def test_every_rule_of_negligibility_that_has_a_number_is_applied():
+    """Where a scene has all inputs, each effect but those without a rule in section 9 is judged."""
+    for name in ("rssr", "rssp", "guide"):
+        bare = family(name)
+        every = [o.name for placed in applicable(bare) for o in placed.outputs]
+        full = extended(bare, every)
+        judged = {finding.name for finding in findings(bare, full, designs(full, 4), every)}
+        without = {"pressure_extrema", "sliding_bearings", "rolling_bearings", "bearing_life"}
+        assert judged == {placed.name for placed in applicable(bare)} - without
 
 
 def test_the_command_lists_and_explains():

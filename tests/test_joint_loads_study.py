@@ -58,7 +58,7 @@ def test_the_plan_is_a_tree_with_shares_and_verdicts():
     assert shown.exit_code == 0, shown.output
     for words in (
         "friction             D2", "part of it", "effects not computed", "rolling_limits",
-        "kinetostatics: matters", "pressure: not wanted, but will matter",
+        "kinetostatics: matters", "coupler: matters", "pressure: matters",
     ):  # fmt: skip
         assert " ".join(words.split()) in " ".join(shown.output.split()), words
 

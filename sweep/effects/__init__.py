@@ -106,7 +106,8 @@ def elsewhere(family: Family, name: str) -> str:
     if not found:
         return ""
     words = ", ".join(f"{entry.name} ({', '.join(entry.families)})" for entry in found)
-    even = " at the first stage of a chain only" if all(entry.even_crank for entry in found) else ""
+    first = isinstance(family, Chain) and all(entry.even_crank for entry in found)
+    even = " at the first stage of a chain only" if first else ""
     return f"; {name} is an output of the effects{even}, families in brackets: {words}"
 
 

@@ -105,18 +105,16 @@ def findings(bare: Family, full: Family, designs: Array, wanted: Iterable[str]) 
     columns = {name: np.ascontiguousarray(designs[:, k]) for k, name in enumerate(full.parameter_names)}
     own = np.column_stack([columns[name] for name in bare.parameter_names])
     angles = Angles.of(2.0 * np.pi * np.arange(SAMPLES)[None] / SAMPLES)
-    computed = {placed.name for placed in called_for(bare, wanted)}
+    computed = {f"{e.name}{placed.number}" for placed in called_for(bare, wanted) for e in closure([placed.entry])}
+    needs = {placed.name: inputs(bare, [placed]) for placed in applicable(bare)}
+    defaults = {p.name: p.default for some in needs.values() for p in some if p.default is not None}
+    # A rule may look at more than its effect's own inputs, so it gets all that is known of the scene.
+    given = {name: np.full(len(designs), x) for name, x in defaults.items()} | columns
     found = []
     for placed in applicable(bare):
-        given = {p.name: columns.get(p.name, _default(p.default, len(designs))) for p in inputs(bare, [placed])}
-        known = {name: x for name, x in given.items() if x is not None}
-        if placed.entry.advise is None or len(known) < len(given):
+        if placed.entry.advise is None or any(p.default is None and p.name not in columns for p in needs[placed.name]):
             continue
-        advice = placed.entry.advise(first_scene(bare, own, angles, known).stage(placed.stage))
+        advice = placed.entry.advise(first_scene(bare, own, angles, given).stage(placed.stage))
         if advice is not None:
             found.append(Finding(placed.name, placed.name in computed, advice))
     return found
-
-
-def _default(value: float | None, n: int) -> Array | None:
-    return None if value is None else np.full(n, value)

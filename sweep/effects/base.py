@@ -16,6 +16,8 @@ from sweep.effects.measured import COSTS
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
 from sweep.families.chain import drive
 
+UNMEASURED = (0.0, 0.0)
+
 Status: TypeAlias = NDArray[np.uint8]
 Rows: TypeAlias = NDArray[np.intp]
 
@@ -211,13 +213,13 @@ class Effect:
 
     @property
     def ns_per_pose(self) -> float:
-        """Measured cost of all pose outputs together (`make bench-effects`); 0 where there are none."""
-        return COSTS[self.name][0]
+        """Measured cost of all pose outputs together; 0 where there are none, and until `make bench-effects`."""
+        return COSTS.get(self.name, UNMEASURED)[0]
 
     @property
     def ns_per_design(self) -> float:
-        """Measured cost of all design outputs together; 0 where there are none."""
-        return COSTS[self.name][1]
+        """Measured cost of all design outputs together; 0 where there are none, and until `make bench-effects`."""
+        return COSTS.get(self.name, UNMEASURED)[1]
 
 
 def take_over(status: Status, later: NDArray[np.generic]) -> None:

@@ -18,7 +18,10 @@ from sweep.families.base import Accuracy, Angles, Array, Family
 
 POSES = 360
 MOTION = "motion"
-CENTRE = {"a": 20.0, "b": 95.0, "c": 60.0, "e": 70.0, "f": 12.0, "g": 8.0, "alpha": 1.2, "branch": 1.0}
+CENTRE = {
+    "a": 20.0, "b": 95.0, "c": 60.0, "e": 70.0, "f": 12.0, "g": 8.0, "alpha": 1.2, "branch": 1.0,
+    "xi": 100.0, "eta": 3.0, "lam": 0.3, "h": 2.0,
+}  # fmt: skip
 # A small machine in mm, t, s; ours.
 INPUTS = {
     "m_crank": 2e-4, "m_coupler": 1e-4, "m_rocker": 3e-4, "m_slider": 3e-4, "com_coupler_x": 45.0, "com_coupler_y": 2.0,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.effects.coupler import coupler_point
-from sweep.effects.base import Effect, Scene
+from sweep.effects.base import Advice, Effect, Scene
 from sweep.families.base import Columns, Output, Parameter
 
 EQUATION = "C0 (1)-(3)"
@@ -21,7 +21,7 @@ CONSTRUCTION = Parameter(
 )  # fmt: skip
 
 INPUTS = (
-    Parameter("x_point", "length", "coupler point from B along the coupler"),
+    Parameter("x_point", "length", "coupler point from B along the coupler", default=0.0),
     Parameter("y_point", "length", "coupler point along n x s, in the coupler's plane", default=0.0),
     Parameter("z_point", "length", "coupler point along n, normal to the coupler's plane", default=0.0),
     CONSTRUCTION,
@@ -59,6 +59,23 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     return columns | {"status": status}
 
 
+def advise(scene: Scene) -> Advice | None:
+    """Coupler mass against the follower's inertia at C, plus how far its centre of mass lies off the line B-C."""
+    given, slider = scene.inputs, "m_slider" in scene.inputs
+    follower = "slider" if slider else "rocker"
+    if not {"m_coupler", f"m_{follower}"} <= set(given):
+        return None
+    b, c = scene.records[1][:, 13], scene.records[1][:, 14]
+    inertia = given[f"m_{follower}"]
+    if not slider:
+        square = given["com_rocker_x"] ** 2 + given["com_rocker_y"] ** 2
+        inertia = (given["j_rocker_zz"] + inertia * square) / c**2
+    off = np.hypot(given["com_coupler_y"], given["com_coupler_z"]) / b
+    with np.errstate(divide="ignore"):
+        share = np.where(given["m_coupler"] > 0.0, given["m_coupler"] / inertia, 0.0)
+    return Advice("coupler's mass over the follower's, brought to C, plus its eccentricity", share + off, 0.05)
+
+
 EFFECT = Effect(
     key="C0",
     name="coupler",
@@ -71,5 +88,6 @@ EFFECT = Effect(
     outputs=OUTPUTS,
     compute=compute,
     called_for="a tool on the coupler, a coupler whose centre of mass is off the line B-C",
-    negligible="coupler mass much below the rocker's inertia over c^2, and balanced",
+    negligible="coupler mass below 5 % of the rocker's inertia over c^2 (of the slider's mass), and balanced",
+    advise=advise,
 )
