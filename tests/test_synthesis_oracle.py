@@ -103,8 +103,8 @@ def test_negative_control_phi0_in_place_of_the_swing_fails():
 
 
 @pytest.mark.parametrize(
-    "kernel", [synthesis.rssr_on_locus, synthesis.rssr_at_direction, synthesis.rssp_on_locus, synthesis.rssp_at_offset,
-               synthesis.rssp_at_place, synthesis.rssr_arc_ends, synthesis.rssp_arc_ends]
+    "kernel", [synthesis.rssr_on_locus, synthesis.rssr_of_size, synthesis.rssr_at_direction, synthesis.rssp_on_locus,
+               synthesis.rssp_at_offset, synthesis.rssp_at_place, synthesis.rssr_arc_ends, synthesis.rssp_arc_ends]
 )  # fmt: skip
 def test_jitted_equals_plain_python(kernel):
     crank = np.array([[r["psi0"], r["phi0"], float(r["phi1"]), r["e"], r["f"], r["g"], r["alpha"]] for r in RSSR[::9]])

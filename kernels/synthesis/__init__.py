@@ -10,6 +10,7 @@ from kernels.synthesis.rssp_locus import rssp_at_offset as rssp_at_offset
 from kernels.synthesis.rssp_locus import rssp_at_place as rssp_at_place
 from kernels.synthesis.rssp_locus import rssp_on_locus as rssp_on_locus
 from kernels.synthesis.rssr_locus import rssr_at_direction as rssr_at_direction
+from kernels.synthesis.rssr_locus import rssr_of_size as rssr_of_size
 from kernels.synthesis.rssr_locus import rssr_on_locus as rssr_on_locus
 from kernels.synthesis.rssr_locus import rssr_points as rssr_points
 from kernels.synthesis.sensitivity import limit_sensitivities as limit_sensitivities

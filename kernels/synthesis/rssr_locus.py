@@ -24,8 +24,9 @@ class _Requirement(NamedTuple):
 
     e: float
     f: float
+    g: float
+    alpha: float
     h: float
-    g_axial: float  # g cos(alpha)
     sa: float
     ca: float
     sin_half: float  # of the swing
@@ -40,15 +41,19 @@ class _Requirement(NamedTuple):
 
 @inline
 def _read(requirements: Array, i: int) -> _Requirement:
-    swing, phi0 = requirements[i, 0], requirements[i, 1]
-    e, f, g, alpha = requirements[i, 3], requirements[i, 4], requirements[i, 5], requirements[i, 6]
+    return _requirement(requirements, i, requirements[i, 3], requirements[i, 4], requirements[i, 5])
+
+
+@inline
+def _requirement(requirements: Array, i: int, e: float, f: float, g: float) -> _Requirement:
+    swing, phi0, alpha = requirements[i, 0], requirements[i, 1], requirements[i, 6]
     sh, ch = sine_cosine(0.5 * swing)
     s0, c0 = sine_cosine(phi0)
     sa, ca = sine_cosine(alpha)
     valid = 0.0 < abs(swing.real) < 2.0 * PI and 0.0 < phi0.real < 2.0 * PI and abs(alpha.real) < 1e5
     valid = valid and abs(requirements[i, 2].real) < 1e5 and abs(e.real) + abs(f.real) + abs(g.real) < 1e150
     branch = -1.0 if swing.real > 0.0 else 1.0  # sheet (3-sgn)
-    return _Requirement(e, f, g * sa, g * ca, sa, ca, sh, ch, 2.0 * sh * ch, 2.0 * sh * sh, s0, c0, branch, valid)
+    return _Requirement(e, f, g, alpha, g * sa, sa, ca, sh, ch, 2.0 * sh * ch, 2.0 * sh * sh, s0, c0, branch, valid)
 
 
 class _Point(NamedTuple):
@@ -80,13 +85,13 @@ def _point(r: _Requirement, u1: float, v1: float) -> _Point:
 @inline
 def _finish(
     r: _Requirement, point: bool, x1: float, y1: float, ahead: float, back: float, u1: float, v1: float,
-    i: int, status: Status, failed: Status, designs: Array, requirements: Array,
+    i: int, status: Status, failed: Status, designs: Array,
 ) -> None:  # fmt: skip
     """Crank and coupler of (6), (7), the tests (i)-(iii), and the row of the design matrix."""
     c = np.sqrt(x1 * x1 + y1 * y1)
     x_mid, y_mid = x1 * r.cos_half - y1 * r.sin_half, y1 * r.cos_half + x1 * r.sin_half
     a = 2.0 * r.sin_half * (r.e * y_mid + r.f * r.sa * x_mid) / (ahead - back)
-    axial, radial = r.g_axial + y1 * r.sa - r.f, ahead - a
+    axial, radial = r.g * r.ca + y1 * r.sa - r.f, ahead - a
     b = np.sqrt(axial * axial + radial * radial)
     # c dF/dpsi/(2 c) = -X sin psi - Y cos psi at both limits
     x2, y2 = x_mid * r.cos_half - y_mid * r.sin_half, y_mid * r.cos_half + x_mid * r.sin_half
@@ -101,8 +106,8 @@ def _finish(
     designs[i, 0] = a if good else math.nan
     designs[i, 1] = b if good else math.nan
     designs[i, 2] = c if good else math.nan
-    designs[i, 3], designs[i, 4], designs[i, 5] = r.e, r.f, requirements[i, 5]
-    designs[i, 6], designs[i, 7] = requirements[i, 6], r.branch
+    designs[i, 3], designs[i, 4], designs[i, 5] = r.e, r.f, r.g
+    designs[i, 6], designs[i, 7] = r.alpha, r.branch
 
 
 @kernel
@@ -129,9 +134,45 @@ def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: 
         r = _read(requirements, i)
         v1, u1 = sine_cosine(requirements[i, 2])
         p = _point(r, u1, v1)
-        _finish(r, p.exists, p.x, p.y, p.ahead, p.back, u1, v1, i, status, failed, designs, requirements)
+        _finish(r, p.exists, p.x, p.y, p.ahead, p.back, u1, v1, i, status, failed, designs)
         if psi1 is not None:
             psi1[i] = arctan2(p.y, p.x) if status[i] == 0 else math.nan
+
+
+@kernel
+def rssr_of_size(requirements: Array, status: Status, failed: Status, designs: Array, psi1: Array | None) -> None:
+    """Crank-rockers of given rocker length: e and g follow from their ratio, as c grows with both and f is not in it.
+
+    Equations (1)-(7) of docs/synthesis.md at e = cos(direction), g = sin(direction), then scaled.
+
+    Parameters
+    ----------
+    requirements : (n, 7) swing, phi0, phi1 [rad], c, f [length], direction = atan2(g, e), alpha [rad]; otherwise as
+        :func:`rssr_on_locus`, c > 0
+    status, failed, designs, psi1 : as :func:`rssr_on_locus`; e and g are nan too where the status is not OK
+
+    Notes
+    -----
+    Requirements may be complex128, with designs and psi1 of that type: exact gradients by the complex step.
+    """
+    for i in range(requirements.shape[0]):
+        v1, u1 = sine_cosine(requirements[i, 2])
+        g, e = sine_cosine(requirements[i, 5])
+        one = _requirement(requirements, i, e, requirements[i, 4], g)
+        p = _point(one, u1, v1)
+        apart = p.x * p.x + p.y * p.y
+        exists = p.exists and apart.real > 0.0
+        size = requirements[i, 3] / np.sqrt(apart) if exists else 0.0 * e
+        r = _Requirement(
+            e * size, one.f, g * size, one.alpha, one.h * size, one.sa, one.ca, one.sin_half, one.cos_half,
+            one.sin_swing, one.versed, one.sin_phi0, one.cos_phi0, one.branch, one.valid,
+        )  # fmt: skip
+        x, y, ahead, back = p.x * size, p.y * size, p.ahead * size, p.back * size
+        _finish(r, exists, x, y, ahead, back, u1, v1, i, status, failed, designs)
+        if status[i] != 0:
+            designs[i, 3], designs[i, 5] = math.nan, math.nan
+        if psi1 is not None:
+            psi1[i] = arctan2(y, x) if status[i] == 0 else math.nan
 
 
 @kernel
@@ -193,6 +234,6 @@ def rssr_at_direction(
         side = (qx1 * qx2 + qy1 * qy2) * c0 + (qx1 * qy2 - qy1 * qx2) * s0
         point = inner >= 0.0 and c > 0.0 and rho1 > 0.0
         back = -rho2 if side < 0.0 else rho2
-        _finish(r, point, x1, y1, rho1, back, qx1 / rho1, qy1 / rho1, i, status, failed, designs, requirements)
+        _finish(r, point, x1, y1, rho1, back, qx1 / rho1, qy1 / rho1, i, status, failed, designs)
         if phi1 is not None:
             phi1[i] = math.atan2(qy1, qx1) if status[i] == 0 else math.nan

@@ -25,8 +25,8 @@ Status = NDArray[np.uint8]
 class Found(NamedTuple):
     """Mechanisms of a requirement: the design matrix, per row its status and the acceptance test it failed, (n,) each.
 
-    ``phi1`` and ``start`` are the crank angle and the follower's position at the extended limit, ``phi0`` the crank
-    angle from there to the folded one.
+    ``phi1`` (not brought into one turn) and ``start`` are the crank angle and the follower's position at the extended
+    limit, ``phi0`` the crank angle from there to the folded one.
     """
 
     designs: Array
@@ -97,42 +97,42 @@ def _outputs(matrix: Array, parameters: int) -> tuple[Status, Status, Array, Arr
     return np.empty(n, np.uint8), np.empty(n, np.uint8), designs, other
 
 
-def _in_turn(angle: Array) -> Array:
-    """The angle in [0, 2 pi); complex ones keep their imaginary part."""
-    turned: Array = angle - TWO_PI * np.floor(angle.real / TWO_PI)
-    return turned
-
-
 def _rssr_on_locus(matrix: Array) -> Found:
     status, failed, designs, psi1 = _outputs(matrix, 8)
     kernels.rssr_on_locus(matrix, status, failed, designs, psi1)
-    return Found(designs, status, failed, _in_turn(matrix[:, 2]), psi1, matrix[:, 1])
+    return Found(designs, status, failed, matrix[:, 2], psi1, matrix[:, 1])
+
+
+def _rssr_of_size(matrix: Array) -> Found:
+    status, failed, designs, psi1 = _outputs(matrix, 8)
+    kernels.rssr_of_size(matrix, status, failed, designs, psi1)
+    return Found(designs, status, failed, matrix[:, 2], psi1, matrix[:, 1])
 
 
 def _rssr_at_direction(matrix: Array) -> Found:
     status, failed, designs, phi1 = _outputs(matrix, 8)
     kernels.rssr_at_direction(matrix, np.ascontiguousarray(matrix[:, 7]), status, failed, designs, phi1)
-    return Found(designs, status, failed, _in_turn(phi1), matrix[:, 2], matrix[:, 1])
+    return Found(designs, status, failed, phi1, matrix[:, 2], matrix[:, 1])
 
 
 def _rssp_on_locus(matrix: Array) -> Found:
     status, failed, designs, start = _outputs(matrix, 6)
     kernels.rssp_on_locus(matrix, status, failed, designs, start)
-    return Found(designs, status, failed, _in_turn(matrix[:, 2]), start, matrix[:, 1])
+    return Found(designs, status, failed, matrix[:, 2], start, matrix[:, 1])
 
 
 def _rssp_at_offset(matrix: Array) -> Found:
     status, failed, designs, start = _outputs(matrix, 6)
     phi1 = np.empty(len(matrix))
     kernels.rssp_at_offset(matrix, np.ascontiguousarray(matrix[:, 5]), status, failed, designs, start, phi1)
-    return Found(designs, status, failed, _in_turn(phi1), start, matrix[:, 1])
+    return Found(designs, status, failed, phi1, start, matrix[:, 1])
 
 
 def _rssp_at_place(matrix: Array) -> Found:
     status, failed, designs, phi0 = _outputs(matrix, 6)
     phi1 = np.empty(len(matrix))
     kernels.rssp_at_place(matrix, status, failed, designs, phi0, phi1)
-    return Found(designs, status, failed, _in_turn(phi1), matrix[:, 1], phi0)
+    return Found(designs, status, failed, phi1, matrix[:, 1], phi0)
 
 
 _SWING = Parameter("swing", "angle", "rocker angle from the extended to the folded position, with its sign")
@@ -145,11 +145,20 @@ _E = Parameter("e", "length", "common perpendicular of the two axes")
 _F = Parameter("f", "length", "offset of the crank plane along the crank axis")
 _G = Parameter("g", "length", "offset of the rocker plane along the rocker axis")
 _ALPHA = Parameter("alpha", "angle", "angle between the axes")
+_C = Parameter("c", "length", "rocker", positive=True)
+_DIRECTION = Parameter("direction", "angle", "atan2(g, e): how the offsets of the two axes are to each other")
 _ROOT = Parameter("root", "sign", "which of the two solutions", choices=(-1.0, 1.0), default=1.0)
 
 LOCI = (
     Locus("rssr", "requirement of rssr", (_SWING, _PHI0, _PHI1, _E, _F, _G, _ALPHA), "phi1", _rssr_on_locus),
     Locus("rssr", "requirement of rssr", (_SWING, _PHI0, _PSI1, _E, _F, _G, _ALPHA, _ROOT), "psi1", _rssr_at_direction),
+    Locus(
+        "rssr",
+        "requirement of rssr",
+        (_SWING, _PHI0, _PHI1, _C, _F, _DIRECTION, _ALPHA),
+        "direction",
+        _rssr_of_size,
+    ),
     Locus("rssp", "requirement of rssp", (_STROKE, _PHI0, _PHI1, _F, _ALPHA), "phi1", _rssp_on_locus),
     Locus("rssp", "requirement of rssp", (_STROKE, _S1, _E, _F, _ALPHA), "s1", _rssp_at_place),
     Locus("rssp", "requirement of rssp", (_STROKE, _PHI0, _E, _F, _ALPHA, _ROOT), "e", _rssp_at_offset),
@@ -169,6 +178,8 @@ def locus(family: str, names: tuple[str, ...]) -> Locus:
         known = tuple(dict.fromkeys(way.family for way in LOCI))
         raise InputError("family", family, f"{' or '.join(known)}{nearest(str(family), known)}", "synthesis")
     told = [way for way in of_family if way.chosen_by in names]
+    # A column that another way asks for as well tells nothing where that one is told.
+    told = [way for way in told if not any(way.chosen_by in other.parameter_names for other in told if other != way)]
     if not told or len({way.chosen_by for way in told} - {"e"}) > 1:
         ways = "; or ".join(", ".join(way.parameter_names) for way in of_family)
         raise InputError("columns", ", ".join(names), ways, "requirement")
