@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+import math
 import os
+import signal
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from sweep.errors import WorkerDied
 from sweep.families.base import Array
 from sweep.optimise.certificate import Result
 from sweep.optimise.problem import Problem
 from sweep.optimise.search import search
-from sweep.signals import depend_on_parent
+from sweep.signals import SIGNALS, depend_on_parent
 
 POLL = 0.05  # between two looks at whether to stop [s]
+GRACE = 1.0  # for workers to hand back what they have once they are to stop [s]
 
 
 def in_processes(
-    problem: Problem, starts: Array, numbers: list[int], asked: Callable[[], bool], jobs: int, answered: bool
+    problem: Problem, starts: Array, numbers: list[int], asked: Callable[[], bool], jobs: int
 ) -> list[Result]:
-    """Results of the starts ``numbers`` that were begun before ``asked`` became true, in the order they ended.
+    """Results of the starts ``numbers`` that were begun before ``asked`` became true, in their order.
 
     Each is what a serial search finds, to the bit.
 
@@ -30,59 +35,62 @@ def in_processes(
     ----------
     problem, starts : as for ``minimise``
     numbers : which of the starts
-    asked : looked at in a thread of this process; workers learn of it by a file
+    asked : looked at in this process; workers learn of it by a file, and those that do not answer soon are ended
     jobs : how many workers
-    answered : whether there is a result already; if not, the first start gets to its first design in any case
 
     Raises
     ------
     WorkerDied
         if a worker process was killed.
     """
+    from concurrent.futures import FIRST_COMPLETED, wait
     from concurrent.futures.process import BrokenProcessPool
 
-    from joblib import Parallel, delayed
+    from joblib.externals.loky import get_reusable_executor
 
+    workers = min(jobs, len(numbers))
     with tempfile.TemporaryDirectory(prefix="linksweep-") as folder:
         flag = Path(folder, "stop")
-        parallel = Parallel(n_jobs=min(jobs, len(numbers)), backend="loky", batch_size=1, pre_dispatch="all")
-        firsts = [not answered and number == numbers[0] for number in numbers]
-        tasks = [
-            delayed(_task)(number, problem, starts[number], flag, os.getpid(), first)
-            for number, first in zip(numbers, firsts, strict=True)
-        ]
+        with _unheard():
+            executor = get_reusable_executor(max_workers=workers)
+        todo, begun, late = list(reversed(numbers)), list[Any](), math.inf
+        waiting: set[Any] = set()
         try:
-            with _watched(asked, flag):
-                found = parallel(tasks)
+            while (todo or waiting) and time.monotonic() < late:
+                # One more than there are workers, so that none of them waits for its next start.
+                while todo and len(waiting) <= workers:
+                    number = todo.pop()
+                    with _unheard():
+                        begun.append(executor.submit(_task, number, problem, starts[number], flag, os.getpid()))
+                    waiting.add(begun[-1])
+                waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED).not_done
+                if not flag.exists() and asked():
+                    flag.touch()
+                    todo, late = [], time.monotonic() + GRACE
+            if waiting:  # still starting up, or busy with something that does not ask
+                executor.shutdown(kill_workers=True)
+            found = [future.result() for future in begun if future not in waiting]
         except BrokenProcessPool as error:
             raise WorkerDied(f"optimiser: a worker process died ({error}); run again") from error
     return [result for result in found if result is not None]
 
 
-def _task(number: int, problem: Problem, start: Array, flag: Path, parent: int, first: bool) -> Result | None:
+def _task(number: int, problem: Problem, start: Array, flag: Path, parent: int) -> Result | None:
     if os.getpid() != parent:
         depend_on_parent(parent)
     # A parent that was killed leaves no folder to look into, but then this process ends as well.
-    if flag.exists() and not first:
-        return None
-    return search(number, problem, start, flag.exists)
+    return None if flag.exists() else search(number, problem, start, flag.exists)
 
 
 @contextmanager
-def _watched(asked: Callable[[], bool], flag: Path) -> Iterator[None]:
-    """While this lasts, a thread asks and leaves the flag when the answer is yes."""
-    done = threading.Event()
-
-    def watch() -> None:
-        while not done.wait(POLL):
-            if asked():
-                flag.touch()
-                return
-
-    thread = threading.Thread(target=watch, name="linksweep: whether to stop", daemon=True)
-    thread.start()
+def _unheard() -> Iterator[None]:
+    """Processes begun within do not hear signals: Ctrl-C reaches the whole group, also who is still starting up."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python lets no other thread decide on signals
+        return
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in SIGNALS}
     try:
         yield
     finally:
-        done.set()
-        thread.join()
+        for number, handler in before.items():
+            signal.signal(number, handler)

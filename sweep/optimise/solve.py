@@ -67,12 +67,14 @@ def minimise(
         def asked() -> bool:
             return time.monotonic() >= end or bool(own) or (stop is not None and stop())
 
-        results = _serial(problem, starts, asked, math.inf if jobs == 1 else SERIAL_SECONDS)
+        results, begun = _serial(problem, starts, asked, math.inf if jobs == 1 else SERIAL_SECONDS)
         done = {r.start for r in results}
         rest = [k for k in range(len(starts)) if k not in done]
         stopped = any(r.ended == "interrupted" for r in results) or (bool(results) and asked())
         if rest and not stopped:
-            results += in_processes(problem, starts, rest, asked, jobs, answered=bool(results))
+            results += in_processes(problem, starts, rest, asked, jobs)
+        if begun is not None and begun.start not in {r.start for r in results}:
+            results.append(begun)
     if own.signal_number is not None:
         results = [replace(r, ended="interrupted") if r.ended == "time" else r for r in results]
         if own.signal_number == signal.SIGTERM:
@@ -90,8 +92,13 @@ def _signals() -> Iterator[Stop]:
         yield stop
 
 
-def _serial(problem: Problem, starts: Array, asked: Callable[[], bool], seconds: float) -> list[Result]:
-    """The starts one after the other; what has not ended after so many seconds is left to the workers."""
+def _serial(
+    problem: Problem, starts: Array, asked: Callable[[], bool], seconds: float
+) -> tuple[list[Result], Result | None]:
+    """The starts one after the other, and how far the one came that has not ended after so many seconds.
+
+    That one is left to the workers, from its beginning; what is known counts if they are stopped before they get there.
+    """
     results: list[Result] = []
     late = time.monotonic() + seconds
     for number, start in enumerate(starts):
@@ -104,11 +111,11 @@ def _serial(problem: Problem, starts: Array, asked: Callable[[], bool], seconds:
 
         found = search(number, problem, start, ask)
         if found.ended == "time" and not asked():
-            break
+            return results, found
         results.append(found)
         if found.ended == "interrupted":
             break
-    return results
+    return results, None
 
 
 def ranked(results: list[Result]) -> list[Result]:
