@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from sweep.families import family as find_family
 from sweep.families.base import Array, Parameter
-from sweep.synthesis.locus import TWO_PI, Locus, Status, locus
+from sweep.synthesis.locus import TWO_PI, Found, Locus, Status, locus
 
 # The synthesis calls the crank angle of the extended position phi1; as a design output it is phi_ext.
 _PLACE = ("phi1", "phi_ext")
@@ -22,24 +23,28 @@ _PLACE = ("phi1", "phi_ext")
 
 @dataclass(frozen=True)
 class OnLocus:
-    """The stage whose links follow from its limit positions: its family, and its number as text ("" if it is alone)."""
+    """The stage whose links follow from its limit positions: its family, and its number as text ("" if it is alone).
+
+    ``told_by`` is the column that tells the way of the synthesis: phi1, or direction for a rocker of given length.
+    """
 
     family: str
     number: str
+    told_by: str = _PLACE[0]
 
-    @property
+    @cached_property
     def way(self) -> Locus:
         """The way of the synthesis that takes the place as a crank angle."""
-        return locus(self.family, _PLACE[:1])
+        return locus(self.family, (self.told_by,))
 
-    @property
+    @cached_property
     def prescribed(self) -> tuple[Parameter, ...]:
         """The design outputs that are prescribed, as columns of a design space."""
         own = find_family(self.family).parameter_names
         asked = [p for p in self.way.parameters if p.name not in own]
-        return tuple(Parameter(self._outside(p.name), p.unit, p.text) for p in asked)
+        return tuple(Parameter(self.outside(p.name), p.unit, p.text) for p in asked)
 
-    @property
+    @cached_property
     def made(self) -> tuple[str, ...]:
         """Parameters of the mechanism that follow: a, b, c and branch, of a slider-crank also e."""
         given = self.way.parameter_names
@@ -74,10 +79,14 @@ class OnLocus:
         status : OK, or NOT_ADMISSIBLE where the place on the locus gives no mechanism that does what is prescribed
         """
         way = self.way
-        found = way.solve(way.read({name: columns[self._outside(name)] for name in way.parameter_names}))
-        own = find_family(self.family).parameter_names
-        made = {name: found.designs[:, own.index(name.removesuffix(self.number))] for name in self.made}
-        return made, found.status
+        found = way.solve(way.read({name: columns[self.outside(name)] for name in way.parameter_names}))
+        return self.links_of(found), found.status
 
-    def _outside(self, name: str) -> str:
+    def links_of(self, found: Found) -> dict[str, Array]:
+        """The parameters in ``made`` out of mechanisms of this stage alone."""
+        own = find_family(self.family).parameter_names
+        return {name: found.designs[:, own.index(name.removesuffix(self.number))] for name in self.made}
+
+    def outside(self, name: str) -> str:
+        """What a column of the requirement is called in a study."""
         return f"{_PLACE[1] if name == _PLACE[0] else name}{self.number}"

@@ -12,7 +12,7 @@ from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem
 from sweep.optimise.form import Program
-from sweep.optimise.gradients import gradients, scalar_gradient
+from sweep.optimise.gradients import gradients, scalar_gradient, stepped
 from sweep.optimise.measures import Series
 from sweep.optimise.model import Model
 from sweep.optimise.points import STATIC, Curves, Points
@@ -45,7 +45,7 @@ def test_gradient_of_a_pose_output_equals_mpmath(output, order):
     curves = Curves(problem, (Series(output),))
     phi = np.array([0.3, 2.0, 4.4])
     points = curves.follow(DESIGN, Points.of([(0, x, 1.0, STATIC, math.nan, 0.0) for x in phi]))
-    found, _ = gradients(curves, DESIGN, points, places=False)
+    found, _ = gradients(curves, stepped(problem, DESIGN, problem.scaled(DESIGN[None, :])[0]), points, places=False)
     with mp.workdps(40):
         exact = [mp.mpf(float(x)) for x in DESIGN[:7]]
         for k, x in enumerate(phi):

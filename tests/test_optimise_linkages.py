@@ -12,7 +12,8 @@ from sweep.errors import InputError
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem, minimise
-from sweep.optimise.starts import diverse, from_sample
+from sweep.optimise.candidates import from_sample
+from sweep.optimise.starts import diverse
 from sweep.study import Limit, OptimiseSettings
 from sweep.summaries import design_outputs
 

@@ -141,8 +141,12 @@ def test_prescribed_values_are_equations_of_the_optimiser_and_no_test_of_the_swe
         tmp_path, BEST_TRANSMISSION.replace('"165 deg"', '{ from = 160, to = 170, count = 3, unit = "deg" }')
     )
     assert swept.limits[1] == Limit("phi0", math.radians(160), math.radians(170))
-    problem = problem_of(study, np.tile([27.0, 60.0, 73.0, 100.0, 0.0, 0.0, 0.0, -1.0], (3, 1)))
-    assert problem.variables == ("a", "b", "c") and "phi_ext" not in problem.fixed
+    designs = np.tile([27.0, 60.0, 73.0, 100.0, 0.0, 0.0, 0.0, -1.0], (3, 1))
+    problem = problem_of(study, designs, on_locus=False)
+    assert problem.variables == ("a", "b", "c") and "phi_ext" not in problem.fixed and len(problem.limits) == 2
+    along = problem_of(study, designs)
+    assert along.variables == ("phi_ext",) and along.fixed["swing"] == swing and along.limits == ()
+    assert problem_of(swept, designs).variables == ("phi0", "phi_ext")
 
 
 def test_fingerprint_knows_what_is_prescribed(tmp_path):

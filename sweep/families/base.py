@@ -138,7 +138,7 @@ class Family:
         """Give the same family with the most accurate poses it has: for single poses, not for sweeps."""
         return self if self.precise_poses is None else replace(self, poses=self.precise_poses)
 
-    @property
+    @cached_property
     def parameter_names(self) -> tuple[str, ...]:
         """Column names of the design matrix in order."""
         return tuple(p.name for p in self.parameters)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from sweep.optimise.certificate import Result
+from sweep.optimise.eliminate import on_locus
 from sweep.optimise.front import front_study
+from sweep.optimise.optimum import optimum
 from sweep.optimise.pareto import pareto
 from sweep.optimise.problem import Problem
 from sweep.optimise.solve import minimise
 from sweep.optimise.study import optimise_study
 
-__all__ = ["Problem", "Result", "front_study", "minimise", "optimise_study", "pareto"]
+__all__ = ["Problem", "Result", "front_study", "minimise", "on_locus", "optimise_study", "optimum", "pareto"]

@@ -18,6 +18,7 @@ from sweep.optimise.problem import Problem
 
 ROUNDS, CYCLES = 60, 3
 KKT = 1e-6  # residual of a converged result
+DWINDLING = 1e-9  # gain of a round from which a fulfilled condition of optimality ends the search
 NEAR_ANGLE = 0.1  # a followed point reaches this far by itself [rad]
 NEAR = 1e-3  # scaled violation from which the objective is looked at
 Propose: TypeAlias = Callable[[Model, State, Form, float, float, float | None], tuple[Array, float]]
@@ -89,13 +90,14 @@ class Descent:
             step = float(np.abs(fractions - at.fractions).max())
             if gain > 0.0:
                 self.best, extra, refused = new, Points.of([]), False
-                if not relaxed:
-                    self.model.learn_price(new)
+                residual = math.nan if relaxed else self.model.learn(new)
                 radius = max(radius, min(1.0, 2.0 * step))
                 true = new.short if relaxed else new.objective
                 self.gap = abs(true - reached) / max(abs(true), 1e-300)
                 if gain <= enough * max(abs(true), 1.0) or (relaxed and new.feasible):
                     return
+                if residual <= (KKT if gain <= DWINDLING else 1e-2 * KKT):
+                    return  # the polish makes the rest of the way in one step
             elif step < 1e-10 or gain > -1e-13 or radius < 1e-7:
                 return
             else:

@@ -61,6 +61,8 @@ class Form:
 
     def rows(self, atoms: Array, t: float) -> Array:
         """The rows' values; a row that is nan counts as far outside."""
+        if np.isfinite(atoms).all():
+            return np.asarray(self.constant + self.matrix @ atoms + self.slack * t)
         return np.nan_to_num(self.constant + self.matrix @ np.nan_to_num(atoms, nan=1e30) + self.slack * t, nan=-FAR)
 
     def objective(self, atoms: Array) -> float:
@@ -256,11 +258,16 @@ class _Layout:
         return maxima, minima
 
     def _size(self, r: Requirement, bound: float) -> float:
-        """What a violation is measured in: the bound itself, unless it is tiny against the curve; 1 for margins."""
+        """What a violation is measured in: the bound itself, unless it is tiny against the curve; 1 for margins.
+
+        A plain number has no curve: the larger of its bounds says how large it is.
+        """
         if r.measure.inner == "pressure":
             return 1.0 + bound  # sin^2 of the limit: a few degrees are as hard a limit as forty
         if any(s.pressure for s in r.measure.series):
             return 1.0
+        if r.measure.kind == "scalar":
+            return max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)) or 1.0
         ends = [k for side in self._ends(r.measure.series) for k in side]
         amplitude = (
             1.0 if r.measure.kind.startswith("phi") else max((abs(self.points.value[k]) for k in ends), default=0.0)

@@ -9,13 +9,19 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.optimise.points import CROSSING, STEP, Curves, Points
+from sweep.optimise.problem import Problem
 
 # Mixed derivative of the slope: complex step in the variable, fourth-order difference in the crank angle.
 OFFSET = 1e-3
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 
 
-def gradients(curves: Curves, design: Array, points: Points, places: bool) -> tuple[Array, Array]:
+def stepped(problem: Problem, base: Array, fractions: Array) -> Any:
+    """Complex designs (n, P): the imaginary step STEP in one scaled variable (n,) each, and in all that follows."""
+    return problem.placed(base, fractions + 1j * STEP * np.eye(len(fractions)))
+
+
+def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tuple[Array, Array]:
     """Derivatives of the curves at the points, and of the points' crank angles, by the scaled variables.
 
     A stationary point needs no account of its own motion (envelope theorem); a crossing of the window's edge moves with
@@ -25,7 +31,7 @@ def gradients(curves: Curves, design: Array, points: Points, places: bool) -> tu
     Parameters
     ----------
     curves : of the problem
-    design : (P,) real design
+    designs : (n, P) complex: the design with the imaginary step STEP in one scaled variable each, see :func:`stepped`
     points : as left by :meth:`Curves.follow` on this design (values, slopes and curvatures are used)
     places : whether the second result is wanted; without it the array is zero
 
@@ -34,10 +40,6 @@ def gradients(curves: Curves, design: Array, points: Points, places: bool) -> tu
     (K, n) and (K, n), per unit of the variables scaled to their bounds.  Measured against mpmath: 2e-15 relative for
     values, 5e-10 for angles (the difference that gives the curvature).
     """
-    problem = curves.problem
-    columns, span = list(problem.columns), problem.span
-    designs = np.repeat(design[None, :].astype(np.complex128), len(columns), axis=0)
-    designs[np.arange(len(columns)), columns] += 1j * STEP * span
     values = curves.values(designs, points).imag.T / STEP
     moves = np.zeros_like(values)
     if places:
@@ -47,8 +49,8 @@ def gradients(curves: Curves, design: Array, points: Points, places: bool) -> tu
         with np.errstate(divide="ignore", invalid="ignore"):
             moves = -mixed / points.curvature[:, None]
     edges = points.how == CROSSING
-    low, high = curves.stroke(points)
-    if edges.any() and low >= 0:
+    low, high = curves.stroke(points) if edges.any() else (-1, -1)
+    if low >= 0:
         place = curves.positions(designs, points)
         level = points.level[edges]
         target = place[:, [low]] + level * (place[:, [high]] - place[:, [low]])

@@ -99,8 +99,8 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     family : whose output it is
     name : ``margin``, ``rotatable``, ``max_pressure_angle``, ``swing``, ``stroke``, ``phi0``, ``stroke_ratio``,
         positions and angles of the limit positions, ``max_abs_x``, ``phi_max_abs_x``, ``max_x``, ``min_x``, ``range_x``
-        of any pose output x; chains: with a stage number.  ``rms_x``, and what only a step of the family computes, are
-        taken as numbers without inner structure.
+        of any pose output x; chains: with a stage number.  ``rms_x``, parameters, and what only a step of the family
+        computes, are taken as numbers without inner structure.
     window : see :class:`sweep.optimise.problem.Problem`
 
     Raises
@@ -132,7 +132,8 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
             inside = window if x == "dev" and kind in ("max_abs", "phi_max_abs") else None
             return Measure(name, kind, (curve(family, x, inside),))
     mean = name.startswith(PREFIX) and name.removeprefix(PREFIX) in family.pose_names
-    if mean or name == STAY.name or name in {output.name for step in family.steps for output in step.provides}:
+    steps = {output.name for step in family.steps for output in step.provides}
+    if mean or name == STAY.name or name in steps or name in family.parameter_names:
         return Measure(name, "scalar", ())
     known = (
         "margin, rotatable, max_pressure_angle, swing or stroke, phi0, stroke_ratio, max_abs_x, max_x, min_x, range_x, "

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from sweep.families.base import Array
 from sweep.optimise.certificate import ACTIVE, Multipliers, multipliers
 from sweep.optimise.form import Form, Program
-from sweep.optimise.gradients import gradients, scalar_gradient
-from sweep.optimise.points import Curves, Points
+from sweep.optimise.gradients import gradients, scalar_gradient, stepped
+from sweep.optimise.points import STEP, Curves, Points
 from sweep.optimise.problem import Problem
 
 FEASIBLE = 1e-9  # largest scaled violation of a feasible design
@@ -64,7 +65,7 @@ class Model:
 
     def __init__(self, problem: Problem, program: Program, start: Array, stop: Callable[[], bool]) -> None:
         self.problem, self.program, self.stop, self.base = problem, program, stop, start
-        self.curves = Curves(problem, program.series)
+        self.curves = Curves(problem, program.series, program.places)
         self.samples = problem.accuracy.samples or SAMPLES
         self.scale, self.price = 1.0, PRICE
         if program.objective.inner == "same":
@@ -86,7 +87,7 @@ class Model:
         design = self.design(fractions)
         points, turns = self.curves.scan(design, samples or self.samples)
         form = self.program.lay_out(self.curves, design, points, turns, self.scale)
-        atoms = self.atoms(fractions, form, points)
+        atoms = self.atoms(design, form, points)
         return State(fractions, design, form, atoms, form.objective(atoms), form.violation(atoms))
 
     def with_points(self, at: State, extra: Points) -> Form:
@@ -96,23 +97,23 @@ class Model:
         points = Points.joined(at.form.points, self.curves.follow(at.design, extra))
         return self.program.lay_out(self.curves, at.design, points, at.form.complete, self.scale)
 
-    def atoms(self, fractions: Array, form: Form, points: Points) -> Array:
+    def atoms(self, design: Array, form: Form, points: Points) -> Array:
         """What the form's rows are made of: curves at the points, their angles, plain numbers."""
-        scalars = [self._scalar(name, fractions[None, :])[0] for name in form.scalars]
+        scalars = [self._scalar(name, design[None, :])[0] for name in form.scalars]
         return np.concatenate([points.value, points.phi, scalars])
 
     def moved(self, fractions: Array, form: Form, points: Points) -> tuple[Points, Array]:
         """The points followed to another design, and the atoms there."""
         self.check()
-        there = self.curves.follow(self.design(fractions), points)
-        return there, self.atoms(fractions, form, there)
+        design = self.design(fractions)
+        there = self.curves.follow(design, points)
+        return there, self.atoms(design, form, there)
 
     def jacobian(self, fractions: Array, form: Form, points: Points) -> Array:
         """Gradients (R, n) of the form's rows by the scaled variables, at followed points."""
-        values, moves = gradients(self.curves, self.design(fractions), points, self.program.places)
-        scalars = [
-            scalar_gradient(lambda f, name=name: self._scalar(name, f), fractions)[None, :] for name in form.scalars
-        ]
+        designs = stepped(self.problem, self.base, fractions)
+        values, moves = gradients(self.curves, designs, points, self.program.places)
+        scalars = [self._scalar_gradient(name, fractions, designs)[None, :] for name in form.scalars]
         jacobian = np.concatenate([values, moves, *scalars])
         # The angle of an extremum that no row asks for may have no derivative; it must not spoil the others.
         jacobian[~form.matrix.any(axis=0)] = 0.0
@@ -123,20 +124,35 @@ class Model:
         jacobian = self.jacobian(state.fractions, state.form, state.form.points)
         return multipliers(state.form, state.form.rows(state.atoms, state.objective), jacobian, state.fractions)
 
-    def learn_price(self, state: State) -> None:
+    def learn(self, state: State) -> float:
         """Price violations at twice what the multipliers of the limits say they are worth (exact penalty).
 
         A higher price than needed forbids steps along curved limits that a later step would bring back.
+
+        Returns
+        -------
+        The residual of the optimality conditions; nan where the rows that hold are not at their bounds, so that their
+        multipliers mean nothing.
         """
         if state.violation > ACTIVE:
-            return  # the rows that hold are not at their bounds: their multipliers mean nothing
-        weights = self.certificate(state).weights
-        limits = [abs(w) for w, label in zip(weights, state.form.labels, strict=True) if label.side != "objective"]
+            return math.nan
+        found = self.certificate(state)
+        limits = [
+            abs(w) for w, label in zip(found.weights, state.form.labels, strict=True) if label.side != "objective"
+        ]
         self.price = max(2.0 * float(sum(limits)), 0.5 * self.price, 1.0)
+        return found.residual
 
-    def _scalar(self, name: str, fractions: Array) -> Array:
+    def _scalar_gradient(self, name: str, fractions: Array, designs: Any) -> Array:
+        if name in self.problem.family.parameter_names:
+            return np.asarray(self._scalar(name, designs).imag / STEP, np.float64)
+        return scalar_gradient(lambda f: self._scalar(name, self.problem.placed(self.base, f)), fractions)
+
+    def _scalar(self, name: str, designs: Any) -> Any:
+        names = self.problem.family.parameter_names
+        if name in names:
+            return designs[:, names.index(name)]
         from sweep.summaries import design_outputs
 
-        designs = np.array([self.design(row) for row in fractions])
         columns = design_outputs(self.problem.family, designs, [name], self.problem.accuracy, self.problem.window)
         return np.asarray(columns[name], dtype=np.float64)

@@ -17,6 +17,7 @@ from sweep.optimise.points import Index
 CORRECTIONS = 8  # of a step along curved limits, each two or three milliseconds
 DIFFERENCE = 1e-5  # of the scaled variables; gradients are good to 1e-12, so the Hessian is to 1e-5
 FLAT = 1e-6  # smallest curvature of the quadratic model: the objective is about 1, the variables run from 0 to 1
+RANK = 1e-9  # singular values below, relative to the largest, are rounding
 BEND = 1e-4  # curvature lent to t and to the violation, which have none; it changes multipliers by 1e-4 of the step
 
 
@@ -27,10 +28,11 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
     """
     points = form.points
     jacobian = np.nan_to_num(model.jacobian(at.fractions, form, points))
-    rows = form.rows(model.atoms(at.fractions, form, points), t)
+    rows = form.rows(model.atoms(at.design, form, points), t)
     # Of a design that misses its limits a little, the rows that will hold are not all at their bounds.
     found = multipliers(form, rows, jacobian, at.fractions, max(ACTIVE, 10.0 * min(at.violation, 1e-3)))
     curvature = hessian(model, at, form, found, np.arange(len(at.fractions)))
+    curvature = _upward(curvature, _holding(jacobian, form, found))
     full = np.column_stack([jacobian, form.slack])
     low, high = np.maximum(-radius, -at.fractions), np.minimum(radius, 1.0 - at.fractions)
     box = (low, high, -np.inf if floor is None else floor - t)
@@ -66,20 +68,45 @@ def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index
     return np.asarray(0.5 * (square + square.T), np.float64)
 
 
+def _holding(jacobian: Array, form: Form, found: Multipliers) -> Array:
+    """Gradients whose null space keeps active limits and bounds and changes the active rows of the objective alike."""
+    active = found.weights != 0.0
+    slack, weights = form.slack[active], found.weights[active]
+    sinking = weights * slack @ jacobian[active] / max(float(weights @ slack), 1e-300)
+    rows = jacobian[active] - slack[:, None] * sinking
+    return np.concatenate([rows, np.eye(jacobian.shape[1])[found.at_bound]])
+
+
+def _upward(curvature: Array, held: Array) -> Array:
+    """The curvature with negative parts made positive, along the rows that hold (their null space) and across apart.
+
+    Along them the curvature decides how far to go; across, the rows do.  Turned positive in one go, the strong
+    curvature across would stiffen a flat valley, and every step along it would be a hundred times too short.
+    """
+    _, sizes, axes = np.linalg.svd(held)
+    rank = int((sizes > RANK * sizes.max(initial=1e-300)).sum())
+    out = np.zeros_like(curvature)
+    for part in (axes[:rank], axes[rank:]):
+        if len(part):
+            values, turned = np.linalg.eigh(part @ curvature @ part.T)
+            own = part.T @ turned
+            out += (own * np.maximum(np.abs(values), FLAT)) @ own.T
+    return out
+
+
 def _quadratic(
     curvature: Array, full: Array, rows: Array, form: Form, box: tuple[Array, Array, float], price: float
 ) -> Array:
     """Step (d, t) that makes t + d'Hd/2 + price v small; every limit's linear row may be missed by v.
 
     A least-distance problem, solved by non-negative least squares (Lawson and Hanson 1974, chapter 23): in the axes of
-    the curvature the objective is the distance from a point.  Negative curvature counts as positive of the same size,
-    so the step always leads downwards and the box keeps it short.
+    the curvature, which is positive, the objective is the distance from a point.
     """
     from scipy.optimize import nnls
 
     n = len(curvature)
     values, axes = np.linalg.eigh(curvature)
-    stiffness = np.concatenate([np.maximum(np.abs(values), FLAT), [BEND, BEND]])
+    stiffness = np.concatenate([np.maximum(values, 0.5 * FLAT), [BEND, BEND]])
     back = np.zeros((n + 2, n + 2))
     back[:n, :n], back[n, n], back[n + 1, n + 1] = axes, 1.0, 1.0
     back /= np.sqrt(stiffness)

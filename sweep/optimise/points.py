@@ -22,6 +22,7 @@ Index: TypeAlias = NDArray[np.intp]
 
 STEP = 1e-30  # imaginary step: the error is of order STEP^2, there is no difference to cancel
 NEIGHBOUR = 3e-5  # distance of the slopes whose difference is the curvature; it only steers Newton [rad]
+SETTLED = 3e-6  # a Newton step this short leaves an error of its square [rad]
 STRIDE = 0.1  # longest single move of a followed point [rad]
 STATIONARY, CROSSING, STATIC = 0, 1, 2
 
@@ -73,9 +74,12 @@ class Points:
 
 
 class Curves:
-    """The curves a problem needs, of one design or of many at the same crank angles."""
+    """The curves a problem needs, of one design or of many at the same crank angles.
 
-    def __init__(self, problem: Problem, series: tuple[Series, ...]) -> None:
+    ``places`` says that the angles of extrema are asked for as well: they need the curvature there.
+    """
+
+    def __init__(self, problem: Problem, series: tuple[Series, ...], places: bool = False) -> None:
         self.problem = problem
         self.family = problem.family
         position = Series(self.family.position, wrapped=self.family.position == "psi")
@@ -85,6 +89,7 @@ class Curves:
         self.position = series.index(position) if position in series else -1
         names = {s.output for s in series} | {s.pressure for s in series if s.pressure}
         self.wanted = frozenset(names)
+        self.places = places
         self.calls = 0
 
     def poses(self, designs: Any, phi: Any) -> dict[str, Any]:
@@ -136,10 +141,11 @@ class Curves:
         return int(low[np.argmin(points.value[low])]), int(high[np.argmax(points.value[high])])
 
     def follow(self, design: Array, points: Points, stride: float = STRIDE) -> Points:
-        """Move the points to where they belong on this design; values, slopes and curvatures are brought up to date.
+        """Move the points to where they belong on this design, and bring their values up to date.
 
         A stationary point climbs (or descends) to its extremum by Newton's method on the slope, at most ``stride`` at a
-        time.  Whatever angle it ends at, the curve's value there bounds the maximum from below.
+        time.  Whatever angle it ends at, the curve's value there bounds the maximum from below.  Slopes, curvatures and
+        paces are brought up to date where an edge or the angles of extrema need them.
         """
         if not len(points):
             return points
@@ -157,11 +163,13 @@ class Curves:
             # Who turned round has stepped over the extremum: shorter steps from now on.
             reach[uphill * move < 0.0] *= 0.5
             uphill = move
-            move = np.nan_to_num(np.clip(move, -reach, reach), nan=0.0)
+            move = np.minimum(np.maximum(move, -reach), reach)
+            move[np.isnan(move)] = 0.0
             phi += move
-            if np.abs(move).max() < 1e-7:
+            if np.abs(move).max() < SETTLED:
                 break
-        slope, curvature, pace, _ = self._local(design, phi, points)
+        if self.places or (points.how == CROSSING).any():
+            slope, curvature, pace, _ = self._local(design, phi, points)
         moved = replace(points, phi=phi, slope=slope, curvature=curvature, pace=pace)
         return replace(moved, value=self.values(design[None, :], moved)[0])
 
@@ -211,8 +219,10 @@ class Curves:
 
     def _approach_edges(self, points: Points, phi: Array, place: Array, pace: Array, move: Array) -> None:
         edges = points.how == CROSSING
+        if not edges.any():
+            return
         low, high = self.stroke(points)
-        if not edges.any() or low < 0:
+        if low < 0:
             return
         base, level = place[low], points.level[edges]
         target = base + level * (place[high] - base)

@@ -1,15 +1,15 @@
-"""Where searches begin: good designs of a sweep, or of a sample, that are not all alike."""
+"""Where searches begin: good designs of a sweep that are not all alike."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
-from sweep.families.base import Accuracy, Array, Family
-from sweep.optimise.measures import ROTATABLE_MARGIN, margins
+from sweep.families.base import Array, Family
 from sweep.optimise.problem import Problem
 
 if TYPE_CHECKING:
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 KEPT = 100_000  # best rows of a dataset that are looked at
 SCREENED = 256  # designs of a study's space per start where a dataset gives none
-SAMPLED = 4096  # designs between plain bounds per start: these cost a microsecond each
-NEARLY = 0.03  # a search mends so small a violation in passing: the objective tells more
 
 
 def diverse(problem: Problem, designs: Array, merit: Array, count: int) -> Array:
@@ -35,24 +33,30 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int) -> Array
     count : how many at most
     """
     order = np.argsort(merit, kind="stable")
-    order = order[np.isfinite(merit[order])]
-    ranked = designs[order]
-    place = problem.scaled(ranked)
+    ranked = designs[order[np.isfinite(merit[order])]]
     others = [c for c in range(designs.shape[1]) if c not in problem.columns]
-    distance = 0.5 * np.sqrt(len(problem.columns) / 6.0)  # half of what two random designs keep on average
+    _, kind = np.unique(ranked[:, others], axis=0, return_inverse=True)
+    return ranked[spread(problem.scaled(ranked), kind.reshape(-1), count)]
+
+
+def spread(place: Array, kind: NDArray[np.intp], count: int) -> list[int]:
+    """Numbers of at most ``count`` rows of ``place`` (k, n), ranked best first, that keep a distance from each other.
+
+    ``kind`` (k,): rows of different kinds are never neighbours.
+    """
+    distance = 0.5 * np.sqrt(place.shape[1] / 6.0)  # half of what two random designs keep on average
     taken: list[int] = []
     for _ in range(12):
-        taken, free = [], np.ones(len(ranked), dtype=np.bool_)
+        taken, free = [], np.ones(len(place), dtype=np.bool_)
         while len(taken) < count and free.any():
             best = int(np.argmax(free))
             taken.append(best)
-            near = np.linalg.norm(place - place[best], axis=1) < distance
-            free &= ~(near & (ranked[:, others] == ranked[best, others]).all(axis=1))
+            free &= ~((np.linalg.norm(place - place[best], axis=1) < distance) & (kind == kind[best]))
             free[best] = False
         if len(taken) == count:
             break
         distance *= 0.5
-    return ranked[taken]
+    return taken
 
 
 def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Array]:
@@ -93,50 +97,3 @@ def drawn(study: Study, count: int, seed: int) -> Array:
         return designs
     fitted, status = fit_line(study.family, designs, study.fit, study.window)
     return np.asarray(fitted[status == st.OK], np.float64)
-
-
-def from_sample(problem: Problem, signs: list[dict[str, float]], count: int, seed: int) -> Array:
-    """Diverse best designs of a Sobol sample between the bounds; the signs take turns.
-
-    Ranked by :func:`ranking`.
-
-    Parameters
-    ----------
-    problem : what is to be minimised
-    signs : combinations of the parameters that are not varied (branches)
-    count : how many at most
-    seed : of the sample
-    """
-    from scipy.stats import qmc
-
-    size = 1 << int(np.ceil(np.log2(SAMPLED * count)))
-    sample = qmc.Sobol(len(problem.variables), seed=seed).random(size)
-    values = problem.lower + sample * problem.span
-    blocks = [problem.rows(values[k :: len(signs)], **choice) for k, choice in enumerate(signs)]
-    designs = np.concatenate(blocks)
-    return diverse(problem, designs, ranking(problem, designs), count)
-
-
-def ranking(problem: Problem, designs: Array) -> Array:
-    """Objective where all limits are nearly kept; far above it the largest violation; then what does not turn."""
-    from sweep.summaries import design_outputs
-
-    turning = ["margin"] if margins(problem.family) else []
-    limits = [limit for limit in problem.limits if not limit.output.startswith("rotatable")]
-    wanted = list(dict.fromkeys([*turning, *(limit.output for limit in limits), problem.objective]))
-    columns: dict[str, Any] = design_outputs(problem.family, designs, wanted, Accuracy(samples=64), problem.window)
-    violation = np.zeros(len(designs))
-    for limit in limits:
-        value = np.asarray(columns[limit.output], np.float64)
-        if limit.output.rstrip("0123456789") in ("swing", "stroke"):
-            value = np.abs(value)
-        for bound, sense in ((limit.minimum, 1.0), (limit.maximum, -1.0)):
-            if bound is not None:
-                violation = np.fmax(violation, sense * (bound - value) / (abs(bound) or 1.0))
-    objective = np.asarray(columns[problem.objective], np.float64)
-    spread = 1.0 + np.abs(objective[np.isfinite(objective)]).max(initial=0.0)
-    merit = np.where(violation > NEARLY, spread * (1.0 + violation), objective)
-    for name in turning:
-        margin = np.asarray(columns[name], np.float64)
-        merit = np.where(margin < ROTATABLE_MARGIN, spread * 1e6 - margin, merit)
-    return merit

@@ -12,14 +12,16 @@ import numpy as np
 from kernels import status as st
 from sweep import store
 from sweep.errors import InputError
-from sweep.families.base import Angles, Array
+from sweep.families.base import Angles, Array, Parameter
+from sweep.optimise.candidates import ranking
 from sweep.optimise.certificate import Result
+from sweep.optimise.coordinates import LocusCoordinates
 from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
 from sweep.optimise.sensitivity import sensitivities
 from sweep.optimise.solve import minimise
-from sweep.optimise.starts import best_rows, diverse, drawn, ranking
+from sweep.optimise.starts import best_rows, diverse, drawn
 from sweep.optimise.tolerance import tolerance_rows
 from sweep.optimise.written import certificates, outputs, write
 from sweep.tables import design_matrix
@@ -28,16 +30,26 @@ if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study
 
 POSES = 720
+WHOLE_TURN = 2.0 * np.pi - 1e-9
 TAILS = (2.0, 98.0)  # percent; beyond are needles that hardly moved and were scaled up to the stroke
 _DRAWN = re.compile(r"(pressure_angle|[xyz]_[a-z])\d*")
 
 
-def problem_of(study: Study, designs: Array) -> Problem:
+def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Problem:
     """The optimisation problem of a study.
 
     Swept steady parameters vary between the ends of their axes, those that [locus] or [fit] sets or scales as far as
     ``designs`` (k, P) reach and half their size beyond; limits on parameters narrow both.  An angle swept over a whole
-    turn may go on for half a turn.  What [locus] prescribes becomes limits: equations where it is fixed.
+    turn may go on for half a turn.
+
+    On the locus, what it prescribes is varied instead of the links: fixed values hold by construction, axes are bounds,
+    limits on links stay limits.  Otherwise what is prescribed becomes limits: equations where it is fixed.
+
+    Parameters
+    ----------
+    study : with an objective
+    designs : (k, P) from its space
+    on_locus : None leaves it to ``optimise.variables``, and without that to whether [locus] fixes swing, stroke or phi0
 
     Raises
     ------
@@ -46,31 +58,58 @@ def problem_of(study: Study, designs: Array) -> Problem:
     """
     if study.objective is None:
         raise InputError("objective", None, "[objective] minimise = an output", str(study.path))
-    made = (*study.made, *study.rescaled)
-    bounds: dict[str, tuple[float, float]] = {}
-    for column, parameter in enumerate(study.family.parameters):
-        if parameter.name in made and parameter.choices is None:
-            low, high = (float(end) for end in np.percentile(designs[:, column], TAILS))
-            reach = 0.5 * max(abs(low), abs(high)) if parameter.unit == "length" else 0.5
-            low, high = (0.2 * low if parameter.positive else low - reach), high + reach
-        elif parameter.name in study.space.bounds and parameter.choices is None:
-            low, high = study.space.bounds[parameter.name]
-            if parameter.unit == "angle" and high - low >= 2.0 * np.pi - 1e-9:
-                low, high = low - np.pi, high + np.pi
-        else:
-            continue
-        for limit in study.parameter_limits:
-            if limit.output == parameter.name:
-                low = low if limit.minimum is None else max(low, limit.minimum)
-                high = high if limit.maximum is None else min(high, limit.maximum)
-        bounds[parameter.name] = (low, high)
-    held = {name: ends[0] for name, ends in bounds.items() if ends[0] == ends[1]}
-    names = tuple(name for name in bounds if name not in held)
-    fixed = {name: value for name, value in study.space.fixed.items() if name in study.family.parameter_names}
+    coordinates = (
+        LocusCoordinates(study.locus) if study.locus and (_wanted(study) if on_locus is None else on_locus) else None
+    )
+    follows, given = ((), ()) if coordinates is None else (coordinates.made, coordinates.given)
+    bounds = {name: _bounds(study, name, designs) for name in (*study.family.parameter_names, *given)}
+    varied = {name: ends for name, ends in bounds.items() if ends is not None and name not in follows}
+    held = {name: ends[0] for name, ends in varied.items() if ends[0] == ends[1]}
+    names = tuple(name for name in varied if name not in held)
+    own = [name for name in (*study.family.parameter_names, *given) if name not in follows]
+    fixed = {name: abs(x) if name in given else x for name, x in study.space.fixed.items() if name in own}
+    limits = [limit for limit in study.output_limits if limit.output not in given]
+    limits += [limit for limit in study.parameter_limits if limit.output in follows]
     return Problem(
-        study.family, names, np.array([bounds[n][0] for n in names]), np.array([bounds[n][1] for n in names]),
-        fixed | held, study.objective.output, study.output_limits, study.window, study.accuracy,
+        study.family, names, np.array([varied[n][0] for n in names]), np.array([varied[n][1] for n in names]),
+        fixed | held, study.objective.output, tuple(limits), study.window, study.accuracy, coordinates,
     )  # fmt: skip
+
+
+def _wanted(study: Study) -> bool:
+    """Whether the search goes along the locus: as the study says, or where that spares it an equation."""
+    if study.optimise is not None and study.optimise.variables is not None:
+        return study.optimise.variables == "locus"
+    return any(limit.output in study.prescribed and limit.minimum == limit.maximum for limit in study.limits)
+
+
+def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | None:
+    """Between which a parameter or a prescribed output may vary; None where it is given, or a sign."""
+    names = study.family.parameter_names
+    parameter = next(p for p in (*study.family.parameters, *_prescribed(study)) if p.name == name)
+    if parameter.choices is not None:
+        return None
+    if name in (*study.made, *study.rescaled):
+        low, high = (float(end) for end in np.percentile(designs[:, names.index(name)], TAILS))
+        reach = 0.5 * max(abs(low), abs(high)) if parameter.unit == "length" else 0.5
+        low, high = (0.2 * low if parameter.positive else low - reach), high + reach
+    elif name in study.space.bounds:
+        low, high = study.space.bounds[name]
+        if name not in names and not name.startswith("phi"):
+            low, high = sorted((abs(low), abs(high)))  # the branch tells the sign of swing and stroke
+        elif parameter.unit == "angle" and high - low >= WHOLE_TURN:
+            low, high = low - np.pi, high + np.pi
+    else:
+        return None
+    for limit in study.parameter_limits:
+        if limit.output == name:
+            low = low if limit.minimum is None else max(low, limit.minimum)
+            high = high if limit.maximum is None else min(high, limit.maximum)
+    return low, high
+
+
+def _prescribed(study: Study) -> tuple[Parameter, ...]:
+    return () if study.locus is None else study.locus.prescribed
 
 
 def problem_and_starts(study: Study, folder: Path) -> tuple[OptimiseSettings, Problem, Array]:
@@ -152,8 +191,10 @@ def _table(study: Study, problem: Problem, results: list[Result]) -> dict[str, A
 
 
 def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
-    """The study's reference design (1, P), which may lie outside the bounds, and its largest violation."""
+    """The study's reference design (1, P), which may lie outside the bounds or off the locus, and its violation."""
     design, _ = design_matrix(study.family, study.reference or {})
+    if problem.coordinates is not None:
+        problem = problem_of(study, design, on_locus=False)
     model = Model(problem, Program(problem), design[0], lambda: False)
     return design, model.state(problem.scaled(design)[0]).violation
 

@@ -182,6 +182,8 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     for k, name in _texts(data, "scene", "want"):
         read_output_name(family, name, ("scene", "want", k), faults)
     locus = read_locus(bare, faults) if prescribed_table is not None else None
+    if search.variables == "locus" and prescribed_table is None:
+        faults.value(("optimise", "variables"), "locus", '"parameters", or a table [locus]')
     sampled = isinstance(design, dict) and "sample" in design
     prescribed = {} if locus is None else read_prescribed(locus, prescribed_table or {}, faults, sampled)
     for name in [name for name in bounds or () if name in prescribed]:
@@ -225,7 +227,9 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         objective=Objective(goal) if goal else None,
         accuracy=accuracy,
         window=window,
-        optimise=OptimiseSettings(search.starts, search.seed, time_budget) if "optimise" in data else None,
+        optimise=OptimiseSettings(search.starts, search.seed, time_budget, search.variables)
+        if "optimise" in data
+        else None,
         pareto=pareto,
         tolerance=tolerance,
         reference=reference,

@@ -137,6 +137,7 @@ class OptimiseSection(Section):
     starts: Annotated[int, Field(ge=1, le=100_000)] = Field(20, description="a whole number, 1 to 100000")
     seed: Seed = Field(0, description="a whole number, 0 or greater")
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
+    variables: Literal["parameters", "locus"] | None = Field(None, description='"parameters" or "locus"')
 
 
 class ParetoSection(Section):

@@ -41,11 +41,15 @@ class Objective:
 
 @dataclass(frozen=True)
 class OptimiseSettings:
-    """Number of starts of the local search, seed of their choice, time allowed [s]."""
+    """Number of starts of the local search, seed of their choice, time allowed [s], and what is varied.
+
+    ``variables`` is "locus" for what [locus] prescribes, "parameters" for the links, None for what suits the study.
+    """
 
     starts: int = 20
     seed: int = 0
     time_budget: float | None = None
+    variables: Literal["parameters", "locus"] | None = None
 
 
 @dataclass(frozen=True)
@@ -172,7 +176,7 @@ class Study:
             "objective": self.objective and self.objective.output,
             "accuracy": {"samples": self.accuracy.samples, "target": self.accuracy.target},
             "window": self.window,
-            "optimise": self.optimise and asdict(self.optimise),
+            "optimise": self.optimise and _without_none(asdict(self.optimise), "variables"),
             "reference": self.reference,
             "output": asdict(self.output),
         }
@@ -183,6 +187,11 @@ class Study:
         if self.tolerance is not None:
             content["tolerance"] = asdict(self.tolerance)
         return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
+def _without_none(content: dict[str, Any], name: str) -> dict[str, Any]:
+    """A key that came later: without a value it leaves the fingerprints of older datasets as they are."""
+    return {key: value for key, value in content.items() if key != name or value is not None}
 
 
 def _space_content(space: DesignSpace) -> Mapping[str, Any]:

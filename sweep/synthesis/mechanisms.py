@@ -29,9 +29,9 @@ def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = 
     ----------
     family : "rssr" or "rssp"
     table : DataFrame or mapping, one length unit, rad.  ``rssr``: swing, phi0, e, f, g, alpha and either phi1 (the
-        place on the locus: crank angle of the extended position) or psi1 (rocker angle there); or phi1, c and direction =
-        atan2(g, e) instead of e and g.  ``rssp``: stroke, f, alpha and phi0 with either phi1 or e; or, without phi0, e
-        and the place s1 where the stroke begins.
+        place on the locus: crank angle of the extended position) or psi1 (rocker angle there); or phi1, c and
+        direction = atan2(g, e) instead of e and g.  ``rssp``: stroke, f, alpha and phi0 with either phi1 or e; or,
+        without phi0, e and the place s1 where the stroke begins.
         Swing and stroke are signed, folded minus extended.  Where psi1 or e is given there are two solutions, told
         apart by ``root``; without such a column both are returned, one row each.
     max_pressure_angle : limit for test (v) [rad]; none if not given

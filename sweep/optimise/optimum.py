@@ -1,0 +1,56 @@
+"""``optimum``: a problem answered from nothing but its statement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels import status as st
+from sweep.optimise.candidates import from_sample
+from sweep.optimise.certificate import Result
+from sweep.optimise.eliminate import on_locus
+from sweep.optimise.problem import Problem
+from sweep.optimise.solve import minimise
+
+if TYPE_CHECKING:
+    from sweep.study import OptimiseSettings
+
+
+def optimum(
+    problem: Problem,
+    signs: Sequence[dict[str, float]],
+    settings: OptimiseSettings,
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+) -> list[Result]:
+    """Best designs of a problem: equations eliminated where they can be, a sample, local searches from the best of it.
+
+    Where no start becomes feasible the equations may give way as well: a second search, in the parameters themselves,
+    begins from the least infeasible design and a sample, and finds the smallest relaxation of all limits.
+
+    Parameters
+    ----------
+    problem : in the parameters themselves
+    signs : combinations of the parameters that are not varied, as ``[{"branch": 1.0}, {"branch": -1.0}]``
+    settings : number of starts, seed of the sample, time for each search
+    stop, jobs : as for ``minimise``
+
+    Returns
+    -------
+    Results as of ``minimise``, best first.  Same arguments, same results, unless time ran out.
+
+    Raises
+    ------
+    InputError
+        if there is no start, or a name of the problem is unknown.
+    """
+    searched = on_locus(problem)
+    starts = from_sample(searched, signs, settings.starts, settings.seed)
+    results = minimise(searched, starts, settings, stop, jobs) if len(starts) or searched is problem else []
+    if searched is problem or any(result.status != st.LIMIT_EXCEEDED for result in results):
+        return results
+    near = [result.design for result in results[:1]]
+    starts = from_sample(problem, signs, settings.starts, settings.seed)
+    return minimise(problem, np.array([*near, *starts]), settings, stop, jobs)
