@@ -187,3 +187,13 @@ def test_starts_that_are_no_designs_are_refused():
     problem = spatial(50.0)
     with pytest.raises(InputError, match="starts"):
         minimise(problem, np.empty((0, 8)), ONCE)
+
+
+def test_start_whose_links_reach_a_part_of_the_turn_is_brought_to_turn_and_one_that_reaches_nowhere_is_told():
+    problem = Problem(RSSR, SPACE, LOW, HIGH, {"branch": 1.0}, "max_abs_d2psi", (
+        Limit("swing", 0.8, 0.9), Limit("max_pressure_angle", None, 0.8)))  # fmt: skip
+    part = np.array([0.59, 3.0, 1.68, 0.9, 0.4, 0.0, 0.45])
+    nowhere = np.array([0.265, 2.0, 2.23, 3.0, 2.0, -2.0, math.pi / 2])
+    turned, lost = sorted(minimise(problem, problem.rows(np.array([part, nowhere])), ONCE), key=lambda r: r.start)
+    assert turned.status == st.OK and turned.kkt_residual <= 1e-6
+    assert lost.status == st.OK or lost.relaxation, "a design without any pose is no answer"

@@ -60,11 +60,11 @@ class Descent:
         """Smallest relaxation of the limits: zero where a feasible design is near."""
         for _ in range(ROUNDS):
             before = self.best
-            if math.isinf(before.form.known_violation(before.atoms)):
+            if math.isinf(before.known):
                 return  # the links reach nowhere: there is nothing to follow
             self._rounds(slsqp.propose, relaxed=True, enough=1e-4)
             same_rows = before.form.complete == self.best.form.complete
-            if self.best.feasible or (same_rows and self.best.short > 0.999 * before.short):
+            if self.best.feasible or (same_rows and self.best.known > 0.999 * before.known):
                 break
         if not self.best.feasible and self.best.form.complete:
             self._rounds(newton.propose, relaxed=True, enough=1e-13)
@@ -83,7 +83,7 @@ class Descent:
             if relaxed:
                 form, t, floor = form.relaxed({"rotatable"} if at.form.complete else set()), at.short, 0.0
                 if not at.form.complete:
-                    t = at.form.known_violation(at.atoms)
+                    t = at.known
             fractions, reached = propose(self.model, at, form, t, radius, floor)
             new = self.model.state(fractions)
             gain = at.short - new.short if relaxed else at.merit(self.model.price) - new.merit(self.model.price)
@@ -92,7 +92,7 @@ class Descent:
                 self.best, extra, refused = new, Points.of([]), False
                 residual = math.nan if relaxed else self.model.learn(new)
                 radius = max(radius, min(1.0, 2.0 * step))
-                true = new.short if relaxed else new.objective
+                true = new.known if relaxed else new.objective
                 self.gap = abs(true - reached) / max(abs(true), 1e-300)
                 if gain <= enough * max(abs(true), 1.0) or (relaxed and new.feasible):
                     return

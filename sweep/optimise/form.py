@@ -48,7 +48,11 @@ class Label:
 
 @dataclass(frozen=True)
 class Form:
-    """Rows of the program and the points whose curves they use."""
+    """Rows of the program and the points whose curves they use.
+
+    ``complete`` says that the design turns and every limit exists for it, ``reaches`` that every stage assembles
+    somewhere, so that its margin says how far it is from turning.
+    """
 
     points: Points
     scalars: tuple[str, ...]
@@ -58,6 +62,7 @@ class Form:
     equal: NDArray[np.bool_]
     labels: tuple[Label, ...]
     complete: bool
+    reaches: bool
 
     def rows(self, atoms: Array, t: float) -> Array:
         """The rows' values; a row that is nan counts as far outside."""
@@ -79,7 +84,9 @@ class Form:
         return self.known_violation(atoms)
 
     def known_violation(self, atoms: Array) -> float:
-        """Largest scaled violation of those limits that exist for this design."""
+        """Largest scaled violation of those limits that exist for this design; infinite where it reaches nowhere."""
+        if not self.reaches:
+            return math.inf
         c = self.constant + self.matrix @ atoms
         own = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
         if np.isnan(c[own]).any():
@@ -122,10 +129,11 @@ class Program:
             raise InputError("objective", problem.objective, "a quantity that changes steadily", PLACE)
         for name in (problem.objective, *(limit.output for limit in problem.limits)):
             measure(problem.family, name, problem.window)  # unknown names end here
-            if output(problem.family, name).jumps:
+            if name not in problem.family.parameter_names and output(problem.family, name).jumps:
                 raise InputError(name, "constant in pieces", "a quantity that changes steadily", PLACE)
-        turning = Measure("rotatable", "min", margins(problem.family), "rotatable")
-        self.requirements = [Requirement(turning, turning.to_inner(1.0), None)] if turning.series else []
+        self.turning = Measure("rotatable", "min", margins(problem.family), "rotatable")
+        turns = Requirement(self.turning, self.turning.to_inner(1.0), None)
+        self.requirements = [turns] if self.turning.series else []
         for limit in problem.limits:
             found = measure(problem.family, limit.output, problem.window)
             if found.inner == "rotatable":
@@ -153,7 +161,8 @@ class Program:
             complete = layout.require(requirement) and complete
         for term, shift in layout.upper(self.objective):
             layout.add(term, shift, -1.0 / scale, 0.0, 1.0, False, Label(self.objective.name, "objective"))
-        return layout.form(complete and layout.has_objective)
+        reaches = all(curves.series.index(s) in points.series for s in self.turning.series)
+        return layout.form(complete and layout.has_objective, reaches)
 
     def value(self, found: Measure, form: Form, curves: Curves, design: Array, atoms: Array) -> float:
         """A measure's value in its own unit; nan where it does not exist."""
@@ -274,7 +283,7 @@ class _Layout:
         )
         return max(abs(bound), 1e-3 * amplitude) or 1.0
 
-    def form(self, complete: bool) -> Form:
+    def form(self, complete: bool, reaches: bool) -> Form:
         matrix = np.zeros((len(self.terms), 2 * len(self.points) + len(self.scalars)))
         for row, term in enumerate(self.terms):
             for k, weight in term.items():
@@ -282,5 +291,5 @@ class _Layout:
         constant, slack, equal, labels = (list(c) for c in zip(*self.rest, strict=True)) if self.rest else ([],) * 4
         return Form(
             self.points, self.scalars, matrix, np.array(constant, np.float64), np.array(slack, np.float64),
-            np.array(equal, np.bool_), tuple(labels), complete,
+            np.array(equal, np.bool_), tuple(labels), complete, reaches,
         )  # fmt: skip

@@ -47,10 +47,14 @@ class State:
         return self.violation <= FEASIBLE
 
     @property
+    def known(self) -> float:
+        """Largest scaled violation of the limits that exist for this design."""
+        return self.form.known_violation(self.atoms)
+
+    @property
     def short(self) -> float:
         """What the elastic program makes small; designs that do not turn rank behind all that do."""
-        known = self.form.known_violation(self.atoms)
-        return known if self.form.complete else known + NOT_TURNING
+        return self.known if self.form.complete else self.known + NOT_TURNING
 
 
 class Model:

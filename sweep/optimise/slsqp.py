@@ -10,7 +10,10 @@ from sweep.families.base import Array
 from sweep.optimise.form import Form
 from sweep.optimise.model import Model, State
 
-ITERATIONS = 30
+ITERATIONS, PER_VARIABLE = (
+    30,
+    3,
+)  # in few variables curvature is known after a few steps, and Newton does the rest faster
 
 
 def propose(model: Model, at: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:
@@ -42,7 +45,7 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
         if own.any()
     ]
     run: Any = minimize
-    options = {"maxiter": ITERATIONS, "ftol": 1e-13}
+    options = {"maxiter": min(ITERATIONS, PER_VARIABLE * len(low)), "ftol": 1e-13}
     found = run(
         lambda z: (z[-1], gradient), begin, jac=True, method="SLSQP", bounds=bounds, constraints=constraints,
         options=options,
