@@ -89,7 +89,7 @@ def with_accuracy(study: Study, target: float | None = None, certify: bool | Seq
     Raises
     ------
     StudyError
-        if the target is not between 1e-15 and 1, or what is wanted cannot be proven.
+        if the target is not between 1e-14 and 0.1, or what is wanted cannot be proven.
     """
     setting = accuracy_table(study.accuracy)
     if target is not None:

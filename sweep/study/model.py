@@ -124,7 +124,7 @@ class ObjectiveSection(Section):
 class AccuracySection(Section):
     """[accuracy]"""
 
-    target: Annotated[float, Field(ge=1e-15, lt=1.0)] | None = Field(None, description="a relative error, 1e-15 to 1")
+    target: Annotated[float, Field(ge=1e-14, le=0.1)] | None = Field(None, description="a relative error, 1e-14 to 0.1")
     samples: Annotated[int, Field(ge=4, le=1_000_000)] | None = Field(
         None, description="a whole number of crank angles, 4 to 1000000"
     )
