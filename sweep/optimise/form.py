@@ -150,7 +150,7 @@ class Program:
             self.requirements.append(Requirement(found, sides[0], sides[1]))
         measures = [self.objective, *(r.measure for r in self.requirements)]
         self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
-        self.scalars = tuple(dict.fromkeys(m.name for m in measures if m.kind == "scalar"))
+        self.scalars = tuple(dict.fromkeys(name for m in measures for name in m.numbers))
         self.places = any(m.kind.startswith("phi") for m in measures)
 
     def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
@@ -217,8 +217,8 @@ class _Layout:
         return self._bounded(m, above=m.sign < 0.0)
 
     def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
-        if m.kind == "scalar":
-            return [({2 * len(self.points) + self.scalars.index(m.name): m.sign}, 0.0)]
+        if m.numbers:
+            return self._numbers(m, above)
         maxima, minima = self._ends(m.series)
         if m.kind in ("max", "min"):
             many = above == (m.kind == "max")
@@ -245,6 +245,18 @@ class _Layout:
             return [({k + end: 1.0}, self._turns(end))]
         apart = self.points.phi[fold] - self.points.phi[ext]
         return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
+
+    def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        """A plain number, or every length with both signs; only the largest length has to stay above a bound."""
+        first = 2 * len(self.points)
+        if m.kind == "scalar":
+            return [({first + self.scalars.index(m.name): m.sign}, 0.0)]
+        names = self.curves.family.parameter_names
+        sizes = {name: float(self.design[names.index(name)]) for name in m.numbers}
+        if above:
+            return [({first + self.scalars.index(name): sign}, 0.0) for name in sizes for sign in (1.0, -1.0)]
+        name = max(sizes, key=lambda name: abs(sizes[name]))
+        return [({first + self.scalars.index(name): math.copysign(1.0, sizes[name])}, 0.0)]
 
     def _outward(self, position: str) -> float:
         """+1 where the extended position is the largest: the branch of the stage (of the last one) says so."""
@@ -275,7 +287,7 @@ class _Layout:
             return 1.0 + bound  # sin^2 of the limit: a few degrees are as hard a limit as forty
         if any(s.pressure for s in r.measure.series):
             return 1.0
-        if r.measure.kind == "scalar":
+        if r.measure.numbers:
             return max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)) or 1.0
         ends = [k for side in self._ends(r.measure.series) for k in side]
         amplitude = (

@@ -16,12 +16,13 @@ from sweep.catalogue import STAY
 from sweep.errors import InputError
 from sweep.families.base import Family
 from sweep.means import PREFIX
+from sweep.size import SIZE, lengths
 
 # A crank that turns must keep this much of Delta/b^2 at its worst pose: cos^2 of 89.94 degrees.
 ROTATABLE_MARGIN = 1e-6
 
 Kind: TypeAlias = Literal[
-    "max_abs", "max", "min", "range", "phi_max_abs", "ext", "fold", "phi_ext", "phi_fold", "phi0", "scalar"
+    "max_abs", "max", "min", "range", "phi_max_abs", "ext", "fold", "phi_ext", "phi_fold", "phi0", "scalar", "lengths"
 ]
 Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable"]
 
@@ -43,13 +44,18 @@ class Series:
 
 @dataclass(frozen=True)
 class Measure:
-    """A design output as ``sign`` * (reduction ``kind`` of its series), read back through ``inner``."""
+    """A design output as ``sign`` * (reduction ``kind`` of its series), read back through ``inner``.
+
+    ``numbers`` are plain numbers instead of series: the output itself ("scalar"), or parameters of which it is the
+    largest magnitude ("lengths").
+    """
 
     name: str
     kind: Kind
     series: tuple[Series, ...]
     inner: Inner = "same"
     sign: float = 1.0
+    numbers: tuple[str, ...] = ()
 
     def to_inner(self, value: float) -> float:
         """Inner value that stands for a value of the output."""
@@ -99,8 +105,8 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     family : whose output it is
     name : ``margin``, ``rotatable``, ``max_pressure_angle``, ``swing``, ``stroke``, ``phi0``, ``stroke_ratio``,
         positions and angles of the limit positions, ``max_abs_x``, ``phi_max_abs_x``, ``max_x``, ``min_x``, ``range_x``
-        of any pose output x; chains: with a stage number.  ``rms_x``, parameters, and what only a step of the family
-        computes, are taken as numbers without inner structure.
+        of any pose output x, ``size``; chains: with a stage number.  ``rms_x``, parameters, and what only a step of the
+        family computes, are taken as numbers without inner structure.
     window : see :class:`sweep.optimise.problem.Problem`
 
     Raises
@@ -134,10 +140,12 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     mean = name.startswith(PREFIX) and name.removeprefix(PREFIX) in family.pose_names
     steps = {output.name for step in family.steps for output in step.provides}
     if mean or name == STAY.name or name in steps or name in family.parameter_names:
-        return Measure(name, "scalar", ())
+        return Measure(name, "scalar", (), numbers=(name,))
+    if name == SIZE.name and lengths(family):
+        return Measure(name, "lengths", (), numbers=lengths(family))
     known = (
         "margin, rotatable, max_pressure_angle, swing or stroke, phi0, stroke_ratio, max_abs_x, max_x, min_x, range_x, "
-        "rms_x"
+        "rms_x, size"
     )
     raise InputError(
         "output", name, f"{known} for x = {', '.join(family.pose_names)}", f"design outputs of {family.name}"
