@@ -120,6 +120,7 @@ def candidate_cost(count: int = 1 << 20) -> dict[str, float]:
 def page(outcomes: list[Outcome], larger: int, seed: int) -> str:
     """The table and which marks are met, as markdown."""
     n, cost = len(outcomes), candidate_cost()
+    command = "make bench-optimise" if larger == LARGER else f"python -m tests.bench.optimise --larger {larger}"
     met = {
         f"within {AGREE:g} of the best value of a search {larger} times larger": (
             sum(o.gap <= AGREE for o in outcomes), n
@@ -130,7 +131,7 @@ def page(outcomes: list[Outcome], larger: int, seed: int) -> str:
     lines = [
         "# The optimiser on random specifications",
         "",
-        "Written by `make bench-optimise`; do not edit. What is measured: [optimiser.md](optimiser.md), Marks.",
+        f"Written by `{command}`; do not edit. What is measured: [optimiser.md](optimiser.md), Marks.",
         "",
         f"Measured on {description()}. Specifications of seed {seed}.",
         "",
