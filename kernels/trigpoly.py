@@ -62,7 +62,8 @@ def _step(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> flo
     step = -2.0 * d1 * d2 / below
     convex = (d2 > 0.0) & (below > 0.0)
     step = step if convex else math.copysign(0.3, -d1)
-    step = 0.0 if d1 == 0.0 else step
+    # On top of a maximum, where symmetric polynomials have a sample, either side is downhill.
+    step = 0.0 if (d1 == 0.0) & (d2 >= 0.0) else step
     return min(max(step, -0.3), 0.3)
 
 

@@ -170,3 +170,20 @@ def test_rssp_kernel_calls_a_nonsense_design_invalid():
         assert columns["status"][0, 0] == st.INVALID_INPUT
         assert np.isnan(columns["s"][0, 0])
         assert np.isnan(columns["discriminant"][0, 0])
+
+
+@pytest.mark.parametrize("off", [-0.0088, 1e-3, 1e-6, 0.0])
+def test_derivatives_keep_their_digits_where_the_axis_of_the_crank_is_square_to_the_slide(off):
+    """alpha near 90 deg and e near 0: the halves of Q' nearly cancel; the links themselves are known to 2^-53."""
+    phi, reach = 4.436, 0.15
+    design = by_construction(1.0, 0.00179, 0.9027, 0.5 * math.pi + off, phi, reach, 1.0)
+    got = evaluated(design, phi, WANT[:4])
+    with mp.workdps(40):
+        a, b, e, f, alpha, _ = (mp.mpf(x) for x in design)
+        u, v, sa, ca = mp.cos(phi), mp.sin(phi), mp.sin(alpha), mp.cos(alpha)
+        m, n, y = e - a * u, f * ca - a * sa * v, f * sa + a * ca * v
+        w = mp.sqrt(b * b - m * m - n * n)
+        w1 = (a * ca * u * y - a * e * v) / w
+        # a rounding of b moves w by b/w times as much, and w1 with it
+        allowed = 2.0**-53 * float(8 * (abs(a * ca * u) + abs(a * e * v / w)) * (1 + b * b / (w * w)))
+        assert abs(got["ds"] - float(a * ca * u + w1)) <= allowed + 4.0 * 2.0**-53 * float(abs(a * ca * u * y / w))

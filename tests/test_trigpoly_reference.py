@@ -135,3 +135,14 @@ def test_sine_and_cosine_are_right_to_one_unit_in_the_last_place():
 @pytest.mark.parametrize("x", [math.nan, math.inf, -math.inf])
 def test_sine_of_no_number_is_nan(x):
     assert np.isnan(sincos(x)).all()
+
+
+def test_a_sample_on_top_of_a_maximum_between_two_minima_is_left():
+    """Even polynomials with two minima about 0: the lowest of 16 points is the maximum between them."""
+    c2 = np.linspace(0.2501, 0.27, 50)
+    coefficients = np.column_stack([np.full(50, -1.0), np.zeros(50), c2, np.zeros(50)])
+    found = least(coefficients)
+    np.testing.assert_allclose(found[:, 0], 0.25 / c2, atol=1e-12)
+    np.testing.assert_allclose(found[:, 2], -c2 - 0.125 / c2, rtol=1e-15)
+    mirrored = least(coefficients * np.array([-1.0, 1.0, 1.0, 1.0]))
+    np.testing.assert_allclose(mirrored[:, 0], -0.25 / c2, atol=1e-12)

@@ -84,17 +84,16 @@ def poses(
                 joints[5, i, j] = 0.0 if assembled else math.nan
             if ds is not None or d2s is not None or d3s is not None:
                 per_w = 1.0 / w if code == st.OK else math.nan * w
-                m1, n1 = r.a * v, -(r.na * u)
-                q1 = -(m * m1 + n * n1)
+                # m m' + n n' with cos^2(phi) + sin^2(phi) = 1 taken out: as it stands it cancels for alpha near 90 deg
+                q1 = r.ka * u * y - r.a * v * r.e
                 w1 = q1 * per_w
                 if ds is not None:
                     ds[i, j] = (r.ka * u + w1) * r.unit
                 if d2s is not None or d3s is not None:
-                    m2, n2 = r.a * u, r.na * v
-                    q2 = -(m1 * m1 + n1 * n1 + m * m2 + n * n2)
+                    q2 = r.ka * (r.ka * u * u - v * y) - r.a * u * r.e
                     w2 = (q2 - w1 * w1) * per_w
                     if d2s is not None:
                         d2s[i, j] = (w2 - r.ka * v) * r.unit
                     if d3s is not None:
-                        q3 = -q1 - 3.0 * (m1 * m2 + n1 * n2)
+                        q3 = -q1 - 3.0 * r.ka * r.ka * u * v
                         d3s[i, j] = ((q3 - 3.0 * w1 * w2) * per_w - r.ka * u) * r.unit

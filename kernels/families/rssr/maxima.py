@@ -1,6 +1,6 @@
 """True maxima of |psi'|, |psi''|, |psi'''| over the turn, refined between samples (docs/rssr.md, section 6).
 
-Per design: the exact margin, then N >= 11/rho samples, rho being the distance of the nearest singularity of the motion;
+Per design: the exact margin; if it turns N >= 11/rho samples, rho being the distance of the nearest singularity;
 then every local maximum of at least 60 % of the best is refined on the next derivative, vectorised over the maxima of
 a whole block of designs.  A maximum whose refinement fails its checks, or a design that would need more than 1024
 samples, goes to :mod:`kernels.families.rssr.careful`.
@@ -27,6 +27,7 @@ from kernels.families.rssr.block import (
     K2,
     S1,
     S2,
+    SA,
     SIN,
     TOLERANCE,
     VALID,
@@ -74,6 +75,9 @@ CAPACITY = (
     _REACH,
 ) = (k * CAPACITY for k in range(19))
 _ROWS = 19
+_NONE = (math.nan, math.nan, math.nan, math.nan)
+_LAST = _LEFT  # the last step, once the sample before the maximum has served
+_NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # what the search needs of a design
 _TURNED = 4e-12  # error of an angle that is the sum of a few turns by :func:`rotate`
 _FLOOR, _MARKS = (FEWEST + 2) * BLOCK, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
 _EXPONENT = np.array([0, 0, 1, 13, 2, 16, 14, 6, 3, 8, 17, 12, 15, 5, 7, 11, 4, 10, 9])  # k of 2^k modulo 19
@@ -131,18 +135,23 @@ def _jet(m: Array, i: int, first: Array | None, second: Array | None) -> tuple[f
 
 
 @inline
-def _refine(count: int, m: Array, rounds: int, first: Array | None, second: Array | None) -> None:
-    """Newton steps to the zero of the next derivative, uphill where it is not concave; all maxima side by side."""
+def _begin(count: int, m: Array) -> None:
+    """Move each maximum to the vertex of the parabola through its three samples."""
     for i in range(count):
         left, right = m[i + _PEAK] - m[i + _LEFT], m[i + _PEAK] - m[i + _RIGHT]
-        offset = 0.5 * (left - right) / (left + right)  # vertex of the parabola through the three samples
+        offset = 0.5 * (left - right) / (left + right)
         m[i + _GUESS] = m[i + _PEAK] + 0.25 * offset * (left - right)
         u, v = rotate(m[i + _U], m[i + _V], offset * m[i + _WIDTH])
         m[i + _U] = u
         m[i + _V] = v
         m[i + _MOVED] = offset * m[i + _WIDTH]
+
+
+@inline
+def _refine(begin: int, end: int, m: Array, rounds: int, first: Array | None, second: Array | None) -> None:
+    """Newton steps to the zero of the next derivative, uphill where it is not concave; all maxima side by side."""
     for _ in range(rounds):
-        for i in range(count):
+        for i in range(begin, end):
             y, dy, d2y = _jet(m, i, first, second)
             width = m[i + _WIDTH]
             step = -dy / d2y if y * d2y < 0.0 else math.copysign(width, y * dy)
@@ -154,13 +163,17 @@ def _refine(count: int, m: Array, rounds: int, first: Array | None, second: Arra
 
 
 @inline
-def _finish(count: int, m: Array, order: int, target: float, first: Array | None, second: Array | None) -> None:
+def _finish(
+    begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None
+) -> None:
     """Peak of the parabola through the last point, what it adds as an error estimate, and the rounding error."""
-    for i in range(count):
+    for i in range(begin, end):
         y, dy, d2y = _jet(m, i, first, second)
-        rise = -0.5 * dy * dy / d2y * math.copysign(1.0, y)
-        peak = abs(y) + rise
-        trusted = (y * d2y < 0.0) & (rise <= target * peak) & (abs(m[i + _MOVED]) <= m[i + _WIDTH])
+        step = -dy / d2y
+        rise = 0.5 * dy * step * math.copysign(1.0, y)
+        peak, width = abs(y) + rise, m[i + _WIDTH]
+        m[i + _LAST] = step
+        trusted = (y * d2y < 0.0) & (rise <= target * peak) & (abs(m[i + _MOVED]) <= width)
         trusted = trusted & (abs(peak - m[i + _GUESS]) <= 0.2 * peak)
         m[i + _PEAK] = peak
         m[i + _ERROR] = rise if trusted else math.inf
@@ -178,7 +191,23 @@ def _finish(count: int, m: Array, order: int, target: float, first: Array | None
             peak,
         )
         m[i + _ROUNDING] = relative
-        m[i + _REACH] = 2.0 * abs(dy / d2y) + 4.0 * relative * math.sqrt(abs(y / d2y)) + _TURNED
+        # What a step of Newton's method leaves is quadratic; that of the jerk has a slope good to a thousandth.
+        left = step * (4.0 * step / width + (1e-3 if order == 3 else 0.0) * math.copysign(1.0, step))
+        m[i + _REACH] = left + 4.0 * relative * math.sqrt(abs(y / d2y)) + _TURNED
+
+
+@kernel
+def _settle(
+    begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None
+) -> float:
+    """More steps for the maxima not trusted yet; the largest error estimate of all, infinite if one still is not."""
+    worst = 0.0
+    for i in range(begin, end):
+        if not m[i + _ERROR] < math.inf:
+            _refine(i, i + 1, m, 3, first, second)
+            _finish(i, i + 1, m, order, target, first, second)
+        worst = max(worst, m[i + _ERROR])
+    return worst
 
 
 @inline
@@ -256,6 +285,33 @@ def _careful(at: Array, k: int, order: int, target: float) -> tuple[float, float
     )  # fmt: skip
 
 
+@inline
+def _put(
+    i: int,
+    result: tuple[float, float, float, float],
+    phi: Array | None,
+    error: Array | None,
+    phi_error: Array | None,
+    max_abs_dpsi: Array | None,
+    max_abs_d2psi: Array | None,
+    max_abs_d3psi: Array | None,
+) -> None:
+    """Write height, place and the errors of both of design i."""
+    best, place, bound, reach = result
+    if phi is not None:
+        phi[i] = place - TURN * np.floor(place / TURN)  # math.floor makes an integer, which nan is not
+    if error is not None:
+        error[i] = bound
+    if phi_error is not None:
+        phi_error[i] = reach
+    if max_abs_dpsi is not None:
+        max_abs_dpsi[i] = best
+    if max_abs_d2psi is not None:
+        max_abs_d2psi[i] = best
+    if max_abs_d3psi is not None:
+        max_abs_d3psi[i] = best
+
+
 @kernel
 def true_maxima(
     designs: Array,
@@ -289,64 +345,67 @@ def true_maxima(
     """
     order = 1 if max_abs_dpsi is not None else (2 if max_abs_d2psi is not None else 3)
     per_rho = 11.0 if order < 3 else 18.0
-    rounds = (2 if order == 1 else 4) - (1 if target > 1e-4 else 0)
-    at, m, size, grid = new_block(), np.empty(_ROWS * CAPACITY), np.empty(MOST + 2), np.empty((FEWEST + 4) * BLOCK)
+    # The parabola at the end is one more; the one maximum in hundreds that is not settled then gets another three.
+    rounds = (2 if order == 1 else 3) - (1 if target > 1e-4 else 0)
+    at, who = new_block(), np.empty(BLOCK, np.int64)
+    m, size, grid = np.empty(_ROWS * CAPACITY), np.empty(MOST + 2), np.empty((FEWEST + 4) * BLOCK)
     first_peak = np.empty(BLOCK + 1, np.int64)
     for start in range(0, designs.shape[0], BLOCK):
-        block = min(BLOCK, designs.shape[0] - start)
-        load_block(designs, start, block, at)
-        least_delta(block, at)
-        singularity_distance(block, at)
-        _sample_block(block, at, cos, sin, grid, max_abs_dpsi, max_abs_d2psi)
-        _mark_peaks(block, grid)
+        count = min(BLOCK, designs.shape[0] - start)
+        load_block(designs, start, count, at)
+        least_delta(count, at)
+        # What does not turn costs its verdict only: the others move together.
+        block = 0
+        for k in range(count):
+            i = start + k
+            status[i] = turning_status(at[k + DELTA], at[k + TOLERANCE], at[k + VALID] != 0.0)
+            who[block] = k
+            block += 1 if status[i] == st.OK else 0
+        if block < count:
+            for i in range(start, start + count):
+                _put(i, _NONE, phi, error, phi_error, max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
+            for row in _NEEDED:
+                for i in range(block):
+                    at[row + i] = at[row + who[i]]
+        padded = (block + 7) & ~7  # whole vectors; what stands in the surplus is never read
+        singularity_distance(padded, at)
+        _sample_block(padded, at, cos, sin, grid, max_abs_dpsi, max_abs_d2psi)
+        _mark_peaks(padded, grid)
         count = 0
-        for k in range(block):
-            first_peak[k] = count
-            status[start + k] = turning_status(at[k + DELTA], at[k + TOLERANCE], at[k + VALID] != 0.0)
-            if status[start + k] != st.OK or at[k + ACROSS] * MOST < per_rho:
+        for i in range(block):
+            first_peak[i] = count
+            if at[i + ACROSS] * MOST < per_rho:
                 continue
             n = FEWEST
-            while n * at[k + ACROSS] < per_rho:
+            while n * at[i + ACROSS] < per_rho:
                 n *= 2
             if n == FEWEST:
-                count = _list_marked(at, k, cos, sin, grid, m, count)
+                count = _list_marked(at, i, cos, sin, grid, m, count)
             else:
-                _sample(at, k, cos, sin, n, size, max_abs_dpsi, max_abs_d2psi)
-                count = _list_peaks(at, k, cos, sin, n, size, m, count)
+                _sample(at, i, cos, sin, n, size, max_abs_dpsi, max_abs_d2psi)
+                count = _list_peaks(at, i, cos, sin, n, size, m, count)
         first_peak[block] = count
-        padded = (count + 7) & ~7  # whole vectors; what stands in the surplus is never read
-        _refine(padded, m, rounds, max_abs_dpsi, max_abs_d2psi)
-        _finish(padded, m, order, target, max_abs_dpsi, max_abs_d2psi)
-        for k in range(block):
-            i = start + k
-            best, place, bound, reach = math.nan, math.nan, math.nan, math.nan
-            if status[i] == st.OK:
-                best, winner, worst = 0.0, 0, 0.0 if first_peak[k + 1] > first_peak[k] else math.inf
-                for peak in range(first_peak[k], first_peak[k + 1]):
-                    winner = peak if m[peak + _PEAK] > best else winner
-                    best = max(best, m[peak + _PEAK])
-                    worst = max(worst, m[peak + _ERROR])
-                if worst < math.inf:
-                    if error is not None:
-                        bound = m[winner + _ERROR] + best * m[winner + _ROUNDING]
-                    if phi is not None:
-                        place = m[winner + _START] + m[winner + _MOVED]
-                    if phi_error is not None:
-                        reach = m[winner + _REACH]
-                else:
-                    best, place, bound, reach, agreed = _careful(at, k, order, target)
-                    if not agreed:
-                        status[i] = st.NOT_CONVERGED
-                        best, place, bound, reach = math.nan, math.nan, math.nan, math.nan
-            if phi is not None:
-                phi[i] = place - TURN * math.floor(place / TURN)
-            if error is not None:
-                error[i] = bound
-            if phi_error is not None:
-                phi_error[i] = reach
-            if max_abs_dpsi is not None:
-                max_abs_dpsi[i] = best
-            if max_abs_d2psi is not None:
-                max_abs_d2psi[i] = best
-            if max_abs_d3psi is not None:
-                max_abs_d3psi[i] = best
+        padded = (count + 7) & ~7
+        _begin(padded, m)
+        _refine(0, padded, m, rounds, max_abs_dpsi, max_abs_d2psi)
+        _finish(0, padded, m, order, target, max_abs_dpsi, max_abs_d2psi)
+        for i in range(block):
+            begin, end = first_peak[i], first_peak[i + 1]
+            worst = 0.0 if end > begin else math.inf
+            for peak in range(begin, end):
+                worst = max(worst, m[peak + _ERROR])
+            if end > begin and not worst < math.inf:
+                worst = _settle(begin, end, m, order, target, max_abs_dpsi, max_abs_d2psi)
+            best, winner = 0.0, 0
+            for peak in range(begin, end):
+                winner = peak if m[peak + _PEAK] > best else winner
+                best = max(best, m[peak + _PEAK])
+            if worst < math.inf:
+                place = m[winner + _START] + m[winner + _MOVED] + m[winner + _LAST]
+                result = best, place, m[winner + _ERROR] + best * m[winner + _ROUNDING], m[winner + _REACH]
+            else:
+                best, place, bound, reach, agreed = _careful(at, i, order, target)
+                result = (best, place, bound, reach) if agreed else _NONE
+                if not agreed:
+                    status[start + who[i]] = st.NOT_CONVERGED
+            _put(start + who[i], result, phi, error, phi_error, max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
