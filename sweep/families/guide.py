@@ -51,6 +51,11 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return filled_with_places(guide.poses, designs, angles, _VALUES, _JOINTS, wanted)
 
 
+def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """As :func:`poses`, in twice the working precision; for float64 only."""
+    return filled_with_places(guide.precise_poses, designs, angles, _VALUES, _JOINTS, wanted)
+
+
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
     """Fill the joint records that effects work from: those of the four-bar; the guided point bears no load."""
     matrix = as_crank_rocker(designs)
@@ -74,6 +79,7 @@ _SEARCHED = Family(
     uses_phi=False,
     joints=joint_records,
     ellipse=ellipse,
+    precise_poses=precise_poses,
 )
 
 FAMILY = replace(_SEARCHED, steps=(certified_travel(_SEARCHED, (0,), ()),))

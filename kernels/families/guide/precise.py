@@ -1,0 +1,167 @@
+"""Motion of the guided four-bar for exactly the given doubles: everything in twice the working precision.
+
+In plain arithmetic (:mod:`kernels.families.guide.motion`) the discriminant of a short coupler is a small difference of
+large numbers, and so are the derivatives of the deviation along a nearly straight path.
+"""
+
+from __future__ import annotations
+
+import math
+
+from kernels import status as st
+from kernels import twofold as two
+from kernels._jit import inline, kernel
+from kernels.families.guide.motion import EPS, Array, Status, reduce_design
+from kernels.twofold import Twofold
+
+BAND = 4.0 * EPS  # what rounding the given numbers does to Delta: a dead point made in float64 is still one
+
+
+@inline
+def _times(a: Twofold, b: Twofold, c: Twofold, d: Twofold) -> tuple[Twofold, Twofold]:
+    """(a + i b)(c + i d)."""
+    return (
+        two.subtract(two.multiply(a, c), two.multiply(b, d)),
+        two.add(two.multiply(a, d), two.multiply(b, c)),
+    )
+
+
+@inline
+def _dot(a: Twofold, b: Twofold, c: Twofold, d: Twofold) -> Twofold:
+    """(a, b) . (c, d)."""
+    return two.add(two.multiply(a, c), two.multiply(b, d))
+
+
+@inline
+def _carried(
+    bx: Twofold, by: Twofold, dx: Twofold, dy: Twofold, cl: Twofold, sl: Twofold, qx: Twofold, qy: Twofold
+) -> tuple[Twofold, Twofold]:
+    """e^{-i lam} b + q d: along and across the line, of a point or a derivative of it."""
+    along, across = _times(bx, by, cl, (-sl[0], -sl[1]))
+    more, above = _times(dx, dy, qx, qy)
+    return two.add(along, more), two.add(across, above)
+
+
+@kernel
+def precise_poses(
+    designs: Array,
+    cos_phi: Array,
+    sin_phi: Array,
+    status: Status,
+    s: Array | None,
+    ds: Array | None,
+    d2s: Array | None,
+    d3s: Array | None,
+    dev: Array | None,
+    ddev: Array | None,
+    d2dev: Array | None,
+    discriminant: Array | None,
+    pressure_angle: Array | None,
+    joints: Array | None,
+) -> None:
+    """As :func:`kernels.families.guide.motion.poses`, for float64 designs only, correct to a few roundings.
+
+    Notes
+    -----
+    (u, v) = (cos phi, sin phi) are taken as they are; what their rounding takes from the unit length is put into W, so
+    that it only displaces the crank pin.  With d = C - B and d . d = b^2 the derivatives follow from d . d' = 0,
+    d . d'' = -d' . d', d . d''' = -3 d' . d''; the coupler point is B + (l/b) d.
+    """
+    for i in range(designs.shape[0]):
+        r = reduce_design(designs, i)
+        row = i if cos_phi.shape[0] > 1 else 0
+        a, b, c, e, unit = r.a, r.b, r.c, r.e, r.unit
+        two_c = 2.0 * c * unit * unit
+        per_c, per_b = two.divide((1.0, 0.0), (c, 0.0), 1.0 / c), two.divide((1.0, 0.0), (b, 0.0), 1.0 / b)
+        square = two.add(two.two_product(a, a), two.two_product(e, e))
+        square = two.add(two.multiply(two.two_sum(c, -b), two.two_sum(c, b)), square)
+        k0 = two.multiply(two.scale(square, 0.5), per_c)
+        k2, half = two.multiply(two.two_product(a, e), per_c), 0.5 * a * a / c
+        sl, cl = two.sine_cosine(designs[i, 6])
+        per_unit = 1.0 / unit
+        lx, ly = two.scale(per_b, designs[i, 4] * per_unit), two.scale(per_b, designs[i, 5] * per_unit)
+        qx, qy = _times(lx, ly, cl, (-sl[0], -sl[1]))
+        h = designs[i, 7] * per_unit
+        for j in range(cos_phi.shape[1]):
+            u, v = cos_phi[row, j], sin_phi[row, j]
+            uu, vv = two.two_product(u, u), two.two_product(v, v)
+            length = two.two_sum(uu[0], vv[0])
+            excess = (length[0] - 1.0) + (length[1] + (uu[1] + vv[1]))  # u^2 + v^2 - 1
+            bx, by = two.two_product(a, u), two.two_product(a, v)
+            x = two.subtract((e, 0.0), bx)
+            w = two.subtract(k0, two.scale(k2, u))
+            w = two.normal(w[0], w[1] + half * excess)
+            rr = _dot(x, by, x, by)
+            delta = two.subtract(rr, two.multiply(w, w))
+            tolerance = BAND * (abs(x[0]) * r.x_size + abs(by[0]) * a + abs(w[0]) * r.w_size)
+            tolerance += BAND * BAND * (r.x_size * r.x_size + a * a + r.w_size * r.w_size)
+            code = st.OK
+            if not r.valid or delta[0] != delta[0]:
+                code = st.INVALID_INPUT
+            elif delta[0] < -tolerance:
+                code = st.NOT_ASSEMBLED
+            elif delta[0] <= tolerance:
+                # The crank pin on the rocker pivot leaves the rocker free; a dead point has one position.
+                code = st.DEAD_POINT if rr[0] > tolerance else st.SINGULAR
+            status[i, j] = code
+            if discriminant is not None:
+                discriminant[i, j] = (delta[0] * two_c) * two_c if r.valid else math.nan
+            assembled = code == st.OK or code == st.DEAD_POINT
+            root = two.root(delta) if code == st.OK else (0.0, 0.0)
+            t = two.scale(root, r.branch)
+            per_rr = 1.0 / rr[0] if assembled else math.nan
+            cos_psi = two.divide(_dot(x, by, (-w[0], -w[1]), (-t[0], -t[1])), rr, per_rr)
+            sin_psi = two.divide(two.subtract(two.multiply(by, w), two.multiply(x, t)), rr, per_rr)
+            cx, cy = two.scale(cos_psi, c), two.scale(sin_psi, c)  # the rocker; its pin is at (e, 0) + this
+            dx, dy = two.add(x, cx), two.subtract(cy, by)
+            if pressure_angle is not None:
+                across_c = abs(two.subtract((c, 0.0), w)[0])
+                pressure_angle[i, j] = math.atan2(across_c, root[0]) if assembled else math.nan
+            if joints is not None:
+                joints[0, i, j], joints[1, i, j] = bx[0] * unit, by[0] * unit
+                joints[2, i, j], joints[3, i, j] = (e + cx[0]) * unit, cy[0] * unit
+                mx, my = _times(dx, dy, lx, ly)
+                joints[4, i, j], joints[5, i, j] = two.add(bx, mx)[0] * unit, two.add(by, my)[0] * unit
+            if s is not None or dev is not None:
+                along, across = _carried(bx, by, dx, dy, cl, sl, qx, qy)
+                if s is not None:
+                    s[i, j] = along[0] * unit
+                if dev is not None:
+                    dev[i, j] = two.add(across, (-h, 0.0))[0] * unit
+            if ds is not None or d2s is not None or d3s is not None or ddev is not None or d2dev is not None:
+                rise = two.scale(t, c)
+                per_rise = 1.0 / rise[0] if code == st.OK else math.nan
+                b1x, b1y = (-by[0], -by[1]), bx  # B'; B'' = -B, B''' = -B'
+                p = two.divide(_dot(dx, dy, b1x, b1y), rise, per_rise)
+                d1x = two.subtract(two.multiply(p, (-cy[0], -cy[1])), b1x)
+                d1y = two.subtract(two.multiply(p, cx), b1y)
+                if ds is not None or ddev is not None:
+                    along, across = _carried(b1x, b1y, d1x, d1y, cl, sl, qx, qy)
+                    if ds is not None:
+                        ds[i, j] = along[0] * unit
+                    if ddev is not None:
+                        ddev[i, j] = across[0] * unit
+                if d2s is not None or d3s is not None or d2dev is not None:
+                    pp = two.multiply(p, p)
+                    inward = two.scale(two.subtract((c, 0.0), w), c)  # d . c k
+                    rest = two.subtract(_dot(dx, dy, bx, by), two.multiply(pp, inward))
+                    q = two.divide(two.add(_dot(d1x, d1y, d1x, d1y), rest), rise, per_rise)
+                    q = (-q[0], -q[1])
+                    d2x = two.subtract(two.subtract(bx, two.multiply(q, cy)), two.multiply(pp, cx))
+                    d2y = two.add(two.subtract(by, two.multiply(pp, cy)), two.multiply(q, cx))
+                    if d2s is not None or d2dev is not None:
+                        along, across = _carried((-bx[0], -bx[1]), (-by[0], -by[1]), d2x, d2y, cl, sl, qx, qy)
+                        if d2s is not None:
+                            d2s[i, j] = along[0] * unit
+                        if d2dev is not None:
+                            d2dev[i, j] = across[0] * unit
+                    if d3s is not None:
+                        pq = two.scale(two.multiply(p, q), 3.0)
+                        both = two.subtract(two.scale(_dot(d1x, d1y, d2x, d2y), 3.0), two.multiply(pq, inward))
+                        both = two.divide(both, rise, per_rise)
+                        # psi''' - psi'^3
+                        turn = two.subtract((-p[0], -p[1]), both)
+                        d3x = two.subtract(two.subtract(b1x, two.multiply(turn, cy)), two.multiply(pq, cx))
+                        d3y = two.add(two.subtract(b1y, two.multiply(pq, cy)), two.multiply(turn, cx))
+                        along, _ = _carried((-b1x[0], -b1x[1]), (-b1y[0], -b1y[1]), d3x, d3y, cl, sl, qx, qy)
+                        d3s[i, j] = along[0] * unit
