@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from pathlib import Path
 
@@ -42,6 +43,20 @@ def test_bearing_limits_are_pressure_angle_limits(swept):
     overloaded = swept["max_sliding_utilisation"] > 1.0
     assert 0 < overloaded.sum() < len(swept)
     assert ((swept["min_theta1_reserve"] < 0.0) == overloaded).all()
+
+
+def test_the_figure_says_which_effect_matters_at_which_speed(swept):
+    """Friction and uneven speed at all speeds alike, vibration and bearings with the square of the speed."""
+    spec = importlib.util.spec_from_file_location("figure", FOLDER / "figure.py")
+    figure = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(figure)
+    table = figure.table(swept).set_index(["effect", "speed"])
+    matters = table["matters"].unstack()
+    assert matters.loc["friction: what it adds to the peak torque"].all()
+    assert matters.loc["uneven crank speed: unevenness"].all()
+    assert list(matters.loc["vibration: what it adds to the lag"]) == [False, False, True]
+    assert not matters.loc["plain bearings: utilisation", 3000] and matters.loc["plain bearings: utilisation", 7000]
+    assert len(figure.chart(table.reset_index(), swept).axes) == 2
 
 
 def test_accepted_design_of_the_full_study():
