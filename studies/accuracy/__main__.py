@@ -68,7 +68,7 @@ def main() -> None:
         targets=optimiser[1],
         oracle=factors,
         worst=pd.DataFrame(json.loads((TABLES / "worst_found.json").read_text())["rows"])[
-            ["region", "output", "factor"]
+            ["poses", "region", "output", "factor"]
         ],
         peers=pd.read_parquet(out / "peers.parquet") if (out / "peers.parquet").exists() else None,
     )

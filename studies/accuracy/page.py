@@ -318,8 +318,8 @@ def _known(m: Measured) -> list[str]:
         lines += ["", f"### {table}, allowed {part['allowed'].iloc[0]:g}", ""]
         lines += pipe_table(["kind of rows", "rows", *quantities], rows)
     worst = [
-        [str(region), *(sig(part.loc[part["output"] == name, "factor"].max()) for name in ORDERS)]
-        for region, part in m.worst.groupby("region", sort=False)
+        [str(poses), str(region), *(sig(part.loc[part["output"] == name, "factor"].max()) for name in ORDERS)]
+        for (poses, region), part in m.worst.groupby(["poses", "region"])
     ]
     return [
         *lines,
@@ -331,7 +331,7 @@ def _known(m: Measured) -> list[str]:
             "known; the tests replay them.",
         ),
         "",
-        *pipe_table(["region", *ORDERS], worst),
+        *pipe_table(["poses of", "region", *ORDERS], worst),
     ]
 
 
