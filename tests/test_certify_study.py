@@ -25,8 +25,8 @@ COLUMNS = ("a", "b", "c", "e", "f", "g", "alpha", "branch")
 PROVABLE = "max_abs_dpsi, max_abs_d2psi, max_abs_d3psi"
 WANTED = ["max_abs_dpsi", "max_abs_d2psi", "phi_max_abs_d2psi", "max_abs_d3psi", "swing", "margin"]
 
-# The search misses the highest peak of these: found by proving 300 000 random designs at three orders.
-MISSED = {
+# Twin peaks closer than the samples, of which a search by height alone takes the lower: found by proving designs.
+TWINS = {
     3: [
         [0.4269867973111896, 3.124678962703731, 1.241868905121866, 2.464459657513995, 1.4233146418966562,
          1.6804687377796221, 1.8195888943385803, -1.0],
@@ -87,18 +87,19 @@ def test_proven_maxima_are_the_searched_ones_with_bounds():
         assert (proven[name] == searched[name]).all()
 
 
-@pytest.mark.parametrize("order", MISSED)
-def test_peak_that_the_search_misses_is_found(order):
+@pytest.mark.parametrize("certify", [False, True])
+@pytest.mark.parametrize("order", TWINS)
+def test_higher_one_of_twin_peaks_is_found(order, certify):
     name = {2: "d2psi", 3: "d3psi"}[order]
-    designs = table(MISSED[order])
-    proven = sweep.summarise("rssr", designs, [f"max_abs_{name}", f"phi_max_abs_{name}"], certify=True)
+    designs = table(TWINS[order])
+    found = sweep.summarise("rssr", designs, [f"max_abs_{name}", f"phi_max_abs_{name}"], certify=certify)
     phi = np.arange(65536) * (2.0 * np.pi / 65536)
     poses = sweep.evaluate("rssr", designs, [name], phi)
     sampled = poses[name].abs().groupby(poses["design"]).max().to_numpy()
-    np.testing.assert_allclose(proven[f"max_abs_{name}"], sampled, rtol=1e-8)
+    np.testing.assert_allclose(found[f"max_abs_{name}"], sampled, rtol=1e-8)
     at = poses[name].abs().groupby(poses["design"]).idxmax()
-    place = proven[f"phi_max_abs_{name}"] - poses["phi"][at].to_numpy()
-    assert (place.abs() < proven[f"err_phi_max_abs_{name}"] + 2.0 * np.pi / 65536).all()
+    place = found[f"phi_max_abs_{name}"] - poses["phi"][at].to_numpy()
+    assert (place.abs() < found[f"err_phi_max_abs_{name}"] + 2.0 * np.pi / 65536).all()
 
 
 def test_unproven_maximum_keeps_its_value_and_says_so(monkeypatch):
@@ -161,11 +162,11 @@ def test_study_that_asks_for_what_has_no_proof_is_refused(tmp_path):
 
 
 def test_proof_of_some_maxima_only(tmp_path):
-    designs = table(MISSED[2])
+    designs = table(TWINS[2])
     wanted = ["max_abs_dpsi", "max_abs_d2psi", "max_abs_psi"]
     proven = sweep.summarise("rssr", designs, wanted, certify=["max_abs_d2psi"])
     searched = sweep.summarise("rssr", designs, wanted)
-    assert (proven["max_abs_d2psi"] > searched["max_abs_d2psi"]).all()
+    assert (proven["err_max_abs_d2psi"] != searched["err_max_abs_d2psi"]).all()
     for name in ("max_abs_dpsi", "max_abs_psi", "err_max_abs_dpsi"):
         assert (proven[name] == searched[name]).all()
     for names in (["max_abs_psi"], ["max_abs_d3psi"], ["max_abs_d2psy"]):
@@ -218,13 +219,15 @@ def _definition(folder: Path, name: str) -> str:
 
 def test_command_line_proves(tmp_path):
     path = tmp_path / "designs.csv"
-    pd.DataFrame(table(MISSED[2])).to_csv(path, index=False)
+    pd.DataFrame(table(TWINS[2])).to_csv(path, index=False)
     lines = []
     for option in ((), ("--certify",)):
         result = CliRunner().invoke(main, ["summarise", "rssr", str(path), "--want", "max_abs_d2psi", *option])
         assert result.exit_code == 0, result.output
-        lines.append([float(line.split(",")[0]) for line in result.output.splitlines()[1:]])
-    assert all(proven >= searched for searched, proven in zip(*lines, strict=True))
+        lines.append([[float(value) for value in line.split(",")] for line in result.output.splitlines()[1:]])
+    searched, proven = (np.array(rows) for rows in lines)
+    np.testing.assert_allclose(proven[:, 0], searched[:, 0], rtol=1e-8)
+    assert (proven[:, 1] != searched[:, 1]).all()  # err_max_abs_d2psi
     study = write(tmp_path, STUDY.replace("certify = true", ""))
     plan = CliRunner().invoke(main, ["check", str(study)]).output
     assert "with the proof that no peak is missed" in plan

@@ -39,46 +39,33 @@ from kernels.families.rssr.block import (
     new_block,
     singularity_distance,
 )
-from kernels.families.rssr.careful import careful_maximum, rounding
+from kernels.families.rssr.careful import careful_maximum
 from kernels.families.rssr.closure import Array, Status
 from kernels.families.rssr.derivatives import follower
 from kernels.families.rssr.margin import turning_status
+from kernels.families.rssr.peaks import (
+    ERROR,
+    HEIGHT,
+    LAST,
+    MOST_PEAKS,
+    MOVED,
+    REACH,
+    ROUNDING,
+    START,
+    TURN,
+    append,
+    begin_at_vertex,
+    finish,
+    new_list,
+    refine,
+    settle,
+)
 from kernels.reduce import largest
-from kernels.trigpoly import far_minimum, point, rotate
+from kernels.trigpoly import far_minimum, point
 
-TURN = 2.0 * math.pi
 FEWEST, MOST = 16, 1024
-MOST_PEAKS = 8  # 16 samples cannot have more; a design with more goes to the careful search
-CAPACITY = (
-    BLOCK * MOST_PEAKS + 120
-)  # rows 960 bytes apart modulo 4096, so that they do not evict each other from the cache
-# Rows of the list of maxima under refinement: constants, place, spacing of the samples, results.
-(
-    _E,
-    _Y0,
-    _CA,
-    _K0,
-    _K1,
-    _K2,
-    _SIZE,
-    _U,
-    _V,
-    _WIDTH,
-    _LEFT,
-    _PEAK,
-    _RIGHT,
-    _START,
-    _GUESS,
-    _MOVED,
-    _ERROR,
-    _ROUNDING,
-    _REACH,
-) = (k * CAPACITY for k in range(19))
-_ROWS = 19
 _NONE = (math.nan, math.nan, math.nan, math.nan)
-_LAST = _LEFT  # the last step, once the sample before the maximum has served
 _NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # what the search needs of a design
-_TURNED = 4e-12  # error of an angle that is the sum of a few turns by :func:`rotate`
 _FLOOR, _MARKS = (FEWEST + 2) * BLOCK, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
 _EXPONENT = np.array([0, 0, 1, 13, 2, 16, 14, 6, 3, 8, 17, 12, 15, 5, 7, 11, 4, 10, 9])  # k of 2^k modulo 19
 
@@ -118,99 +105,6 @@ def _sample_block(
 
 
 @inline
-def _jet(m: Array, i: int, first: Array | None, second: Array | None) -> tuple[float, float, float]:
-    """The wanted transfer function and its next two derivatives at a maximum of the list."""
-    e, y0, ca, k0, k1, k2 = m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2]
-    u, v = m[i + _U], m[i + _V]
-    p, q, j, k = follower(e, y0, ca, k0, k1, k2, u, v)
-    if first is not None:
-        return p, q, j
-    if second is not None:
-        return q, j, k
-    # The fifth derivative only steers the iteration: a difference quotient of the fourth is enough.
-    ahead = 1e-4 * m[i + _WIDTH]
-    u, v = rotate(u, v, ahead)
-    _, _, _, k_ahead = follower(e, y0, ca, k0, k1, k2, u, v)
-    return j, k, (k_ahead - k) / ahead
-
-
-@inline
-def _begin(count: int, m: Array) -> None:
-    """Move each maximum to the vertex of the parabola through its three samples."""
-    for i in range(count):
-        left, right = m[i + _PEAK] - m[i + _LEFT], m[i + _PEAK] - m[i + _RIGHT]
-        offset = 0.5 * (left - right) / (left + right)
-        m[i + _GUESS] = m[i + _PEAK] + 0.25 * offset * (left - right)
-        u, v = rotate(m[i + _U], m[i + _V], offset * m[i + _WIDTH])
-        m[i + _U] = u
-        m[i + _V] = v
-        m[i + _MOVED] = offset * m[i + _WIDTH]
-
-
-@inline
-def _refine(begin: int, end: int, m: Array, rounds: int, first: Array | None, second: Array | None) -> None:
-    """Newton steps to the zero of the next derivative, uphill where it is not concave; all maxima side by side."""
-    for _ in range(rounds):
-        for i in range(begin, end):
-            y, dy, d2y = _jet(m, i, first, second)
-            width = m[i + _WIDTH]
-            step = -dy / d2y if y * d2y < 0.0 else math.copysign(width, y * dy)
-            step = min(max(step, -0.5 * width), 0.5 * width)
-            m[i + _MOVED] += step
-            u, v = rotate(m[i + _U], m[i + _V], step)
-            m[i + _U] = u
-            m[i + _V] = v
-
-
-@inline
-def _finish(
-    begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None
-) -> None:
-    """Peak of the parabola through the last point, what it adds as an error estimate, and the rounding error."""
-    for i in range(begin, end):
-        y, dy, d2y = _jet(m, i, first, second)
-        step = -dy / d2y
-        rise = 0.5 * dy * step * math.copysign(1.0, y)
-        peak, width = abs(y) + rise, m[i + _WIDTH]
-        m[i + _LAST] = step
-        trusted = (y * d2y < 0.0) & (rise <= target * peak) & (abs(m[i + _MOVED]) <= width)
-        trusted = trusted & (abs(peak - m[i + _GUESS]) <= 0.2 * peak)
-        m[i + _PEAK] = peak
-        m[i + _ERROR] = rise if trusted else math.inf
-        relative = rounding(
-            order,
-            m[i + _E],
-            m[i + _Y0],
-            m[i + _CA],
-            m[i + _K0],
-            m[i + _K1],
-            m[i + _K2],
-            m[i + _SIZE],
-            m[i + _U],
-            m[i + _V],
-            peak,
-        )
-        m[i + _ROUNDING] = relative
-        # What a step of Newton's method leaves is quadratic; that of the jerk has a slope good to a thousandth.
-        left = step * (4.0 * step / width + (1e-3 if order == 3 else 0.0) * math.copysign(1.0, step))
-        m[i + _REACH] = left + 4.0 * relative * math.sqrt(abs(y / d2y)) + _TURNED
-
-
-@kernel
-def _settle(
-    begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None
-) -> float:
-    """More steps for the maxima not trusted yet; the largest error estimate of all, infinite if one still is not."""
-    worst = 0.0
-    for i in range(begin, end):
-        if not m[i + _ERROR] < math.inf:
-            _refine(i, i + 1, m, 3, first, second)
-            _finish(i, i + 1, m, order, target, first, second)
-        worst = max(worst, m[i + _ERROR])
-    return worst
-
-
-@inline
 def _mark_peaks(count: int, size: Array) -> None:
     """For the samples of :func:`_sample_block`: the set of local maxima of at least 60 %, as a sum of powers of two."""
     for k in range(count):
@@ -235,7 +129,7 @@ def _list_marked(at: Array, k: int, cos: Array, sin: Array, size: Array, m: Arra
         lowest = marks & -marks
         i = _EXPONENT[lowest % 19]
         here = (i + 1) * BLOCK + k
-        _append(at, k, cos[i], sin[i], size[here - BLOCK], size[here], size[here + BLOCK], FEWEST, i, m, count)
+        append(at, k, cos[i], sin[i], size[here - BLOCK], size[here], size[here + BLOCK], FEWEST, i, m, count)
         marks ^= lowest
         count += 1
     return count
@@ -253,20 +147,9 @@ def _list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, 
             if length - count == MOST_PEAKS:
                 return count
             here = n - FEWEST + i - 1
-            _append(at, k, cos[here], sin[here], size[i - 1], size[i], size[i + 1], n, i - 1, m, length)
+            append(at, k, cos[here], sin[here], size[i - 1], size[i], size[i + 1], n, i - 1, m, length)
             length += 1
     return length
-
-
-@inline
-def _append(
-    at: Array, k: int, u: float, v: float, left: float, peak: float, right: float, n: int, sample: int, m: Array, i: int
-) -> None:
-    width = TURN / n
-    m[i + _U], m[i + _V], m[i + _START], m[i + _WIDTH] = u, v, sample * width, width
-    m[i + _LEFT], m[i + _PEAK], m[i + _RIGHT] = left, peak, right
-    m[i + _E], m[i + _Y0], m[i + _CA] = at[k + E], at[k + Y0], at[k + CA]
-    m[i + _K0], m[i + _K1], m[i + _K2], m[i + _SIZE] = at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE]
 
 
 @inline
@@ -348,7 +231,7 @@ def true_maxima(
     # The parabola at the end is one more; the one maximum in hundreds that is not settled then gets another three.
     rounds = (2 if order == 1 else 3) - (1 if target > 1e-4 else 0)
     at, who = new_block(), np.empty(BLOCK, np.int64)
-    m, size, grid = np.empty(_ROWS * CAPACITY), np.empty(MOST + 2), np.empty((FEWEST + 4) * BLOCK)
+    m, size, grid = new_list(), np.empty(MOST + 2), np.empty((FEWEST + 4) * BLOCK)
     first_peak = np.empty(BLOCK + 1, np.int64)
     for start in range(0, designs.shape[0], BLOCK):
         count = min(BLOCK, designs.shape[0] - start)
@@ -386,23 +269,23 @@ def true_maxima(
                 count = _list_peaks(at, i, cos, sin, n, size, m, count)
         first_peak[block] = count
         padded = (count + 7) & ~7
-        _begin(padded, m)
-        _refine(0, padded, m, rounds, max_abs_dpsi, max_abs_d2psi)
-        _finish(0, padded, m, order, target, max_abs_dpsi, max_abs_d2psi)
+        begin_at_vertex(padded, m)
+        refine(0, padded, m, rounds, max_abs_dpsi, max_abs_d2psi)
+        finish(0, padded, m, order, target, max_abs_dpsi, max_abs_d2psi)
         for i in range(block):
             begin, end = first_peak[i], first_peak[i + 1]
             worst = 0.0 if end > begin else math.inf
             for peak in range(begin, end):
-                worst = max(worst, m[peak + _ERROR])
+                worst = max(worst, m[peak + ERROR])
             if end > begin and not worst < math.inf:
-                worst = _settle(begin, end, m, order, target, max_abs_dpsi, max_abs_d2psi)
+                worst = settle(begin, end, m, order, target, max_abs_dpsi, max_abs_d2psi)
             best, winner = 0.0, 0
             for peak in range(begin, end):
-                winner = peak if m[peak + _PEAK] > best else winner
-                best = max(best, m[peak + _PEAK])
+                winner = peak if m[peak + HEIGHT] > best else winner
+                best = max(best, m[peak + HEIGHT])
             if worst < math.inf:
-                place = m[winner + _START] + m[winner + _MOVED] + m[winner + _LAST]
-                result = best, place, m[winner + _ERROR] + best * m[winner + _ROUNDING], m[winner + _REACH]
+                place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
+                result = best, place, m[winner + ERROR] + best * m[winner + ROUNDING], m[winner + REACH]
             else:
                 best, place, bound, reach, agreed = _careful(at, i, order, target)
                 result = (best, place, bound, reach) if agreed else _NONE
