@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.cascade import BLOCK, Cascade, levels
-from sweep.catalogue import is_proven
 from sweep.errors import InputError
 from sweep.families.base import Array, Columns
 from sweep.fit import fit_line
+from sweep.reductions.catalogue import is_proven
 from sweep.summaries import design_outputs
 from sweep.tables import design_matrix
 

@@ -104,7 +104,7 @@ def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certi
 
 
 def _check_budget(study: Study, jobs: int, force: bool) -> None:
-    from sweep.study.estimate import check_budget, estimate
+    from sweep.estimate import check_budget, estimate
 
     if not force:
         check_budget(study, estimate(study, jobs))

@@ -14,9 +14,9 @@ import numpy as np
 
 from kernels.status import OK
 from sweep.cascade import BLOCK, CALL_SECONDS, Cascade, levels
-from sweep.catalogue import is_proven
 from sweep.chunk import output_columns, parameter_matrix, parameter_ns
 from sweep.families.base import Array, Unit
+from sweep.reductions.catalogue import is_proven
 from sweep.study.units import internal_unit
 from sweep.summaries import output
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sweep.catalogue import output_names
 from sweep.effects import elsewhere, extended, input_names, offered
 from sweep.errors import InputError, nearest
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Family
+from sweep.reductions.catalogue import output_names
 from sweep.tables import design_matrix, numbers, wanted_names
 
 if TYPE_CHECKING:

@@ -11,17 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from sweep.catalogue import applying_step, check_certifiable, general_way, is_position, output, output_names, proofs
 from sweep.effects import extended, input_names
 from sweep.errors import InputError
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.chain import Stage
-from sweep.margins import margin_suffixes
-from sweep.means import mean_squares
+from sweep.reductions.catalogue import (
+    applying_step,
+    check_certifiable,
+    general_way,
+    is_position,
+    output,
+    output_names,
+    proofs,
+)
+from sweep.reductions.margins import margin_suffixes
+from sweep.reductions.means import mean_squares
+from sweep.reductions.turn import Group, group_ns, limits_and_reductions, margin_group
 from sweep.sampling import Index
 from sweep.tables import design_matrix, wanted_names
-from sweep.turn import Group, group_ns, limits_and_reductions, margin_group
 
 if TYPE_CHECKING:
     import pandas as pd

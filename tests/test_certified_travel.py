@@ -12,9 +12,9 @@ from kernels import status as st
 from kernels._jit import kernel
 from kernels.families import guide, rssr
 from kernels.families.rssr import driven
-from sweep.extrema import Request, true_extrema
 from sweep.families import family
-from sweep.families.travel import as_crank_rocker
+from sweep.families.guide import as_crank_rocker
+from sweep.reductions.extrema import Request, true_extrema
 from tests.reference.chain import rocker_angle, series
 from tests.reference.guide import coupler_point
 from tests.turn_designs import GUIDE, NEEDLE, guided_four_bars, needle_drives

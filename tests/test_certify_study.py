@@ -14,10 +14,10 @@ import sweep
 from kernels import status as st
 from sweep.cli import main
 from sweep.errors import InputError, StudyError
+from sweep.estimate import other_accuracies
 from sweep.families import rssr as entry
 from sweep.families.base import Accuracy
 from sweep.study import load_study, with_accuracy
-from sweep.study.estimate import other_accuracies
 from sweep.summaries import routes
 from tests.rssr_designs import random_designs
 

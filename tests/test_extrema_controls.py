@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from sweep import extrema
-from sweep.extrema import Request, true_extrema
 from sweep.families.base import Family, Output, Parameter
+from sweep.reductions import extrema
+from sweep.reductions.extrema import Request, true_extrema
 from sweep.sampling import sample_turn
 from tests.turn_designs import RSSR, crank_rockers
 

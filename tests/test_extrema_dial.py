@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from sweep import extrema
-from sweep.extrema import Request, true_extrema
 from sweep.families.base import Accuracy
+from sweep.reductions import extrema
+from sweep.reductions.extrema import Request, true_extrema
 from sweep.summaries import design_outputs
 from tests.turn_designs import NEEDLE, RSSR, crank_rockers, needle_drives
 

@@ -13,9 +13,9 @@ from sweep.families.base import Accuracy
 from sweep.optimise import Problem
 from sweep.optimise.form import Program
 from sweep.optimise.gradients import gradients, scalar_gradient, stepped
-from sweep.optimise.measures import Series
 from sweep.optimise.model import Model
 from sweep.optimise.points import STATIC, Curves, Points
+from sweep.reductions.measures import Series
 from sweep.study import Limit
 
 NAMES = ("a", "b", "c", "e", "f", "g", "alpha")

@@ -13,7 +13,7 @@ from sweep.errors import InputError
 from sweep.families import family
 from sweep.families.base import Angles, Family, Output, Parameter
 from sweep.optimise import Problem, minimise, pareto
-from sweep.size import lengths
+from sweep.reductions.size import lengths
 from sweep.study import Limit, OptimiseSettings, ParetoSettings
 
 FIXED = {"f": -0.3, "g": 0.2, "alpha": 0.5, "branch": 1.0}

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from sweep.errors import BudgetError
+from sweep.estimate import check_budget, estimate, other_accuracies
 from sweep.study import Budget, Study, load_study
-from sweep.study.estimate import check_budget, estimate, other_accuracies
 
 PROOF = "with the proof that no peak is missed"
 TEXT = """

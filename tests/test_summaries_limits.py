@@ -124,7 +124,7 @@ def test_limit_angles_are_those_of_the_poses_in_line(names, own_steps, monkeypat
         columns = [f"{p}{suffix}" for p in find_family(name).parameter_names]
         table |= dict(zip(columns, parts[number].T, strict=True))
     if not own_steps:
-        monkeypatch.setattr("sweep.catalogue.own_steps", lambda *_: [])
+        monkeypatch.setattr("sweep.reductions.catalogue.own_steps", lambda *_: [])
     stages = [""] if len(names) == 1 else [str(k + 1) for k, name in enumerate(names) if name == "rssr"]
     for stage in stages:
         wanted = [f"{limit}{stage}" for limit in ("psi_ext", "phi_ext", "psi_fold", "phi_fold")]

@@ -13,7 +13,7 @@ import pytest
 import sweep
 from sweep.errors import InputError
 from sweep.families import family
-from sweep.optimise.measures import measure
+from sweep.reductions.measures import measure
 
 ROCKERS = {
     "a": [11.0, 20.0, 30.0, 8.0], "b": [36.5, 60.0, 90.0, 22.3], "c": [22.0, 70.0, 60.0, 23.9],

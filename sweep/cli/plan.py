@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from sweep.cli.listing import aligned, main_outputs
 
 if TYPE_CHECKING:
+    from sweep.estimate import Estimate
     from sweep.study import Study
-    from sweep.study.estimate import Estimate
     from sweep.study.space import Axis
 
 
@@ -30,7 +30,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     """
     from sweep.cascade import ordered_routes
     from sweep.plan import PARAMETER_UNITS
-    from sweep.report.answer import bound_words
+    from sweep.report.limits import bound_words
     from sweep.report.quantities import quantity
     from sweep.summaries import output
 

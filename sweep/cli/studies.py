@@ -57,8 +57,8 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
     A study over its budget ends with exit code 3.
     """
     from sweep.cli.plan import plan_lines
+    from sweep.estimate import check_budget, estimate, other_accuracies
     from sweep.study import load_study
-    from sweep.study.estimate import check_budget, estimate, other_accuracies
 
     model = load_study(study, smoke=smoke)
     cost = estimate(model, jobs)

@@ -41,7 +41,7 @@ _ENTRIES = {
 }
 NAMES = tuple(_ENTRIES)
 
-# Prefixes of the general reductions over the turn (sweep/catalogue.py): max_abs_force_d asks for force_d.
+# Prefixes of the general reductions over the turn (sweep/reductions/catalogue.py): max_abs_force_d asks for force_d.
 _REDUCTIONS = ("phi_max_abs_", "max_abs_", "max_", "min_", "range_", "rms_", "")
 # In the stages behind the first, speed and acceleration are those of the first stage's crank.
 _FIRST_ONLY = ("speed", "speed_change")

@@ -104,6 +104,17 @@ class Step:
         return self.ns_per_design + self.ns_per_sample * (accuracy.samples or 0)
 
 
+class Travel(NamedTuple):
+    """Where the parts of a guided point's drive stand in the design matrix, for the proof of its maxima.
+
+    ``starts`` are the columns in which the parameters of each stage begin, crank-rockers first, the guide's last;
+    ``couplings`` those of kappa of each stage but the first, the offset stands behind it.
+    """
+
+    starts: tuple[int, ...]
+    couplings: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class Family:
     """A mechanism family, or a chain of them, which looks the same from outside.
@@ -117,6 +128,7 @@ class Family:
     :mod:`kernels.effects.pressure_extrema` takes.  A family without them has no effects.  ``dear`` names, for pose
     outputs that cost far more than the motion, what they are computed by and its cost [ns per pose].  ``precise_poses``
     is a slower ``poses`` for real numbers whose errors are a few roundings of what is given, where the family has one.
+    ``travel`` is given by a guide, alone or behind crank-rockers (:mod:`sweep.reductions.travel`).
     """
 
     name: str
@@ -133,6 +145,7 @@ class Family:
     ellipse: EllipseFunction | None = None
     dear: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     precise_poses: PoseFunction | None = None
+    travel: Travel | None = None
 
     def precise(self) -> Family:
         """Give the same family with the most accurate poses it has: for single poses, not for sweeps."""

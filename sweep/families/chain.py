@@ -12,8 +12,7 @@ import numpy as np
 from kernels.chain import chain_rule, input_angle
 from kernels.status import OK
 from sweep.errors import InputError
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.travel import certified_travel
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, Travel
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
 
@@ -80,7 +79,7 @@ def chain(families: tuple[Family, ...]) -> Chain:
             if stage.number == 1 or o.name not in stage.family.derivative_of.values()
         ]
     own = {f"{name}1": f"{derivative}1" for name, derivative in families[0].derivative_of.items()}
-    searched = Chain(
+    return Chain(
         name="+".join(f.name for f in families),
         title=" driving ".join(f.title for f in families),
         parameters=parameters,
@@ -94,12 +93,16 @@ def chain(families: tuple[Family, ...]) -> Chain:
         }
         | dict(last.dear),
         stages=stages,
+        travel=_travel(stages),
     )
-    if [family.name for family in families] != ["rssr"] * (len(families) - 1) + ["guide"]:
-        return searched
-    couplings = [stage.kappa for stage in stages if stage.kappa is not None]
-    step = certified_travel(searched, [stage.columns.start for stage in stages], couplings)
-    return replace(searched, steps=(step,))
+
+
+def _travel(stages: tuple[Stage, ...]) -> Travel | None:
+    """Crank-rockers that drive a guide, and nothing else, have a guided point whose maxima can be proven."""
+    if [stage.family.name for stage in stages] != ["rssr"] * (len(stages) - 1) + ["guide"]:
+        return None
+    couplings = tuple(stage.kappa for stage in stages if stage.kappa is not None)
+    return Travel(tuple(stage.columns.start for stage in stages), couplings)
 
 
 def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Parameter, ...]]:

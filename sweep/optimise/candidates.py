@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.families.base import Accuracy, Array
-from sweep.optimise.measures import ROTATABLE_MARGIN, margins
 from sweep.optimise.problem import Problem
 from sweep.optimise.starts import spread
+from sweep.reductions.measures import ROTATABLE_MARGIN, margins
 
 SAMPLED = 1 << 15  # designs per start: on a locus they cost a third of a microsecond each
 BLOCK = 1 << 15  # designs ranked together

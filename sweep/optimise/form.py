@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.catalogue import output
 from sweep.errors import InputError
 from sweep.families.base import Array
-from sweep.optimise.measures import Measure, Series, margins, measure
 from sweep.optimise.points import Curves, Points
 from sweep.optimise.problem import PLACE, Problem
+from sweep.reductions.catalogue import output
+from sweep.reductions.measures import Measure, Series, margins, measure
 
 Term = dict[int, float]
 AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.families.base import Angles, Array
-from sweep.optimise.measures import Series
 from sweep.optimise.problem import Problem
+from sweep.reductions.measures import Series
 
 Index: TypeAlias = NDArray[np.intp]
 

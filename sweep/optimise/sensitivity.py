@@ -10,9 +10,9 @@ import numpy as np
 
 from sweep.families.base import Accuracy, Array, Family
 from sweep.optimise.form import Program
-from sweep.optimise.measures import Measure
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
+from sweep.reductions.measures import Measure
 
 TIE = 1e-6  # extrema this near to the largest one (relative) share it
 DIMENSIONS = ("length", "angle", "ratio")  # a geared drive's dimensions are in planet radii

@@ -3,108 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from kernels import status as codes
-from sweep.cascade import MAGNITUDES, meets
 from sweep.report.front import front_sentence
+from sweep.report.limits import LimitState, Row, limit_state, limit_states, limited, value_of
 from sweep.report.quantities import Quantity, change, number, quantity
 from sweep.report.tables import parameter_rows
 
 if TYPE_CHECKING:
     from sweep.report.dataset import Dataset
     from sweep.report.scan import Scan
-    from sweep.study import Limit
 
-Row = Mapping[str, Any]
-ACTIVE = 1e-5  # a limit is called active if the optimum is this near to it, relative to its size
 KKT = 1e-6  # residual above which the optimiser's result is not called a local optimum
 MISSED = ("missed", "unknown")
 NEAREST = 4  # limits with room to spare that are named in the answer; the table has them all
 NO_PROOF = "This is no proof of a global optimum"
-
-
-@dataclass(frozen=True)
-class LimitState:
-    """One limit and where the result stands; ``state`` is "active", "met", "missed" or "unknown".
-
-    ``room`` is the distance to the limit relative to its size, negative where it is missed.
-    """
-
-    shown: Quantity
-    bound: str
-    value: str
-    reference: str
-    slack: str
-    state: str
-    room: float = 0.0
-
-
-def limited(data: Dataset, name: str) -> Quantity:
-    """An output under a limit; a parameter keeps its own name."""
-    shown = quantity(name, data.units.get(name, ""))
-    return replace(shown, symbol=name, words=name) if name in data.study.family.parameter_names else shown
-
-
-def limit_state(
-    limit: Limit, row: Row | None, reference: Row | None, shown: Quantity, active_names: frozenset[str]
-) -> LimitState:
-    """Whether a design keeps a limit, and with how much room."""
-    value, other = _value(row, limit.output), _value(reference, limit.output)
-    if _is_flag(limit.output):
-        words = {1.0: "yes", 0.0: "no"}
-        state = "unknown" if math.isnan(value) else "met" if meets(limit, np.array([value]))[0] else "missed"
-        return LimitState(shown, bound_words(limit, shown), words.get(value, "–"), words.get(other, "–"), "", state)
-    size = abs(value) if limit.output.rstrip("0123456789") in MAGNITUDES else value
-    rooms = []
-    if limit.minimum is not None:
-        rooms.append((size - limit.minimum, limit.minimum))
-    if limit.maximum is not None:
-        rooms.append((limit.maximum - size, limit.maximum))
-    room, bound = min(rooms, key=lambda pair: pair[0]) if not math.isnan(size) else (math.nan, math.nan)
-    tolerance = ACTIVE * max(abs(bound), 1e-12)
-    if math.isnan(room):
-        state = "unknown"
-    elif room < -tolerance:
-        state = "missed"
-    elif room <= tolerance or limit.output in active_names:
-        state = "active"
-    else:
-        state = "met"
-    slack = "" if state in ("unknown", "active") else shown.show(abs(room), 3)
-    return LimitState(
-        shown,
-        bound_words(limit, shown),
-        shown.show(value),
-        shown.show(other),
-        slack,
-        state,
-        room / max(abs(bound), 1e-12),
-    )
-
-
-def bound_words(limit: Limit, shown: Quantity) -> str:
-    """``at most 45°``, ``24.4 to 24.6 mm``."""
-    if _is_flag(limit.output):
-        return "must turn fully"
-    if limit.minimum is not None and limit.maximum is not None:
-        if limit.minimum == limit.maximum:
-            return f"exactly {shown.show(limit.maximum)}"
-        return f"{number(limit.minimum * shown.factor)} to {shown.show(limit.maximum)}"
-    if limit.maximum is not None:
-        return f"at most {shown.show(limit.maximum)}"
-    return f"at least {shown.show(limit.minimum if limit.minimum is not None else math.nan)}"
-
-
-def limit_states(data: Dataset) -> list[LimitState]:
-    """Every limit of the study at the result of the study."""
-    row = data.result
-    active = frozenset(data.active)
-    return [limit_state(x, row, data.reference, limited(data, x.output), active) for x in data.study.limits]
 
 
 def answer(data: Dataset, found: Scan) -> list[str]:
@@ -136,7 +50,7 @@ def answer(data: Dataset, found: Scan) -> list[str]:
 
 def _headline(data: Dataset, who: str, name: str) -> str:
     shown = quantity(name, data.units.get(name, ""))
-    value, old = _value(data.result, name), _value(data.reference, name)
+    value, old = value_of(data.result, name), value_of(data.reference, name)
     article = "an" if shown.words[0] in "aeiou" else "a"
     text = f"{who} has {article} {shown.words} of {_with_speed(data, shown, value)}"
     if data.reference is None:
@@ -150,7 +64,7 @@ def _headline(data: Dataset, who: str, name: str) -> str:
 
 def _comparison(data: Dataset, name: str) -> str:
     shown = quantity(name, data.units.get(name, ""))
-    value, old = _value(data.result, name), _value(data.reference, name)
+    value, old = value_of(data.result, name), value_of(data.reference, name)
     text = f"Its {shown.words} is {_with_speed(data, shown, value)}"
     difference = change(shown, value, old)
     return f"{text}; the reference has {shown.show(old)} ({difference})." if difference else f"{text}."
@@ -192,11 +106,11 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
     faults = [f"{s.shown.words}: {s.value} instead of {s.bound}" for s in limit_states(data) if s.state in MISSED]
     objective = data.study.objective
     if data.optimum is not None:
-        residual = _value(data.optimum, "kkt_residual")
+        residual = value_of(data.optimum, "kkt_residual")
         if not residual <= KKT:
             faults.append(f"the optimiser did not settle (KKT residual {number(residual, 3)}, {number(KKT)} is wanted)")
         if objective is not None and found.best_row:
-            best, value = found.best_row[objective.output], _value(data.optimum, objective.output)
+            best, value = found.best_row[objective.output], value_of(data.optimum, objective.output)
             if not abs(value) <= abs(best) * (1.0 + 1e-6):
                 shown = quantity(objective.output, data.units.get(objective.output, ""))
                 faults.append(f"the optimiser ended above the best design of the sweep, {shown.show(best)}")
@@ -211,7 +125,7 @@ def _against_reference(data: Dataset) -> list[str]:
     worse = [
         f"{quantity(name, data.units.get(name, '')).words}"
         for name in criteria
-        if name is not None and abs(_value(data.result, name)) > abs(_value(data.reference, name)) * (1.0 + 1e-9)
+        if name is not None and abs(value_of(data.result, name)) > abs(value_of(data.reference, name)) * (1.0 + 1e-9)
     ]
     missed = []
     for limit in data.study.limits:
@@ -239,25 +153,16 @@ def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
 def _proof(data: Dataset) -> str:
     if data.optimum is None:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
-    starts, agree = data.starts, _value(data.optimum, "agree")
+    starts, agree = data.starts, value_of(data.optimum, "agree")
     text = f"{NO_PROOF}: the optimiser started from {starts} design{'s' if starts != 1 else ''} of the sweep"
     if math.isfinite(agree):
         text += f", {number(agree)} of which ended at this value"
-    residual, violation = _value(data.optimum, "kkt_residual"), _value(data.optimum, "violation")
+    residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
     return f"{text}. KKT residual {number(residual, 3)}, largest violation of a limit {number(violation, 3)}."
 
 
-def _value(row: Row | None, name: str) -> float:
-    value = None if row is None else row.get(name)
-    return math.nan if value is None else float(value)
-
-
-def _is_flag(name: str) -> bool:
-    return name.rstrip("0123456789") == "rotatable"
-
-
 def _is_number(row: Row, name: str) -> bool:
-    return math.isfinite(_value(row, name))
+    return math.isfinite(value_of(row, name))
 
 
 def _count(n: float) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.errors import StoreError
-from sweep.report import answer, front, robust, tables
+from sweep.report import answer, front, limits, robust, tables
 from sweep.report.curves import motion_caption, motion_figure
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.drawing import COORDINATE, mechanism_caption, mechanism_figure
@@ -171,7 +171,7 @@ def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Sa
         title=data.study.title or data.study.name,
         figures=figures,
         sentences=answer.answer(data, found),
-        limits=answer.limit_states(data),
+        limits=limits.limit_states(data),
         outputs=tables.output_rows(data),
         parameters=tables.parameter_rows(data),
         fates=tables.fates(data, found),

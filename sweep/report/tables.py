@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.families import family as find_family
+from sweep.report.limits import bound_words, limited
 from sweep.report.quantities import change, number, quantity
 
 if TYPE_CHECKING:
@@ -135,8 +136,6 @@ def fates(data: Dataset, found: Scan) -> list[Fate]:
 
 def _by_limit(data: Dataset) -> list[tuple[str, int]]:
     """The limits that designs miss, in words, those of the study file's order."""
-    from sweep.report.answer import bound_words, limited
-
     shown = [(limited(data, limit.output), limit) for limit in data.study.limits]
     return [
         (f"{quantity.words}: not {bound_words(limit, quantity)}", data.missed[limit.output])

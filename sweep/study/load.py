@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sweep.catalogue import check_certifiable, proofs
 from sweep.effects import extended
 from sweep.errors import InputError, StudyError, closest, nearest
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
+from sweep.reductions.catalogue import check_certifiable, proofs
 from sweep.study import units
 from sweep.study.design import read_reference, read_space
 from sweep.study.faults import Faults, Key, S, read_section

@@ -72,7 +72,7 @@ def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[floa
 
 def _searchable(family: Family, output: Output, bounds: tuple[float, ...], side: str, faults: Faults) -> bool:
     """Whether the optimiser can hold such bounds."""
-    from sweep.optimise.measures import measure
+    from sweep.reductions.measures import measure
 
     try:
         found = measure(family, output.name)

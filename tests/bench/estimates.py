@@ -12,8 +12,8 @@ import time
 from pathlib import Path
 
 from sweep.chunk import compute_chunk, warm
+from sweep.estimate import estimate, neighbours
 from sweep.study import Study, load_study
-from sweep.study.estimate import estimate, neighbours
 
 STUDIES = Path(__file__).resolve().parents[2] / "studies"
 SECONDS = 3.0  # of a slice, by the estimate

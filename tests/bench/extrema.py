@@ -15,8 +15,8 @@ import numpy as np
 from kernels import status as st
 from studies.accuracy.machine import description
 from studies.accuracy.timing import seconds
-from sweep import extrema
 from sweep.families.base import Accuracy
+from sweep.reductions import extrema
 from sweep.summaries import design_outputs
 from tests.turn_designs import GUIDE, NEEDLE, RSSR, crank_rockers, guided_four_bars, needle_drives
 

@@ -9,15 +9,15 @@ import numpy as np
 
 from kernels import scan
 from kernels import status as st
-from sweep.catalogue import STAY, Way, general_way
-from sweep.dwell import window_angle
 from sweep.errors import InputError
-from sweep.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.chain import Chain
-from sweep.margins import combined, margin_suffixes, margins, own_step
+from sweep.reductions.catalogue import STAY, Way, general_way
+from sweep.reductions.dwell import window_angle
+from sweep.reductions.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
+from sweep.reductions.margins import combined, margin_suffixes, margins, own_step
+from sweep.reductions.window import Window
 from sweep.sampling import TWO_PI, Mask, Status, blocks, sample_turn
-from sweep.window import Window
 
 Group: TypeAlias = Literal["margin", "limits", "reductions", "means"]
 Found: TypeAlias = dict[Request, Extremum]

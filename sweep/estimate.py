@@ -101,7 +101,7 @@ def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
     With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range
     of `sweep.summarise` is left out.
     """
-    from sweep.catalogue import certified_names
+    from sweep.reductions.catalogue import certified_names
     from sweep.study.load import study_from_data, with_accuracy
     from sweep.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
 

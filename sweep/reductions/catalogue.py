@@ -9,12 +9,13 @@ from typing import Literal
 
 from sweep.effects import elsewhere, offered
 from sweep.errors import InputError, nearest
-from sweep.extrema import Mode, Request
 from sweep.families.base import Accuracy, Family, Output, Step
 from sweep.families.chain import Chain, Stage
-from sweep.margins import margin_suffixes
+from sweep.reductions.extrema import Mode, Request
+from sweep.reductions.margins import margin_suffixes
+from sweep.reductions.size import SIZE, lengths, size_step
+from sweep.reductions.travel import certified_travel
 from sweep.sampling import is_angle_of_follower
-from sweep.size import SIZE, lengths, size_step
 
 REDUCTIONS = {
     "max_abs": "largest magnitude over one turn of",
@@ -76,13 +77,17 @@ def is_position(family: Family, pose: str) -> bool:
     return pose == family.position or is_angle_of_follower(pose) or re.fullmatch(r"s\d+", pose) is not None
 
 
+def steps_of(family: Family) -> tuple[Step, ...]:
+    """The family's own routes, and those that are made for it here."""
+    made = (size_step(family), certified_travel(family))
+    return (*family.steps, *(step for step in made if step is not None))
+
+
 def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | None]]:
     """The family's own routes to an output, and those of a chain's first stage, which turns as if it were alone."""
     found: list[tuple[Step, Output, Stage | None]] = [
-        (step, o, None) for step in family.steps for o in step.provides if o.name == name
+        (step, o, None) for step in steps_of(family) for o in step.provides if o.name == name
     ]
-    if name == SIZE.name and (step := size_step(family)) is not None:
-        found.append((step, SIZE, None))
     if isinstance(family, Chain) and name.endswith("1"):
         stage = family.stages[0]
         found += [
@@ -99,7 +104,7 @@ def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, 
 
 def certified_names(family: Family) -> tuple[str, ...]:
     """Outputs whose maxima can be proven, those of a chain's first stage included."""
-    names = [o.name for step in family.steps if step.certifies for o in step.provides]
+    names = [o.name for step in steps_of(family) if step.certifies for o in step.provides]
     if isinstance(family, Chain):
         names += [f"{o.name}1" for step in family.stages[0].family.steps if step.certifies for o in step.provides]
     return tuple(names)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from kernels import status as st
-from sweep.extrema import DESIGN_STATUS, Request, true_extrema
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.chain import Chain, Stage
+from sweep.reductions.extrema import DESIGN_STATUS, Request, true_extrema
 from sweep.sampling import pose_columns
 
 NAMES = ("rotatable", "margin", "max_pressure_angle")

@@ -2,65 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
 from kernels import status as st
 from kernels.families import guide, rssr
-from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step
+from sweep.families import guide as guided
+from sweep.families import rssr as crank_rocker
+from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Travel
+from sweep.reductions.extrema import Request, true_extrema
 
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up
 DERIVATIVES = ("ds", "d2s", "d3s")
-# Columns of a design matrix in which stages and couplings begin.
-GUIDE_COLUMNS, ROCKER_COLUMNS = 9, 8
+GUIDE_COLUMNS, ROCKER_COLUMNS = len(guided.PARAMETERS), len(crank_rocker.PARAMETERS)
 
 
-def certified_travel(family: Family, starts: Sequence[int], couplings: Sequence[int]) -> Step:
-    """The step that proves maxima of the travel.
-
-    Parameters
-    ----------
-    family : whose poses the search works on
-    starts : columns in which the stages' parameters begin, the guide's last
-    couplings : columns of kappa of each stage but the first; the offset stands behind it
-    """
-    run = partial(_proven, family, tuple(starts), tuple(couplings))
+def certified_travel(family: Family) -> Step | None:
+    """The step that proves maxima of a guided point's travel; None for a family without one."""
+    if family.travel is None:
+        return None
+    run = partial(_proven, family, family.travel)
     outputs: list[Output] = []
     for pose in (o for o in family.pose_outputs if o.name in DERIVATIVES):
         words = f"largest magnitude over one turn of {pose.name}: {pose.text}"
         outputs.append(Output(f"max_abs_{pose.name}", pose.unit, words, pose.equation))
         place = f"crank angle of the largest magnitude of {pose.name}: {pose.text}"
         outputs.append(Output(f"phi_max_abs_{pose.name}", "rad", place, pose.equation))
-    return Step("certified maxima", tuple(outputs), run, 8000.0 + 7000.0 * len(starts), _certified, certifies=True)
-
-
-def as_crank_rocker(designs: Array) -> Array:
-    """Design matrix of a guide's four-bar as a crank-rocker with parallel axes and all links in one plane."""
-    matrix = np.zeros((len(designs), ROCKER_COLUMNS))
-    matrix[:, :4], matrix[:, -1] = designs[:, :4], designs[:, GUIDE_COLUMNS - 1]
-    return matrix
+    return Step(
+        "certified maxima", tuple(outputs), run, 8000.0 + 7000.0 * len(family.travel.starts), _certified, certifies=True
+    )
 
 
 def _certified(accuracy: Accuracy) -> bool:
     return accuracy.certify
 
 
-def _proven(
-    family: Family,
-    starts: tuple[int, ...],
-    couplings: tuple[int, ...],
-    designs: Array,
-    wanted: frozenset[str],
-    accuracy: Accuracy,
-) -> Columns:
-    from sweep.extrema import Request, true_extrema
-
+def _proven(family: Family, travel: Travel, designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     assert accuracy.target is not None
+    starts, couplings = travel
     n = len(designs)
     driven = np.ascontiguousarray(designs[:, starts[-1] : starts[-1] + GUIDE_COLUMNS])
-    stages = [designs[:, start : start + ROCKER_COLUMNS] for start in starts[:-1]] + [as_crank_rocker(driven)]
+    stages = [designs[:, start : start + ROCKER_COLUMNS] for start in starts[:-1]] + [guided.as_crank_rocker(driven)]
     joined = np.reshape([designs[:, k : k + 2] for k in couplings], (len(couplings), n, 2))
     shares = np.empty((n, 6))
     guide.travel_shares(driven, shares)

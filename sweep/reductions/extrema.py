@@ -13,9 +13,10 @@ import numpy as np
 
 from kernels import scan
 from kernels import status as st
-from sweep.breaks import jumps, near_jumps, search
 from sweep.families.base import Array, Family
-from sweep.refine import EPS, Peaks, polish_places, refine_peaks
+from sweep.reductions.breaks import jumps, near_jumps, search
+from sweep.reductions.refine import EPS, Peaks, polish_places, refine_peaks
+from sweep.reductions.window import Window, edges
 from sweep.sampling import (
     TWO_PI,
     Index,
@@ -27,7 +28,6 @@ from sweep.sampling import (
     pose_columns,
     sample_turn,
 )
-from sweep.window import Window, edges
 
 Mode: TypeAlias = Literal[-1, 0, 1]
 
@@ -95,7 +95,7 @@ def true_extrema(
     extrema : per request; nan where the status is not OK, except NOT_CONVERGED, which keeps its best value
     status : (n,) OK; NOT_ROTATABLE, UNDECIDABLE, SINGULAR, INVALID_INPUT from poses that the search met;
         NOT_OSCILLATING where an angle without extremum was asked for; NOT_CONVERGED where 32768 samples do not resolve
-        the curve.  Whether a dead point lies between the samples is for the margin to say (`sweep.margins`).
+        the curve.  Whether a dead point lies between the samples is for the margin to say (`sweep.reductions.margins`).
 
     Notes
     -----

@@ -12,11 +12,11 @@ import re
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from sweep.catalogue import STAY
 from sweep.errors import InputError
 from sweep.families.base import Family
-from sweep.means import PREFIX
-from sweep.size import SIZE, lengths
+from sweep.reductions.catalogue import STAY
+from sweep.reductions.means import PREFIX
+from sweep.reductions.size import SIZE, lengths
 
 # A crank that turns must keep this much of Delta/b^2 at its worst pose: cos^2 of 89.94 degrees.
 ROTATABLE_MARGIN = 1e-6

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from kernels import status as st
-from sweep.extrema import DESIGN_STATUS, LIMIT, START
 from sweep.families.base import Accuracy, Array, Columns, Family
+from sweep.reductions.extrema import DESIGN_STATUS, LIMIT, START
 from sweep.sampling import Index, Status, blocks, sample_turn
 
 EPS = 2.0**-53
