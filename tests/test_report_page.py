@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import re
 from pathlib import Path
@@ -216,3 +217,16 @@ def test_funnel_names_the_limit_that_designs_miss(full: Path) -> None:
     assert count == data.counts[5] > 0 == data.missed["max_abs_dev"]
     assert f"largest pressure angle of stage 1: not at most 45° {count:,}".replace(",", " ") in words
     assert "a limit of the study is exceeded" not in words
+
+
+def test_pictures_the_study_draws_itself_are_shown(tmp_path: Path) -> None:
+    own = [{"file": f"{name}.svg", "title": f"The {name}", "caption": f"Of {name}"} for name in ("atlas", "other")]
+    folder = write_dataset(tmp_path / "designs", study_data(report={"figures": own}), optimum={})
+    drawn = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
+    (tmp_path / "out" / "figures").mkdir(parents=True)
+    (tmp_path / "out" / "figures" / "atlas.svg").write_bytes(drawn)
+    page = write_report(folder, tmp_path / "out")
+    assert base64.b64encode(drawn).decode("ascii") in page.read_text(encoding="utf-8")
+    words = text_of(page)
+    assert "The atlas Of atlas" in words
+    assert "The other figures/other.svg has not been drawn" in words

@@ -184,6 +184,16 @@ FAULTS = {
         '[report]\ncurves = [{ label = "x", x = "c", y = "e", points = [[1, 2]] }]\n[budget]',
         ["report.curves[0].points = [[1, 2]]", "two or more points"],
     ),
+    "report figure in another folder": (
+        "[budget]",
+        '[report]\nfigures = [{ file = "../atlas.svg", title = "x", caption = "y" }]\n[budget]',
+        ["report.figures[0].file = '../atlas.svg'", "ending in .svg"],
+    ),
+    "report figure without a caption": (
+        "[budget]",
+        '[report]\nfigures = [{ file = "atlas.svg", title = "x" }]\n[budget]',
+        ["report.figures[0].caption", "a text"],
+    ),
 }
 
 

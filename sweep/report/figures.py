@@ -51,6 +51,11 @@ def save(figure: Figure, path: Path) -> Saved:
     """Write an SVG that depends on nothing but its data: no date, no random identifiers."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    return drawn_before(path)
+
+
+def drawn_before(path: Path) -> Saved:
+    """A figure that was saved earlier."""
     encoded = base64.b64encode(path.read_bytes()).decode("ascii")
     return Saved(path, f"data:image/svg+xml;base64,{encoded}")
 

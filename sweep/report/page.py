@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,7 @@ from sweep.report import answer, front, limits, robust, tables
 from sweep.report.curves import motion_caption, motion_figure
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.drawing import COORDINATE, mechanism_caption, mechanism_figure
-from sweep.report.figures import TEMPLATES, Saved, house_style, save
+from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
 from sweep.report.files import copy_tables, write_survivors
 from sweep.report.maps import Overlay, line_figure, map_figure, trade_off_figure
 from sweep.report.quantities import Quantity, quantity
@@ -40,7 +40,8 @@ def write(folder: Path, out: Path) -> Path:
         write_survivors(data.parts, out / "survivors.parquet")
         target = out / "report.html"
         partial = out / "_tmp-report.html"
-        partial.write_text(render(data, found, cells, figures), encoding="utf-8")
+        own = own_figures(data.study, out / "figures")
+        partial.write_text(render(data, found, cells, figures, own), encoding="utf-8")
         partial.replace(target)
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
@@ -138,6 +139,26 @@ def axis_quantity(data: Dataset, name: str) -> Quantity:
     return replace(shown, symbol=name, words=data.definitions.get(name, name))
 
 
+@dataclass(frozen=True)
+class OwnFigure:
+    """A picture the study draws itself; ``uri`` is None where it has not been drawn."""
+
+    title: str
+    caption: str
+    file: str
+    uri: str | None
+
+
+def own_figures(study: Study, folder: Path) -> list[OwnFigure]:
+    """The pictures that ``[report] figures`` names, as far as they lie in the folder."""
+    found = []
+    for entry in study.data.get("report", {}).get("figures", []):
+        path = folder / entry["file"]
+        uri = drawn_before(path).uri if path.exists() else None
+        found.append(OwnFigure(entry["title"], entry["caption"], entry["file"], uri))
+    return found
+
+
 def overlays(study: Study, x: str, y: str) -> list[Overlay]:
     """Known lines, ``[report] curves`` of the study, that lie in the plane of the map; points in the axes' units."""
     import numpy as np
@@ -152,7 +173,7 @@ def overlays(study: Study, x: str, y: str) -> list[Overlay]:
     return found
 
 
-def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Saved]) -> str:
+def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Saved], own: list[OwnFigure]) -> str:
     """The HTML text."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -170,6 +191,7 @@ def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Sa
         data=data,
         title=data.study.title or data.study.name,
         figures=figures,
+        own_figures=own,
         sentences=answer.answer(data, found),
         limits=limits.limit_states(data),
         outputs=tables.output_rows(data),

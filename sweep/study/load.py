@@ -202,6 +202,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     if space is not None:
         given |= {name: x for name, x in space.fixed.items() if name not in (*bare.parameter_names, *prescribed)}
     reference = None if reference_design is None else read_reference(family, reference_design, faults, given)
+    _check_figures(report, faults)
     _check_curves(report, [*prescribed, *(name for name in design or () if name in family.parameter_names)], faults)
     if faults.lines or space is None or disk_bytes is None or seconds is None:
         raise StudyError(str(path), faults.lines)
@@ -366,6 +367,15 @@ def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> 
     except InputError as error:
         faults.value(("mechanism", "chain"), list(names), error.allowed)
         return None
+
+
+def _check_figures(report: ReportSection, faults: Faults) -> None:
+    for k, figure in enumerate(report.figures):
+        for name in figure.required:
+            if getattr(figure, name) is None:
+                faults.missing(("report", "figures", k, name), str(type(figure).model_fields[name].description))
+        if figure.file is not None and not re.fullmatch(r"[\w-]+\.svg", figure.file):
+            faults.value(("report", "figures", k, "file"), figure.file, "letters, digits, - and _, ending in .svg")
 
 
 def _check_curves(report: ReportSection, parameters: list[str], faults: Faults) -> None:

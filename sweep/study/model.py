@@ -192,11 +192,23 @@ class CurveTable(Section):
     )
 
 
+class FigureTable(Section):
+    """report.figures"""
+
+    required = ("file", "title", "caption")
+    file: str | None = Field(None, description="the name of an SVG file without a folder")
+    title: str | None = Field(None, description="a text")
+    caption: str | None = Field(None, description="a text")
+
+
 class ReportSection(Section):
     """[report]"""
 
     curves: list[CurveTable] = Field(
         [], description='a list of { label = "...", x = "k", y = "a", points = [[1, 1], [9, 9]] }'
+    )
+    figures: list[FigureTable] = Field(
+        [], description='a list of { file = "atlas.svg", title = "...", caption = "..." }'
     )
 
 
