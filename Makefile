@@ -63,8 +63,9 @@ bench-peers: $(VENV)/ready  ## the planar case next to pylinkage, which gets an 
 search-worse: $(VENV)/ready  ## look for poses with larger errors than any known; appends to tests/oracle/worst_found.json
 	$(BIN)/python -m tests.search.worse
 
-bench: $(VENV)/ready  ## ns per sample against numpy and C, one run
+bench: $(VENV)/ready  ## ns per sample against numpy and C, one run; what each effect costs
 	$(BIN)/python -m tests.bench.kernels
+	$(BIN)/python -m tests.bench.effects --dry
 
 docs: $(VENV)/ready  ## make docs/effects.md from the register
 	$(SWEEP) effects --markdown > docs/effects.md
