@@ -88,10 +88,14 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
             ("memory", size(cost.memory_bytes)),
             ("disk", f"{size(cost.disk_bytes)}, allowed {size(study.budget.disk_bytes)}"),
             ("time", f"{duration(cost.seconds)} with {cost.jobs} workers, allowed {duration(study.budget.seconds)}"),
-            *((words, f"{duration(seconds)}, {seconds / cost.seconds:.3g} times that") for words, seconds in others),
+            *((words, f"{duration(seconds)}, {_times(seconds / cost.seconds)}") for words, seconds in others),
         ]
     )
     return lines
+
+
+def _times(ratio: float) -> str:
+    return "as much" if abs(ratio - 1.0) < 0.005 else f"{ratio:.3g} times that"
 
 
 def _front(study: Study) -> list[str]:
