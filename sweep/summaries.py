@@ -185,8 +185,10 @@ def _jobs(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> list[_Jo
     steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
     groups: dict[Group, list[str]] = {}
     ways = {name: (applying_step(family, name, accuracy), general_way(family, name)) for name in dict.fromkeys(wanted)}
-    # Margins of several stages belong together: a first stage judged by itself would take its designs from the others.
-    together = any(own is None and way is not None and way.kind == "margin" for own, way in ways.values())
+    # The margin of a whole chain asks all stages: a first one judged by itself would take its designs from the others.
+    together = any(
+        own is None and way is not None and way.kind == "margin" and not way.suffix for own, way in ways.values()
+    )
     for name, (own, way) in ways.items():
         if own is not None and not (together and way is not None and way.kind == "margin"):
             step, stage = own

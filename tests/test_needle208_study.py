@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import sweep
+from sweep.cascade import levels
 from sweep.study import load_study
 
 FOLDER = Path(__file__).parents[1] / "studies" / "needle208"
@@ -32,6 +33,12 @@ def test_full_study_sweeps_ten_million_designs_and_asks_for_the_documented_requi
         assert limits[name].maximum == pytest.approx(np.radians(45.0))
     assert limits["stroke"].minimum <= 24.5 <= limits["stroke"].maximum
     assert study.speed == pytest.approx(7000.0 * 2.0 * np.pi / 60.0)
+
+
+def test_stage_1_is_judged_before_anything_is_fitted():
+    stops = [level.route.outputs if level.route else ("fit",) for level in levels(load_study(FOLDER))]
+    assert set(stops[0]) == {"rotatable1", "max_pressure_angle1"}
+    assert stops[1:3] == [("swing1",), ("fit",)]
 
 
 def test_accepted_optimum_has_the_accepted_figures_and_keeps_every_limit():

@@ -87,6 +87,10 @@ def test_weakest_stage_decides_for_the_chain():
         found["max_pressure_angle"][both],
         np.maximum(found["max_pressure_angle1"], found["max_pressure_angle2"])[both],
     )
+    numbered = [name for name in names if name not in WANTED]
+    apart = design_outputs(NEEDLE, designs, numbered, EXACT)
+    for name in (*numbered, "status"):
+        np.testing.assert_array_equal(apart[name], found[name], err_msg=name)
     alone = design_outputs(RSSR, designs[:, :8], WANTED, EXACT)
     np.testing.assert_array_equal(found["rotatable1"], alone["rotatable"])
     np.testing.assert_allclose(found["margin1"], alone["margin"], rtol=1e-9)
