@@ -121,6 +121,7 @@ def test_summarise_passes_accuracy_and_window(tmp_path: Path) -> None:
         (("geared_dwell", "{tmp}/nophi.csv", "--want", "psi"), "a column phi [rad], or --poses N"),
         (("geared_dwell", "{tmp}/empty.csv", "--want", "psi"), "readable csv"),
         (("geared_dwell", "{tmp}/fake.parquet", "--want", "psi"), "readable parquet"),
+        (("geared_dwell", "{tmp}/german.csv", "--want", "psi"), "values between commas, with decimal points"),
         (("geared_dwell", "{tmp}/table.txt", "--want", "psi"), "ending in .parquet or .csv"),
     ],
 )
@@ -129,6 +130,7 @@ def test_bad_input_is_one_message_and_exit_code_2(tmp_path: Path, arguments: tup
     (tmp_path / "bad.csv").write_text("k,a,phi\n1.2,1,0\nx,1,0\n")
     (tmp_path / "nan.csv").write_text("k,a,phi\n1.2,1,0\n,1,0\n")
     (tmp_path / "nophi.csv").write_text("k,a\n1.2,1\n")
+    (tmp_path / "german.csv").write_text("k;a;phi\n1,2;1,0;0,5\n")
     for name in ("empty.csv", "fake.parquet", "table.txt"):
         (tmp_path / name).write_text("" if name == "empty.csv" else "no table")
     before = sorted(tmp_path.rglob("*"))

@@ -132,6 +132,7 @@ def test_study_needs_no_fitted_parameters_and_bounds_the_scaled_ones(tmp_path):
         (("[design]", '[design]\nxi2 = "3 mm"'), "design.xi2 = '3 mm'; allowed: nothing here: [fit] finds it"),
         (('"24.5 mm"', '"24.5 deg"'), "fit.stroke = '24.5 deg'; allowed: a length"),
         (("[fit]", "[fit]\nstork = 1"), "fit.stork: unknown key; allowed: stroke, direction"),
+        (("[fit]", "[optimise]\n[fit]"), "limits.stroke is missing; needed: bounds near fit.stroke"),
         (("b2 = { max = 60", "b22 = { max = 60"), "limits.b22: unknown design output"),
     ],
 )

@@ -107,6 +107,17 @@ FAULTS = {
     "length of zero": ('a = "10 mm"\nb = {', 'a = "0 mm"\nb = {', ["design.a = 0.0", "positive length (crank)"]),
     "negative length in a table": ("value = 4.0", "value = -4.0", ["design.b = -4.0", "positive length (coupler)"]),
     "negative length on an axis": ("from = 20", "from = -20", ["design.c.from = -20.0", "positive length (rocker)"]),
+    "nan for a length": ('a = "10 mm"\nb = {', "a = nan\nb = {", ["design.a = nan", 'as "40.0 mm"']),
+    "list for a length": (
+        'a = "10 mm"\nb = {',
+        "a = [1, 2]\nb = {",
+        ["design.a = [1, 2]", '{ values = [...], unit = "mm" }'],
+    ),
+    "decimal comma": (
+        'a = "10 mm"\nb = {',
+        'a = "10,5 mm"\nb = {',
+        ["design.a = '10,5 mm'", "a decimal point, no comma"],
+    ),
     "true for a length": ('a = "10 mm"\nb = {', "a = true\nb = {", ["design.a = true", "a length with its unit"]),
     "axis without unit": (A_AXIS, "c = { from = 20, to = 40, count = 5 }", ["design.c.unit is missing", 'unit = "mm"']),
     "axis with unknown unit": (A_AXIS, A_AXIS.replace("mm", "mmm"), ["design.c.unit = 'mmm'", "did you mean 'mm'?"]),
@@ -158,6 +169,7 @@ FAULTS = {
     "target and samples": ("target = 1e-8", "target = 1e-8\nsamples = 720", ["accuracy.samples = 720", "not both"]),
     "target of zero": ("target = 1e-8", "target = 0", ["accuracy.target = 0", "relative error"]),
     "samples with a fraction": ("target = 1e-8", "samples = 7.5", ["accuracy.samples = 7.5", "whole number"]),
+    "too few samples": ("target = 1e-8", "samples = 7", ["accuracy.samples = 7", "8 to 1048576"]),
     "no starts": ("starts = 10", "starts = 0", ["optimise.starts = 0", "whole number"]),
     "negative seed": ("seed = 1", "seed = -1", ["optimise.seed = -1", "0 or greater"]),
     "time budget as a number": ('"60 s"', "60", ["optimise.time_budget = 60", "60 s"]),
@@ -288,6 +300,17 @@ SAMPLED = RIGHT.replace(", count = 5", "").replace(", count = 4", "")
 def test_faults_of_a_sample(sample: str, pieces: list[str], tmp_path: Path) -> None:
     (message,) = faults_of(SAMPLED.replace("[design]", f"[design]\nsample = {sample}"), tmp_path)
     assert all(piece in message for piece in pieces)
+
+
+def test_an_optimiser_needs_something_to_vary(tmp_path: Path) -> None:
+    axes = {A_AXIS: 'c = "20 mm"', "[35.0, 40.0]": "[35.0]", "from = 0, to = 90, count = 4": "value = 0"}
+    text = RIGHT
+    for axis, fixed in axes.items():
+        text = text.replace(axis, fixed)
+    (message,) = faults_of(text, tmp_path)  # the branch, which takes two values, does not change steadily
+    assert "optimise = 'no swept parameter'" in message
+    (tmp_path / "study.toml").write_text(text.replace("[35.0]", "[35.0, 36.0]"))
+    assert load_study(tmp_path).space.count == 4
 
 
 def test_a_sampled_axis_has_no_count(tmp_path: Path) -> None:

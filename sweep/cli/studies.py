@@ -12,7 +12,9 @@ STUDY = click.argument("study", type=click.Path(exists=True, path_type=Path))
 
 @click.command()
 @STUDY
-@click.option("--out", type=click.Path(path_type=Path), help="Dataset folder; default results/<study>/designs.")
+@click.option(
+    "--out", type=click.Path(file_okay=False, path_type=Path), help="Dataset folder; default results/<study>/designs."
+)
 @click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers.")
 @click.option("--backend", type=click.Choice(["threading", "loky"]), default="threading", show_default=True)
 @click.option("--accuracy", type=float, help="Relative error of the extrema, instead of the study's own target.")

@@ -58,7 +58,7 @@ def evaluate_table(family: str, table: Path, want: tuple[str, ...], poses: int |
 @FAMILY
 @TABLE
 @WANT
-@click.option("--samples", type=click.IntRange(min=3), help="Extrema on a grid of this many crank angles.")
+@click.option("--samples", type=int, help="Extrema on a grid of this many crank angles.")
 @click.option(
     "--accuracy", type=float, help="Extrema refined to this relative error (default 1e-8), with err_ columns."
 )
@@ -120,10 +120,16 @@ def read_table(path: Path) -> pd.DataFrame:
     try:
         if suffix == ".parquet":
             return pd.read_parquet(path)
+        with path.open("rb") as file:
+            head = file.readline()
+        if b"," not in head and (b";" in head or b"\t" in head):
+            raise InputError("table", path.name, "values between commas, with decimal points", str(path))
         # Not the parser of pandas, whose default was off by an ulp for some numbers up to version 2.
         table = csv.read_csv(path)
         frame: pd.DataFrame = table.rename_columns([name.strip() for name in table.column_names]).to_pandas()
         return frame
+    except InputError:
+        raise
     except (ValueError, OSError) as error:  # pyarrow derives all its complaints about content from these
         raise InputError("table", path.name, f"readable {suffix[1:]} ({error})", str(path)) from error
 

@@ -78,6 +78,13 @@ def read_space(
     return DesignSpace(names, axes, fixed, "sobol", sample.n or 0, sample.seed)
 
 
+def check_varied(family: Family, space: DesignSpace, faults: Faults) -> None:
+    """Report a space in which [optimise] finds nothing to vary: signs do not change steadily."""
+    signs = [p.name for p in family.parameters if p.choices is not None]
+    if not any(axis.low < axis.high and axis.name not in signs for axis in space.axes):
+        faults.value(("optimise",), "no swept parameter", "a study with a length, angle or number that is swept")
+
+
 def read_reference(
     family: Family, raw: Mapping[str, Any], faults: Faults, given: Mapping[str, float] = MappingProxyType({})
 ) -> dict[str, float]:
@@ -148,9 +155,12 @@ def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | 
         except units.UnitFault as fault:
             faults.value(key, raw, str(fault))
             return None
+    if isinstance(raw, list):
+        faults.value(key, raw, _list_form(p))
+        return None
     number_like = isinstance(raw, (int, float)) and not isinstance(raw, bool)
     if not number_like or internal != "1":
-        faults.value(key, raw, _forms(p, raw if number_like else None))
+        faults.value(key, raw, _forms(p, raw if number_like and math.isfinite(raw) else None))
         return None
     return _read_fixed(p, {"value": raw}, key, faults)
 
@@ -232,7 +242,8 @@ def _choices(p: Parameter) -> str:
 
 
 def _usual(internal: str) -> str:
-    return {"rad": "deg"}.get(internal, internal)
+    """The unit a designer writes where the internal one is given."""
+    return {"rad": "deg", "t": "kg", "t*mm^2": "kg*mm^2", "rad/s": "rpm"}.get(internal, internal)
 
 
 def _forms(p: Parameter, number: object = None) -> str:
@@ -246,6 +257,12 @@ def _forms(p: Parameter, number: object = None) -> str:
     usual = _usual(internal)
     article = "an" if p.unit == "angle" else "a"
     return f'{article} {p.unit} with its unit, as "{shown} {usual}" or {{ value = {shown}, unit = "{usual}" }}'
+
+
+def _list_form(p: Parameter) -> str:
+    """The right way to write several values of this parameter."""
+    internal = units.internal_unit(p.unit)
+    return "{ values = [...] }" if internal == "1" else f'{{ values = [...], unit = "{_usual(internal)}" }}'
 
 
 def _axis_form(p: Parameter) -> str:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Output
+from sweep.families.chain import Chain
 from sweep.study import units
 from sweep.study.faults import Faults, Key, read_section
 from sweep.study.model import LimitEntry
 from sweep.study.study import Limit
+
+if TYPE_CHECKING:
+    from sweep.fit import LineFit
 
 _YES_OR_NO = re.compile(r"rotatable\d*")
 
@@ -47,6 +51,14 @@ def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple
         else:
             faults.value(key, entry, _form(output))
     return tuple(found)
+
+
+def check_fitted_stroke(fit: LineFit, family: Family, raw: Mapping[str, Any], faults: Faults) -> None:
+    """Report an optimum whose stroke nothing holds: [fit] scales the designs of the sweep, not those of the search."""
+    names = ("stroke", f"stroke{len(family.stages)}") if isinstance(family, Chain) else ("stroke",)
+    if fit.stroke is not None and not any(name in raw for name in names):
+        words = f'{{ min = {fit.stroke * 0.999:g}, max = {fit.stroke * 1.001:g}, unit = "mm" }}'
+        faults.missing(("limits", "stroke"), f"bounds near fit.stroke that [optimise] must keep, as {words}")
 
 
 def _parameter(family: Family, name: str) -> Output | None:

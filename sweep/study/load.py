@@ -16,9 +16,9 @@ from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
 from sweep.reductions.catalogue import check_certifiable, proofs
 from sweep.study import units
-from sweep.study.design import read_reference, read_space
+from sweep.study.design import check_varied, read_reference, read_space
 from sweep.study.faults import Faults, Key, S, read_section
-from sweep.study.limits import read_limits, read_output_name
+from sweep.study.limits import check_fitted_stroke, read_limits, read_output_name
 from sweep.study.model import (
     REQUIRED_TABLES,
     TABLES,
@@ -195,9 +195,13 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     if isinstance(data.get("pareto"), dict):
         pareto = read_pareto(front, data["pareto"], family, goal, front_budget, faults)
     fit = _fit(_section(FitSection, "fit", data, faults), family, faults) if "fit" in data else None
+    if fit is not None and "optimise" in data:
+        check_fitted_stroke(fit, family, bounds or {}, faults)
     fitted = fit.parameters(family) if fit is not None else ()
     made = () if locus is None else locus.made
     space = None if design is None else read_space(family, design, faults, fitted, given, made, prescribed)
+    if "optimise" in data and space is not None and fit is None and (locus is None or search.variables != "parameters"):
+        check_varied(family, space, faults)
     # The inputs of effects describe the scene: the reference design has the same unless it says otherwise.
     if space is not None:
         given |= {name: x for name, x in space.fixed.items() if name not in (*bare.parameter_names, *prescribed)}

@@ -125,8 +125,8 @@ class AccuracySection(Section):
     """[accuracy]"""
 
     target: Annotated[float, Field(ge=1e-14, le=0.1)] | None = Field(None, description="a relative error, 1e-14 to 0.1")
-    samples: Annotated[int, Field(ge=4, le=1_000_000)] | None = Field(
-        None, description="a whole number of crank angles, 4 to 1000000"
+    samples: Annotated[int, Field(ge=8, le=2**20)] | None = Field(
+        None, description="a whole number of crank angles, 8 to 1048576"
     )
     certify: Proofs = Field(False, description="true or false, or a list of the wanted maxima to prove")
 

@@ -132,6 +132,8 @@ def split(text: str, internal: str) -> tuple[float, str]:
         if there is no number, or no unit where one is needed.
     """
     match = _NUMBER.fullmatch(text.strip())
+    if match is not None and match[2].startswith(","):
+        raise UnitFault(f"a decimal point, no comma; {example(internal)}")
     if match is None or not match[2] or not math.isfinite(float(match[1])):
         raise UnitFault(f"a number and its unit; {example(internal)}")
     return float(match[1]), match[2]
