@@ -23,9 +23,9 @@ from sweep.summaries import design_outputs
 FITTED = ("xi", "eta", "lam", "h")
 SCALED = ("a", "b", "c", "e", "xi", "eta", "h")
 
-# The deviation is a smooth function of the input: 48 Chebyshev points miss 1e-4 of its extremes, which is far below
-# what the optimiser moves afterwards.
-SAMPLES = 48
+# The deviation is a smooth function of the input: 48 Chebyshev points of a swing miss 1e-4 of its extremes, 256 of a
+# whole turn 4e-4 at most (48: up to 2e-2), which is far below what the optimiser moves afterwards.
+SWING_SAMPLES, TURN_SAMPLES = 48, 256
 SWING_ACCURACY = Accuracy(target=1e-6)
 # Measured on one core of a Zen 4 [ns per design], the limit positions of the driving stage included.
 NS_FIT = 7000.0
@@ -113,11 +113,11 @@ def _suffix(family: Family) -> str:
 
 
 def _input_angles(family: Family, designs: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """Input angles of the guide over its swing, Chebyshev points, (n, SAMPLES), and the status of what drives it."""
-    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, SAMPLES))
+    """Input angles of the guide over its swing or turn, Chebyshev points, (n, m), and the status of what drives it."""
+    samples = SWING_SAMPLES if isinstance(family, Chain) else TURN_SAMPLES
+    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))
     if not isinstance(family, Chain):
-        turn = np.broadcast_to(2.0 * np.pi * share, (len(designs), SAMPLES)).copy()
-        return turn, np.zeros(len(designs), np.uint8)
+        return np.tile(2.0 * np.pi * share, (len(designs), 1)), np.zeros(len(designs), np.uint8)
     last = family.stages[-1]
     upstream = find_family([stage.family.name for stage in family.stages[:-1]])
     driving = np.ascontiguousarray(designs[:, : len(upstream.parameters)])

@@ -48,6 +48,19 @@ def test_fitted_designs_have_the_stroke_and_a_small_deviation():
     assert (got.max_abs_dev < 0.02 * 24.5).mean() > 0.5
 
 
+def test_a_guide_that_turns_is_scaled_to_its_stroke_as_well():
+    rng = np.random.default_rng(4)
+    names = family("guide").parameter_names
+    designs = np.zeros((300, len(names)))
+    designs[:, :4] = rng.uniform((6, 20, 20, 20), (12, 40, 40, 40), (300, 4))
+    designs[:, names.index("branch")] = 1.0
+    fitted, status = fit_line(family("guide"), designs, LineFit(20.0, True), None)
+    got = summarise("guide", dict(zip(names, fitted[status == st.OK].T, strict=True)), "stroke")
+    assert (got.status == st.OK).sum() > 100
+    # The largest distance of 256 Chebyshev points of a turn is pi^2/255: half of it, squared, over two is 2e-4.
+    np.testing.assert_allclose(got.stroke[got.status == st.OK], 20.0, rtol=1e-3)
+
+
 def test_deviation_cannot_be_improved_by_moving_the_point():
     designs = random_designs(200, seed=1)
     fitted, status = fit_line(family(CHAIN), designs, LineFit(None, False), None)

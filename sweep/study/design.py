@@ -158,9 +158,9 @@ def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | 
     if isinstance(raw, list):
         faults.value(key, raw, _list_form(p))
         return None
-    number_like = isinstance(raw, (int, float)) and not isinstance(raw, bool)
-    if not number_like or internal != "1":
-        faults.value(key, raw, _forms(p, raw if number_like and math.isfinite(raw) else None))
+    bare = raw if isinstance(raw, (int, float)) and not isinstance(raw, bool) else None
+    if bare is None or internal != "1":
+        faults.value(key, raw, _forms(p, bare if bare is not None and math.isfinite(bare) else None))
         return None
     return _read_fixed(p, {"value": raw}, key, faults)
 
