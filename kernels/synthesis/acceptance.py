@@ -29,7 +29,7 @@ PRESSURE = 6
 NAMES = ("", "point", "side", "crank", "branch", "rotation", "pressure angle")
 MEANING: dict[int, str] = {
     PASSED: "",
-    NO_POINT: "the locus has no point here: at infinity, or no real root",
+    NO_POINT: "the locus has no point here: at infinity, no real root, or the rocker would be negative",
     SIDE: "(i) side condition: the crank would turn phi0 + 180 deg, or the limits change places",
     CRANK: "(ii) the crank length is not positive: the first limit is the folded one",
     BRANCH: "(iii) branch defect: the limits lie on different assembly modes, or the follower goes the other way",

@@ -120,9 +120,9 @@ def rssp_at_offset(
         f, alpha = requirements[i, 3], requirements[i, 4]
         s0, c0 = sine_cosine(phi0)
         sa, ca = sine_cosine(alpha)
+        sh, ch = sine_cosine(0.5 * phi0)
         lift, cot = e / ca, stroke * c0 / s0
-        radius, aside = abs(0.5 * stroke / s0), lift - 0.5 * cot
-        inner = (radius - aside) * (radius + aside)
+        inner = (0.5 * stroke * (ch / sh) - lift) * (0.5 * stroke * (sh / ch) + lift)
         middle = root[i] * math.sqrt(max(inner, 0.0))
         # The end away from the foot is a sum without cancellation, the other one comes from the product s1 s2.
         product = -lift * (lift - cot)

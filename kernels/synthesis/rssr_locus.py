@@ -1,4 +1,4 @@
-"""Crank-rockers (RSSR) from swing and crank angle between the limits; equations (1)-(8) of docs/synthesis.md.
+"""Crank-rockers (RSSR) from swing and crank angle between the limits; equations (1)-(8a) of docs/synthesis.md.
 
 Position 1 is extended, position 2 folded; X, Y are the coordinates of the rocker ball about the rocker axis, h = g sin
 alpha.  In both positions the ball lies in the plane of crank axis and crank: two linear equations for X1, Y1 once the
@@ -202,7 +202,7 @@ def rssr_at_direction(
 ) -> None:
     """Crank-rockers at given rocker angles of the extended position: a quadratic equation for the rocker length.
 
-    Equations (5)-(8) of docs/synthesis.md.
+    Equations (5)-(8a) of docs/synthesis.md.
 
     Parameters
     ----------
@@ -225,15 +225,28 @@ def rssr_at_direction(
         turn = 2.0 * r.sin_half * (r.e * ca * cm - r.h * sm) * c0
         p1 = turn - 2.0 * r.cos_half * (r.e * cm - r.h * ca * sm) * s0
         p0 = -(r.e * r.e + r.h * r.h) * s0
-        inner = p1 * p1 - 4.0 * p2 * p0
-        large = -0.5 * (p1 + math.copysign(math.sqrt(max(inner, 0.0)), p1))
+        # (8a): A cos(2 phi1 + phi0) - B sin(2 phi1 + phi0) = D, and p1^2 - 4 p2 p0 = 4 (A^2 + B^2 - D^2)
+        big_a, big_b = r.sin_half * (r.e * sm - ca * r.h * cm), r.sin_half * (ca * r.e * cm + r.h * sm)
+        big_d = r.sin_half * c0 * (r.e * sm + ca * r.h * cm) - s0 * r.cos_half * (ca * r.e * sm + r.h * cm)
+        reach = math.sqrt(big_a * big_a + big_b * big_b)
+        inner = (reach - big_d) * (reach + big_d)
+        far = math.copysign(math.sqrt(max(inner, 0.0)), p1)
+        large = -(0.5 * p1 + far)
         c = large / p2 if root[i] > 0.0 else p0 / large
         x1, y1 = c * c1, c * s1
         qx1, qy1, qx2, qy2 = x1 + r.e, ca * y1 - r.h, c * c2 + r.e, ca * (c * s2) - r.h
         rho1, rho2 = math.sqrt(qx1 * qx1 + qy1 * qy1), math.sqrt(qx2 * qx2 + qy2 * qy2)
+        u1, v1 = qx1 / rho1, qy1 / rho1
+        if rho1 < 0.5 * (abs(r.e) + abs(r.h)):
+            # close to the crank axis the ball does not tell phi1 well: (8a) does, up to half a turn
+            apart = -root[i] * far
+            twice = math.atan2(big_a * apart - big_b * big_d, big_a * big_d + big_b * apart)
+            sine, cosine = sine_cosine(0.5 * (twice - requirements[i, 1]))
+            way = math.copysign(1.0, u1 * cosine + v1 * sine)
+            u1, v1 = way * cosine, way * sine
         side = (qx1 * qx2 + qy1 * qy2) * c0 + (qx1 * qy2 - qy1 * qx2) * s0
         point = inner >= 0.0 and c > 0.0 and rho1 > 0.0
         back = -rho2 if side < 0.0 else rho2
-        _finish(r, point, x1, y1, rho1, back, qx1 / rho1, qy1 / rho1, i, status, failed, designs)
+        _finish(r, point, x1, y1, rho1, back, u1, v1, i, status, failed, designs)
         if phi1 is not None:
-            phi1[i] = math.atan2(qy1, qx1) if status[i] == 0 else math.nan
+            phi1[i] = math.atan2(v1, u1) if status[i] == 0 else math.nan
