@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,8 @@ BATCH_SECONDS = 0.1
 FEWEST = 64
 # Measured: what a call of a route takes however few designs it is given.
 CALL_SECONDS = 1e-3
+
+Number = TypeVar("Number", float, Array)
 
 # A clockwise and an anticlockwise follower of the same amplitude meet the same requirement.
 MAGNITUDES = ("swing", "stroke")
@@ -236,11 +238,14 @@ def _before_fit(study: Study, route: Route) -> bool:
     return all(number is not None and int(number[1]) < last for number in numbers)
 
 
+def compared(name: str, values: Number) -> Number:
+    """What limits and objectives compare: of a swing and a stroke the magnitude, of anything else the value itself."""
+    return abs(values) if name.rstrip("0123456789") in MAGNITUDES else values
+
+
 def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:
     """Whether each value keeps the limit; nan does not.  Swing and stroke are compared by magnitude."""
-    x = np.asarray(values, dtype=np.float64)
-    if limit.output.rstrip("0123456789") in MAGNITUDES:
-        x = np.abs(x)
+    x = compared(limit.output, np.asarray(values, dtype=np.float64))
     good = np.isfinite(x)
     if limit.minimum is not None:
         good &= x >= limit.minimum

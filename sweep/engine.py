@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import platform
+import shlex
 import signal
 import socket
 import subprocess
@@ -82,7 +83,8 @@ def run(
     with store.locked(folder):
         head = {"run": uuid.uuid4().hex[:12]}
         begin = time.monotonic()
-        store.append_run(folder, head | {"event": "start"} | _circumstances(jobs, backend))
+        command = _command(model, folder, smoke, accuracy, certify)
+        store.append_run(folder, head | {"event": "start", "command": command} | _circumstances(jobs, backend))
         try:
             computed = _sweep(model, folder, jobs, backend, force, progress)
             if model.optimise is not None:
@@ -273,6 +275,13 @@ def _front(study: Study, folder: Path, jobs: int) -> None:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while searching the front; run again to continue"
             raise Interrupted(number, text) from None
+
+
+def _command(study: Study, folder: Path, smoke: bool, accuracy: float | None, certify: bool | None) -> str:
+    """The command that makes the dataset again."""
+    words = ["sweep", "run", str(study.path), "--out", str(folder), *(["--smoke"] if smoke else [])]
+    words += [] if accuracy is None else ["--accuracy", repr(accuracy)]
+    return shlex.join([*words, *(["--certify"] if certify else [])])
 
 
 def _circumstances(jobs: int, backend: str) -> dict[str, Any]:

@@ -202,6 +202,7 @@ def test_pandas_reads_the_folder_and_the_run_is_noted(study: Study, tmp_path: Pa
     assert is_complete(folder)
     start, end = read_runs(folder)
     assert (start["event"], end["outcome"], start["jobs"]) == ("start", "complete", 2)
+    assert start["command"] == f"sweep run {study.path} --out {folder}"
     before = chunk_bytes(folder)
     run(study, folder)
     assert read_runs(folder)[-1]["text"] == "0 chunks computed"

@@ -5,12 +5,15 @@ from __future__ import annotations
 import base64
 import html
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from sweep import run, store
 from sweep.errors import InputError, StoreError
 from sweep.report import write_report
 from sweep.report.answer import answer
@@ -20,6 +23,7 @@ from sweep.report.maps import map_figure
 from sweep.report.page import divided_axes, gather, overlays
 from sweep.report.quantities import quantity
 from sweep.report.scan import Cells, Grid
+from sweep.report.tables import parameter_rows
 from sweep.study import study_from_data
 from tests.report_dataset import curve, designs, study_data, write_dataset
 
@@ -100,6 +104,7 @@ def test_figures_depend_on_the_data_only(full: Path, tmp_path: Path) -> None:
     ("changes", "words"),
     [
         ({"kkt_residual": 1e-3}, "Not achieved: the optimiser did not settle (KKT residual 0.001,"),
+        ({"kkt_residual": np.nan}, "the optimiser did not settle (its KKT residual does not exist, 1·10⁻⁶ is wanted)"),
         ({"max_abs_d2s": 9.0}, "Not achieved: the optimiser ended above the best design of the sweep, 8.5 mm/rad²"),
         ({"stroke": 24.0, "status": 5}, "No design was found that keeps all limits"),
         ({"stroke": 24.0, "status": 5}, "Not achieved: stroke: 24 mm instead of 24.4 to 24.6 mm"),
@@ -129,6 +134,45 @@ def test_says_so_when_no_design_is_feasible(tmp_path: Path) -> None:
     design = study_data()["design"] | {"a1": {"from": 26.0, "to": 30.0, "count": 5, "unit": "mm"}}
     words = text_of(write_report(write_dataset(tmp_path / "designs", study_data(optimise=None, design=design))))
     assert "No design of the 2 050 in the sweep meets all limits." in words
+    assert "What stops most of them, 2 050: the crank does not turn fully" in words
+
+
+def test_signed_objective_is_best_where_it_is_least(tmp_path: Path) -> None:
+    """A slider behind the shaft: the farther back, the smaller the largest s."""
+    data: dict[str, Any] = {
+        "study": {"name": "behind"},
+        "mechanism": {"family": "rssp"},
+        "scene": {"want": ["stroke"]},
+        "design": {"b": {"values": [40, 60, 80], "unit": "mm"}, "a": "8 mm", "branch": -1}
+        | dict.fromkeys(("e", "f"), "0 mm") | {"alpha": "0 deg"},
+        "objective": {"minimise": "max_s"},
+    }  # fmt: skip
+    data_set, found, _ = gather(run(study_from_data(data, "study.toml"), tmp_path / "designs", jobs=1))
+    assert found.best_row["b"] == 80.0
+    assert "largest displacement of −72 mm" in plain(answer(data_set, found)[0])
+
+
+def test_a_run_killed_before_its_totals_were_noted_is_reported_in_full(tmp_path: Path) -> None:
+    folder = write_dataset(tmp_path / "designs", study_data(optimise=None))
+    whole, _, _ = gather(folder)
+    store.write_plan(folder, whole.plan | {"counts": None, "missed": None, "complete": False})
+    again, _, _ = gather(folder)
+    assert again.counts == whole.counts
+    assert again.missed == whole.missed
+
+
+def test_rounding_of_zero_and_edges_of_listed_values_are_told(tmp_path: Path) -> None:
+    """The sweep takes listed values as they are, the optimiser goes anywhere between them."""
+    design = study_data()["design"] | {
+        "f1": {"values": [-5, 0, 5], "unit": "mm"},
+        "g1": {"values": [-5, 5], "unit": "mm"},
+    }
+    folder = write_dataset(tmp_path / "designs", study_data(design=design), optimum={"f1": -3.6e-15, "g1": 5.0})
+    rows = {row.name: row for row in parameter_rows(gather(folder)[0])}
+    assert (plain(rows["f1"].value), plain(rows["f1"].space), rows["f1"].edge) == ("0 mm", "−5 to 5 mm", "")
+    assert (plain(rows["g1"].value), rows["g1"].edge) == ("5 mm", "upper edge")
+    swept = replace(gather(folder)[0], optima=None)
+    assert plain(next(row.space for row in parameter_rows(swept) if row.name == "f1")) == "−5, 0 or 5 mm"
 
 
 def test_one_axis_gives_a_line(tmp_path: Path) -> None:

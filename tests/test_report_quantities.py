@@ -24,7 +24,7 @@ RPM = 2.0 * math.pi / 60.0
         ("phi_max_abs_d2s", "rad", "φ at max |s″|", "crank angle of the largest acceleration", "°"),
         ("max_pressure_angle2", "rad", "max pressure angle₂", "largest pressure angle of stage 2", "°"),
         ("max_abs_dev", "length", "max |dev|", "largest deviation from the line", "mm"),
-        ("range_x_m2", "length", "range of x m₂", "range of x m of stage 2", "mm"),
+        ("range_x_m2", "length", "range of x of M₂", "range of x of M of stage 2", "mm"),
         ("min_discriminant", "length^4", "min discriminant", "smallest discriminant", "mm⁴"),
         ("margin", "1", "margin", "margin", ""),
         ("err_max_abs_d2s", "mm", "error of max |s″|", "error of the largest acceleration", "mm/rad²"),
@@ -48,7 +48,7 @@ def test_values_at_speed_are_those_calculated_by_hand() -> None:
 
 def test_angles_are_shown_in_degrees() -> None:
     assert quantity("swing", "rad").show(math.pi / 4.0) == "45°"
-    assert quantity("err_swing", "rad").show(math.radians(1e-7)) == "1.00·10⁻⁷°"
+    assert quantity("err_swing", "rad").show(math.radians(1e-7)) == "1·10⁻⁷°"
     assert quantity("swing", "rad").show(math.nan) == "–"
 
 
@@ -60,7 +60,7 @@ def test_angles_are_shown_in_degrees() -> None:
         (123456.7, "123457"),
         (1234567.0, "1.23·10⁶"),
         (0.00012345678, "0.00012346"),
-        (3.2e-8, "3.20·10⁻⁸"),
+        (3.2e-8, "3.2·10⁻⁸"),
         (0.0, "0"),
         (math.nan, "–"),
         (math.inf, "∞"),

@@ -26,11 +26,11 @@ def parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[Path], 
     rng = np.random.default_rng(5)
     lattice = np.stack(np.meshgrid(X, Y, np.arange(40.0), indexing="ij"), axis=-1).reshape(-1, 3)
     table = pd.DataFrame(lattice, columns=["x", "y", "z"])
-    table["score"] = -(1.0 + (table.x - 0.3) ** 2 + np.log(table.y) ** 2 + 0.01 * rng.random(len(table)))
-    table["err_score"] = 1e-9 * rng.random(len(table))
+    table["stroke"] = -(1.0 + (table.x - 0.3) ** 2 + np.log(table.y) ** 2 + 0.01 * rng.random(len(table)))
+    table["err_stroke"] = 1e-9 * rng.random(len(table))
     table["other"] = rng.random(len(table)).astype(np.float32)
     table["status"] = rng.choice(np.array([0, 0, 0, 3, 5], np.uint8), len(table))
-    table.loc[table.status != 0, ["score", "other"]] = np.nan
+    table.loc[table.status != 0, ["stroke", "other"]] = np.nan
     files = []
     for k, (start, stop) in enumerate(pairwise([0, 1500, 1600, len(table)])):
         files.append(tmp_path / f"part-{k}.parquet")
@@ -41,27 +41,27 @@ def parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[Path], 
 def test_cells_counts_and_best_agree_with_pandas(parts: tuple[list[Path], pd.DataFrame]) -> None:
     files, table = parts
     cells = [Cells.of_values("x", X, 99), Cells.of_values("y", Y, 4)]
-    found = scan(files, cells, "score", "other")
+    found = scan(files, cells, "stroke", "other")
     good = table[table.status == 0]
     assert found.rows == len(table)
     assert found.feasible == len(good)
     assert found.counts == table.status.value_counts().to_dict()
     # nine values in four cells: 2, 2, 2, 3
     group = np.searchsorted([2, 4, 6], np.searchsorted(Y, good.y), side="right")
-    groups = good.score.abs().groupby([group, good.x])
+    groups = good.stroke.abs().groupby([group, good.x])
     np.testing.assert_array_equal(found.grids["x", "y"].best, groups.min().unstack().to_numpy())
     np.testing.assert_array_equal(found.grids["x", "y"].count, groups.size().unstack().to_numpy())
-    np.testing.assert_array_equal(found.lines["x"].best, good.score.abs().groupby(good.x).min())
-    best = good.loc[good.score.abs().idxmin()]
+    np.testing.assert_array_equal(found.lines["x"].best, good.stroke.abs().groupby(good.x).min())
+    best = good.loc[good.stroke.abs().idxmin()]
     assert found.best_row == {name: float(best[name]) for name in table.columns}
-    relative = (good.err_score / good.score.abs()).max()
-    assert found.errors["err_score"] == (good.err_score.max(), relative)
+    relative = (good.err_stroke / good.stroke.abs()).max()
+    assert found.errors["err_stroke"] == (good.err_stroke.max(), relative)
 
 
 def test_front_and_scatter_come_from_all_parts(parts: tuple[list[Path], pd.DataFrame]) -> None:
     files, table = parts
-    found = scan(files, [Cells.of_values("x", X, 99)], "score", "other")
-    points = table.loc[table.status == 0, ["score", "other"]].abs().to_numpy(float)
+    found = scan(files, [Cells.of_values("x", X, 99)], "stroke", "other")
+    points = table.loc[table.status == 0, ["stroke", "other"]].abs().to_numpy(float)
     np.testing.assert_array_equal(found.front, naive_front(points))
     np.testing.assert_array_equal(found.scatter, points)
 
@@ -69,9 +69,9 @@ def test_front_and_scatter_come_from_all_parts(parts: tuple[list[Path], pd.DataF
 def test_scatter_is_thinned_evenly(parts: tuple[list[Path], pd.DataFrame], monkeypatch: pytest.MonkeyPatch) -> None:
     files, table = parts
     monkeypatch.setattr(module, "SCATTER_POINTS", 400)
-    found = scan(files, [], "score", "other")
+    found = scan(files, [], "stroke", "other")
     taken = table.iloc[:: len(table) // 400]
-    expected = taken.loc[taken.status == 0, ["score", "other"]].abs().to_numpy(float)
+    expected = taken.loc[taken.status == 0, ["stroke", "other"]].abs().to_numpy(float)
     np.testing.assert_array_equal(found.scatter, expected)
 
 
@@ -85,7 +85,7 @@ def test_without_objective_the_feasible_are_counted(parts: tuple[list[Path], pd.
 def test_most_telling_axes_are_those_the_objective_depends_on(parts: tuple[list[Path], pd.DataFrame]) -> None:
     files, _ = parts
     cells = [Cells.of_values("z", np.arange(40.0), 8), Cells.of_values("x", X, 99), Cells.of_values("y", Y, 99)]
-    assert most_telling(scan(files, cells, "score", "other")) == ("x", "y")
+    assert most_telling(scan(files, cells, "stroke", "other")) == ("x", "y")
 
 
 @settings(deadline=None, max_examples=50)

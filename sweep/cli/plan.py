@@ -39,7 +39,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     if study.speed is not None:
         lines += [f"speed {study.speed * 30.0 / math.pi:g} rpm ({study.speed:.6g} rad/s)"]
     kind = "every combination" if study.space.kind == "product" else "Sobol sample"
-    lines += ["", f"{study.space.count} designs, {kind} of"]
+    lines += ["", f"{study.space.count} designs, {kind} of" if study.space.axes else "1 design, nothing is swept"]
     lines += aligned([(axis.name, _axis(axis)) for axis in study.space.axes])
 
     limits = {
@@ -133,9 +133,10 @@ def _effects(study: Study) -> list[str]:
         lines += ["", "effects, with their share of the cost at equal numbers of poses"]
         lines += aligned(tree(bare, study.want, POSES))
     lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(out)}"]
-    found = findings(bare, study.family, spread_designs(study, ADVISED), study.want)
+    looked_at = spread_designs(study, ADVISED)
+    found = findings(bare, study.family, looked_at, study.want)
     if found:
-        lines += ["", f"what matters here, from {ADVISED} designs spread over the space; the choice is yours"]
+        lines += ["", f"what matters here, from {len(looked_at)} designs spread over the space; the choice is yours"]
         lines += [f"  {finding.words}" for finding in found]
     return lines
 

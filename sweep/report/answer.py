@@ -6,10 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 from kernels import status as codes
+from sweep.cascade import compared
 from sweep.report.front import front_sentence
 from sweep.report.limits import LimitState, Row, limit_state, limit_states, limited, value_of
 from sweep.report.quantities import Quantity, change, number, quantity
-from sweep.report.tables import parameter_rows
+from sweep.report.tables import fates, parameter_rows
 
 if TYPE_CHECKING:
     from sweep.report.dataset import Dataset
@@ -25,7 +26,9 @@ def answer(data: Dataset, found: Scan) -> list[str]:
     """Sentences that answer the study's question, the most important first."""
     total = data.designs
     if data.result is None:
-        return [f"No design of the {_count(total)} in the sweep meets all limits.", *_sweep_sentences(data, found)]
+        stops = max(fates(data, found)[:-1], key=lambda fate: fate.count, default=None)
+        most = [] if stops is None else [f"What stops most of them, {_count(stops.count)}: {stops.text}."]
+        return [f"No design of the {_count(total)} in the sweep meets all limits.", *most]
     sentences = []
     who = "The optimum" if data.optimum is not None else "The best design of the sweep"
     if data.optimum is not None and int(data.optimum.get("status", 0)) == codes.LIMIT_EXCEEDED:
@@ -44,7 +47,7 @@ def answer(data: Dataset, found: Scan) -> list[str]:
     sentences.append(front_sentence(data))
     sentences += _against_reference(data)
     sentences += not_achieved(data, found)
-    sentences.append(_proof(data))
+    sentences.append(_proof(data, found))
     return [s for s in sentences if s]
 
 
@@ -108,10 +111,10 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
     if data.optimum is not None:
         residual = value_of(data.optimum, "kkt_residual")
         if not residual <= KKT:
-            faults.append(f"the optimiser did not settle (KKT residual {number(residual, 3)}, {number(KKT)} is wanted)")
+            faults.append(f"the optimiser did not settle ({_residual(residual)}, {number(KKT)} is wanted)")
         if objective is not None and found.best_row:
             best, value = found.best_row[objective.output], value_of(data.optimum, objective.output)
-            if not abs(value) <= abs(best) * (1.0 + 1e-6):
+            if not compared(objective.output, value) <= compared(objective.output, best) + 1e-6 * abs(best):
                 shown = quantity(objective.output, data.units.get(objective.output, ""))
                 faults.append(f"the optimiser ended above the best design of the sweep, {shown.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
@@ -122,11 +125,11 @@ def _against_reference(data: Dataset) -> list[str]:
     if data.reference is None:
         return []
     criteria = [data.study.objective.output if data.study.objective is not None else None, data.second]
-    worse = [
-        f"{quantity(name, data.units.get(name, '')).words}"
-        for name in criteria
-        if name is not None and abs(value_of(data.result, name)) > abs(value_of(data.reference, name)) * (1.0 + 1e-9)
-    ]
+    worse = []
+    for name in filter(None, criteria):
+        value, old = value_of(data.result, name), value_of(data.reference, name)
+        if compared(name, value) > compared(name, old) + 1e-9 * abs(old):
+            worse.append(quantity(name, data.units.get(name, "")).words)
     missed = []
     for limit in data.study.limits:
         state = limit_state(limit, data.reference, None, limited(data, limit.output), frozenset())
@@ -150,15 +153,21 @@ def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
     return [f"{text}; the best of them has {shown.symbol} = {shown.show(best)}, from where the optimiser went on."]
 
 
-def _proof(data: Dataset) -> str:
+def _residual(value: float) -> str:
+    return "its KKT residual does not exist" if math.isnan(value) else f"KKT residual {number(value, 3)}"
+
+
+def _proof(data: Dataset, found: Scan) -> str:
     if data.optimum is None:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
     starts, agree = data.starts, value_of(data.optimum, "agree")
-    text = f"{NO_PROOF}: the optimiser started from {starts} design{'s' if starts != 1 else ''} of the sweep"
+    kind = "" if found.feasible else "random "
+    text = f"{NO_PROOF}: the optimiser started from {starts} {kind}design{'s' if starts != 1 else ''} of the sweep"
     if math.isfinite(agree):
         text += f", {number(agree)} of which ended at this value"
     residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
-    return f"{text}. KKT residual {number(residual, 3)}, largest violation of a limit {number(violation, 3)}."
+    words = "" if math.isnan(residual) else f"{_residual(residual)}, "
+    return f"{text}. {words}{'l' if words else 'L'}argest violation of a limit {number(violation, 3)}."
 
 
 def _is_number(row: Row, name: str) -> bool:

@@ -46,7 +46,7 @@ class Dataset:
     def counts(self) -> dict[int, int]:
         """Designs by status, those that were not kept included."""
         codes = {name: code for code, name in store.STATUS_NAMES.items()}
-        return {codes[name]: count for name, count in self.plan.get("counts", {}).items() if name in codes}
+        return {codes[name]: count for name, count in (self.plan.get("counts") or {}).items() if name in codes}
 
     @property
     def missed(self) -> dict[str, int]:
@@ -136,6 +136,9 @@ def read_dataset(folder: Path) -> Dataset:
         raise InputError("folder", str(folder), allowed, "report")
     if not store.is_complete(folder):
         raise InputError("folder", str(folder), "a complete dataset; run the study again to resume it", "report")
+    if not plan.get("complete"):  # killed after the last chunk, before the totals were noted
+        counts, missed = store.totals(folder)
+        plan |= {"counts": counts, "missed": missed}
     study = study_of(plan, folder)
     optima, curves, front = folder / store.OPTIMUM, folder / store.CURVES, folder / store.PARETO
     parts = tuple(part.path for part in store.parts(folder))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as codes
-from sweep.cascade import MAGNITUDES
+from sweep.cascade import compared
 from sweep.report.figures import LIMIT, OPTIMUM
 from sweep.report.quantities import Quantity, change, number, quantity
 
@@ -51,7 +51,7 @@ def front_rows(data: Dataset) -> list[FrontRow]:
                 value="–" if missed else objective.show(value),
                 fast="" if missed else objective.at_speed(value, data.study.speed),
                 change="" if missed else change(objective, value, best),
-                second="–" if missed else second.show(_size(second.name, float(point[second.name]))),
+                second="–" if missed else second.show(compared(second.name, float(point[second.name]))),
                 state="no design found" if missed else _state(point),
                 held=str(point["relaxation"]) if missed else _held(str(point["active"]), second.name),
             )
@@ -98,18 +98,12 @@ def draw_front(axes: Axes, data: Dataset) -> None:
     points = _points(data)
     good = [p for p in points if int(p["status"]) != codes.LIMIT_EXCEEDED]
     if good:
-        x = np.array([abs(float(p[objective.name])) for p in good]) * objective.factor
-        y = np.array([abs(float(p[second.name])) for p in good]) * second.factor
+        x, y = (np.array([compared(q.name, float(p[q.name])) * q.factor for p in good]) for q in (objective, second))
         axes.plot(x, y, color=OPTIMUM, linewidth=1.6, marker="o", markersize=5, zorder=4, label=f"front ({len(good)})")
     missed = [float(p["bound"]) * second.factor for p in points if p not in good]
     for k, bound in enumerate(missed):
         label = "bounds without a design" if k == 0 else None
         axes.axhline(bound, color=LIMIT, linewidth=0.8, linestyle=(0, (6, 4)), label=label)
-
-
-def _size(name: str, value: float) -> float:
-    """What a bound compares: of a swing and a stroke the magnitude."""
-    return abs(value) if name.rstrip("0123456789") in MAGNITUDES else value
 
 
 def _quantities(data: Dataset) -> tuple[Quantity | None, Quantity | None]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from sweep.cascade import MAGNITUDES, meets
+from sweep.cascade import compared, meets
 from sweep.report.quantities import Quantity, number, quantity
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def limit_state(
         words = {1.0: "yes", 0.0: "no"}
         state = "unknown" if math.isnan(value) else "met" if meets(limit, np.array([value]))[0] else "missed"
         return LimitState(shown, bound_words(limit, shown), words.get(value, "–"), words.get(other, "–"), "", state)
-    size = abs(value) if limit.output.rstrip("0123456789") in MAGNITUDES else value
+    size = compared(limit.output, value)
     rooms = []
     if limit.minimum is not None:
         rooms.append((size - limit.minimum, limit.minimum))

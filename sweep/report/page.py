@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
+from sweep.cascade import compared
 from sweep.errors import StoreError
 from sweep.report import answer, front, limits, robust, tables
 from sweep.report.curves import motion_caption, motion_figure
@@ -114,7 +115,8 @@ def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[s
     against = study.pareto.output if study.pareto is not None else data.second
     if shown is not None and against is not None and (len(found.scatter) or data.front is not None):
         second = quantity(against, data.units.get(against, ""))
-        at = {role: (abs(float(row[shown.name])), abs(float(row[second.name]))) for role, row in marks.items()}
+        first, other = shown.name, second.name
+        at = {role: (compared(first, float(r[first])), compared(other, float(r[other]))) for role, r in marks.items()}
         bound = next((limit.maximum for limit in study.limits if limit.output == second.name), None)
         drawn = None if data.front is None else partial(front.draw_front, data=data)
         figures["trade_off"] = save(trade_off_figure(found, shown, second, at, bound, drawn), folder / "trade-off.svg")

@@ -28,6 +28,7 @@ REDUCTIONS = {
     "min_": ("min {}", "smallest {}"),
     "rms_": ("rms {}", "root mean square of {}"),
 }
+_POINT = re.compile("([xyz])_([a-z])")
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,7 @@ def quantity(name: str, unit: str) -> Quantity:
             break
     order, root, stage = _derivative(base)
     symbolic = order > 0 or root in ("s", "psi")
+    root = _POINT.sub(lambda m: f"{m[1]} of {m[2].upper()}", root)
     symbol = SYMBOLS.get(root, root.replace("_", " ")) + PRIMES[order] + stage.translate(SUBSCRIPTS)
     words = POSITIONS.get(root, root.replace("_", " ")) if order == 0 else DERIVATIVES[order]
     words += " across the line" if order and root == "dev" else ""
@@ -146,6 +148,7 @@ def number(value: float, digits: int = 5) -> str:
         text = text.rstrip("0").rstrip(".") if "." in text else text
     else:
         mantissa, exponent = f"{value:.{max(digits - 3, 0)}e}".split("e")
+        mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
         power = str(int(exponent)).replace("-", "−").translate(SUPERSCRIPTS)
         text = f"{mantissa}·10{power}"
     return text.replace("-", "−")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sweep.cascade import compared
 from sweep.families.base import Array
 
 ROWS_PER_BATCH = 262_144
@@ -88,7 +89,7 @@ def scan(parts: Sequence[Path], cells: Sequence[Cells], objective: str | None, s
     ----------
     parts : Parquet files of the dataset
     cells : divided axes; every pair of them gets a grid
-    objective, second : output columns, smaller (in magnitude) is better; None where the study has none
+    objective, second : output columns, smaller is better; None where the study has none
     """
     found = Scan()
     for c in cells:
@@ -112,13 +113,13 @@ def scan(parts: Sequence[Path], cells: Sequence[Cells], objective: str | None, s
                 _note_errors(found, name, np.abs(batch[name][ok]), np.abs(batch[name[4:]][ok]))
         if not ok.any():
             continue
-        score = np.abs(batch[objective]) if objective is not None else np.zeros(ok.size)
+        score = compared(objective, batch[objective]) if objective is not None else np.zeros(ok.size)
         _fill(found, cells, batch, ok, score)
         row = int(np.argmin(np.where(ok, score, np.inf)))
         if score[row] < best:
             best, found.best_row = float(score[row]), {name: float(batch[name][row]) for name in names}
         if objective is not None and second is not None:
-            other = np.abs(batch[second])
+            other = compared(second, batch[second])
             both = ok & np.isfinite(other)
             points = np.column_stack([score, other])
             found.front = non_dominated(np.vstack([found.front, points[both]]))

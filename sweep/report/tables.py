@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 
 FEW = 3
+# What is this small beside the ends of its axis is the rounding of zero.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -92,12 +94,14 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
         value, other = _number(data.result, p.name), _number(data.reference, p.name)
         space, edge = "fixed", ""
         low, high = study.space.bounds.get(p.name, (math.nan, math.nan))
+        if abs(value) < ROUNDING * max(abs(low), abs(high)):
+            value = 0.0
         if p.name in study.made:
             space = "follows from the limit positions" if p.name in links else "fitted"
         elif p.choices is not None and high > low:
             space = " or ".join(number(choice) for choice in p.choices)
-        elif high > low and (listed := _few_values(study, p.name)) is not None:
-            space = f"{' or '.join(number(value * shown.factor) for value in listed[:-1])} or {shown.show(listed[-1])}"
+        elif high > low and data.optimum is None and (listed := _few_values(study, p.name)) is not None:
+            space = f"{', '.join(number(value * shown.factor) for value in listed[:-1])} or {shown.show(listed[-1])}"
         elif high > low:
             space = f"{number(low * shown.factor)} to {shown.show(high)}"
             near = 1e-9 * (high - low)
@@ -109,7 +113,7 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
 
 
 def _few_values(study: Study, name: str) -> list[float] | None:
-    """The values of an axis that has two or three of them: they are a choice, not a range."""
+    """The values of an axis that has two or three of them: to a sweep they are a choice, not a range."""
     axis = next((axis for axis in study.space.axes if axis.name == name), None)
     return None if axis is None or axis.values is None or len(axis.values) > FEW else axis.values.tolist()
 
@@ -118,7 +122,7 @@ def fates(data: Dataset, found: Scan) -> list[Fate]:
     """Designs per status in the order in which the sweep finds out, the feasible ones last."""
     counts = data.counts or found.counts
     total = max(sum(counts.values()), 1)
-    order = [codes.INVALID_INPUT, codes.NOT_ASSEMBLED, codes.NOT_ROTATABLE, codes.UNDECIDABLE]
+    order = [codes.INVALID_INPUT, codes.NOT_ADMISSIBLE, codes.NOT_ASSEMBLED, codes.NOT_ROTATABLE, codes.UNDECIDABLE]
     failed = sorted(
         (c for c in counts if c != codes.OK), key=lambda c: order.index(c) if c in order else len(order) + c
     )
@@ -177,7 +181,6 @@ def provenance(data: Dataset) -> list[tuple[str, str]]:
         rows.append(("extrema over the turn", f"refined, relative error {number(accuracy.target, 2)}{proof}"))
     else:
         rows.append(("extrema over the turn", f"on a grid of {accuracy.samples} crank angles"))
-    rows.append(("command", f"sweep run studies/{data.study.name}"))
     return rows + run_rows(data.runs)
 
 
@@ -188,7 +191,9 @@ def run_rows(runs: tuple[dict[str, Any], ...]) -> list[tuple[str, str]]:
         return []
     last = starts[-1]
     rows = [
-        (key, str(last[key])) for key in ("time", "commit", "machine", "python", "jobs", "backend") if last.get(key)
+        (key, str(last[key]))
+        for key in ("command", "time", "commit", "machine", "python", "jobs", "backend")
+        if last.get(key)
     ]
     rows.append(("versions", ", ".join(f"{name} {release}" for name, release in last.get("versions", {}).items())))
     seconds = sum(run.get("seconds", 0.0) for run in runs)
