@@ -7,7 +7,6 @@ import json
 import math
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
@@ -17,6 +16,7 @@ from sweep.cascade import BLOCK, CALL_SECONDS, Cascade, levels
 from sweep.chunk import output_columns, parameter_matrix, parameter_ns
 from sweep.families.base import Array, Unit
 from sweep.reductions.catalogue import is_proven
+from sweep.sources import DIGESTS
 from sweep.study.units import internal_unit
 from sweep.summaries import output
 
@@ -39,8 +39,8 @@ PARAMETER_UNITS = {word: internal_unit(word) for word in get_args(Unit)}
 
 # Parts of the package that decide no value in a chunk; everything else does.
 NOT_VALUES = frozenset(
-    ["optimise", "report", "cli", "templates", "__init__.py", "__main__.py", "engine.py", "progress.py"]
-) | {"signals.py", "poses.py", "comparison.py"}
+    ["optimise", "report", "cli", "__init__.py", "__main__.py", "engine.py", "progress.py", "signals.py", "poses.py"]
+) | {"comparison.py"}
 
 # Sections of the study file that decide no value in a chunk.
 NOT_IN_CHUNKS = ("study", "optimise", "pareto", "tolerance", "reference", "budget", "report")
@@ -215,21 +215,15 @@ def code_hash() -> str:
 
     from kernels._cache import source_hash
 
-    root = Path(__file__).resolve().parent
-    paths = [path for path in sorted(root.rglob("*.py")) if path.relative_to(root).parts[0] not in NOT_VALUES]
-    return _hash_sources(root, paths, f"{source_hash()} {np.__version__} {scipy.__version__}")
+    values = [path for path in DIGESTS if path.split("/")[0] not in NOT_VALUES]
+    return _hash_sources(values, f"{source_hash()} {np.__version__} {scipy.__version__}")
 
 
 @lru_cache
 def optimiser_hash() -> str:
     """Hash of the sources that determine the optimum, beyond those of the chunks."""
-    root = Path(__file__).resolve().parent
-    return _hash_sources(root, sorted((root / "optimise").rglob("*.py")), code_hash())
+    return _hash_sources([path for path in DIGESTS if path.startswith("optimise/")], code_hash())
 
 
-def _hash_sources(root: Path, paths: list[Path], first: str) -> str:
-    digest = hashlib.sha256(first.encode())
-    for path in paths:
-        digest.update(path.relative_to(root).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+def _hash_sources(paths: list[str], first: str) -> str:
+    return hashlib.sha256(f"{first} {[(path, DIGESTS[path]) for path in paths]}".encode()).hexdigest()[:16]

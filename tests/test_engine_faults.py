@@ -249,6 +249,14 @@ def test_change_of_code_is_foreign_too(study: Study, tmp_path: Path, monkeypatch
         run(study, out)
 
 
+def test_code_is_what_was_imported_whatever_its_files_have_become(monkeypatch: pytest.MonkeyPatch) -> None:
+    imported = sweep.plan.code_hash(), sweep.plan.optimiser_hash()
+    sweep.plan.code_hash.cache_clear()
+    sweep.plan.optimiser_hash.cache_clear()
+    monkeypatch.setattr(Path, "read_bytes", lambda path: b"edited")
+    assert (sweep.plan.code_hash(), sweep.plan.optimiser_hash()) == imported
+
+
 def test_held_lock_is_refused_with_its_holder(study: Study, whole: dict[str, bytes], tmp_path: Path) -> None:
     out = run(study, tmp_path / "out")
     with locked(out), pytest.raises(LockedError, match=f"process {os.getpid()}") as caught:

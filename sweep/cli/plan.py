@@ -136,7 +136,10 @@ def _effects(study: Study) -> list[str]:
     looked_at = spread_designs(study, ADVISED)
     found = findings(bare, study.family, looked_at, study.want)
     if found:
-        lines += ["", f"what matters here, from {len(looked_at)} designs spread over the space; the choice is yours"]
+        lines += [
+            "",
+            f"what matters here, by {len(looked_at)} of the designs, spread over the space; the choice is yours",
+        ]
         lines += [f"  {finding.words}" for finding in found]
     return lines
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from importlib import import_module
 
+import sweep.sources  # noqa: F401 (read before any source that makes a value is imported, and all of those begin here)
 from sweep.errors import InputError, nearest
 from sweep.families.base import Family
 
