@@ -11,8 +11,10 @@ from kernels import status as st
 from sweep.errors import InputError
 from sweep.families import family
 from sweep.families.base import Accuracy
-from sweep.optimise import Problem, minimise
+from sweep.optimise import Problem, minimise, newton
 from sweep.optimise.candidates import from_sample
+from sweep.optimise.form import Program
+from sweep.optimise.model import Model
 from sweep.optimise.starts import diverse
 from sweep.study import Limit, OptimiseSettings
 from sweep.summaries import design_outputs
@@ -168,6 +170,21 @@ def test_needle_drive_beats_the_sine_with_a_straightness_of_a_twentieth_millimet
     assert 24.4 - 1e-6 <= float(seen["stroke"][0]) <= 24.6 + 1e-6
     assert float(seen["max_abs_dev"][0]) <= 0.05 + 1e-7
     assert max(float(seen["max_pressure_angle1"][0]), float(seen["max_pressure_angle2"][0])) <= math.pi / 4 + 1e-8
+
+
+def test_newton_step_to_where_the_links_do_not_reach_is_still_a_step():
+    # Corrected for rows that do not exist, it became a step of nothing, which ended the rounds far from an optimum.
+    problem = spatial(50.0)
+    program, base, tried = Program(problem), problem.rows(problem.lower)[0], 0
+    for fractions in np.random.default_rng(3).random((60, 7)):
+        model = Model(problem, program, problem.placed(base, fractions), lambda: False)
+        at = model.state(fractions)
+        if at.violation < 1.0:
+            tried += 1
+            form = at.form.near(at.atoms, at.objective)
+            there, _ = newton.propose(model, at, form, at.objective, 0.25, None)
+            assert np.abs(there - fractions).max() > 1e-6
+    assert tried > 5
 
 
 def test_diverse_starts_keep_their_distance_and_begin_with_the_best():

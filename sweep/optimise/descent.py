@@ -17,6 +17,7 @@ from sweep.optimise.points import STATIC, Points
 from sweep.optimise.problem import Problem
 
 ROUNDS, CYCLES = 60, 3
+NEWTON = 240  # rounds of Newton steps: along a narrow curved valley hundreds are needed, and each gains
 KKT = 1e-6  # residual of a converged result
 DWINDLING = 1e-9  # gain of a round from which a fulfilled condition of optimality ends the search
 NEAR_ANGLE = 0.1  # a followed point reaches this far by itself [rad]
@@ -48,7 +49,7 @@ class Descent:
             if math.isfinite(self.best.objective) and self.best.violation < NEAR:
                 for _ in range(CYCLES):
                     self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=8)
-                    self._rounds(newton.propose, relaxed=False, enough=1e-13)
+                    self._rounds(newton.propose, relaxed=False, enough=1e-13, rounds=NEWTON)
                     if self.model.certificate(self.best).residual <= KKT:
                         break
                 self.best = newton.polish(self.model, newton.repair(self.model, self.best))

@@ -15,6 +15,7 @@ from sweep.optimise.model import FEASIBLE, Model, State
 from sweep.optimise.points import Index
 
 CORRECTIONS = 8  # of a step along curved limits, each two or three milliseconds
+LOST = 1.0  # scaled violation that no correction mends, above all of links that do not reach: the step must be shorter
 DIFFERENCE = 1e-5  # of the scaled variables; gradients are good to 1e-12, so the Hessian is to 1e-5
 FLAT = 1e-6  # smallest curvature of the quadratic model: the objective is about 1, the variables run from 0 to 1
 RANK = 1e-9  # singular values below, relative to the largest, are rounding
@@ -47,7 +48,7 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
         if not merit < value:
             break
         best, value = step, merit
-        if missed <= FEASIBLE:
+        if missed <= FEASIBLE or missed > LOST:
             break
         # The rows bend away from their tangents: aim beside by what was missed.
         step = _quadratic(curvature, full, true - full @ step, form, box, model.price)
