@@ -99,6 +99,25 @@ def test_limit_positions_of_the_table_of_crank_rockers():
         assert np.median(found[f"err_{name}"]) < 1e-12
 
 
+@pytest.mark.parametrize(
+    ("design", "phi0", "stroke_ratio"),
+    [
+        ((1.981239643231553e-09, 28.525761791025275, 69.28350958738054, -31.206092007024893, -40.418177415528376,
+          32.08044160201162, 2.132710294534813, -1.0), 3.1415926532561856303, 0.99999999978761880046),
+        ((0.003611318813218683, 23.65385666082121, 42.839828311276584, -3.242994525909431, -20.40971158601303,
+          -5.473596520133931, 1.2945625724406051, -1.0), 3.1430872286429752622, 1.0009519288989078613),
+        ((2.74366791051808, 26.97344495631146, 57.64340995887085, -42.015627223468485, -12.071020014735183,
+          6.66655779261923, 1.6150321104185181, -1.0), 3.3278236634308408795, 1.1260292527887191754),
+    ],
+)  # fmt: skip
+def test_stroke_ratio_keeps_its_digits_where_both_limits_nearly_coincide(design, phi0, stroke_ratio):
+    """Expected at 60 digits; the condition numbers of both are at most 1.2."""
+    names = ("a", "b", "c", "e", "f", "g", "alpha", "branch")
+    found = sweep.summarise("rssr", {n: [x] for n, x in zip(names, design, strict=True)}, ["phi0", "stroke_ratio"])
+    assert found["phi0"][0] == pytest.approx(phi0, rel=0.0, abs=4.0 * 2.0**-53 * phi0)
+    assert found["stroke_ratio"][0] == pytest.approx(stroke_ratio, rel=0.0, abs=4.0 * 2.0**-53)
+
+
 def test_swing_of_a_general_chain_is_unwrapped():
     designs = crank_rockers(300, 42)
     found = design_outputs(PLAIN_RSSR, designs, ["swing", "psi_ext", "psi_fold", "range_psi"], Accuracy(target=1e-8))

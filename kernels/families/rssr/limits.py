@@ -217,12 +217,18 @@ def _fill(at: Array, k: int, n: int, begin: Array, out: Array, error: Array | No
         phi1, xi1, s1, c1, t1, phi2, xi2, s2, c2, t2 = phi2, xi2, s2, c2, t2, phi1, xi1, s1, c1, t1
     if not (xi1 > 0.0 and xi2 < 0.0):
         return False
-    branch, rocker = at[k + BRANCH], at[k + ROCKER]
+    branch, rocker, ca = at[k + BRANCH], at[k + ROCKER], at[k + CA]
     swing, lever = _swing(at, k, s1, c1, s2, c2, xi1 - xi2)
-    phi0 = _wrapped(phi2 - phi1)
+    dc, ds = c2 - c1, s2 - s1
+    if abs(swing) < _TINY_SWING:
+        half = math.tan(0.5 * swing)
+        dc, ds = -half * (s1 + s2), half * (c1 + c2)
+    # The ball from the crank axis, and how it moves from one limit to the other: phi0 - pi without cancellation.
+    x, y, dx, dy = at[k + E] + rocker * c1, rocker * (ca * s1 - at[k + K1]), rocker * dc, rocker * ca * ds
+    beyond = math.atan2(x * dy - y * dx, x * (x + dx) + y * (y + dy))
     out[0], out[1] = math.atan2(branch * s1, c1), math.atan2(branch * s2, c2)
     out[2], out[3] = _wrapped(phi1), _wrapped(phi2)
-    out[4], out[5], out[6] = branch * swing, phi0, phi0 / (TURN - phi0)
+    out[4], out[5], out[6] = branch * swing, math.pi + beyond, (math.pi + beyond) / (math.pi - beyond)
     if error is not None:
         size = 8.0 * EPS * (abs(at[k + E]) + 2.0 + abs(at[k + Y0]) + at[k + W_SIZE])
         error[0], error[1] = size / t1 + 4.0 * EPS, size / t2 + 4.0 * EPS
@@ -230,5 +236,5 @@ def _fill(at: Array, k: int, n: int, begin: Array, out: Array, error: Array | No
         both = error[0] + error[1]
         error[4] = min(both, both * lever + 32.0 * EPS * abs(swing))
         error[5] = error[2] + error[3]
-        error[6] = error[5] * TURN / ((TURN - phi0) * (TURN - phi0))
+        error[6] = error[5] * TURN / ((math.pi - beyond) * (math.pi - beyond))
     return True
