@@ -46,6 +46,8 @@ _REDUCTIONS = ("phi_max_abs_", "max_abs_", "max_", "min_", "range_", "rms_", "")
 # In the stages behind the first, speed and acceleration are those of the first stage's crank.
 _FIRST_ONLY = ("speed", "speed_change")
 
+_INPUT_NAMES: dict[tuple[tuple[str, str], ...], frozenset[str]] = {}
+
 
 @lru_cache
 def effect(name: str) -> Effect:
@@ -89,7 +91,11 @@ def _carriers(family: Family, placed: Placed) -> list[Placed]:
 
 def input_names(family: Family) -> frozenset[str]:
     """Inputs of all effects that can be asked of a family, or of the stages of a chain."""
-    return frozenset(p.name for p in inputs(family, applicable(family)))
+    # Asked at every call of the reductions; it depends on nothing but the names of the stages.
+    stages = tuple((stage.name, number) for stage, number in stages_of(family))
+    if stages not in _INPUT_NAMES:
+        _INPUT_NAMES[stages] = frozenset(p.name for p in inputs(family, applicable(family)))
+    return _INPUT_NAMES[stages]
 
 
 def offered(family: Family) -> tuple[Output, ...]:

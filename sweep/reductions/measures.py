@@ -79,7 +79,7 @@ class Measure:
         return value
 
 
-def curve(family: Family, output: str, window: tuple[float, float] | None = None) -> Series:
+def curve(output: str, window: tuple[float, float] | None = None) -> Series:
     """The series of a plain pose output."""
     return Series(output, window=window, wrapped=output.rstrip("0123456789") == "psi")
 
@@ -128,7 +128,7 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
         fits = {"swing": "psi", "stroke": "s"}.get(stem, stem.split("_")[0] if limits[stem] in ("ext", "fold") else "")
         if position and (not fits or position.rstrip("0123456789") == fits):
             inner: Inner = "ratio" if stem == "stroke_ratio" else "same"
-            return Measure(name, limits[stem], (curve(family, position),), inner)
+            return Measure(name, limits[stem], (curve(position),), inner)
     reductions: dict[str, Kind] = {
         "phi_max_abs_": "phi_max_abs", "max_abs_": "max_abs", "max_": "max", "min_": "min", "range_": "range",
     }  # fmt: skip
@@ -136,7 +136,7 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
         x = name.removeprefix(prefix)
         if x != name and x in family.pose_names:
             inside = window if x == "dev" and kind in ("max_abs", "phi_max_abs") else None
-            return Measure(name, kind, (curve(family, x, inside),))
+            return Measure(name, kind, (curve(x, inside),))
     mean = name.startswith(PREFIX) and name.removeprefix(PREFIX) in family.pose_names
     steps = {output.name for step in family.steps for output in step.provides}
     if mean or name == STAY.name or name in steps or name in family.parameter_names:
