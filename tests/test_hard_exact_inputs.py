@@ -111,8 +111,20 @@ def test_dead_points_and_a_pin_on_the_axis_keep_their_status():
         [st.SINGULAR, st.OK],
         [st.INVALID_INPUT, st.INVALID_INPUT],
     ]
-    assert abs(columns["psi"][0, 0]) == np.pi
     assert np.isnan(columns["dpsi"][0, 0])
+
+
+@pytest.mark.parametrize("branch", [1.0, -1.0])
+def test_an_angle_of_pi_is_never_minus_pi(branch):
+    """In (-pi, pi], as documented: at a dead point, where no rounding hides the sign of zero, and at a limit."""
+    flat = np.array([[1.0, 2.0, 1.5, 4.5, 0.0, 0.0, 0.0, branch]])
+    for mechanism in (PLAIN, PRECISE):
+        columns = mechanism.poses(flat, Angles.of(np.zeros((1, 1))), WANTED)
+        assert columns["psi"][0, 0] == np.pi == np.arctan2(columns["sin_psi"][0, 0], columns["cos_psi"][0, 0])
+    drawing = {"a": 1.0, "b": 13.0, "c": 20.0, "e": 26.0, "f": 12.0 * branch, "g": 0.0, "alpha": np.pi / 2.0}
+    frame = sweep.summarise("rssr", drawing | {"branch": branch}, ["psi_ext", "phi_ext"])
+    assert frame["psi_ext"][0] == np.pi
+    assert frame["phi_ext"][0] < 1e-15
 
 
 def test_dead_points_made_in_float64_are_dead_points():

@@ -187,3 +187,36 @@ def test_derivatives_keep_their_digits_where_the_axis_of_the_crank_is_square_to_
         # a rounding of b moves w by b/w times as much, and w1 with it
         allowed = 2.0**-53 * float(8 * (abs(a * ca * u) + abs(a * e * v / w)) * (1 + b * b / (w * w)))
         assert abs(got["ds"] - float(a * ca * u + w1)) <= allowed + 4.0 * 2.0**-53 * float(abs(a * ca * u * y / w))
+
+
+def test_dead_points_made_in_float64_are_dead_points():
+    """A coupler computed for the dead point is off by a few roundings; what is off by more is decided, and rightly."""
+    r = np.random.default_rng(3)
+    n = 1000
+    a, (e, f) = r.uniform(0.1, 2.0, n), r.uniform(-3.0, 3.0, (2, n))
+    alpha, phi = r.uniform(-3.0, 3.0, n), r.uniform(0.0, 6.0, n)
+    across = np.hypot(e - a * np.cos(phi), f * np.cos(alpha) - a * np.sin(alpha) * np.sin(phi))
+    for factor, wanted, share in ((1.0, st.DEAD_POINT, 0.99), (1.0 - 1e-13, st.NOT_ASSEMBLED, 0.9)):
+        designs = np.column_stack([a, across * factor, e, f, alpha, np.ones(n)])
+        poses = family("rssp").precise().poses(designs, Angles.of(phi[:, None]), frozenset({"s"}))
+        assert (poses["status"] == wanted).mean() > share
+
+
+def test_poses_a_rounding_of_the_links_can_tell_from_a_dead_point_have_derivatives():
+    """Twice the working precision decides where plain arithmetic could not; its band is that of the links alone."""
+    r = np.random.default_rng(4)
+    n = 300
+    a, (e, f) = r.uniform(5.0, 20.0, n), r.uniform(-60.0, 60.0, (2, n))
+    alpha, phi = r.uniform(-3.0, 3.0, n), r.uniform(0.0, 6.0, n)
+    m, height = e - a * np.cos(phi), f * np.cos(alpha) - a * np.sin(alpha) * np.sin(phi)
+    size = np.abs(m) * (np.abs(e) + a) + np.abs(height) * (np.abs(f) + a)
+    designs = np.column_stack([a, np.sqrt(m * m + height * height + 7.0 * 2.0**-53 * size), e, f, alpha, np.ones(n)])
+    angles = Angles.of(phi[:, None])
+    plain, exact = (f.poses(designs, angles, frozenset(WANT)) for f in (family("rssp"), family("rssp").precise()))
+    decided = exact["status"] == st.OK
+    assert (plain["status"] == st.DEAD_POINT).mean() > 0.6
+    assert decided.mean() > 0.8
+    for i in np.flatnonzero(decided)[:40]:
+        true = naive.outputs(tuple(designs[i]), phi[i])
+        # s moves with the square root of Q, of which a rounding of phi's cosine and sine is left
+        assert abs(exact["ds"][i, 0] - float(true["ds"])) < 0.2 * abs(float(true["ds"]))

@@ -1,7 +1,7 @@
 """Crank-rocker against the oracle tables (25 digits, computed from joint coordinates), hard rows included.
 
 Tolerance (docs/rssr.md, section 7): K 2^-53 max(cond, |y|), for derivatives the largest of the orders up to theirs.
-K = 8 for poses (measured 2.0) and for the margin (1.2), 16 for limit positions (2.9).
+K = 8 for poses (measured 2.0) and for the margin (1.2), 16 for limit positions (2.5).
 """
 
 import json

@@ -9,6 +9,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+import sweep
 from kernels import status as st
 from kernels.families import rssr
 from tests.reference.rssr import DIGITS, Linkage, golden_section
@@ -103,6 +104,19 @@ def test_largest_pressure_angle_is_that_of_a_fine_grid():
     np.testing.assert_allclose(found["max_pressure_angle"], at, rtol=1e-11)
 
 
+def test_largest_pressure_angle_of_long_offsets_along_nearly_parallel_axes_is_within_its_error():
+    designs = random_designs(2000, 15)
+    scale = 10.0 ** np.random.default_rng(15).uniform(3.0, 8.0, 2000)
+    designs[:, 4], designs[:, 6] = scale * designs[:, 2], designs[:, 6] / scale
+    designs[:, 5] += designs[:, 4]
+    frame = sweep.summarise("rssr", dict(zip(rssr.Design._fields, designs.T, strict=True)), ["max_pressure_angle"])
+    turning = np.flatnonzero(frame["status"] == st.OK)[:6]
+    assert len(turning) == 6
+    for i in turning:
+        exact = mp.acos(mp.sqrt(Linkage(*designs[i]).margin()))
+        assert abs(frame["max_pressure_angle"][i] - exact) <= frame["err_max_pressure_angle"][i]
+
+
 def test_limit_positions_are_where_the_rocker_reverses():
     designs = random_designs(2000, 4, rotatable=True)
     found = limits(designs)
@@ -122,6 +136,22 @@ def test_limit_positions_are_where_the_rocker_reverses():
     np.testing.assert_array_equal(returns, swings)
     np.testing.assert_allclose(np.abs(found["swing"][swings]), np.ptp(psi[swings], axis=1), rtol=2e-3)
     np.testing.assert_array_equal(np.sign(found["swing"][swings]), -designs[swings, 7])
+
+
+def test_unevenness_of_a_tiny_crank_keeps_its_digits_at_any_pressure_angle():
+    """phi0 - pi = swing times the turning of the ball's direction per psi, to first order in the crank."""
+    designs = random_designs(3000, 14)
+    designs[:, 0], designs[:, 1] = 1e-9, designs[:, 1] * np.random.default_rng(14).uniform(0.9, 1.1, 3000)
+    found = limits(designs)
+    ok = found["status"] == st.OK
+    _, _, c, e, _, g, alpha, _ = designs[ok].T
+    m = found["psi_ext"][ok] + 0.5 * found["swing"][ok]
+    sa, ca = np.sin(alpha), np.cos(alpha)
+    x, y = e + c * np.cos(m), c * ca * np.sin(m) - g * sa
+    beyond = found["swing"][ok] * c * (x * ca * np.cos(m) + y * np.sin(m)) / (x * x + y * y)
+    assert ok.sum() > 1000
+    assert np.abs(found["phi0"][ok] - (np.pi + beyond)).max() <= 4.0 * 2.0**-53 * np.pi
+    assert np.abs(found["stroke_ratio"][ok] - (np.pi + beyond) / (np.pi - beyond)).max() <= 8.0 * 2.0**-53
 
 
 def test_no_limit_position_is_lost_among_100_000_designs():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -59,6 +61,13 @@ _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_with_places(rssp.poses, designs, angles, _VALUES, _JOINTS, wanted)
+
+
+def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """As :func:`poses`, with the discriminant in twice the working precision; for float64 only."""
+    q = np.empty((len(designs), angles.cos.shape[1]))
+    rssp.precise_discriminants(designs, angles.cos, angles.sin, q)
+    return filled_with_places(partial(rssp.poses, exact_q=q), designs, angles, _VALUES, _JOINTS, wanted)
 
 
 def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -149,4 +158,5 @@ FAMILY = Family(
     joints=joint_records,
     joint_needs=_JOINT_NEEDS,
     ellipse=ellipse,
+    precise_poses=precise_poses,
 )

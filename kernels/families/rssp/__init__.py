@@ -1,7 +1,8 @@
 """Spatial slider-crank: revolute crank, two ball joints, prismatic slider (RSSP); planar for alpha = 0.
 
-``closure`` reduces a design to its constants, ``motion`` evaluates poses, ``margin`` decides rotatability and the
-largest pressure angle, ``limits`` finds the limit positions, ``joints`` and ``ellipse`` are what effects work from.
+``closure`` reduces a design to its constants, ``motion`` evaluates poses, ``precise`` their discriminant in twice the
+working precision, ``margin`` decides rotatability and the largest pressure angle, ``limits`` finds the limit positions,
+``joints`` and ``ellipse`` are what effects work from.
 """
 
 from kernels.families.rssp.closure import Design as Design
@@ -10,3 +11,4 @@ from kernels.families.rssp.joints import joints as joints
 from kernels.families.rssp.limits import limits as limits
 from kernels.families.rssp.margin import margin as margin
 from kernels.families.rssp.motion import poses as poses
+from kernels.families.rssp.precise import precise_discriminants as precise_discriminants

@@ -54,14 +54,18 @@ class Reduced(NamedTuple):
 
 
 @inline
-def axial_square(f: Any, g: Any, alpha: Any, ca: Any) -> tuple[Any, Any]:
-    """f^2 + g^2 - 2 f g cos(alpha) and the magnitude of its terms, without cancellation near alpha = 0, pi; (K*)."""
+def axial_terms(f: Any, g: Any, alpha: Any, ca: Any) -> tuple[Any, Any, Any]:
+    """f^2 + g^2 - 2 f g cos(alpha), the magnitude of its terms, and f cos(alpha) - g; (K*).
+
+    Without cancellation where the axes are nearly parallel, alpha near 0 or pi, and both offsets long.
+    """
     near_zero = ca.real >= 0.0
     sine, cosine = sincos(0.5 * alpha)
     h = sine if near_zero else cosine
-    gap = f - g if near_zero else f + g
-    near, far = gap * gap, 4.0 * f * g * h * h
-    return near + (far if near_zero else -far), near.real + abs(far.real)
+    sign = 1.0 if near_zero else -1.0
+    gap, rest = f - sign * g, 2.0 * f * h * h
+    near, far = gap * gap, 2.0 * g * rest
+    return near + sign * far, near.real + abs(far.real), sign * (gap - rest)
 
 
 @inline
@@ -92,7 +96,7 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
 def reduce_scaled(a: Any, b: Any, c: Any, e: Any, f: Any, g: Any, alpha: Any, branch: float) -> Reduced:
     """As :func:`reduce_design`, for lengths whose squares stay in float64; without a branch, so that it vectorises."""
     sa, ca = sincos(alpha)
-    q, q_size = axial_square(f, g, alpha, ca)
+    q, q_size, rise = axial_terms(f, g, alpha, ca)
     square = (c - b) * (c + b) + (a * a + e * e) + q
     per_a, per_c = 1.0 / a, 1.0 / c
     k0, k1, k2 = 0.5 * square * per_c * per_a, g * sa * per_c, e * per_c
@@ -102,7 +106,7 @@ def reduce_scaled(a: Any, b: Any, c: Any, e: Any, f: Any, g: Any, alpha: Any, br
     valid = valid & (abs(alpha.real) < 1e5) & (branch * branch == 1.0)
     return Reduced(
         e * per_a, branch * (f * sa * per_a), branch * ca, k0, k1, k2, size,
-        b * per_a, c * per_a, (f * ca - g) * per_a, sa, branch, valid,
+        b * per_a, c * per_a, rise * per_a, sa, branch, valid,
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kernels._jit import kernel
-from kernels.families.rssr.closure import Array, axial_square
+from kernels.families.rssr.closure import Array, axial_terms
 from kernels.sincos import sincos
 
 
@@ -23,11 +23,11 @@ def pressure_ellipse(designs: Array, ellipse: Array) -> None:
         a, b, c = designs[i, 0], designs[i, 1], designs[i, 2]
         e, f, g = designs[i, 3], designs[i, 4], designs[i, 5]
         sa, ca = sincos(designs[i, 6])
-        q, q_size = axial_square(f, g, designs[i, 6], ca)
+        q, q_size, rise = axial_terms(f, g, designs[i, 6], ca)
         per = 1.0 / (b * c)
         out = ellipse[i]
         out[0] = 0.5 * per * (b * b + c * c - a * a - e * e - q)
         out[1], out[2] = per * (a * e), -per * (a * g * sa)
-        out[3], out[4], out[5] = (g - f * ca) / b, 0.0, a * sa / b
+        out[3], out[4], out[5] = -rise / b, 0.0, a * sa / b
         radial = 0.5 * per * (b * b + c * c + a * a + e * e + q_size) + per * a * (abs(e) + abs(g * sa))
         out[6] = radial + (abs(g) + abs(f * ca) + a) / b

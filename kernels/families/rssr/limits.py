@@ -173,7 +173,7 @@ def limits(designs: Array, status: Status, out: Array, error: Array | None) -> N
 
     Notes
     -----
-    Where the status is not OK all are nan.  Largest error over the 122 oracle rows: 3.0 x 2^-53 x max(cond, |y|).
+    Where the status is not OK all are nan.  Largest error over the 122 oracle rows: 2.5 x 2^-53 x max(cond, |y|).
     """
     at, marks, begin = new_block(), np.empty(BLOCK), np.empty(3)
     cos, sin = np.empty(FEWEST), np.empty(FEWEST)
@@ -226,7 +226,7 @@ def _fill(at: Array, k: int, n: int, begin: Array, out: Array, error: Array | No
     # The ball from the crank axis, and how it moves from one limit to the other: phi0 - pi without cancellation.
     x, y, dx, dy = at[k + E] + rocker * c1, rocker * (ca * s1 - at[k + K1]), rocker * dc, rocker * ca * ds
     beyond = math.atan2(x * dy - y * dx, x * (x + dx) + y * (y + dy))
-    out[0], out[1] = math.atan2(branch * s1, c1), math.atan2(branch * s2, c2)
+    out[0], out[1] = math.atan2(0.0 + branch * s1, c1), math.atan2(0.0 + branch * s2, c2)  # pi, never -pi
     out[2], out[3] = _wrapped(phi1), _wrapped(phi2)
     out[4], out[5], out[6] = branch * swing, math.pi + beyond, (math.pi + beyond) / (math.pi - beyond)
     if error is not None:

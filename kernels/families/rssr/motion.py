@@ -83,10 +83,11 @@ def poses(
             s = (x * t - y * w) / rr if has_angle else math.nan  # -sin psi of the mirrored mechanism
             if cos_psi is not None:
                 cos_psi[i, j] = -c
+            sine = 0.0 - r.branch * s  # never -0.0, which would turn the angle pi into -pi
             if sin_psi is not None:
-                sin_psi[i, j] = -r.branch * s
+                sin_psi[i, j] = sine
             if psi is not None:
-                psi[i, j] = arctan2(-r.branch * s, -c)
+                psi[i, j] = arctan2(sine, -c)
             if pressure_angle is not None:
                 # arctangent, not acos: acos loses half the digits near zero.
                 across = hypotenuse(r.rocker - w, r.z0 - r.sa * v)

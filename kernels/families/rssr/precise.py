@@ -173,10 +173,11 @@ def precise_poses(
             s = two.divide(two.subtract(two.multiply(x, t), two.multiply(y, w)), rr, per_rr)
             if cos_psi is not None:
                 cos_psi[i, j] = -c[0]
+            sine = 0.0 - branch * s[0]  # never -0.0, which would turn the angle pi into -pi
             if sin_psi is not None:
-                sin_psi[i, j] = -branch * s[0]
+                sin_psi[i, j] = sine
             if psi is not None:
-                psi[i, j] = math.atan2(-branch * s[0], -c[0])
+                psi[i, j] = math.atan2(sine, -c[0])
             if x_b is not None:
                 x_b[i, j] = designs[i, 0] * u if valid else math.nan
             if y_b is not None:
