@@ -134,8 +134,9 @@ def _unmark(marks: float, begin: Array) -> int:
 
 
 @inline
-def _wrapped(phi: float) -> float:
-    turned = phi - TURN * math.floor(phi / TURN)
+def _wrapped(angle: float) -> float:
+    """The angle of an arctangent in [0, 2 pi)."""
+    turned = angle + TURN if angle < 0.0 else 0.0 + angle
     return turned if turned < TURN else 0.0
 
 
@@ -227,7 +228,8 @@ def _fill(at: Array, k: int, n: int, begin: Array, out: Array, error: Array | No
     x, y, dx, dy = at[k + E] + rocker * c1, rocker * (ca * s1 - at[k + K1]), rocker * dc, rocker * ca * ds
     beyond = math.atan2(x * dy - y * dx, x * (x + dx) + y * (y + dy))
     out[0], out[1] = math.atan2(0.0 + branch * s1, c1), math.atan2(0.0 + branch * s2, c2)  # pi, never -pi
-    out[2], out[3] = _wrapped(phi1), _wrapped(phi2)
+    # psi stands still where phi is searched, so it is the better known; (8) gives phi from it.
+    out[2], out[3] = _wrapped(math.atan2(y, x)), _wrapped(math.atan2(-y - dy, -x - dx))
     out[4], out[5], out[6] = branch * swing, math.pi + beyond, (math.pi + beyond) / (math.pi - beyond)
     if error is not None:
         size = 8.0 * EPS * (abs(at[k + E]) + 2.0 + abs(at[k + Y0]) + at[k + W_SIZE])
