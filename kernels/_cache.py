@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import hashlib
 import marshal
+import pickle
 import struct
 import sys
 from collections.abc import Callable
@@ -38,6 +39,8 @@ PACKAGE = __name__.partition(".")[0]
 PYC_HEADER = 16
 # A .pyc is younger than its source if it was written so much later [ns].
 YOUNGER = 2_000_000_000
+# What reading a file that is empty or ends too soon raises; numba does not wait for its files to reach the disk.
+DAMAGED = (EOFError, pickle.UnpicklingError)
 
 
 def _digests() -> dict[str, str]:
@@ -128,10 +131,19 @@ class KernelCache(FunctionCache):
 
     _impl_class = _Form
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled code of one signature, or None; of files that a power cut left short nothing is kept."""
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except DAMAGED:
+            with suppress(OSError), FileLock(CACHE_DIR / "_lock"):
+                self.flush()  # type: ignore[no-untyped-call]
+            return None
+
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the compiled code of one signature; one process at a time."""
         # A disk that is full takes no code; what was compiled serves this process all the same.
-        with suppress(OSError), FileLock(CACHE_DIR / "_lock"):
+        with suppress(OSError, *DAMAGED), FileLock(CACHE_DIR / "_lock"):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 

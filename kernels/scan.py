@@ -20,7 +20,6 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Status = NDArray[np.uint8]
 
-MAGNITUDE = 0
 FLAT = 1e-9
 EPS = 2.0**-53
 TWO_PI = 2.0 * math.pi

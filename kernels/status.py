@@ -28,7 +28,7 @@ MEANING: dict[int, str] = {
     NOT_ROTATABLE: "the crank does not turn fully (margin below zero)",
     UNDECIDABLE: "whether the crank turns fully cannot be decided in float64 (margin zero within rounding)",
     LIMIT_EXCEEDED: "a limit of the study is exceeded",
-    NOT_CONVERGED: "an iteration did not reach its tolerance",
+    NOT_CONVERGED: "the accuracy asked for was not reached, by an iteration or because rounding is all there is",
     INVALID_INPUT: "a parameter is not finite, a length is not positive, or their scale leaves float64",
     SINGULAR: "the position is not defined (a joint lies on the axis it turns about)",
     NOT_OSCILLATING: "the follower turns fully: it has no limit positions",

@@ -73,6 +73,15 @@ def test_code_is_compiled_once_and_found_again(tree: Path) -> None:
     assert report(tree) == ["2.0", "1", "KernelCache"]
 
 
+def test_files_that_end_too_soon_are_made_anew(tree: Path) -> None:
+    report(tree)
+    for kind, length in (("nbc", 100), ("nbi", 0)):
+        for file in (tree.parents[1] / "cache").rglob(f"*.{kind}"):
+            file.write_bytes(file.read_bytes()[:length])
+        assert report(tree) == ["2.0", "0", "KernelCache"]
+    assert report(tree) == ["2.0", "1", "KernelCache"]
+
+
 def test_a_kernel_outside_of_the_package_is_compiled_and_not_kept(tree: Path) -> None:
     (tree.parent / "bench.py").write_text(KERNEL)
     program = "from bench import run; print(run(1.0), len(run.stats.cache_hits), type(run._cache).__name__)"

@@ -88,7 +88,7 @@ def cache() -> None:
 def clear() -> None:
     """Remove the compiled kernels of every version; they are compiled anew when needed.
 
-    This is the cure when a damaged file in the cache stops a kernel from loading.
+    Files cut short are noticed and made anew; this is the cure for any other damage, and makes room.
     """
     from kernels._cache import cache_root
 
