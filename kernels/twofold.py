@@ -103,6 +103,15 @@ def root(a: Twofold) -> Twofold:
 
 
 @inline
+def unit_vector(x: float, y: float) -> tuple[Twofold, Twofold]:
+    """The vector of length 1 in the direction of (x, y), whose length is 1 but for rounding."""
+    xx, yy = two_product(x, x), two_product(y, y)
+    square = two_sum(xx[0], yy[0])
+    excess = 0.5 * ((square[0] - 1.0) + (square[1] + (xx[1] + yy[1])))
+    return normal(x, -excess * x), normal(y, -excess * y)
+
+
+@inline
 def sine_cosine(x: float) -> tuple[Twofold, Twofold]:
     """Sine and cosine for |x| <= 1e5, with a relative error below 2^-84; nan for nan and infinity.
 

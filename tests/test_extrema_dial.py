@@ -1,7 +1,7 @@
-"""The accuracy dial: a smaller target gives a smaller error, and ``err_`` bounds it in at least 99.9 % of all cases.
+"""The accuracy dial of the general search: a smaller target gives a smaller error, and every error is below ``err_``.
 
-The reference is the same search with four times as many samples to begin with and a target of 1e-13; that it is right
-is shown by tests/test_extrema_reference.py.
+The reference (tests/climbing.py) are poses in twice the working precision about the peak that was found; that the peak
+is the right one is shown by tests/test_extrema_reference.py and by the proofs of docs/extrema.md.
 """
 
 from __future__ import annotations
@@ -12,52 +12,97 @@ import numpy as np
 import pytest
 
 from kernels import status as st
+from studies.accuracy.regions import regions
 from sweep.families.base import Accuracy
-from sweep.reductions import extrema
 from sweep.reductions.extrema import Request, true_extrema
 from sweep.summaries import design_outputs
-from tests.turn_designs import NEEDLE, RSSR, crank_rockers, needle_drives
+from tests.climbing import climbed, turning_points
+from tests.turn_designs import GUIDE, NEEDLE, RSSR, crank_rockers, guided_four_bars, needle_drives
 
-TARGETS = (1e-2, 1e-4, 1e-6, 1e-8)
-REQUESTS = {"rssr": (Request("d2psi", 0), Request("d3psi", 0)), "rssr+guide": (Request("d2s", 0), Request("s", 1))}
+TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+ALONE = replace(RSSR, steps=())
+ROCKER = (Request("d2psi", 0), Request("d3psi", 0), Request("psi", 1))
+TRAVEL = (Request("d2s", 0), Request("d3s", 0), Request("dev", 0), Request("s", 1), Request("s", -1))
+CASES = {
+    "rssr": (ALONE, crank_rockers, 2000, ROCKER),
+    "guide": (GUIDE, guided_four_bars, 1000, TRAVEL),
+    "rssr+guide": (NEEDLE, needle_drives, 1000, TRAVEL),
+}
+HARD = ("pressure angle beyond 84", "change point", "parallel axes", "long coupler")
 
 
-@pytest.fixture(scope="module", params=["rssr", "rssr+guide"])
+@pytest.fixture(scope="module", params=CASES)
 def case(request):
-    family, make, n = (RSSR, crank_rockers, 4000) if request.param == "rssr" else (NEEDLE, needle_drives, 2000)
-    family = replace(family, steps=())
-    designs = make(8 * n, 21)
+    family, make, n, requests = CASES[request.param]
+    designs = make(12 * n, 21)
     margin = design_outputs(family, designs, ["margin"], Accuracy(target=1e-8))
     designs = designs[(margin["status"] == st.OK) & (margin["margin"] > 1e-5)][:n]
-    requests = REQUESTS[request.param]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(extrema, "START", 128)
-        patch.setattr(extrema, "ROUGH", 0.05)
-        reference, status = true_extrema(family, designs, requests, 1e-13)
+    found, status = true_extrema(family, designs, requests, 1e-9)
+    if family is ALONE:
+        designs = designs[status != st.NOT_OSCILLATING]  # rockers that turn round have no largest angle
+        found, status = true_extrema(family, designs, requests, 1e-9)
     assert (status == st.OK).all()
-    return family, designs, requests, reference
+    exact = {r: climbed(family, designs, r.pose, r.mode, found[r].phi) for r in requests}
+    return family, designs, requests, exact
 
 
 def test_errors_fall_with_the_target_and_stay_below_it(case):
-    family, designs, requests, reference = case
+    family, designs, requests, exact = case
     worst = []
     for target in TARGETS:
         found, status = true_extrema(family, designs, requests, target)
         assert (status == st.OK).all()
-        relative = np.abs(found[requests[0]].value - reference[requests[0]].value) / reference[requests[0]].value
-        assert np.quantile(relative, 0.999) <= target
-        assert relative.max() <= 10.0 * target
-        worst.append(np.quantile(relative, 0.999))
-    assert worst[0] > 10.0 * worst[1] > 100.0 * worst[2] > 1000.0 * worst[3]
+        relative = np.abs(found[requests[0]].value / exact[requests[0]] - 1.0)
+        assert relative.max() <= target
+        worst.append(np.quantile(relative, 0.99))
+    assert worst[0] > 10.0 * worst[1] > 100.0 * worst[2]  # at 1e-6 most are exact already
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_error_estimates_bound_the_error(case, target):
-    family, designs, requests, reference = case
+    family, designs, requests, exact = case
     found, _ = true_extrema(family, designs, requests, target)
     for request in requests:
-        error = np.abs(found[request].value - reference[request].value)
-        claimed = found[request].err + reference[request].err
-        assert (error <= claimed).mean() >= 0.999
-        # An estimate that is always huge would bound everything and say nothing.
-        assert np.median(found[request].err / np.abs(reference[request].value)) <= target
+        off = _off(found[request].value, exact[request], request)
+        assert (off <= found[request].err).all()
+        if request.mode == 0:
+            # An estimate that is always huge would bound everything and say nothing.
+            assert np.median(found[request].err / np.abs(exact[request])) <= target
+
+
+@pytest.fixture(scope="module")
+def hard():
+    return {r.name: r.designs for r in regions(100, 5) if r.name in HARD}
+
+
+@pytest.mark.parametrize("region", HARD)
+@pytest.mark.parametrize("target", [1e-3, 1e-8, 1e-12])
+def test_error_estimates_bound_the_error_of_hard_designs(hard, region, target):
+    """Plain poses of long couplers are wrong by up to 2e-7, those near change points by 1e-8."""
+    designs = hard[region]
+    for request in ROCKER[:2]:
+        fine, known = true_extrema(ALONE, designs, [request], 1e-9, locate=True)
+        found, status = true_extrema(ALONE, designs, [request], target)
+        good = (known == st.OK) & (status == st.OK)
+        assert good.sum() > 30
+        exact = climbed(ALONE, designs[good], request.pose, request.mode, fine[request].phi[good])
+        assert (np.abs(found[request].value[good] - exact) <= found[request].err[good]).all()
+        assert np.median(found[request].err[good] / exact) <= target
+
+
+@pytest.mark.parametrize("target", [1e-3, 1e-8, 1e-12])
+def test_places_lie_within_their_errors(case, target):
+    family, designs, requests, _ = case
+    for request in (r for r in requests if r.pose in family.derivative_of):
+        slope = family.derivative_of[request.pose]
+        fine, _ = true_extrema(family, designs, [request], 1e-9, locate=True)
+        exact = turning_points(family, designs, slope, fine[request].phi)
+        found, _ = true_extrema(family, designs, [request], target, locate=True)
+        off = np.abs(np.angle(np.exp(1j * (found[request].phi - exact))))
+        assert (off <= found[request].err_phi).all()
+        assert found[request].err_phi.max() <= max(target, 1e-10)
+
+
+def _off(value, exact, request):
+    off = value - exact
+    return np.abs(off - 2.0 * np.pi * np.rint(off / (2.0 * np.pi)) if request.pose == "psi" else off)

@@ -147,6 +147,7 @@ def with_effects(family: Family, effects: tuple[Placed, ...]) -> Family:
         parameters=(*family.parameters, *added),
         pose_outputs=(*family.pose_outputs, *(o for placed in effects for o in placed.pose_outputs)),
         poses=partial(effect_poses, family, effects, added, own),
+        precise_poses=family.precise_poses and partial(effect_poses, family.precise(), effects, added, own),
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
         dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )

@@ -39,8 +39,12 @@ class Chain(Family):
     stages: tuple[Stage, ...] = ()
 
     def precise(self) -> Chain:
-        """The chain of the stages with the most accurate poses they have."""
-        return chain(tuple(stage.family.precise() for stage in self.stages))
+        """The chain with the most accurate poses its stages have."""
+        return (
+            self
+            if self.precise_poses is None
+            else replace(self, poses=self.precise_poses, stages=_precise(self.stages))
+        )
 
 
 @dataclass
@@ -92,9 +96,14 @@ def chain(families: tuple[Family, ...]) -> Chain:
             f"{name}{s.number}": (f"{what}{s.number}", ns) for s in stages for name, (what, ns) in s.family.dear.items()
         }
         | dict(last.dear),
+        precise_poses=partial(_poses, _precise(stages), {}) if any(f.precise_poses for f in families) else None,
         stages=stages,
         travel=_travel(stages),
     )
+
+
+def _precise(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
+    return tuple(replace(stage, family=stage.family.precise()) for stage in stages)
 
 
 def _travel(stages: tuple[Stage, ...]) -> Travel | None:

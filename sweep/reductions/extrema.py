@@ -15,7 +15,7 @@ from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
 from sweep.reductions.breaks import jumps, near_jumps, search
-from sweep.reductions.refine import EPS, Peaks, polish_places, refine_peaks
+from sweep.reductions.refine import EPS, Peaks, Sampler, confirmed, first_peaks, polish_places, sharpen
 from sweep.reductions.window import Window, edges
 from sweep.sampling import (
     TWO_PI,
@@ -38,6 +38,8 @@ ROUGH = 0.1  # fourth difference of samples against their size, above which they
 PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
 BREAKING = 512  # samples from which on what is still rough may be a jump
 DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
+RIVALS = 1e-3  # peaks lower than the best by no more of its size may turn out the highest
+TIE = 1e-10  # to which peaks are told apart where their places are wanted
 
 
 class Request(NamedTuple):
@@ -127,7 +129,7 @@ class Candidates(NamedTuple):
     column: Index
     sign: Array
 
-    def only(self, which: Mask) -> Candidates:
+    def only(self, which: Index | Mask) -> Candidates:
         """Some of them."""
         return Candidates(self.request[which], self.row[which], self.column[which], self.sign[which])
 
@@ -180,7 +182,7 @@ class _Search:
         peaks = self._refine(rows, columns, samples, candidates, scales)
         for number, request in enumerate(self.requests):
             mine = candidates.request == number
-            row, found = candidates.row[mine], Peaks(*(column[mine] for column in peaks))
+            row, found = candidates.row[mine], peaks.only(mine)
             if self.window is not None and request.windowed:
                 row, found = self._within_window(rows, columns, request, row, found, resolved)
             elif request in breaks:
@@ -240,19 +242,53 @@ class _Search:
     ) -> Peaks:
         number, row, column, sign = candidates
         near = (column[:, None] + np.arange(-3, 4)) % samples
-        around, size, rounding = np.empty((row.size, 7)), np.empty(row.size), np.empty(row.size)
-        amplified = self._amplification(columns, row, column)
+        around, size = np.empty((row.size, 7)), np.empty(row.size)
         for k, request in enumerate(self.requests):
             mine = number == k
             around[mine] = sign[mine, None] * columns[request.pose][row[mine, None], near[mine]]
             size[mine] = scales[request][row[mine]]
-            derivative = request.pose in self.family.derivative_of.values()
-            rounding[mine] = amplified[mine] if derivative else np.sqrt(amplified[mine])
-        middle = sign * around[:, 3]
+        spacing = TWO_PI / samples
+        # A quarter of what is allowed: the rest is for what precise poses may find.
+        tolerance: Array = 0.25 * self.target * size
+        first = first_peaks(np.multiply(column, spacing, dtype=np.float64), spacing, around)
+        sample = self._sampler(self.family, rows, candidates, sign * around[:, 3])
+        peaks = sharpen(sample, first, spacing, tolerance, self.target if self.locate else None)
+        rounding = self._rounding(columns, candidates, self.guards) * np.abs(peaks.height)
+        peaks = peaks._replace(err_height=peaks.err_height + rounding)
+        if self.family.precise_poses is not None:
+            self._confirm(rows, columns, spacing, candidates, peaks, size)
+        return peaks
+
+    def _confirm(
+        self, rows: Index, columns: dict[str, Array], spacing: float, candidates: Candidates, peaks: Peaks, size: Array
+    ) -> None:
+        """Replace the peaks that may be the highest by what the family's precise poses say of them."""
+        number, row, _, sign = candidates
+        windowed = np.array([request.windowed for request in self.requests])[number]  # which of them count, shows later
+        group, doubt = number * rows.size + row, peaks.err_height + RIVALS * size
+        lowest = np.full(len(self.requests) * rows.size, -np.inf)
+        np.maximum.at(lowest, group, peaks.height - doubt)
+        rivals = np.flatnonzero((peaks.height + doubt >= lowest[group]) | windowed)
+        group, tolerance = group[rivals], self.target * size[rivals]
+        if self.locate:
+            # Which of several is the highest decides on the place.
+            tied = np.bincount(group, minlength=lowest.size)[group] > 1
+            tolerance = np.where(tied, np.minimum(tolerance, TIE * size[rivals]), tolerance)
+        mine, peak = candidates.only(rivals), peaks.only(rivals)
+        sample = self._sampler(self.family.precise(), rows, mine, sign[rivals] * peak.height)
+        peak = confirmed(sample, peak, spacing, tolerance)
+        # The first stage of a chain is given its exact input, those behind it a rounded one.
+        rounding = self._rounding(columns, mine, self.guards[1:]) * np.abs(peak.height)
+        for column, found in zip(peaks, peak._replace(err_height=peak.err_height + rounding), strict=True):
+            column[rivals] = found
+
+    def _sampler(self, family: Family, rows: Index, candidates: Candidates, middle: Array) -> Sampler:
+        """Measured values of candidates by the poses of ``family``, angles continuous with the values ``middle``."""
+        number, row, _, sign = candidates
 
         def sample(active: Index, phi: Array) -> Array:
             designs = rows[row[active]]
-            poses, status = pose_columns(self.family, self.designs[designs], phi, self.names)
+            poses, status = pose_columns(family, self.designs[designs], phi, self.names)
             if not self.anywhere:
                 bad = status != st.OK
                 hit = bad.any(axis=1)
@@ -266,20 +302,21 @@ class _Search:
                 out[mine] = sign[active][mine, None] * values
             return out
 
-        spacing = TWO_PI / samples
-        centre = np.multiply(column, spacing, dtype=np.float64)
-        tolerance: Array = self.target * size
-        peaks = refine_peaks(sample, centre, spacing, around, tolerance, self.target if self.locate else None)
-        # Rounding that is the same for neighbouring poses leaves no ripple.
-        return peaks._replace(err_height=peaks.err_height + 4.0 * EPS * rounding * np.abs(peaks.height))
+        return sample
 
-    def _amplification(self, columns: dict[str, Array], row: Index, column: Index) -> Array:
-        """How much a pose near a dead point amplifies the rounding of its discriminant (docs/extrema.md)."""
+    def _rounding(self, columns: dict[str, Array], candidates: Candidates, guards: list[str]) -> Array:
+        """Share of a value that rounding may have changed alike at neighbouring poses, where it leaves no ripple.
+
+        A pose near a dead point amplifies the rounding of its discriminant (docs/extrema.md).
+        """
+        number, row, column, _ = candidates
         amplified = np.ones(row.size)
-        for name in self.guards:
+        for name in guards:
             here, largest = columns[name][row, column], columns[name].max(axis=1)[row]
             amplified += np.divide(largest, here, out=np.ones(row.size), where=_tells(largest) & (here > 0.0))
-        return amplified
+        derivatives = set(self.family.derivative_of.values())
+        derived = np.array([request.pose in derivatives for request in self.requests])[number]
+        return 4.0 * EPS * np.where(derived, amplified, np.sqrt(amplified))
 
     def _within_window(
         self, rows: Index, columns: dict[str, Array], request: Request, row: Index, peaks: Peaks, resolved: Mask
@@ -292,9 +329,8 @@ class _Search:
         edge = edge.only(resolved[edge.row])
         height = np.abs(edge.values) if request.mode == 0 else request.mode * edge.values
         none = np.zeros(edge.row.size)
-        added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height)
-        joined = Peaks(*(np.concatenate([p[inside], q]) for p, q in zip(peaks, added, strict=True)))
-        return np.concatenate([row[inside], edge.row]), joined
+        added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height, none)
+        return np.concatenate([row[inside], edge.row]), peaks.only(inside).joined(added)
 
     def _beside_jumps(
         self, rows: Index, samples: int, request: Request, row: Index, peaks: Peaks, between: Mask, resolved: Mask
@@ -313,9 +349,9 @@ class _Search:
             return np.abs(curve(phi)) if request.mode == 0 else request.mode * curve(phi)
 
         arcs = search(curve, measured, column, samples)
-        added = Peaks(arcs.phi, arcs.value, np.full(arcs.phi.size, TWO_PI / samples), arcs.err, arcs.value)
-        joined = Peaks(*(np.concatenate(pair) for pair in zip(peaks, added, strict=True)))
-        return np.concatenate([row, at, at]), joined
+        wide, none = np.full(arcs.phi.size, TWO_PI / samples), np.zeros(arcs.phi.size)
+        added = Peaks(arcs.phi, arcs.value, wide, arcs.err, arcs.value, none)
+        return np.concatenate([row, at, at]), peaks.joined(added)
 
     def _keep_best(self, rows: Index, request: Request, row: Index, peaks: Peaks) -> Array:
         """Store the best candidate of each row; by how much refinement moved it from the guess (0 where none)."""
@@ -338,9 +374,10 @@ class _Search:
 
     def _polish(self, rows: Index, slope: str, phi: Array, err_phi: Array) -> tuple[Array, Array]:
         """Places of flat tops from the zero of the derivative, which is steep there."""
+        precise = self.family.precise()
 
         def sample(active: Index, angles: Array) -> Array:
-            return pose_columns(self.family, self.designs[rows[active]], angles, [slope])[0][slope]
+            return pose_columns(precise, self.designs[rows[active]], angles, [slope])[0][slope]
 
         return polish_places(sample, phi, err_phi)
 

@@ -9,15 +9,16 @@ import numpy as np
 
 from kernels import scan
 from sweep.families.base import Array
-from sweep.sampling import Index
+from sweep.sampling import Index, Mask
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
-"""``sample(candidates, phi)``: measured values (k, 5) of the candidates with these numbers at the angles phi (k, 5)."""
+"""``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""
 
 OFFSETS = np.arange(-2.0, 3.0)
 SHRINK = 0.125
 PASSES = 12
-POLISHES = 2
+POLISHES = 3
+NARROW, WIDE = 1e-8, 1e-4  # secants [rad]: shorter ones would see the rounding of the crank angle
 # The quartic over a five-point window errs in proportion to at least the fourth power of its width, so one pass to the
 # next divides the error by at least 8^4; a sixty-fourth of the last change is claimed, which leaves a factor of 64.
 CLAIM = 1.0 / 64.0
@@ -26,31 +27,54 @@ EPS = 2.0**-53
 
 
 class Peaks(NamedTuple):
-    """Refined peaks of k candidates, each (k,): place [rad], measured value, their errors, first guess from samples."""
+    """Refined peaks of k candidates, each (k,).
+
+    Place [rad], measured value, their errors, first guess from samples, step of the next five points [rad].
+    """
 
     phi: Array
     height: Array
     err_phi: Array
     err_height: Array
     guess: Array
+    step: Array
+
+    def only(self, which: Index | Mask) -> Peaks:
+        """Some of them."""
+        return Peaks(*(column[which] for column in self))
+
+    def joined(self, others: Peaks) -> Peaks:
+        """These and others."""
+        return Peaks(*(np.concatenate(pair) for pair in zip(self, others, strict=True)))
 
 
-def refine_peaks(
-    sample: Sampler,
-    centre: Array,
-    spacing: float,
-    around: Array,
-    tolerance: Array,
-    locate: float | None = None,
-) -> Peaks:
-    """Highest points near the given samples, by quartics through five points ever closer together.
+def first_peaks(centre: Array, spacing: float, around: Array) -> Peaks:
+    """Peaks of the quartics through five samples.
+
+    Parameters
+    ----------
+    centre : (k,) crank angles of the best samples [rad]
+    spacing : distance of the samples [rad]
+    around : (k, 7) measured values at the best sample and its three neighbours on either side
+    """
+    place, height, ripple, blur = _quartic(np.ascontiguousarray(around[:, 1:6]))
+    # One fourth difference may vanish by chance where the curve is not yet resolved; three in a row do not.
+    fourth = np.abs(around[:, :3] + around[:, 4:] - 4.0 * (around[:, 1:4] + around[:, 3:6]) + 6.0 * around[:, 2:5])
+    widest = fourth.max(axis=1)
+    err_height = np.where(np.abs(place) < 2.0, RIPPLE * widest + 4.0 * EPS * np.abs(height), np.inf)
+    err_phi = spacing * np.minimum(blur * widest / np.maximum(ripple, EPS * EPS), 2.0)
+    step = np.full(centre.size, SHRINK * spacing)
+    return Peaks(centre + spacing * place, height, err_phi, err_height, height.copy(), step)
+
+
+def sharpen(sample: Sampler, peaks: Peaks, spacing: float, tolerance: Array, locate: float | None = None) -> Peaks:
+    """Highest points near the given ones, by quartics through five points ever closer together.
 
     Parameters
     ----------
     sample : evaluates the measured quantity; called with the candidates that are not finished yet
-    centre : (k,) crank angles of the best samples [rad]
-    spacing : distance of the samples [rad]
-    around : (k, 7) measured values at the best sample and its three neighbours on either side
+    peaks : k peaks as known so far
+    spacing : distance of the samples they come from [rad]
     tolerance : (k,) error allowed in the height
     locate : error allowed in the place [rad]; without it the place is as good as the height left it
 
@@ -60,16 +84,8 @@ def refine_peaks(
     1e-2, one for 1e-4, two for 1e-8, three or four where the place is wanted.  A peak that leaves its window is
     followed.
     """
-    place, height, ripple, blur = _quartic(np.ascontiguousarray(around[:, 1:6]))
-    # One fourth difference may vanish by chance where the curve is not yet resolved; three in a row do not.
-    fourth = np.abs(around[:, :3] + around[:, 4:] - 4.0 * (around[:, 1:4] + around[:, 3:6]) + 6.0 * around[:, 2:5])
-    widest = fourth.max(axis=1)
-    guess = height.copy()
-    phi = centre + spacing * place
-    err_height = RIPPLE * widest + 4.0 * EPS * np.abs(height)
-    err_phi = spacing * np.minimum(blur * widest / np.maximum(ripple, EPS * EPS), 2.0)
-    step = np.full(centre.size, SHRINK * spacing)
-    enough = (np.abs(place) < 2.0) & (err_height <= tolerance)
+    phi, height, err_phi, err_height, guess, step = (column.copy() for column in peaks)
+    enough = err_height <= tolerance
     if locate is not None:
         enough &= err_phi <= locate
     active = np.flatnonzero(~enough)
@@ -92,9 +108,40 @@ def refine_peaks(
         enough = inside & (error <= tolerance[active])
         if locate is not None:
             enough &= (err_phi[active] <= locate) | ~sharper
-        step[active] = np.where(inside, SHRINK * u, u)
+        # A window that has lost its peak was too small for its place.
+        step[active] = np.where(inside, SHRINK * u, np.minimum(u / SHRINK, SHRINK * spacing))
         active = active[~enough & (step[active] > 1e-6 * spacing)]
-    return Peaks(phi, height, err_phi, err_height, guess)
+    return Peaks(phi, height, err_phi, err_height, guess, step)
+
+
+def confirmed(sample: Sampler, peaks: Peaks, spacing: float, tolerance: Array) -> Peaks:
+    """Peaks as poses of higher precision have them: their heights are values at their places.
+
+    One pose at the place of a peak measures how far rounding, and what was left of interpolation, have moved its
+    value.  Only where that is more than the ``tolerance`` the peak is sharpened again.
+
+    Parameters
+    ----------
+    sample : evaluates the measured quantity with less rounding than what the peaks come from
+    peaks, spacing, tolerance : as in `sharpen`
+    """
+    peaks = _attained(sample, peaks, np.arange(peaks.phi.size))
+    again = np.flatnonzero(peaks.err_height > tolerance)
+    if again.size:
+        # Rounding may have spoilt the place too: begin as wide as it is uncertain.
+        step = np.maximum(peaks.step, np.minimum(peaks.err_phi, SHRINK * spacing))
+        rough = peaks._replace(step=step).only(again)
+        sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, spacing, tolerance[again])
+        sharper = _attained(sample, sharper, again)
+        for column, found in zip(peaks, sharper, strict=True):
+            column[again] = found
+    return peaks
+
+
+def _attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
+    """Heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
+    height = sample(which, peaks.phi[:, None])[:, 0]
+    return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
 
 
 def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Array]:
@@ -103,23 +150,27 @@ def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Ar
     Parameters
     ----------
     slope : evaluates the derivative; called with numbers of places (k,) and angles (k, 3)
-    phi, err_phi : (n,) places and their errors [rad] as `refine_peaks` left them
+    phi, err_phi : (n,) places and their errors [rad] as `sharpen` left them
 
     Notes
     -----
-    Secant steps over 1e-4 rad; a step much longer than the error it should remove, or than the secant, is not taken.
-    The height of a top fixes its place to the square root of its rounding only, the derivative to its own rounding.
+    Secant steps, each as wide as the place is uncertain; one much longer than the error it should remove, or than the
+    secant, is not taken.  The height of a top fixes its place to the square root of its rounding only, the derivative
+    to its own rounding.
     """
-    step, every = 1e-4, np.arange(phi.size)
+    every = np.arange(phi.size)
     phi, err_phi = phi.copy(), err_phi.copy()
+    last = np.zeros(phi.size)
     for _ in range(POLISHES):
-        below, here, above = slope(every, phi[:, None] + step * np.arange(-1.0, 2.0)).T
+        step = np.clip(64.0 * err_phi, NARROW, WIDE)
+        below, here, above = slope(every, phi[:, None] + step[:, None] * np.arange(-1.0, 2.0)).T
         bend = (above - below) / (2.0 * step)
         move = -np.divide(here, bend, out=np.full(phi.size, np.inf), where=bend != 0.0)
-        better = np.abs(move) <= np.clip(64.0 * err_phi, 0.01 * step, step)
+        better = np.abs(move) <= step
         phi[better] += move[better]
-        # The last step is as long as the noise of the derivative lets it be.
-        err_phi[better] = 4.0 * np.abs(move[better]) + 4.0 * EPS * np.pi
+        # The last steps are as long as the noise of the derivative lets them be; one may be short by chance.
+        err_phi[better] = 4.0 * np.maximum(np.abs(move), last)[better] + 8.0 * EPS * np.pi
+        last = SHRINK * np.abs(move)
     return phi, err_phi
 
 

@@ -99,8 +99,16 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
         left[a], right[a] = np.where(onto_left, phi[a], left[a]), np.where(onto_left, right[a], phi[a])
         side[a] = np.where(onto_left, -1.0, 1.0)
         a = a[(np.abs(now) > 8.0 * EPS * size[a]) & (right[a] - left[a] > 8.0 * EPS)]
-    err = slope * (np.abs(f) + window.err[rows[row]] + 4.0 * EPS * size) + 4.0 * EPS * np.abs(values)
-    return Edges(row, phi, values, err)
+    poses, _ = pose_columns(family.precise(), designs[rows[row]], phi[:, None], names)
+    exact, f = poses[pose][:, 0], poses[family.position][:, 0] - level
+    if is_angle_of_follower(family.position):
+        f -= TWO_PI * np.round(f / TWO_PI)
+    err = (
+        slope * (np.abs(f) + window.err[rows[row]] + 4.0 * EPS * size)
+        + np.abs(values - exact)
+        + 4.0 * EPS * np.abs(exact)
+    )
+    return Edges(row, phi, exact, err)
 
 
 def _brackets(rows: Index, window: Window, positions: Array) -> tuple[Index, Index, Array]:

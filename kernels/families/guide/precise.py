@@ -63,9 +63,8 @@ def precise_poses(
 
     Notes
     -----
-    (u, v) = (cos phi, sin phi) are taken as they are; what their rounding takes from the unit length is put into W, so
-    that it only displaces the crank pin.  With d = C - B and d . d = b^2 the derivatives follow from d . d' = 0,
-    d . d'' = -d' . d', d . d''' = -3 d' . d''; the coupler point is B + (l/b) d.
+    (cos phi, sin phi) give the direction of the crank, its length is the crank's.  With d = C - B and d . d = b^2 the
+    derivatives follow from d . d' = 0, d . d'' = -d' . d', d . d''' = -3 d' . d''; the coupler point is B + (l/b) d.
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
@@ -76,21 +75,17 @@ def precise_poses(
         square = two.add(two.two_product(a, a), two.two_product(e, e))
         square = two.add(two.multiply(two.two_sum(c, -b), two.two_sum(c, b)), square)
         k0 = two.multiply(two.scale(square, 0.5), per_c)
-        k2, half = two.multiply(two.two_product(a, e), per_c), 0.5 * a * a / c
+        k2 = two.multiply(two.two_product(a, e), per_c)
         sl, cl = two.sine_cosine(designs[i, 6])
         per_unit = 1.0 / unit
         lx, ly = two.scale(per_b, designs[i, 4] * per_unit), two.scale(per_b, designs[i, 5] * per_unit)
         qx, qy = _times(lx, ly, cl, (-sl[0], -sl[1]))
         h = designs[i, 7] * per_unit
         for j in range(cos_phi.shape[1]):
-            u, v = cos_phi[row, j], sin_phi[row, j]
-            uu, vv = two.two_product(u, u), two.two_product(v, v)
-            length = two.two_sum(uu[0], vv[0])
-            excess = (length[0] - 1.0) + (length[1] + (uu[1] + vv[1]))  # u^2 + v^2 - 1
-            bx, by = two.two_product(a, u), two.two_product(a, v)
+            u, v = two.unit_vector(cos_phi[row, j], sin_phi[row, j])
+            bx, by = two.scale(u, a), two.scale(v, a)
             x = two.subtract((e, 0.0), bx)
-            w = two.subtract(k0, two.scale(k2, u))
-            w = two.normal(w[0], w[1] + half * excess)
+            w = two.subtract(k0, two.multiply(k2, u))
             rr = _dot(x, by, x, by)
             delta = two.subtract(rr, two.multiply(w, w))
             tolerance = BAND * (abs(x[0]) * r.x_size + abs(by[0]) * a + abs(w[0]) * r.w_size)

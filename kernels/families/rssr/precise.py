@@ -18,9 +18,9 @@ from kernels.families.rssr.closure import EPS, Array, Status, reduce_scaled, uni
 from kernels.twofold import Twofold
 
 # Columns of the constants: high and low parts in units of the crank, mirrored to branch +1; then plain numbers.
-E, Y0, CA, K0, K1, K2, HALF, RHO, Z0, SA = range(0, 20, 2)
-MX, MY, MW, VALID, BRANCH = range(20, 25)
-PRECISE_COLUMNS = 25
+E, Y0, CA, K0, K1, K2, RHO, Z0, SA = range(0, 18, 2)
+MX, MY, MW, VALID, BRANCH = range(18, 23)
+PRECISE_COLUMNS = 23
 BAND = 4.0 * EPS  # what rounding the given numbers does to Delta: a dead point made in float64 is still one
 _ROW = 64  # designs side by side; the constant stride lets the loop over them become vector code
 
@@ -56,7 +56,6 @@ def _reduce(at: Array, k: int) -> None:
     _put(at, K0, k, two.multiply(two.multiply(square, (0.5 * per_c[0], 0.5 * per_c[1])), per_a))
     _put(at, K1, k, two.multiply(two.scale(sa, g), per_c))
     _put(at, K2, k, two.scale(per_c, e))
-    _put(at, HALF, k, two.scale(per_c, 0.5 * a))
     _put(at, RHO, k, two.scale(per_a, c))
     _put(at, Z0, k, two.multiply(two.add(two.scale(ca, f), (-g, 0.0)), per_a))
     _put(at, SA, k, sa)
@@ -125,32 +124,23 @@ def precise_poses(
 
     Notes
     -----
-    (u, v) = (cos phi, sin phi) are taken as they are; what their rounding takes from the unit length is put into W, so
-    that it only displaces the crank pin.  The derivatives follow from d . d = b^2: with d' = p k' - B' and so on,
-    d . d' = 0, d . d'' = -d' . d', d . d''' = -3 d' . d'', where no term is much larger than what it belongs to.
+    (cos phi, sin phi) give the direction of the crank, its length is the crank's.  The derivatives follow from
+    d . d = b^2: with d' = p k' - B' and so on, d . d' = 0, d . d'' = -d' . d', d . d''' = -3 d' . d'', where no term is
+    much larger than what it belongs to.
     """
     for i in range(designs.shape[0]):
         row = i if cos_phi.shape[0] > 1 else 0
         e, y0, ca = _get(constants, E, i), _get(constants, Y0, i), _get(constants, CA, i)
         k0, k1, k2 = _get(constants, K0, i), _get(constants, K1, i), _get(constants, K2, i)
-        half, rho, z0, sa = (
-            _get(constants, HALF, i),
-            _get(constants, RHO, i),
-            _get(constants, Z0, i),
-            _get(constants, SA, i),
-        )
+        rho, z0, sa = _get(constants, RHO, i), _get(constants, Z0, i), _get(constants, SA, i)
         mx, my, mw = constants[i, MX], constants[i, MY], constants[i, MW]
         valid, branch = constants[i, VALID] != 0.0, constants[i, BRANCH]
         two_ac = 2.0 * designs[i, 0] * designs[i, 2]
         for j in range(cos_phi.shape[1]):
-            u, v = cos_phi[row, j], sin_phi[row, j]
-            uu, vv = two.two_product(u, u), two.two_product(v, v)
-            length = two.two_sum(uu[0], vv[0])
-            excess = (length[0] - 1.0) + (length[1] + (uu[1] + vv[1]))  # u^2 + v^2 - 1
-            x = two.add(e, (-u, 0.0))
-            y = two.add(y0, two.scale(ca, v))
-            w = two.add(k0, two.subtract(two.scale(k1, v), two.scale(k2, u)))
-            w = two.normal(w[0], w[1] + half[0] * excess)
+            u, v = two.unit_vector(cos_phi[row, j], sin_phi[row, j])
+            x = two.subtract(e, u)
+            y = two.add(y0, two.multiply(ca, v))
+            w = two.add(k0, two.subtract(two.multiply(k1, v), two.multiply(k2, u)))
             rr = two.add(two.multiply(x, x), two.multiply(y, y))
             delta = two.subtract(rr, two.multiply(w, w))
             tolerance = BAND * (abs(x[0]) * mx + abs(y[0]) * my + abs(w[0]) * mw)
@@ -179,10 +169,10 @@ def precise_poses(
             if psi is not None:
                 psi[i, j] = math.atan2(sine, -c[0])
             if x_b is not None:
-                x_b[i, j] = designs[i, 0] * u if valid else math.nan
+                x_b[i, j] = designs[i, 0] * u[0] if valid else math.nan
             if y_b is not None:
                 y_b[i, j] = branch * designs[i, 0] * y[0] if valid else math.nan
-            z = two.subtract(z0, two.scale(sa, v))
+            z = two.subtract(z0, two.multiply(sa, v))
             if z_b is not None:
                 z_b[i, j] = designs[i, 0] * z[0] + designs[i, 5] if valid else math.nan
             if x_c is not None:
@@ -197,27 +187,27 @@ def precise_poses(
             if dpsi is not None or d2psi is not None or d3psi is not None:
                 # d from the crank pin to the ball, B' = (-v, hu, -su), B'' = (-u, -hv, sv), k = -(c, s), k' = (s, -c)
                 dx, dy = two.subtract(x, two.multiply(rho, c)), two.add(y, two.multiply(rho, s))  # dy, dz negative
-                hu, su = two.scale(ca, u), two.scale(sa, u)
+                hu, su = two.multiply(ca, u), two.multiply(sa, u)
                 rise = two.multiply(rho, t)
                 per_rise = 1.0 / rise[0] if code == st.OK else math.nan
-                p = two.subtract(two.multiply(z, su), two.add(two.multiply(dy, hu), two.scale(dx, v)))
+                p = two.subtract(two.multiply(z, su), two.add(two.multiply(dy, hu), two.multiply(dx, v)))
                 p = two.divide(p, rise, per_rise)
                 if dpsi is not None:
                     dpsi[i, j] = branch * p[0]
                 if d2psi is not None or d3psi is not None:
-                    hv, sv = two.scale(ca, v), two.scale(sa, v)
+                    hv, sv = two.multiply(ca, v), two.multiply(sa, v)
                     inward, turn = two.subtract(rho, w), two.multiply(p, rho)
                     centre = two.multiply(p, turn)
-                    d1x, d1y = two.add(two.multiply(turn, s), (v, 0.0)), two.add(two.multiply(turn, c), hu)  # d1y neg.
+                    d1x, d1y = two.add(two.multiply(turn, s), v), two.add(two.multiply(turn, c), hu)  # d1y neg.
                     square = two.add(two.add(two.multiply(d1x, d1x), two.multiply(d1y, d1y)), two.multiply(su, su))
-                    along = two.subtract(two.scale(dx, u), two.multiply(centre, inward))
+                    along = two.subtract(two.multiply(dx, u), two.multiply(centre, inward))
                     along = two.add(along, two.subtract(two.multiply(z, sv), two.multiply(dy, hv)))
                     q = two.divide(two.add(square, along), rise, per_rise)  # negative
                     if d2psi is not None:
                         d2psi[i, j] = -branch * q[0]
                     if d3psi is not None:
                         swing = two.multiply(q, rho)
-                        d2x = two.subtract(two.add(two.multiply(centre, c), (u, 0.0)), two.multiply(swing, s))
+                        d2x = two.subtract(two.add(two.multiply(centre, c), u), two.multiply(swing, s))
                         d2y = two.add(two.add(two.multiply(centre, s), two.multiply(swing, c)), hv)
                         both = two.subtract(two.multiply(d1x, d2x), two.multiply(d1y, d2y))
                         both = two.subtract(both, two.multiply(su, sv))
