@@ -241,6 +241,24 @@ def test_engineering_method_beats_every_mechanism_of_a_dense_search():
     assert solution.objective <= dense.min() * (1.0 + 1e-9)
 
 
+def test_engineering_method_keeps_the_joint_in_its_box():
+    """The rocker ball at the extended position in a box that the free optimum misses; the best of a dense search."""
+    numbers = {"swing": 0.8, "phi0": 3.2, **SPACE, "f_range": (-3.0, 3.0), "max_pressure_angle": 1.2}
+    box = {"x_ext": (0.3, 1.0), "y_ext": (-0.6, 0.6)}
+    free, kept = (solve(EngineeringMethod(**numbers, bounds=BOUNDS | more), starts=4)[0] for more in ({}, box))
+    assert free.feasible and kept.feasible
+    assert not 0.3 <= free.mechanism["x_ext"] <= 1.0
+    turn = check_limits(rocker(kept), 0.8, 3.2, 1.2)
+    ball = kept.mechanism["c"] * np.exp(1j * turn["psi_ext"])
+    assert ball == pytest.approx(kept.mechanism["x_ext"] + 1j * kept.mechanism["y_ext"], abs=1e-9)
+    assert 0.3 - 1e-8 <= ball.real <= 1.0 + 1e-8 and abs(ball.imag) <= 0.6 + 1e-8
+    phi1, f = (grid.ravel() for grid in np.meshgrid(np.linspace(0, 2 * np.pi, 480), np.linspace(-3, 3, 61)))
+    dense = EngineeringMethod(**numbers, bounds=BOUNDS | box).evaluate(np.column_stack([phi1, f]))
+    inside = (dense.limits >= 0.0).all(axis=1)
+    assert inside.sum() > 50
+    assert free.objective < kept.objective <= np.abs(dense.curve[inside]).max(axis=1).min() * (1.0 + 1e-9)
+
+
 def test_task5_pin_goes_as_prescribed():
     m = best(TASK5).mechanism
     table = {name: [m[f"{name}1"]] for name in RSSR}

@@ -8,10 +8,24 @@ import numpy as np
 import pytest
 
 from sweep.errors import InputError
-from sweep.synthesis.tasks import EngineeringMethod, Position, Setting, Task1, Task2, Task3, Task4, Task7, solve
+from sweep.synthesis.tasks import (
+    EngineeringMethod,
+    Position,
+    Setting,
+    Task1,
+    Task2,
+    Task3,
+    Task4,
+    Task5,
+    Task6,
+    Task7,
+    Task8,
+    solve,
+)
 from sweep.synthesis.tasks.problem import Candidates, Unknown
 
 DRIVE = {"a": 0.4, "b": 1.8, "c": 1.2, "e": 1.5, "f": 1.2, "g": 1.0, "alpha": 1.3, "branch": -1.0}
+FRAME = {"phi0": 3.2, "e": 1.0, "g": 1.0, "alpha": 1.3, "f_range": (-3.0, 3.0)}
 
 
 @dataclass(frozen=True)
@@ -103,6 +117,18 @@ def test_solution_reads_as_text():
             "at most 5",
         ),
         (lambda: Task7(DRIVE, 1.0, -0.6, -0.5), "start_acceleration"),
+        (lambda: EngineeringMethod(np.nan, **FRAME), "swing = nan"),
+        (lambda: EngineeringMethod(7.0, **FRAME), "between 0 and 2 pi, or its negative"),
+        (lambda: EngineeringMethod(0.8, **FRAME, max_pressure_angle=45.0), "max_pressure_angle = 45.0; .* 0 and pi/2"),
+        (lambda: EngineeringMethod(0.8, **FRAME, objective="speed"), "acceleration or pressure_angle"),
+        (lambda: EngineeringMethod(0.8, **FRAME, bounds={"b": (3.0, 1.0)}), "bounds"),
+        (lambda: solve(EngineeringMethod(0.8, **FRAME, bounds={"bb": (1.0, 3.0)})), "did you mean 'b'"),
+        (lambda: Task2((0.5, -1.0), (3.0, 3.5), 1.0, 0.0, 1.0, (Position(1, 0.2), Position(2, 0.6))), "swing_range"),
+        (lambda: Task5(3.5, **FRAME, rho0=0.5), "below pi"),
+        (lambda: Task5(0.8, **FRAME, rho0=0.5, ratio_range=(0.5, 2.0)), "one side of 1"),
+        (lambda: Task6(DRIVE, (0.0, 0.0), (0.0, 0.0), 0.5, -0.1), "another place"),
+        (lambda: Task8(0.8, **FRAME, stroke=-1.0, dwell=1.0, tolerance=0.1), "stroke = -1.0"),
+        (lambda: Task8(0.8, **FRAME, stroke=1.0, dwell=1.0, tolerance=0.1, limit="middle"), "extended or folded"),
         (lambda: Task7(DRIVE | {"a": 5.0}, 1.0, 0.6, -0.5), "drive"),
     ],
 )

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from kernels import synthesis as kernels
+from sweep.errors import InputError, nearest
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Columns
 from sweep.summaries import design_outputs
@@ -90,9 +91,17 @@ Bounds = Mapping[str, tuple[float, float]]
 
 
 def size_limits(columns: Mapping[str, Array], bounds: Bounds) -> list[Array]:
-    """Slacks of the bounds on lengths, lower then upper each, in units of the range."""
+    """Slacks of the bounds on lengths, lower then upper each, in units of the range.
+
+    Raises
+    ------
+    InputError
+        for a name that is not among what is found.
+    """
     slacks = []
     for name, (low, high) in bounds.items():
+        if name not in columns:
+            raise InputError("bounds", name, f"{', '.join(columns)}{nearest(name, columns)}", "task")
         slacks += [(columns[name] - low) / (high - low), (high - columns[name]) / (high - low)]
     return slacks
 

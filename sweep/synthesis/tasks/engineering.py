@@ -19,6 +19,7 @@ from sweep.synthesis.tasks.crank_rocker import (
     size_names,
     turn,
 )
+from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 
@@ -33,7 +34,13 @@ class EngineeringMethod:
     f_range : where f is looked for [length]; two equal numbers fix it.  With alpha = 0 only f - g matters.
     max_pressure_angle : limit over the whole turn [rad]; pi/2 asks for a full turn only
     objective : "acceleration", max |d2psi|, or "pressure_angle", the largest over the turn
-    bounds : of the lengths found, by name (a, b, c)
+    bounds : of what is found, by name: the lengths a, b, c, and the place x_ext, y_ext of the rocker ball at the
+        extended position, from the rocker axis: a box for the joint C1
+
+    Raises
+    ------
+    InputError
+        for a number out of its range or a word that is none of those allowed, here and in every task.
     """
 
     swing: float
@@ -45,6 +52,9 @@ class EngineeringMethod:
     max_pressure_angle: float = 0.5 * np.pi
     objective: Literal["acceleration", "pressure_angle"] = "acceleration"
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_given(self)
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -65,8 +75,9 @@ class EngineeringMethod:
         f = x[:, 1] if x.shape[1] > 1 else np.full(len(x), self.f_range[0])
         swing, phi0 = np.full(len(x), self.swing), np.full(len(x), self.phi0)
         e, g, alpha = (np.full(len(x), value) for value in (self.e, self.g, self.alpha))
-        designs, _ = designs_on_locus(swing, phi0, x[:, 0], e, f, g, alpha)
+        designs, psi1 = designs_on_locus(swing, phi0, x[:, 0], e, f, g, alpha)
         columns = named(designs)
+        columns |= {"x_ext": columns["c"] * np.cos(psi1), "y_ext": columns["c"] * np.sin(psi1)}
         limits = [pressure_limit(designs, self.max_pressure_angle), *size_limits(columns, self.bounds)]
         if self.objective == "acceleration":
             curve = np.asarray(motion(designs, turn(), "d2psi")["d2psi"], np.float64)

@@ -10,6 +10,7 @@ import numpy as np
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.synthesis.tasks.crank_rocker import motion, named, pressure_limit, size_limits, size_names, turn
+from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.positions import PLANAR, Position, equation_names, through_positions
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
@@ -47,6 +48,7 @@ class Task1:
     objective: str = field(default="largest |d2psi|", init=False)
 
     def __post_init__(self) -> None:
+        check_given(self)
         room = 2 if abs(np.sin(self.alpha)) > PLANAR else 1
         if not 1 <= len(self.positions) <= room:
             raise InputError("positions", len(self.positions), f"1 to {room}", "Task1")

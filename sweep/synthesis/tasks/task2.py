@@ -10,6 +10,7 @@ import numpy as np
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.synthesis.tasks.crank_rocker import motion, named, pressure_limit, size_limits, size_names, turn
+from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.positions import PLANAR, Position, through_positions
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
@@ -50,6 +51,7 @@ class Task2:
     objective: str = field(default="largest |d2psi|", init=False)
 
     def __post_init__(self) -> None:
+        check_given(self)
         alphas = (self.alpha,) if self.alpha_range is None else self.alpha_range
         if min(abs(np.sin(alpha)) for alpha in alphas) <= PLANAR or np.ptp(np.sign(np.sin(alphas))):
             raise InputError("alpha", alphas, "angles whose sines are not 0", "Task2")

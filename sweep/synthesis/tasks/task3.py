@@ -23,6 +23,7 @@ from sweep.synthesis.tasks.crank_rocker import (
     size_names,
     turn,
 )
+from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 from sweep.tables import design_matrix
 
@@ -83,6 +84,7 @@ class Task3:
     objective: str = field(default="largest |d2psi| of all settings", init=False)
 
     def __post_init__(self) -> None:
+        check_given(self)
         if not self.settings:
             raise InputError("settings", self.settings, "at least one besides the first", "Task3")
         first = {"swing": self.swing, "phi0": self.phi0}

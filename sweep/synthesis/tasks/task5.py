@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.synthesis.tasks.crank_rocker import (
     designs_on_locus,
@@ -18,6 +19,7 @@ from sweep.synthesis.tasks.crank_rocker import (
     size_names,
     turn,
 )
+from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 
@@ -75,6 +77,11 @@ class Task5:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     objective: str = field(default="largest |d2rho/dphi2|", init=False)
+
+    def __post_init__(self) -> None:
+        check_given(self)
+        if not abs(self.swing) < np.pi:
+            raise InputError("swing", self.swing, "an angle below pi, or its negative", "Task5")
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:

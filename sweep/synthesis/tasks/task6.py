@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sweep.errors import InputError
 from sweep.families import family
 from sweep.families.base import Angles, Array
 from sweep.synthesis.tasks.crank_rocker import size_limits, size_names
+from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 from sweep.synthesis.tasks.second_stage import Drive, chain_motion, chain_of, second_pressure_limit
 
@@ -56,6 +58,9 @@ class Task6:
     _first: Drive = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        check_given(self)
+        if tuple(self.start) == tuple(self.end):
+            raise InputError("end", self.end, "another place than the start", "Task6")
         object.__setattr__(self, "_first", Drive.of(self.drive, "Task6"))
 
     @property

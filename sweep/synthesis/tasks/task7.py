@@ -12,6 +12,7 @@ from sweep.errors import InputError
 from sweep.families import family
 from sweep.families.base import Angles, Array
 from sweep.synthesis.tasks.crank_rocker import RSSR, size_limits, size_names
+from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 from sweep.synthesis.tasks.second_stage import Drive, chain_motion, chain_of, second_pressure_limit
 
@@ -64,6 +65,7 @@ class Task7:
     _second_derivatives: tuple[float, float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        check_given(self)
         for name, value, sign in (
             ("start_acceleration", self.start_acceleration, 1.0), ("end_acceleration", self.end_acceleration, -1.0),
         ):  # fmt: skip

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from sweep.errors import InputError
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
 from sweep.summaries import design_outputs
@@ -19,6 +20,7 @@ from sweep.synthesis.tasks.crank_rocker import (
     size_limits,
     size_names,
 )
+from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 from sweep.synthesis.tasks.second_stage import chain_motion, chain_of, second_pressure_limit
 
@@ -69,6 +71,11 @@ class Task8:
 
     equations: tuple[str, ...] = field(default=(), init=False)
     objective: str = field(default="largest |d2s/dphi2| over the turn", init=False)
+
+    def __post_init__(self) -> None:
+        check_given(self)
+        if not self.stroke > 0.0:
+            raise InputError("stroke", self.stroke, "a positive length", "Task8")
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
