@@ -111,7 +111,8 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
     if data.optimum is not None:
         residual = value_of(data.optimum, "kkt_residual")
         if not residual <= KKT:
-            faults.append(f"the optimiser did not settle ({_residual(residual)}, {number(KKT)} is wanted)")
+            what = "had no time left to settle" if data.optimum.get("ended") == "time" else "did not settle"
+            faults.append(f"the optimiser {what} ({_residual(residual)}, {number(KKT)} is wanted)")
         if objective is not None and found.best_row:
             best, value = found.best_row[objective.output], value_of(data.optimum, objective.output)
             if not compared(objective.output, value) <= compared(objective.output, best) + 1e-6 * abs(best):
