@@ -17,7 +17,7 @@ from sweep.families.base import Accuracy
 from sweep.reductions.extrema import Request, true_extrema
 from sweep.summaries import design_outputs
 from tests.climbing import climbed, turning_points
-from tests.turn_designs import GUIDE, NEEDLE, RSSR, crank_rockers, guided_four_bars, needle_drives
+from tests.turn_designs import GUIDE, NEEDLE, RSSP, RSSR, crank_rockers, guided_four_bars, needle_drives, slider_cranks
 
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 ALONE = replace(RSSR, steps=())
@@ -25,6 +25,7 @@ ROCKER = (Request("d2psi", 0), Request("d3psi", 0), Request("psi", 1))
 TRAVEL = (Request("d2s", 0), Request("d3s", 0), Request("dev", 0), Request("s", 1), Request("s", -1))
 CASES = {
     "rssr": (ALONE, crank_rockers, 2000, ROCKER),
+    "rssp": (RSSP, slider_cranks, 1000, (Request("d2s", 0), Request("d3s", 0), Request("s", 1))),
     "guide": (GUIDE, guided_four_bars, 1000, TRAVEL),
     "rssr+guide": (NEEDLE, needle_drives, 1000, TRAVEL),
 }
