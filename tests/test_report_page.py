@@ -176,6 +176,15 @@ def test_rounding_of_zero_and_edges_of_listed_values_are_told(tmp_path: Path) ->
     assert plain(next(row.space for row in parameter_rows(swept) if row.name == "f1")) == "−5, 0 or 5 mm"
 
 
+def test_a_range_of_three_values_has_edges_too(tmp_path: Path) -> None:
+    design = study_data()["design"] | {"a1": {"from": 18.0, "to": 20.0, "count": 3, "unit": "mm"}}
+    data, _, _ = gather(write_dataset(tmp_path / "designs", study_data(optimise=None, design=design)))
+    assert next((plain(row.space), row.edge) for row in parameter_rows(data) if row.name == "a1") == (
+        "18 to 20 mm",
+        "lower edge",
+    )
+
+
 def test_one_axis_gives_a_line(tmp_path: Path) -> None:
     design = study_data()["design"] | {"alpha1": "0 deg", "xi2": "40 mm"}
     data = study_data(optimise=None, design=design, output={"curves": "none"})

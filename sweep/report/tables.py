@@ -113,9 +113,10 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
 
 
 def _few_values(study: Study, name: str) -> list[float] | None:
-    """The values of an axis that has two or three of them: to a sweep they are a choice, not a range."""
+    """Two or three listed values of an axis: to a sweep they are a choice, not a range."""
     axis = next((axis for axis in study.space.axes if axis.name == name), None)
-    return None if axis is None or axis.values is None or len(axis.values) > FEW else axis.values.tolist()
+    listed = "values" in study.data["design"].get(name, {})
+    return None if axis is None or axis.values is None or not listed or axis.count > FEW else axis.values.tolist()
 
 
 def fates(data: Dataset, found: Scan) -> list[Fate]:
