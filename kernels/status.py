@@ -29,11 +29,12 @@ MEANING: dict[int, str] = {
     UNDECIDABLE: "whether the crank turns fully cannot be decided in float64 (margin zero within rounding)",
     LIMIT_EXCEEDED: "a limit of the study is exceeded",
     NOT_CONVERGED: "the accuracy asked for was not reached, by an iteration or because rounding is all there is",
-    INVALID_INPUT: "a parameter is not finite, a length is not positive, or their scale leaves float64",
+    INVALID_INPUT: "a parameter is not finite, a length is not positive, parameters exclude each other (supports at "
+    "one place, a collar no larger than its journal, nothing that has inertia), or their scale leaves float64",
     SINGULAR: "the position is not defined (a joint lies on the axis it turns about)",
     NOT_OSCILLATING: "the follower turns fully: it has no limit positions",
     NOT_LINEAR: "the deflection is too large for the linearised equation; the number given solves that equation only",
-    JAMMED: "friction blocks the motion, or its iteration does not contract",
+    JAMMED: "friction blocks the motion, or its iteration does not contract; the crank all but stops within the turn",
     NO_DWELL: "the output does not make one turn per turn of the input: no dwell is defined",
     NOT_ADMISSIBLE: "the point of the locus gives no mechanism that meets the requirement",
 }

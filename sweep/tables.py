@@ -97,11 +97,10 @@ def _parameter_column(family: Parametrised, p: Parameter, table: Table, names: l
         )
     values = np.broadcast_to(_column(table, p.name), rows)
     _refuse(~np.isfinite(values), values, p.name, "a finite number")
-    if p.positive:
-        _refuse(values <= 0.0, values, p.name, f"a positive {p.unit}")
+    if p.sign:
+        _refuse(values <= 0.0 if p.positive else values < 0.0, values, p.name, f"a {p.sign} {p.unit}")
     if p.choices is not None:
-        allowed = " or ".join(f"{choice:+g}" for choice in p.choices)
-        _refuse(~np.isin(values, p.choices), values, p.name, allowed)
+        _refuse(~np.isin(values, p.choices), values, p.name, p.choice)
     return values
 
 

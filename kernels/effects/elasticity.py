@@ -81,7 +81,7 @@ def steady_state(
     p, d2psi : (n, N) on the grid phi_j = 2 pi j / N, N odd;  c, reach : (n,), see `quasi_static`;  data : (n, 5)
     phi : (n, m) or (1, m), where eta and elongation are wanted
     last : whether no finer grid follows
-    status : (n,) out; NOT_CONVERGED where N does not resolve the solution (tail above 1e-9) or a multiplier reaches 1,
+    status : (n,) out; NOT_CONVERGED where N does not resolve the solution (tail above 1e-9) or a multiplier exceeds 1,
         NOT_LINEAR where |eta| > 0.1 reach cos(pressure angle) somewhere (the numbers stay), NOT_ROTATABLE where p is
         nan
     eta, elongation : (n, m) out [rad], [length];  floquet : (n,) out, largest modulus or nan
@@ -114,7 +114,7 @@ def steady_state(
         floquet[i] = math.nan
         if resolved or last:
             floquet[i] = largest_multiplier(qc, qs, stiffness, damping)
-        status[i] = st.OK if resolved and floquet[i] < 1.0 else st.NOT_CONVERGED
+        status[i] = st.OK if resolved and floquet[i] <= 1.0 else st.NOT_CONVERGED
         for j in range(n):
             lag = series(ec, es, 2.0 * math.pi * j / n)[0] if status[i] == st.OK else 0.0
             if not abs(lag) <= LINEAR * reach[i] * abs(p[i, j]) / c[i]:
@@ -214,10 +214,12 @@ def largest_multiplier(qc: Array, qs: Array, stiffness: float, damping: float) -
             e11 * m11 + e12 * m21, e11 * m12 + e12 * m22, e21 * m11 + e22 * m21, e21 * m12 + e22 * m22,
         )  # fmt: skip
         q0, d0 = q2, d2
-    trace, determinant = m11 + m22, m11 * m22 - m12 * m21
+    # The product of the multipliers is what the damping alone makes of it (Liouville): exactly 1 without any.
+    modulus = math.exp(-math.pi * damping * qc[0])
+    trace, determinant = m11 + m22, modulus * modulus
     discriminant = 0.25 * trace * trace - determinant
     if discriminant < 0.0:
-        return math.sqrt(determinant)
+        return modulus
     return abs(0.5 * trace) + math.sqrt(discriminant)
 
 

@@ -3,7 +3,8 @@
 Dynamics sheet, section 2.1.  Couples follow from the latest reactions, the dyad is solved again with them, and so on;
 the reactions are affine in the couples and the couples are norms of reactions, so the iteration contracts for ordinary
 lubrication (6-15 passes) and diverges where the linkage jams.  A pass that fails to shrink the correction five times
-in a row, or the cap, ends in JAMMED: the last iterate is never given out.
+in a row, or the cap, ends in JAMMED: the last iterate is never given out.  Close to jamming the corrections form a slow
+geometric series, whose rest is added every tenth pass.
 
 As the reactions are affine, the answers to the three couples (B, C, guidance) are found once per pose and a pass is
 a sum of four vectors.  Their norms bound the contraction: rho(L) < 1 proves a unique solution.
@@ -30,6 +31,7 @@ Status = NDArray[np.uint8]
 TOLERANCE = 1e-14
 PASSES = 200
 STALLED = 5
+LEAP = 10  # every so many passes the rest of the geometric series is gone at once (Aitken)
 ANSWER = 20  # the six vectors of :func:`kernels.effects.kinetostatics.store_forces`, finger couple, driving torque
 
 
@@ -133,33 +135,41 @@ def friction_loads(
                 store_forces(answers[which], 1.0, r)
                 answers[which, 18], answers[which, 19] = r.finger, r.drive
                 if which == 0:
-                    # Unit couples of the size that the frictionless reactions make.
-                    unit_b, unit_c = f.mu_b * f.r_b * norm(r.r_b), f.mu_c * f.r_c * norm(r.r_c)
-                    unit_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, _guidance(answers[0], axis, f), speed_d)
+                    # Couples of the size that the largest force makes: a joint at rest at first may be loaded later.
+                    size = max(norm(r.r_b), max(norm(r.r_c), norm(r.r_d)))
+                    unit_b, unit_c = f.mu_b * f.r_b * size, f.mu_c * f.r_c * size
+                    unit_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, (size, size, size), speed_d)
                 else:
                     for at in range(ANSWER):
                         answers[which, at] -= answers[0, at]
-            size_b, size_c, t_d = unit_b, unit_c, unit_d
-            x, y, z = 1.0, 1.0, 1.0
-            last, stalled, count, converged = math.inf, 0, 0, False
+            x, y, z, size_b, size_c, t_d = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            dx0, dy0, dz0, last, least = 0.0, 0.0, 0.0, math.inf, math.inf
+            stalled, count, converged = 0, 0, False
             while code == st.OK and not converged and count < PASSES and stalled < STALLED:
                 count += 1
-                x, y, z = _share(size_b, unit_b), _share(size_c, unit_c), _share(t_d, unit_d)
                 _total(answers, x, y, z, total)
-                new_b = f.mu_b * f.r_b * norm((total[3], total[4], total[5]))
-                new_c = f.mu_c * f.r_c * norm((total[6], total[7], total[8]))
-                new_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, _guidance(total, axis, f), speed_d)
-                change = _largest_change(new_b, size_b, new_c, size_c, new_d, t_d)
-                size_b, size_c, t_d = new_b, new_c, new_d
+                size_b = f.mu_b * f.r_b * norm((total[3], total[4], total[5]))
+                size_c = f.mu_c * f.r_c * norm((total[6], total[7], total[8]))
+                t_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, _guidance(total, axis, f), speed_d)
+                dx, dy, dz = _share(size_b, unit_b) - x, _share(size_c, unit_c) - y, _share(t_d, unit_d) - z
+                change = _largest_change(x, dx, y, dy, z, dz)
                 # The last digits wander: a change at rounding level is convergence, not a stall.
                 converged = change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last)
-                stalled = stalled + 1 if change >= last else 0
+                converged = converged and math.isfinite(dx + dy + dz)
                 last = change
+                # In proportion to themselves couples change less and less even while they grow without end.
+                step = max(abs(dx), max(abs(dy), abs(dz)))
+                stalled = 0 if step < least else stalled + 1
+                least = step
+                further = 1.0
+                if count % LEAP == 0 and not converged:
+                    further, least = _leap(dx * dx0 + dy * dy0 + dz * dz0, dx0 * dx0 + dy0 * dy0 + dz0 * dz0), math.inf
+                x, y, z = max(x + further * dx, 0.0), max(y + further * dy, 0.0), max(z + further * dz, 0.0)
+                dx0, dy0, dz0 = dx, dy, dz
             if code == st.OK and not converged:
                 code = st.JAMMED
             status[i, k] = code
             good = 1.0 if code == st.OK else math.nan
-            x, y, z = _share(size_b, unit_b), _share(size_c, unit_c), _share(t_d, unit_d)
             # The crank's bearing feeds nothing back: its torque follows from the reactions with the other three.
             _total(answers, x, y, z, total)
             moment_a = (total[12], total[13], total[14])
@@ -236,11 +246,17 @@ def _contraction(answers: Array, m: Array, f: Friction, axis: Vector, b: float, 
 
 
 @inline
-def _largest_change(b: float, b0: float, c: float, c0: float, d: float, d0: float) -> float:
+def _leap(along: float, square: float) -> float:
+    """Steps that lie ahead if each is the share along/square of the one before: 1/(1 - share); 1 unless they shrink."""
+    return square / (square - along) if abs(along) < square else 1.0
+
+
+@inline
+def _largest_change(x: float, dx: float, y: float, dy: float, z: float, dz: float) -> float:
     """Largest change of a couple in proportion to that couple."""
     worst = 0.0
-    for new, old in ((b, b0), (c, c0), (d, d0)):
-        size = max(abs(new), abs(old))
+    for old, change in ((x, dx), (y, dy), (z, dz)):
+        size = max(abs(old), abs(old + change))
         if size > 0.0:
-            worst = max(worst, abs(new - old) / size)
+            worst = max(worst, abs(change) / size)
     return worst

@@ -116,7 +116,7 @@ def _fill(
                 used[i, j] = good * value
             if permissible is not None or reserve is not None:
                 # theta2 stands still where there is no radial force; any axial force then permits no radial angle.
-                tan2 = along / rho if rho != 0.0 else math.copysign(1e300, along)
+                tan2 = along / rho if rho != 0.0 else (math.copysign(1e300, along) if along != 0.0 else 0.0)
                 limit = _first_crossing(utilisation, looks, bearings, limits, i, moment[i], tan2)
                 if permissible is not None:
                     permissible[i, j] = good * limit

@@ -22,6 +22,9 @@ Status = NDArray[np.uint8]
 NEWTON = 60
 RESOLVED = 1e-9
 FINER = 4  # looks per sample before an extreme speed is refined
+# The period is summed on FINER times as many angles until E stands still; more than MOST mean a stall for a moment.
+MOST = 20000
+STILL = 1e-12
 
 
 @kernel
@@ -47,7 +50,7 @@ def speed_fluctuation(
     mean_speed : (n,) mean in time [rad/s]
     phi : (n, m) or (1, m), where speed and acceleration are wanted
     status : (n,) out; JAMMED where the machine stalls (no E above -min W), NOT_CONVERGED where N resolves too little,
-        NOT_ROTATABLE where a sample is nan
+        NOT_ROTATABLE where a sample is nan, INVALID_INPUT where nothing has inertia
     delta, fastest, slowest, energy : (n,) out; (max - min)/mean, extremes of omega, the constant E
     speed, acceleration : (n, m) or None; omega and d omega/d t = (1/2) d(omega^2)/d phi
     """
@@ -61,6 +64,8 @@ def speed_fluctuation(
         coefficients(inertia[i], turn, all_jc, all_js)
         coefficients(excess[i], turn, all_wc, all_ws)
         code = st.OK if math.isfinite(all_jc[0] + all_wc[0]) else st.NOT_ROTATABLE
+        if code == st.OK and not all_jc[0] > 0.0:
+            code = st.INVALID_INPUT
         # A torque excess far below the inertia torque moves no speed: its noise need not be resolved.
         energy_scale = all_jc[0] * mean_speed[i] * mean_speed[i]
         if code == st.OK and (tail(all_jc, all_js, 0.0) > RESOLVED or tail(all_wc, all_ws, energy_scale) > RESOLVED):
@@ -73,15 +78,14 @@ def speed_fluctuation(
         count = significant(all_wc, all_ws)
         wc, ws = all_wc[:count], all_ws[:count]
         on_grid(wc, ws, looks, work)
-        least = math.inf
-        for j in range(n):
-            least = min(least, work[j])
-        e = _energy(inertia[i], work, least, mean_speed[i], jc[0]) if code == st.OK else math.nan
-        if code == st.OK and not math.isfinite(e):
-            code = st.JAMMED
-        status[i], energy[i] = code, e
         on_grid(jc, js, looks, fine_j)
         on_grid(wc, ws, looks, fine_w)
+        e = math.nan
+        if code == st.OK:
+            e = _energy(inertia[i], work, mean_speed[i], 0.5 * energy_scale)
+            e = _settled(jc, js, wc, ws, fine_j, fine_w, mean_speed[i], e)
+            code = st.OK if math.isfinite(e) else st.JAMMED
+        status[i], energy[i] = code, e
         high = _extreme(jc, js, wc, ws, e, 1.0, fine_j, fine_w) if code == st.OK else math.nan
         low = _extreme(jc, js, wc, ws, e, -1.0, fine_j, fine_w) if code == st.OK else math.nan
         fastest[i], slowest[i], delta[i] = high, low, (high - low) / mean_speed[i]
@@ -97,11 +101,33 @@ def speed_fluctuation(
 
 
 @inline
-def _energy(inertia: Array, work: Array, least: float, mean_speed: float, mean_inertia: float) -> float:
-    """Newton on the period, kept above -min W; nan where the period stays too short even there (stall)."""
-    n = work.size
-    low = -least
-    e = max(0.5 * mean_inertia * mean_speed * mean_speed, low + 1e-3 * abs(low) + 1e-300)
+def _settled(
+    jc: Array, js: Array, wc: Array, ws: Array, inertia: Array, work: Array, mean_speed: float, e: float
+) -> float:
+    """E on finer and finer grids until it stands still; nan where the machine all but stands for a moment (stall).
+
+    The slower it gets, the sharper the peak of 1/omega: a grid that resolves J and W may miss it.
+    """
+    while True:
+        new = _energy(inertia, work, mean_speed, e)
+        if abs(new - e) <= STILL * (abs(new) + jc[0] * mean_speed * mean_speed):
+            return new
+        e, size = new, FINER * work.size
+        if size > MOST:
+            return math.nan
+        inertia, work, looks = np.empty(size), np.empty(size), np.empty((4, size))
+        on_grid(jc, js, looks, inertia)
+        on_grid(wc, ws, looks, work)
+
+
+@inline
+def _energy(inertia: Array, work: Array, mean_speed: float, e: float) -> float:
+    """Newton on the period from E = e, kept above -min W; nan where the period stays too short even there (stall)."""
+    n, low = work.size, -math.inf
+    for j in range(n):
+        low = max(low, -work[j])
+    if not e > low:
+        e = low + 1e-3 * abs(low) + 1e-300
     for _ in range(NEWTON):
         period, slope = 0.0, 0.0
         for j in range(n):

@@ -84,7 +84,7 @@ def _output_rows(outputs: tuple[Output, ...]) -> list[tuple[str, str, str, str]]
 
 def input_words(p: Parameter) -> str:
     """Definition of an input with what it may be."""
-    notes = ["positive"] if p.positive else []
+    notes = [p.sign] if p.sign else []
     notes += [f"{p.default:g} if left out" if p.default is not None else "required"]
     return f"{p.text} ({', '.join(notes)})"
 

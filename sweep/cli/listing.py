@@ -41,8 +41,8 @@ def describe(family: Family) -> list[str]:
     lines = [f"{family.name}: {family.title}", "", "parameters (one length unit throughout, angles in rad)"]
     parameters = []
     for p in family.parameters:
-        notes = ["positive"] if p.positive else []
-        notes += [" or ".join(f"{choice:+g}" for choice in p.choices)] if p.choices else []
+        notes = [p.sign] if p.sign else []
+        notes += [p.choice] if p.choices else []
         notes += [f"default {p.default:g}"] if p.default is not None else []
         parameters.append((p.name, p.unit, p.text + (f" ({', '.join(notes)})" if notes else "")))
     lines += aligned(parameters)

@@ -227,6 +227,11 @@ def take_over(status: Status, later: NDArray[np.generic]) -> None:
     np.copyto(status, later, where=status == st.OK)
 
 
+def refuse(status: Status, designs: NDArray[np.bool_]) -> None:
+    """Make INVALID_INPUT the status of these designs, (n,), where it is OK so far, in place."""
+    np.copyto(status, st.INVALID_INPUT, where=designs[:, None] & (status == st.OK))
+
+
 def no_poses(scene: Scene, wanted: frozenset[str]) -> Columns:
     """What an effect computes per pose that has no outputs per pose: the motion's status."""
     return {"status": scene.status()}

@@ -7,8 +7,8 @@ import numpy as np
 from kernels import status as st
 from kernels.effects.bearing_life import bearing_loads, mean_load
 from sweep.effects import kinetostatics, loads
-from sweep.effects.base import DesignResult, Effect, Scene
-from sweep.effects.bearings import CATALOGUE, SUPPORTS
+from sweep.effects.base import DesignResult, Effect, Scene, refuse
+from sweep.effects.bearings import CATALOGUE, SUPPORTS, together
 from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Array, Columns, Output, filled
 
@@ -47,8 +47,10 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     if "forces" not in scene.memo:
         kinetostatics.compute(scene, frozenset({"force_d", "moment_d"}))
     forces, status = scene.memo["forces"]
+    status = status.copy()
+    refuse(status, together(scene, "d"))
     axis = np.ascontiguousarray(scene.records[1][:, 3:6])
-    return filled(bearing_loads, (forces, axis, _data(scene)), _NAMES, wanted, status.copy())
+    return filled(bearing_loads, (forces, axis, _data(scene)), _NAMES, wanted, status)
 
 
 def _data(scene: Scene) -> Array:
@@ -59,7 +61,9 @@ def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Column
     """Mean loads and lives; the error is what half the samples would change."""
     scene = scene.on_grid(SAMPLES)
     found = compute(scene, frozenset({"equivalent_load_d1", "equivalent_load_d2"}))
-    status = np.where((found["status"] == st.OK).all(axis=1), st.OK, st.NOT_ROTATABLE).astype(np.uint8)
+    # Poses that do not assemble, or lie at a dead point, are those of a crank that does not turn.
+    worst = found["status"].max(axis=1)
+    status = np.where(worst == st.OK, st.OK, np.maximum(worst, st.NOT_ROTATABLE)).astype(np.uint8)
     dpsi, exponent = np.ascontiguousarray(scene.records[0][:, :, 22]), scene.inputs["life_exponent"]
     columns: Columns = {}
     for k in "12":

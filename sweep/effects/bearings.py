@@ -6,9 +6,10 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.effects import bearings, permissible
-from sweep.effects.base import ComputeFunction, Effect, Scene, largest
+from sweep.effects.base import ComputeFunction, Effect, Scene, largest, refuse
 from sweep.effects.loads import SPEED
 from sweep.effects.pressure import components
 from sweep.families.base import Array, Columns, Output, Parameter, filled
@@ -36,9 +37,9 @@ SLIDING_INPUTS = (
     Parameter("journal_length1", "length", "length of journal 1", positive=True),
     Parameter("journal_length2", "length", "length of journal 2", positive=True),
     Parameter("collar_diameter", "length", "outer diameter of the thrust collar", positive=True),
-    Parameter("journal_factor", "ratio", "1 point contact, 4/pi run-in, pi/2 new", default=1.0),
-    Parameter("thrust_radius_d", "length", "mean thrust radius of the collar", default=0.0),
-    Parameter("mu_d", "ratio", "coefficient of friction of the rocker bearing"),
+    Parameter("journal_factor", "ratio", "1 point contact, 4/pi run-in, pi/2 new", default=1.0, positive=True),
+    Parameter("thrust_radius_d", "length", "mean thrust radius of the collar", default=0.0, not_negative=True),
+    Parameter("mu_d", "ratio", "coefficient of friction of the rocker bearing", not_negative=True),
 )
 SLIDING_OUTPUTS = (
     Output("journal_load1", "force", "radial load of journal 1", EQUATION),
@@ -49,13 +50,13 @@ SLIDING_OUTPUTS = (
     Output("collar_pressure", "pressure", "mean pressure of the collar", EQUATION),
 )
 CATALOGUE = (
-    Parameter("rotation_factor", "ratio", "V of the bearing catalogue", default=1.0),
-    Parameter("radial_factor", "ratio", "X of the bearing catalogue"),
-    Parameter("axial_factor", "ratio", "Y of the bearing catalogue"),
-    Parameter("e_limit", "ratio", "e of the bearing catalogue"),
-    Parameter("life_exponent", "ratio", "3 for balls, 10/3 for rollers", default=3.0),
+    Parameter("rotation_factor", "ratio", "V of the bearing catalogue", default=1.0, positive=True),
+    Parameter("radial_factor", "ratio", "X of the bearing catalogue", not_negative=True),
+    Parameter("axial_factor", "ratio", "Y of the bearing catalogue", not_negative=True),
+    Parameter("e_limit", "ratio", "e of the bearing catalogue", not_negative=True),
+    Parameter("life_exponent", "ratio", "3 for balls, 10/3 for rollers", default=3.0, positive=True),
     Parameter("dynamic_capacity", "force", "C_dyn of the bearing catalogue", positive=True),
-    Parameter("shock_factor", "ratio", "K_b", default=1.0),
+    Parameter("shock_factor", "ratio", "K_b", default=1.0, positive=True),
     Parameter("axial_support", "choice", "support that takes the axial load", default=1.0, choices=(1.0, 2.0)),
 )
 ROLLING_INPUTS = (*_COMMON, *CATALOGUE)
@@ -100,10 +101,19 @@ def _compute(
     permissible: Callable[[Scene], Array] | None, scene: Scene, wanted: frozenset[str],
 ) -> Columns:  # fmt: skip
     direction, status = components(scene)
+    refuse(status, together(scene, "d"))
+    if "collar_diameter" in (p.name for p in inputs):
+        refuse(status, scene.inputs["collar_diameter"] <= scene.inputs["journal_diameter"])
     arguments = [*direction, scene.inputs["resisting_torque"], _data(scene, inputs)]
     if permissible is not None:
         arguments.append(permissible(scene))
     return filled(kernel, arguments, tuple(o.name for o in results), wanted, status)
+
+
+def together(scene: Scene, shaft: str) -> NDArray[np.bool_]:
+    """Designs both of whose supports of a shaft stand at one place, (n,)."""
+    same: NDArray[np.bool_] = scene.inputs[f"support_{shaft}1"] == scene.inputs[f"support_{shaft}2"]
+    return same
 
 
 def _pressures(scene: Scene) -> Array:

@@ -18,12 +18,13 @@ FORMULAS = (
     "(2) frequency ratio nu = sqrt(k/J) |p|/omega",
     "(3) J omega^2 eta'' + h omega p^2 eta' + (k p^2 + h omega p p') eta = M - J omega^2 psi'', 2 pi periodic,",
     "    by its Fourier coefficients; slider: J is the driven mass, c = 1, eta a length (ours)",
-    "(4) stable while the largest Floquet multiplier stays below 1",
+    "(4) stable while the largest Floquet multiplier stays below 1, bounded at 1 (no damping); above 1, and where 241",
+    "    samples of the turn do not resolve it, the steady state is not converged",
 )
 
 _SHARED = (
     Parameter("stiffness", "stiffness", "stiffness of the coupler along B-C", positive=True),
-    Parameter("damping", "damping", "damping of the coupler along B-C", default=0.0),
+    Parameter("damping", "damping", "damping of the coupler along B-C", default=0.0, not_negative=True),
     SPEED,
 )
 INPUTS = {
@@ -59,7 +60,9 @@ def _dynamic_outputs(kind: loads.Follower) -> tuple[Output, ...]:
 
 
 _KERNEL_NAMES = ("lag", "lag_displacement", "frequency_ratio")
-FLOQUET = Output("floquet", "1", "largest modulus of the Floquet multipliers; stable below 1", EQUATION)
+FLOQUET = Output(
+    "floquet", "1", "largest modulus of the Floquet multipliers; stable below 1, exactly 1 without damping", EQUATION
+)
 
 # Odd grids of the steady state: the next one is tried for designs that the one before does not resolve.
 MULTIPLIER_ERROR = 1e-6

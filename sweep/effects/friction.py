@@ -8,18 +8,21 @@ import numpy as np
 
 from kernels.effects.friction import friction_loads
 from sweep.effects import loads
-from sweep.effects.base import Effect, Scene, largest, take_over
+from sweep.effects.base import Effect, Scene, largest, refuse, take_over
+from sweep.effects.bearings import together
 from sweep.effects.kinetostatics import bodies, drive, force_outputs, vector_columns, wanted_groups
 from sweep.families.base import Columns, Output, Parameter, optional_outputs
 
 KEY = "D2"
-EQUATION = "D2 (1)-(3)"
+EQUATION = "D2 (1)-(4)"
 FORMULAS = (
     "(1) ball joints: E = -mu r |R| w/|w|, w the speed of the coupler relative to crank or rocker",
     "(2) shafts: t = -sign(speed) mu [r (F1 + F2) + r_t |F_axial|], F1 and F2 the loads of the two supports;",
     "    slider: two shoes that move with it, force -sign(s') mu (F1 + F2), ours",
     "(3) iterated until the couples change by less than 1e-14; L_ij = mu_i r_i |d R_i/d couple_j|,",
     "    rho(L) < 1 proves one solution",
+    "(4) the moment at A holds the drive torque and leaves the shaft's friction torque out; force and moment at D hold",
+    "    what rubs there",
 )
 SUFFIX = "_friction"
 PASSES = "friction_passes"
@@ -32,16 +35,23 @@ def _data(kind: loads.Follower) -> tuple[Parameter, ...]:
     rocker = kind is loads.ROCKER
     joints = _JOINTS | {"d": f"{kind.name} bearing" if rocker else "slide"}
     along, place = ("rocker axis", "D") if rocker else ("slide, moving with the slider", "C")
-    thrust = Parameter("thrust_radius_d", "length", "mean thrust radius of the rocker bearing", default=0.0)
+    thrust = tuple(
+        Parameter(
+            f"thrust_radius_{j}", "length", f"mean thrust radius of the {joints[j]}", default=0.0, not_negative=True
+        )
+        for j in ("ad" if rocker else "a")
+    )
     return (
-        *(Parameter(f"mu_{j}", "ratio", f"coefficient of friction of the {text}") for j, text in joints.items()),
         *(
-            Parameter(f"radius_{j}", "length", f"friction radius of the {text}")
+            Parameter(f"mu_{j}", "ratio", f"coefficient of friction of the {text}", not_negative=True)
+            for j, text in joints.items()
+        ),
+        *(
+            Parameter(f"radius_{j}", "length", f"friction radius of the {text}", not_negative=True)
             for j, text in joints.items()
             if rocker or j != "d"
         ),
-        Parameter("thrust_radius_a", "length", "mean thrust radius of the crank bearing", default=0.0),
-        *((thrust,) if rocker else ()),
+        *thrust,
         Parameter("support_a1", "length", "first support along the crank axis, from A"),
         Parameter("support_a2", "length", "second support along the crank axis, from A"),
         Parameter("support_d1", "length", f"first support along the {along}, from {place}"),
@@ -95,6 +105,9 @@ def behind(scene: Scene) -> Columns | None:
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted quantities with friction; status JAMMED where the iteration does not contract."""
     status, handed_back, kind = scene.status(), behind(scene), loads.follower(scene)
+    if handed_back is not None:
+        take_over(status, handed_back["status"])
+    refuse(status, together(scene, "a") | together(scene, "d"))
     losses = tuple(_losses(kind))
     forces, couples, _ = wanted_groups(wanted, SUFFIX)
     asked = ((18, forces), (2, couples), (len(losses), not wanted.isdisjoint(losses)))
@@ -109,8 +122,6 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     friction_loads(
         poses, designs, bodies(scene), load, data, finger, status, out[0], out[1], out[2], contraction
     )  # fmt: skip
-    if handed_back is not None:
-        take_over(status, handed_back["status"])
     columns = vector_columns(out[0], wanted, SUFFIX)
     for names, values in ((tuple(_COUPLES), out[1]), (losses, out[2])):
         if values is not None:

@@ -22,11 +22,12 @@ def _body(body: str) -> tuple[Parameter, ...]:
         Parameter(f"com_{body}_{axis}", "length", f"centre of mass of the {body} ({frame})", default=0.0)
         for axis in "xyz"
     )
+    text = f"inertia of the {body} about its centre of mass"
     moments = (
-        Parameter(f"j_{body}_{axes}", "inertia", f"inertia of the {body} about its centre of mass", default=0.0)
+        Parameter(f"j_{body}_{axes}", "inertia", text, default=0.0, not_negative=axes[0] == axes[1])
         for axes in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
-    return Parameter(f"m_{body}", "mass", f"mass of the {body}"), *centre, *moments
+    return Parameter(f"m_{body}", "mass", f"mass of the {body}", not_negative=True), *centre, *moments
 
 
 GRAVITY = tuple(

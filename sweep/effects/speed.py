@@ -18,7 +18,9 @@ FORMULAS = (
     "    estimate [max - min of W - (J - mean J) omega^2/2]/(mean J omega^2)",
 )
 
-FLYWHEEL = Parameter("flywheel", "inertia", "inertia on the crank shaft besides the links", default=0.0)
+FLYWHEEL = Parameter(
+    "flywheel", "inertia", "inertia on the crank shaft besides the links", default=0.0, not_negative=True
+)
 OUTPUTS = (
     Output("crank_speed", "rad/s", "speed of the crank in the steady state of constant mean speed", EQUATION),
     Output("crank_acceleration", "rad/s^2", "its angular acceleration", EQUATION),

@@ -42,6 +42,18 @@ class Parameter:
     positive: bool = False
     default: float | None = None
     choices: tuple[float, ...] | None = None
+    not_negative: bool = False
+
+    @property
+    def sign(self) -> str:
+        """What its sign may be, in a word; empty if anything."""
+        return "positive" if self.positive else "non-negative" if self.not_negative else ""
+
+    @property
+    def choice(self) -> str:
+        """The values it may have, in words; signs are shown where they are the choice."""
+        signed = any(x < 0.0 for x in self.choices or ())
+        return " or ".join(f"{x:+g}" if signed else f"{x:g}" for x in self.choices or ())
 
 
 @dataclass(frozen=True)

@@ -230,15 +230,11 @@ def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faul
 
 
 def _checked(p: Parameter, written: float, value: float, key: Key, faults: Faults) -> float:
-    if p.positive and not value > 0.0:
-        faults.value(key, written, f"a positive {p.unit} ({p.text})")
+    if p.sign and not (value > 0.0 or (value == 0.0 and p.not_negative)):
+        faults.value(key, written, f"a {p.sign} {p.unit} ({p.text})")
     if p.choices is not None and value not in p.choices:
-        faults.value(key, written, _choices(p))
+        faults.value(key, written, p.choice)
     return float(value)
-
-
-def _choices(p: Parameter) -> str:
-    return " or ".join(f"{choice:+g}" for choice in p.choices or ())
 
 
 def _usual(internal: str) -> str:
@@ -249,7 +245,7 @@ def _usual(internal: str) -> str:
 def _forms(p: Parameter, number: object = None) -> str:
     """The right ways to write a fixed value of this parameter."""
     if p.choices is not None:
-        return f"{_choices(p)}, or {{ values = {[int(c) for c in p.choices]} }}"
+        return f"{p.choice}, or {{ values = {[int(c) for c in p.choices]} }}"
     internal = units.internal_unit(p.unit)
     if internal == "1":
         return "a number"
