@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Never, TextIO
 
@@ -13,7 +15,7 @@ LINE_SECONDS = 10.0
 
 
 class Progress:
-    """Counts designs; used as a context.
+    """Counts designs; used as a context.  Nobody to tell (a closed pipe, a lost terminal) silences it, not the sweep.
 
     Parameters
     ----------
@@ -24,12 +26,13 @@ class Progress:
     """
 
     def __init__(self, label: str, total: int, done: int, show: bool, stream: TextIO | None = None) -> None:
-        self.label, self.total, self.done, self.show = label, total, done, show
+        self.label, self.total, self.done = label, total, done
         self.stream = sys.stderr if stream is None else stream
+        self.show = show and self.stream is not None
         self.begin = self.said = time.monotonic()
         self.first = done
         self.bar: tqdm[Never] | None = None
-        if show and self.stream.isatty():
+        if self.show and self.stream.isatty():
             self.bar = tqdm(desc=label, total=total, initial=done, unit=" designs", unit_scale=True, file=self.stream)
 
     def __enter__(self) -> Progress:
@@ -38,18 +41,27 @@ class Progress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self.bar is not None:
-            self.bar.close()
-        elif self.show:
-            self._line()
+        with self._listener():
+            if self.bar is not None:
+                self.bar.close()
+            elif self.show:
+                self._line()
 
     def advance(self, designs: int) -> None:
         """So many more designs are finished."""
         self.done += designs
-        if self.bar is not None:
-            self.bar.update(designs)
-        elif self.show and time.monotonic() - self.said > LINE_SECONDS:
-            self._line()
+        with self._listener():
+            if self.bar is not None:
+                self.bar.update(designs)
+            elif self.show and time.monotonic() - self.said > LINE_SECONDS:
+                self._line()
+
+    @contextmanager
+    def _listener(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError:
+            self.show, self.bar = False, None
 
     def _line(self) -> None:
         self.said = time.monotonic()

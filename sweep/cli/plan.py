@@ -84,7 +84,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     lines += aligned(
         [
             ("chunks", f"{cost.chunks} of {min(cost.chunk_size, cost.designs)} designs"),
-            ("rows kept", f"{cost.kept:.3g} of all designs ({study.output.keep}, {study.output.dtype})"),
+            ("rows kept", f"{_kept(cost)} ({study.output.keep}, {study.output.dtype})"),
             ("memory", size(cost.memory_bytes)),
             ("disk", f"{size(cost.disk_bytes)}, allowed {size(study.budget.disk_bytes)}"),
             ("time", f"{duration(cost.seconds)} with {cost.jobs} workers, allowed {duration(study.budget.seconds)}"),
@@ -92,6 +92,13 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
         ]
     )
     return lines
+
+
+def _kept(cost: Estimate) -> str:
+    from sweep.estimate import LEAST_KEPT
+
+    words = f"{cost.kept:.3g} of all designs"
+    return f"none of a pilot's designs, {words} assumed" if cost.kept <= LEAST_KEPT else words
 
 
 def _times(ratio: float) -> str:
