@@ -87,6 +87,28 @@ def test_gradient_of_a_limit_equals_differences_of_the_true_output(output):
         assert jacobian[row, j] * scale == pytest.approx(difference, rel=1e-7, abs=1e-9)
 
 
+def test_what_has_no_derivative_spoils_the_rows_that_ask_for_it_and_no_others(monkeypatch):
+    problem = rssr(limits=(Limit("phi0", -10.0, None), Limit("margin", -10.0, None)))
+    model = Model(problem, Program(problem), DESIGN, lambda: False)
+    at = problem.scaled(DESIGN[None, :])[0]
+    state = model.state(at)
+    whole = model.jacobian(at, state.form, state.form.points)
+
+    def lost(*arguments, **options):
+        values, moves = gradients(*arguments, **options)
+        moves[angle, 0] = np.inf  # the crank angle of an extremum whose second derivative vanishes
+        return values, moves
+
+    count = len(state.form.points)  # the rows are made of so many values and so many crank angles
+    angle = int(np.flatnonzero(state.form.matrix[:, count : 2 * count].any(axis=0))[0])
+    asking = state.form.matrix[:, count + angle] != 0.0
+    assert 0 < asking.sum() < len(asking)
+    monkeypatch.setattr("sweep.optimise.model.gradients", lost)
+    found = model.jacobian(at, state.form, state.form.points)
+    assert np.isnan(found[asking]).all()
+    np.testing.assert_array_equal(found[~asking], whole[~asking])
+
+
 def test_gradient_at_a_window_edge_follows_the_edge():
     guide = family("guide")
     names = ("a", "b", "c", "e", "xi", "eta", "lam", "h")

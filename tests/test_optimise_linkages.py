@@ -79,6 +79,18 @@ def test_geared_dwell_has_its_corner_optimum_at_a_equal_k(k):
         assert result.kkt_residual <= 1e-6
 
 
+def test_starts_from_a_sample_are_good_between_its_poses_too():
+    """Near a = k + 2 the acceleration has a pole that 64 poses miss: a search among them climbs right into it."""
+    dwell = family("geared_dwell")
+    limits = (Limit("dwell_angle", 1.842, None), Limit("dwell_deviation", None, 0.66))
+    problem = Problem(dwell, ("k", "a"), np.array([1.2, 0.05]), np.array([6.0, 8.0]), {}, "max_abs_d2psi", limits)
+    starts = from_sample(problem, [{}], 6, 0)
+    found = design_outputs(dwell, starts, ["max_abs_d2psi", "dwell_angle"], Accuracy(target=1e-8))
+    assert len(starts) == 6
+    assert found["max_abs_d2psi"].max() < 2.1  # the optimum is 1.998, at a = k
+    assert found["dwell_angle"].min() > 0.95 * 1.842
+
+
 SPACE = ("a", "b", "c", "e", "f", "g", "alpha")
 LOW, HIGH = np.array([0.2, 1, 0.8, 0, -2, -2, 0]), np.array([1.5, 5, 3, 3, 2, 2, math.pi / 2])
 

@@ -18,7 +18,8 @@ BLOCK = 1 << 15  # designs ranked together
 KEPT = 512  # best of the sample per start
 PARENTS, CHILDREN, ROUNDS = 8, 24, 12  # improved per start; samples around each and round
 RADIUS = 0.06  # of the first of these samples, in variables scaled to their bounds
-ACCURACY = Accuracy(samples=64)  # misses a peak by less than what the local search gains
+ACCURACY = Accuracy(samples=64)  # misses a peak by less than what the local search gains ...
+VERIFIED, HIDDEN = Accuracy(target=1e-3), 2.0  # ... but near a pole, told by a true extremum so many times larger
 NEARLY = 0.03  # a search mends so small a violation in passing: the objective tells more
 PRICE = 3.0  # of such a violation, in objectives
 ABSENT = 100.0  # violation of a limit on what a design does not have, as the swing of a rocker that turns
@@ -54,6 +55,7 @@ def from_sample(problem: Problem, signs: Sequence[dict[str, float]], count: int,
         merit = np.concatenate([merit, found])
         best = np.sort(np.argsort(merit, kind="stable")[: KEPT * count])
         place, kind, merit = place[best], kind[best], merit[best]
+    merit = _verified(problem, bases, place, kind, merit)
     order = np.argsort(merit, kind="stable")
     order = order[np.isfinite(merit[order])]
     order = order[spread(place[order], kind[order], PARENTS * count)]
@@ -75,6 +77,17 @@ def _one_turn(problem: Problem) -> tuple[Array, Array]:
     return 0.5 - 0.5 * share, 0.5 + 0.5 * share
 
 
+def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array) -> Array:
+    """Ranks of designs that the poses found good; where these hid most of a peak, the rank by the true extrema."""
+    out = merit.copy()
+    for own, base in enumerate(bases):
+        rows = np.flatnonzero((kind == own) & np.isfinite(merit))
+        found = ranking(problem, problem.placed(base, place[rows]), VERIFIED)
+        hidden = found > HIDDEN * merit[rows]
+        out[rows[hidden]] = found[hidden]
+    return out
+
+
 def _improved(
     problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array, rng: np.random.Generator
 ) -> tuple[Array, Array]:
@@ -89,14 +102,16 @@ def _improved(
             rows = np.flatnonzero(kind == own)
             designs = problem.placed(base, children[rows].reshape(-1, place.shape[1]))
             values[rows] = ranking(problem, designs).reshape(-1, CHILDREN)
-        best = np.argmin(values, axis=1)
-        better = values[np.arange(len(place)), best] < merit
-        place[better], merit[better] = children[better, best[better]], values[better, best[better]]
+        chosen = np.arange(len(place)), np.argmin(values, axis=1)
+        best = children[chosen]
+        found = _verified(problem, bases, best, kind, values[chosen])
+        better = found < merit
+        place[better], merit[better] = best[better], found[better]
         radius[~better] *= 0.5
     return place, merit
 
 
-def ranking(problem: Problem, designs: Array) -> Array:
+def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> Array:
     """Objective where all limits are nearly kept; far above it the largest violation; then what does not turn.
 
     Cheap limits first: parameters, then margins and pressure angles, then the others; only designs that nearly keep
@@ -106,6 +121,7 @@ def ranking(problem: Problem, designs: Array) -> Array:
     ----------
     problem : whose objective and limits count
     designs : (n, P)
+    accuracy : of their extrema over the turn
     """
     limits = [limit for limit in problem.limits if not limit.output.startswith("rotatable")]
     names = problem.family.parameter_names
@@ -119,7 +135,7 @@ def ranking(problem: Problem, designs: Array) -> Array:
     violation = np.zeros(len(designs))
     for left, group in zip((3.0, 2.0, 1.0), groups, strict=True):
         wanted = list(dict.fromkeys(limit.output for limit in group)) + (turning if left == 2.0 else [])
-        columns = _values(problem, designs[alive], wanted)
+        columns = _values(problem, designs[alive], wanted, accuracy)
         for limit in group:
             violation[alive] = np.maximum(violation[alive], _missed(limit, columns[limit.output]))
         bad = violation[alive] > NEARLY
@@ -129,12 +145,12 @@ def ranking(problem: Problem, designs: Array) -> Array:
             merit[alive[stuck]] = STUCK * (1.0 - np.nan_to_num(columns["margin"][stuck]))
             bad |= stuck
         alive = alive[~bad]
-    objective = _values(problem, designs[alive], [problem.objective])[problem.objective]
+    objective = _values(problem, designs[alive], [problem.objective], accuracy)[problem.objective]
     merit[alive] = np.nan_to_num(objective + PRICE * np.abs(objective) * violation[alive], nan=np.inf, posinf=np.inf)
     return merit
 
 
-def _values(problem: Problem, designs: Array, wanted: list[str]) -> dict[str, Array]:
+def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accuracy) -> dict[str, Array]:
     """Outputs and parameters (n,) of designs."""
     from sweep.summaries import design_outputs
 
@@ -142,7 +158,7 @@ def _values(problem: Problem, designs: Array, wanted: list[str]) -> dict[str, Ar
     columns: dict[str, Any] = {name: designs[:, names.index(name)] for name in wanted if name in names}
     outputs = [name for name in wanted if name not in names]
     if outputs and len(designs):
-        columns |= design_outputs(problem.family, designs, outputs, ACCURACY, problem.window)
+        columns |= design_outputs(problem.family, designs, outputs, accuracy, problem.window)
     return {name: np.asarray(columns.get(name, np.empty(0)), np.float64) for name in wanted}
 
 

@@ -119,9 +119,12 @@ class Model:
         values, moves = gradients(self.curves, designs, points, self.program.places)
         scalars = [self._scalar_gradient(name, fractions, designs)[None, :] for name in form.scalars]
         jacobian = np.concatenate([values, moves, *scalars])
-        # The angle of an extremum that no row asks for may have no derivative; it must not spoil the others.
-        jacobian[~form.matrix.any(axis=0)] = 0.0
-        return np.asarray(form.matrix @ jacobian, np.float64)
+        # What has no derivative, as the angle of a vanishing extremum, spoils the rows that ask for it and no others.
+        lost = ~np.isfinite(jacobian).all(axis=1)
+        jacobian[lost] = 0.0
+        rows = np.asarray(form.matrix @ jacobian, np.float64)
+        rows[form.matrix[:, lost].any(axis=1)] = np.nan
+        return rows
 
     def certificate(self, state: State) -> Multipliers:
         """Multipliers and residual of the optimality conditions at a checked design."""
