@@ -27,8 +27,9 @@ from sweep.reductions.catalogue import (
 )
 from sweep.reductions.margins import margin_suffixes
 from sweep.reductions.means import mean_squares
+from sweep.reductions.refine import precise_maxima
 from sweep.reductions.turn import Group, group_ns, limits_and_reductions, margin_group
-from sweep.sampling import Index
+from sweep.sampling import TWO_PI, Index
 from sweep.tables import design_matrix, wanted_names
 
 if TYPE_CHECKING:
@@ -222,16 +223,36 @@ def _run(family: Family, job: _Job, designs: Array, accuracy: Accuracy, window: 
     if not isinstance(job.group, Step):
         return limits_and_reductions(family, designs, job.outputs, accuracy, window)
     own = {name: name.removesuffix("1") if job.stage else name for name in job.outputs}
-    part = job.stage.designs(designs) if job.stage else designs
+    part, mechanism = (job.stage.designs(designs), job.stage.family) if job.stage else (designs, family)
     found = job.group.run(part, frozenset(own.values()), accuracy)
-    columns: Columns = {"status": found["status"]}
-    for name, plain in own.items():
-        columns[name] = found[plain]
-        if accuracy.target is not None:
+    if accuracy.target is not None:
+        for plain in own.values():
             # A step that serves a target promises it; one that estimates its error says so itself.
-            promised = accuracy.target * np.abs(np.asarray(found[plain], np.float64))
-            columns[f"err_{name}"] = found.get(f"err_{plain}", promised)
-    return columns
+            found.setdefault(f"err_{plain}", accuracy.target * np.abs(np.asarray(found[plain], np.float64)))
+            if plain.startswith("max_abs_") and mechanism.precise_poses is not None and not accuracy.certify:
+                _sharpen(mechanism, job.group, part, plain, found, accuracy.target)
+    return {"status": found["status"]} | {
+        key: found[own_key]
+        for name, plain in own.items()
+        for key, own_key in ((name, plain), (f"err_{name}", f"err_{plain}"))
+        if own_key in found
+    }
+
+
+def _sharpen(family: Family, step: Step, designs: Array, name: str, columns: Columns, target: float) -> None:
+    """Take a step's maxima that rounding left less accurate than was asked from the family's precise poses."""
+    place = f"phi_{name}"
+    value, err = (np.asarray(columns[key], np.float64) for key in (name, f"err_{name}"))
+    rows = np.flatnonzero(err > target * np.abs(value))
+    if not rows.size:
+        return
+    phi = np.asarray(step.run(designs[rows], frozenset((name, place)), Accuracy(target=target))[place], np.float64)
+    peaks = precise_maxima(family, designs[rows], name.removeprefix("max_abs_"), phi, target, place in columns)
+    better = peaks.err_height < err[rows]
+    rows, peaks = rows[better], peaks.only(better)
+    value[rows], err[rows] = peaks.height, peaks.err_height
+    if place in columns:
+        columns[place][rows], columns[f"err_{place}"][rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
 
 
 def _spread(values: NDArray[np.generic], rows: Index, n: int) -> NDArray[np.generic]:

@@ -91,6 +91,29 @@ def test_error_estimates_bound_the_error_of_hard_designs(hard, region, target):
         assert np.median(found[request].err[good] / exact) <= target
 
 
+@pytest.mark.parametrize("region", HARD)
+@pytest.mark.parametrize("target", [1e-8, 1e-12])
+def test_the_search_of_the_crank_rocker_keeps_the_accuracy_asked_of_hard_designs(hard, region, target):
+    """What its plain poses leave beyond the target, by rounding, its precise poses find."""
+    designs, names = hard[region], ["max_abs_d2psi", "phi_max_abs_d2psi", "max_abs_d3psi", "phi_max_abs_d3psi"]
+    found = design_outputs(RSSR, designs, names, Accuracy(target=target))
+    assert (found["status"] == st.OK).all()
+    for pose in ("d2psi", "d3psi"):
+        exact = climbed(ALONE, designs, pose, 0, found[f"phi_max_abs_{pose}"])
+        off, err = np.abs(found[f"max_abs_{pose}"] - exact), found[f"err_max_abs_{pose}"]
+        assert (off <= err).all()
+        assert (err <= target * exact).all()
+
+
+def test_plain_poses_alone_would_not_know_their_errors(hard):
+    designs, pose = hard["long coupler"], "d2psi"
+    fine, _ = true_extrema(ALONE, designs, [Request(pose, 0)], 1e-9, locate=True)
+    exact = climbed(ALONE, designs, pose, 0, fine[Request(pose, 0)].phi)
+    plain, _ = true_extrema(replace(ALONE, precise_poses=None), designs, [Request(pose, 0)], 1e-8)
+    off, err = np.abs(plain[Request(pose, 0)].value - exact), plain[Request(pose, 0)].err
+    assert (off > 10.0 * err).sum() > 3
+
+
 @pytest.mark.parametrize("target", [1e-3, 1e-8, 1e-12])
 def test_places_lie_within_their_errors(case, target):
     family, designs, requests, _ = case

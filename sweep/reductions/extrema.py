@@ -250,17 +250,18 @@ class _Search:
         spacing = TWO_PI / samples
         # A quarter of what is allowed: the rest is for what precise poses may find.
         tolerance: Array = 0.25 * self.target * size
-        first = first_peaks(np.multiply(column, spacing, dtype=np.float64), spacing, around)
+        centre = np.multiply(column, spacing, dtype=np.float64)
+        first = first_peaks(centre, np.full(row.size, spacing), around)
         sample = self._sampler(self.family, rows, candidates, sign * around[:, 3])
-        peaks = sharpen(sample, first, spacing, tolerance, self.target if self.locate else None)
+        peaks = sharpen(sample, first, tolerance, self.target if self.locate else None)
         rounding = self._rounding(columns, candidates, self.guards) * np.abs(peaks.height)
         peaks = peaks._replace(err_height=peaks.err_height + rounding)
         if self.family.precise_poses is not None:
-            self._confirm(rows, columns, spacing, candidates, peaks, size)
+            self._confirm(rows, columns, candidates, peaks, size)
         return peaks
 
     def _confirm(
-        self, rows: Index, columns: dict[str, Array], spacing: float, candidates: Candidates, peaks: Peaks, size: Array
+        self, rows: Index, columns: dict[str, Array], candidates: Candidates, peaks: Peaks, size: Array
     ) -> None:
         """Replace the peaks that may be the highest by what the family's precise poses say of them."""
         number, row, _, sign = candidates
@@ -276,7 +277,7 @@ class _Search:
             tolerance = np.where(tied, np.minimum(tolerance, TIE * size[rivals]), tolerance)
         mine, peak = candidates.only(rivals), peaks.only(rivals)
         sample = self._sampler(self.family.precise(), rows, mine, sign[rivals] * peak.height)
-        peak = confirmed(sample, peak, spacing, tolerance)
+        peak = confirmed(sample, peak, tolerance)
         # The first stage of a chain is given its exact input, those behind it a rounded one.
         rounding = self._rounding(columns, mine, self.guards[1:]) * np.abs(peak.height)
         for column, found in zip(peaks, peak._replace(err_height=peak.err_height + rounding), strict=True):
@@ -329,7 +330,7 @@ class _Search:
         edge = edge.only(resolved[edge.row])
         height = np.abs(edge.values) if request.mode == 0 else request.mode * edge.values
         none = np.zeros(edge.row.size)
-        added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height, none)
+        added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height, none, none)
         return np.concatenate([row[inside], edge.row]), peaks.only(inside).joined(added)
 
     def _beside_jumps(
@@ -350,7 +351,7 @@ class _Search:
 
         arcs = search(curve, measured, column, samples)
         wide, none = np.full(arcs.phi.size, TWO_PI / samples), np.zeros(arcs.phi.size)
-        added = Peaks(arcs.phi, arcs.value, wide, arcs.err, arcs.value, none)
+        added = Peaks(arcs.phi, arcs.value, wide, arcs.err, arcs.value, none, none)
         return np.concatenate([row, at, at]), peaks.joined(added)
 
     def _keep_best(self, rows: Index, request: Request, row: Index, peaks: Peaks) -> Array:

@@ -8,8 +8,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kernels import scan
-from sweep.families.base import Array
-from sweep.sampling import Index, Mask
+from sweep.families.base import Array, Family
+from sweep.sampling import Index, Mask, pose_columns
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""
@@ -18,6 +18,7 @@ OFFSETS = np.arange(-2.0, 3.0)
 SHRINK = 0.125
 PASSES = 12
 POLISHES = 3
+LOBES = 49  # poses about a maximum among which it is looked for again
 NARROW, WIDE = 1e-8, 1e-4  # secants [rad]: shorter ones would see the rounding of the crank angle
 # The quartic over a five-point window errs in proportion to at least the fourth power of its width, so one pass to the
 # next divides the error by at least 8^4; a sixty-fourth of the last change is claimed, which leaves a factor of 64.
@@ -29,7 +30,8 @@ EPS = 2.0**-53
 class Peaks(NamedTuple):
     """Refined peaks of k candidates, each (k,).
 
-    Place [rad], measured value, their errors, first guess from samples, step of the next five points [rad].
+    Place [rad], measured value, their errors, first guess from samples, spacing of those and step of the next five
+    points [rad].
     """
 
     phi: Array
@@ -37,6 +39,7 @@ class Peaks(NamedTuple):
     err_phi: Array
     err_height: Array
     guess: Array
+    spacing: Array
     step: Array
 
     def only(self, which: Index | Mask) -> Peaks:
@@ -48,13 +51,12 @@ class Peaks(NamedTuple):
         return Peaks(*(np.concatenate(pair) for pair in zip(self, others, strict=True)))
 
 
-def first_peaks(centre: Array, spacing: float, around: Array) -> Peaks:
+def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
     """Peaks of the quartics through five samples.
 
     Parameters
     ----------
-    centre : (k,) crank angles of the best samples [rad]
-    spacing : distance of the samples [rad]
+    centre, spacing : (k,) crank angles of the best samples, and their distance from the next [rad]
     around : (k, 7) measured values at the best sample and its three neighbours on either side
     """
     place, height, ripple, blur = _quartic(np.ascontiguousarray(around[:, 1:6]))
@@ -63,18 +65,16 @@ def first_peaks(centre: Array, spacing: float, around: Array) -> Peaks:
     widest = fourth.max(axis=1)
     err_height = np.where(np.abs(place) < 2.0, RIPPLE * widest + 4.0 * EPS * np.abs(height), np.inf)
     err_phi = spacing * np.minimum(blur * widest / np.maximum(ripple, EPS * EPS), 2.0)
-    step = np.full(centre.size, SHRINK * spacing)
-    return Peaks(centre + spacing * place, height, err_phi, err_height, height.copy(), step)
+    return Peaks(centre + spacing * place, height, err_phi, err_height, height, spacing, SHRINK * spacing)
 
 
-def sharpen(sample: Sampler, peaks: Peaks, spacing: float, tolerance: Array, locate: float | None = None) -> Peaks:
+def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: float | None = None) -> Peaks:
     """Highest points near the given ones, by quartics through five points ever closer together.
 
     Parameters
     ----------
     sample : evaluates the measured quantity; called with the candidates that are not finished yet
     peaks : k peaks as known so far
-    spacing : distance of the samples they come from [rad]
     tolerance : (k,) error allowed in the height
     locate : error allowed in the place [rad]; without it the place is as good as the height left it
 
@@ -84,7 +84,7 @@ def sharpen(sample: Sampler, peaks: Peaks, spacing: float, tolerance: Array, loc
     1e-2, one for 1e-4, two for 1e-8, three or four where the place is wanted.  A peak that leaves its window is
     followed.
     """
-    phi, height, err_phi, err_height, guess, step = (column.copy() for column in peaks)
+    phi, height, err_phi, err_height, guess, spacing, step = (column.copy() for column in peaks)
     enough = err_height <= tolerance
     if locate is not None:
         enough &= err_phi <= locate
@@ -109,12 +109,12 @@ def sharpen(sample: Sampler, peaks: Peaks, spacing: float, tolerance: Array, loc
         if locate is not None:
             enough &= (err_phi[active] <= locate) | ~sharper
         # A window that has lost its peak was too small for its place.
-        step[active] = np.where(inside, SHRINK * u, np.minimum(u / SHRINK, SHRINK * spacing))
-        active = active[~enough & (step[active] > 1e-6 * spacing)]
-    return Peaks(phi, height, err_phi, err_height, guess, step)
+        step[active] = np.where(inside, SHRINK * u, np.minimum(u / SHRINK, SHRINK * spacing[active]))
+        active = active[~enough & (step[active] > 1e-6 * spacing[active])]
+    return Peaks(phi, height, err_phi, err_height, guess, spacing, step)
 
 
-def confirmed(sample: Sampler, peaks: Peaks, spacing: float, tolerance: Array) -> Peaks:
+def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array) -> Peaks:
     """Peaks as poses of higher precision have them: their heights are values at their places.
 
     One pose at the place of a peak measures how far rounding, and what was left of interpolation, have moved its
@@ -123,15 +123,15 @@ def confirmed(sample: Sampler, peaks: Peaks, spacing: float, tolerance: Array) -
     Parameters
     ----------
     sample : evaluates the measured quantity with less rounding than what the peaks come from
-    peaks, spacing, tolerance : as in `sharpen`
+    peaks, tolerance : as in `sharpen`
     """
     peaks = _attained(sample, peaks, np.arange(peaks.phi.size))
     again = np.flatnonzero(peaks.err_height > tolerance)
     if again.size:
         # Rounding may have spoilt the place too: begin as wide as it is uncertain.
-        step = np.maximum(peaks.step, np.minimum(peaks.err_phi, SHRINK * spacing))
+        step = np.maximum(peaks.step, np.minimum(peaks.err_phi, SHRINK * peaks.spacing))
         rough = peaks._replace(step=step).only(again)
-        sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, spacing, tolerance[again])
+        sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, tolerance[again])
         sharper = _attained(sample, sharper, again)
         for column, found in zip(peaks, sharper, strict=True):
             column[again] = found
@@ -142,6 +142,49 @@ def _attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
     """Heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
     height = sample(which, peaks.phi[:, None])[:, 0]
     return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
+
+
+def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target: float, locate: bool) -> Peaks:
+    """Largest magnitudes (n,) next to where they were found, from the family's precise poses alone; error inf if lost.
+
+    Parameters
+    ----------
+    family, designs : with precise poses; the (n, P) design matrix
+    pose : which output is largest
+    phi : (n,) places of the maxima as known so far [rad]
+    target : relative accuracy
+    locate : whether the places are wanted too
+
+    Notes
+    -----
+    Near a change point the jerk has tops of nearly equal height a few widths apart, told apart by precise poses only.
+    So each maximum is looked for again among `LOBES` poses about its place, three per width sqrt(y/|y''|) of the curve.
+    """
+    precise = family.precise()
+
+    def measured(which: Index, angles: Array, name: str = pose) -> Array:
+        found = pose_columns(precise, designs[which], angles, [name])[0][name]
+        return np.abs(found) if name == pose else found
+
+    every = np.arange(phi.size)
+    three = measured(every, phi[:, None] + NARROW * np.arange(-1.0, 2.0))
+    bend = np.abs(three[:, 0] - 2.0 * three[:, 1] + three[:, 2]) / NARROW**2
+    spacing = np.minimum(np.sqrt(three[:, 1] / np.maximum(bend, three[:, 1])), 1.0) / 3.0
+    angles = phi[:, None] + spacing[:, None] * np.arange(-(LOBES // 2), LOBES // 2 + 1)
+    values = measured(every, angles)
+    inner = values[:, 3:-3]
+    top = (inner >= values[:, 2:-4]) & (inner >= values[:, 4:-2]) & (inner >= 0.9 * values.max(axis=1)[:, None])
+    row, column = np.nonzero(top)
+    first = first_peaks(angles[row, column + 3], spacing[row], values[row[:, None], column[:, None] + np.arange(7)])
+    peaks = confirmed(lambda active, at: measured(row[active], at), first, target * first.height)
+    best, which = np.full(phi.size, -np.inf), np.full(phi.size, -1)
+    scan.best_candidate(row, peaks.height, best, which)
+    highest, slope = peaks.only(which), family.derivative_of.get(pose)
+    highest.err_height[which < 0] = np.inf
+    if not locate or slope is None:
+        return highest
+    places = polish_places(lambda active, at: measured(active, at, slope), highest.phi, highest.err_phi)
+    return highest._replace(phi=places[0], err_phi=places[1])
 
 
 def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Array]:
