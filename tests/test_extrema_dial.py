@@ -109,9 +109,9 @@ def test_plain_poses_alone_would_not_know_their_errors(hard):
     designs, pose = hard["long coupler"], "d2psi"
     fine, _ = true_extrema(ALONE, designs, [Request(pose, 0)], 1e-9, locate=True)
     exact = climbed(ALONE, designs, pose, 0, fine[Request(pose, 0)].phi)
-    plain, _ = true_extrema(replace(ALONE, precise_poses=None), designs, [Request(pose, 0)], 1e-8)
+    plain, _ = true_extrema(replace(ALONE, precise_poses=None), designs, [Request(pose, 0)], 1e-12)
     off, err = np.abs(plain[Request(pose, 0)].value - exact), plain[Request(pose, 0)].err
-    assert (off > 10.0 * err).sum() > 3
+    assert (off > 10.0 * err).sum() > 10
 
 
 @pytest.mark.parametrize("target", [1e-3, 1e-8, 1e-12])
