@@ -184,8 +184,9 @@ def _edge(work: pd.DataFrame) -> str:
     return (
         f"`accuracy = {power(first['setting'])}` leaves {sig(first['largest_error'])} of the largest acceleration at"
         f" {duration(first['ns_per_design'])} a design, `accuracy = {power(last['setting'])}` leaves"
-        f" {sig(last['largest_error'])} at {duration(last['ns_per_design'])}: float64 knows no more there, and `err_`"
-        f" says so. A grid of {finest['setting']:.0f} is off by {100.0 * finest['largest_error']:.0f} %."
+        f" {sig(last['largest_error'])} at {duration(last['ns_per_design'])}: what plain arithmetic leaves there, poses in"
+        f" twice the precision finish. A grid of {finest['setting']:.0f} is off by"
+        f" {100.0 * finest['largest_error']:.0f} %."
     )
 
 

@@ -129,12 +129,9 @@ def _grid_refined(samples: int) -> Way:
 
 
 def _adaptive(target: float) -> Way:
-    cos, sin = rssr.sampling_tables()
-
     def run(designs: Array) -> Array:
-        status, found = np.empty(len(designs), np.uint8), np.empty(len(designs))
-        rssr.true_maxima(designs, cos, sin, target, status, None, None, None, None, found, None)
-        return found
+        columns = design_outputs(RSSR, designs, ["max_abs_d2psi"], Accuracy(target=target))
+        return np.asarray(columns["max_abs_d2psi"], np.float64)
 
     return run
 
