@@ -184,8 +184,8 @@ def _edge(work: pd.DataFrame) -> str:
     return (
         f"`accuracy = {power(first['setting'])}` leaves {sig(first['largest_error'])} of the largest acceleration at"
         f" {duration(first['ns_per_design'])} a design, `accuracy = {power(last['setting'])}` leaves"
-        f" {sig(last['largest_error'])} at {duration(last['ns_per_design'])}: what plain arithmetic leaves there, poses in"
-        f" twice the precision finish. A grid of {finest['setting']:.0f} is off by"
+        f" {sig(last['largest_error'])} at {duration(last['ns_per_design'])}: what plain arithmetic leaves there, poses"
+        f" in twice the precision finish. A grid of {finest['setting']:.0f} is off by"
         f" {100.0 * finest['largest_error']:.0f} %."
     )
 
