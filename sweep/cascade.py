@@ -37,7 +37,9 @@ Number = TypeVar("Number", float, Array)
 MAGNITUDES = ("swing", "stroke")
 
 # With these one output is missing or rough, the others are worth having where all rows are kept.
-PARTIAL = (codes.NOT_OSCILLATING, codes.NOT_CONVERGED)
+PARTIAL = (
+    codes.NOT_OSCILLATING, codes.NOT_CONVERGED, codes.JAMMED, codes.NOT_LINEAR, codes.SINGULAR, codes.INVALID_INPUT,
+)  # fmt: skip
 
 
 class Dropped(Exception):

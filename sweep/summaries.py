@@ -45,7 +45,9 @@ MOST_SAMPLES = 2**20
 FEWEST_SAMPLES = 8
 
 # With these some outputs are missing or rough, the others are worth having.
-PARTIAL = (st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL)
+PARTIAL = (
+    st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
+)  # fmt: skip
 
 
 class Route(NamedTuple):
@@ -160,7 +162,7 @@ def design_outputs(
         # Refinement meets a dead point between samples, a plain grid does not.
         status = margin_group(family, designs, (), accuracy)["status"].astype(np.uint8)
     for job in jobs:
-        # A follower that turns fully has no limit positions, or no dwell, but extrema it has.
+        # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
         alive = np.flatnonzero(np.isin(status, PARTIAL))
         found = _run(family, job, designs[alive], accuracy, window)
         for name in job.outputs:
@@ -184,7 +186,7 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
 
 def _jobs(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> list[_Job]:
     steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
-    groups: dict[Group, list[str]] = {}
+    groups: dict[tuple[Group, str], list[str]] = {}
     ways = {name: (applying_step(family, name, accuracy), general_way(family, name)) for name in dict.fromkeys(wanted)}
     # The margin of a whole chain asks all stages: a first one judged by itself would take its designs from the others.
     together = any(
@@ -197,7 +199,9 @@ def _jobs(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> list[_Jo
         elif way is not None:
             position: Group = "limits" if is_position(family, way.of) else "reductions"
             group: Group = "margin" if way.kind == "margin" else "means" if way.kind == "mean" else position
-            groups.setdefault(group, []).append(name)
+            # Each effect by itself: one that jams or leaves its range takes nothing from the others.
+            effect = family.dear.get(way.of, ("", 0.0))[0]
+            groups.setdefault((group, effect), []).append(name)
         else:
             output(family, name)  # unknown names end here, with the nearest known one
             allowed = "another accuracy: this output is only computed " + (
@@ -209,8 +213,8 @@ def _jobs(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> list[_Jo
         for step, stage, names in steps.values()
     ]
     jobs += [
-        _Job(group, group, None, tuple(names), group_ns(family, group, tuple(names), accuracy))
-        for group, names in groups.items()
+        _Job(f"{group} {effect}".rstrip(), group, None, tuple(names), group_ns(family, group, tuple(names), accuracy))
+        for (group, effect), names in groups.items()
     ]
     return sorted(jobs, key=lambda job: job.ns_per_design)
 

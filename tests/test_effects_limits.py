@@ -131,3 +131,17 @@ def test_an_input_of_the_wrong_sign_is_refused(output, wrong):
     given = table([output], 2) | {name: np.array([0.5, value])}
     with pytest.raises(InputError, match=rf"column {name}, row 1: .*(non-negative|positive)"):
         sweep.summarise("rssr", given, [output if output == "unevenness" else f"max_{output}"])
+
+
+@pytest.mark.parametrize("failing", ["max_abs_lag", "rms_lag", "max_abs_lag_dynamic", "max_force_c_friction"])
+def test_an_effect_that_fails_takes_nothing_from_the_others(failing):
+    """A soft coupler and a shaft that jams: what is wanted beside them keeps its bits."""
+    soft = {"stiffness": 300.0, "driven_inertia": 1.0, "damping": 0.1, "flywheel": 20.0}
+    given = RSSR_LOADS | FRICTION | soft | {"mu_d": 8.0}
+    wanted = ["max_abs_force_c", "rms_drive_torque", "fastest", "max_abs_d2psi"]
+    alone, beside = (sweep.summarise("rssr", given, names).iloc[0] for names in (wanted, [failing, *wanted]))
+    assert alone["status"] == st.OK
+    assert beside["status"] in (st.NOT_LINEAR, st.JAMMED)
+    assert np.isnan(beside[failing])
+    for name in wanted:
+        assert beside[name] == alone[name], name
