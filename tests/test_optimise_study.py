@@ -126,6 +126,9 @@ def test_best_rows_are_the_feasible_ones(dataset):
     rows = pd.read_parquet(folder)
     assert len(designs) == len(rows) and merit.min() == rows.max_abs_d2psi.min()
     assert problem_of(study, designs).variables == ("a", "b", "c", "alpha")
+    # the sign of a swing is that of its branch; what is small is its magnitude
+    _, merit = best_rows(study.family, "swing", folder)
+    assert merit.min() == rows.swing.abs().min()
 
 
 def test_study_without_a_feasible_row_is_answered_with_a_relaxation(tmp_path):

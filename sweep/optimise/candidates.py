@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sweep.cascade import compared
 from sweep.families.base import Accuracy, Array
 from sweep.optimise.problem import Problem
 from sweep.optimise.starts import spread
@@ -145,7 +146,8 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
             merit[alive[stuck]] = STUCK * (1.0 - np.nan_to_num(columns["margin"][stuck]))
             bad |= stuck
         alive = alive[~bad]
-    objective = _values(problem, designs[alive], [problem.objective], accuracy)[problem.objective]
+    values = _values(problem, designs[alive], [problem.objective], accuracy)[problem.objective]
+    objective = compared(problem.objective, values)
     merit[alive] = np.nan_to_num(objective + PRICE * np.abs(objective) * violation[alive], nan=np.inf, posinf=np.inf)
     return merit
 
@@ -164,8 +166,7 @@ def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accur
 
 def _missed(limit: Any, value: Array) -> Array:
     """Violation relative to the bound (n,); an output that a design does not have misses its limit by far."""
-    if limit.output.rstrip("0123456789") in ("swing", "stroke"):
-        value = np.abs(value)
+    value = compared(limit.output, value)
     out = np.zeros(len(value))
     for bound, sense in ((limit.minimum, 1.0), (limit.maximum, -1.0)):
         if bound is not None:

@@ -60,12 +60,13 @@ def spread(place: Array, kind: NDArray[np.intp], count: int) -> list[int]:
 
 
 def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Array]:
-    """The best feasible designs of a dataset (k, P), k up to 10^5, and their objective.
+    """The best feasible designs of a dataset (k, P), k up to 10^5, and their objective as it is compared.
 
     Only the parameters, the objective and the status are read, batch by batch.
     """
     import pyarrow.parquet as pq
 
+    from sweep.cascade import compared
     from sweep.store import parts
 
     names = family.parameter_names
@@ -76,7 +77,7 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
                 good = np.asarray(batch["status"]) == st.OK
                 more = np.column_stack([np.asarray(batch[name], np.float64) for name in names])[good]
                 designs = np.concatenate([designs, more])
-                merit = np.concatenate([merit, np.asarray(batch[objective], np.float64)[good]])
+                merit = np.concatenate([merit, compared(objective, np.asarray(batch[objective], np.float64)[good])])
                 if len(merit) > KEPT:
                     best = np.sort(np.argsort(merit, kind="stable")[:KEPT])
                     designs, merit = designs[best], merit[best]
