@@ -109,6 +109,11 @@ def test_rssp_jitted_equals_plain():
         for jitted, plain in zip(run(rssp.poses, dtype), run(rssp.poses.py_func, dtype), strict=True):
             np.testing.assert_array_equal(jitted, plain)
     assert {st.OK, st.NOT_ASSEMBLED} <= set(run(rssp.poses, np.float64)[0].ravel())
+    precise = run(rssp.precise_poses, np.float64)
+    for jitted, plain in zip(precise, run(rssp.precise_poses.py_func, np.float64), strict=True):
+        np.testing.assert_allclose(jitted, plain, rtol=2.0**-50)
+    for twice, once in zip(precise, run(rssp.poses, np.float64), strict=True):
+        np.testing.assert_allclose(twice, once, rtol=1e-11)
 
 
 def test_rssp_complex_step_gives_exact_gradients():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -64,10 +62,8 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """As :func:`poses`, with the discriminant in twice the working precision; for float64 only."""
-    q = np.empty((len(designs), angles.cos.shape[1]))
-    rssp.precise_discriminants(designs, angles.cos, angles.sin, q)
-    return filled_with_places(partial(rssp.poses, exact_q=q), designs, angles, _VALUES, _JOINTS, wanted)
+    """As :func:`poses`, in twice the working precision; for float64 only."""
+    return filled_with_places(rssp.precise_poses, designs, angles, _VALUES, _JOINTS, wanted)
 
 
 def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:

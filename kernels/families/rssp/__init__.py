@@ -1,7 +1,7 @@
 """Spatial slider-crank: revolute crank, two ball joints, prismatic slider (RSSP); planar for alpha = 0.
 
-``closure`` reduces a design to its constants, ``motion`` evaluates poses, ``precise`` their discriminant in twice the
-working precision, ``margin`` decides rotatability and the largest pressure angle, ``limits`` finds the limit positions,
+``closure`` reduces a design to its constants, ``motion`` evaluates poses, ``precise`` the same in twice the working
+precision, ``margin`` decides rotatability and the largest pressure angle, ``limits`` finds the limit positions,
 ``joints`` and ``ellipse`` are what effects work from.
 """
 
@@ -11,4 +11,4 @@ from kernels.families.rssp.joints import joints as joints
 from kernels.families.rssp.limits import limits as limits
 from kernels.families.rssp.margin import margin as margin
 from kernels.families.rssp.motion import poses as poses
-from kernels.families.rssp.precise import precise_discriminants as precise_discriminants
+from kernels.families.rssp.precise import precise_poses as precise_poses

@@ -25,7 +25,6 @@ def poses(
     discriminant: Array | None,
     pressure_angle: Array | None,
     joints: Array | None,
-    exact_q: Array | None = None,
 ) -> None:
     """Slider displacement, transfer functions, discriminant and pressure angle of every design at its crank angles.
 
@@ -39,13 +38,11 @@ def poses(
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT or INVALID_INPUT
     s ... pressure_angle : (n, m) out [length; rad], or None: what is None is neither computed nor compiled
     joints : (6, n, m) out, crank pin x y z and slider ball x y z, or None
-    exact_q : (n, m) of :func:`kernels.families.rssp.precise.precise_discriminants`, or None
 
     Notes
     -----
     Where the status is not OK the values are nan, except that a dead point keeps its position (Q = 0) and the
     discriminant is always given.  The dead-point band is the rounding error of Q itself; outside it the sign is right.
-    With ``exact_q`` it is half as wide: what rounding the links once may do to Q.
     Measured: errors below 1.6 x 2^-53 max(cond, |y|) over the oracle table, lengths from 1e-100 to 1e100.
     """
     for i in range(designs.shape[0]):
@@ -55,10 +52,8 @@ def poses(
             u, v = cos_phi[row, j], sin_phi[row, j]
             y = r.k0 + r.ka * v
             m, n = r.e - r.a * u, r.n0 - r.na * v
-            if exact_q is not None:
-                q, error = exact_q[i, j], 4.0 * EPS
-            else:
-                q, error = (r.b - m) * (r.b + m) - n * n, 8.0 * EPS
+            q = (r.b - m) * (r.b + m) - n * n
+            error = 8.0 * EPS
             tolerance = error * (abs(m.real) * r.m_size + abs(n.real) * r.n_size)
             tolerance += error * error * (r.m_size * r.m_size + r.n_size * r.n_size)
             code = st.OK

@@ -1,24 +1,36 @@
-"""The discriminant of the spatial slider-crank for exactly the given doubles, in twice the working precision.
+"""Motion of the spatial slider-crank for exactly the given doubles: everything in twice the working precision.
 
-Q alone is a small difference of large numbers; what :mod:`kernels.families.rssp.motion` makes of it loses nothing.
+In plain arithmetic (:mod:`kernels.families.rssp.motion`) the discriminant near a dead point is a small difference of
+large numbers, and so are the derivatives for long offsets.
 """
 
 from __future__ import annotations
 
+import math
+
+from kernels import status as st
 from kernels import twofold as two
 from kernels._jit import kernel
-from kernels.families.rssp.closure import Array, reduce_design
+from kernels.families.rssp.closure import EPS, Array, Status, reduce_design
+
+BAND = 4.0 * EPS  # what rounding the given numbers does to Q: a dead point made in float64 is still one
 
 
 @kernel
-def precise_discriminants(designs: Array, cos_phi: Array, sin_phi: Array, q: Array) -> None:
-    """Q of equation (1) of docs/rssp.md, correct to a rounding of what is given.
-
-    Parameters
-    ----------
-    designs : (n, 6) columns of :class:`kernels.families.rssp.closure.Design`, float64
-    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
-    q : (n, m) out, in squared units of the reduced design
+def precise_poses(
+    designs: Array,
+    cos_phi: Array,
+    sin_phi: Array,
+    status: Status,
+    s: Array | None,
+    ds: Array | None,
+    d2s: Array | None,
+    d3s: Array | None,
+    discriminant: Array | None,
+    pressure_angle: Array | None,
+    joints: Array | None,
+) -> None:
+    """As :func:`kernels.families.rssp.motion.poses`, for float64 designs only, correct to a few roundings.
 
     Notes
     -----
@@ -27,11 +39,54 @@ def precise_discriminants(designs: Array, cos_phi: Array, sin_phi: Array, q: Arr
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
         row = i if cos_phi.shape[0] > 1 else 0
+        unit = r.unit
         sa, ca = two.sine_cosine(designs[i, 4])
-        n0, na = two.scale(ca, designs[i, 3] * (1.0 / r.unit)), two.scale(sa, r.a)
+        f, ka, na = designs[i, 3] * (1.0 / unit), two.scale(ca, r.a), two.scale(sa, r.a)
+        y0, n0, ae = two.scale(sa, f), two.scale(ca, f), two.two_product(r.a, r.e)
         for j in range(cos_phi.shape[1]):
             u, v = two.unit_vector(cos_phi[row, j], sin_phi[row, j])
-            m = two.subtract((r.e, 0.0), two.scale(u, r.a))
+            hu, hv = two.multiply(ka, u), two.multiply(ka, v)
+            y, m = two.add(y0, hv), two.subtract((r.e, 0.0), two.scale(u, r.a))
             n = two.subtract(n0, two.multiply(na, v))
-            reach = two.multiply(two.subtract((r.b, 0.0), m), two.add((r.b, 0.0), m))
-            q[i, j] = two.subtract(reach, two.multiply(n, n))[0]
+            q = two.multiply(two.subtract((r.b, 0.0), m), two.add((r.b, 0.0), m))
+            q = two.subtract(q, two.multiply(n, n))
+            tolerance = BAND * (abs(m[0]) * r.m_size + abs(n[0]) * r.n_size)
+            tolerance += BAND * BAND * (r.m_size * r.m_size + r.n_size * r.n_size)
+            code = st.OK
+            if not r.valid or q[0] != q[0]:
+                code = st.INVALID_INPUT
+            elif q[0] < -tolerance:
+                code = st.NOT_ASSEMBLED
+            elif q[0] <= tolerance:
+                code = st.DEAD_POINT
+            status[i, j] = code
+
+            if discriminant is not None:
+                discriminant[i, j] = (q[0] * unit) * unit if r.valid else math.nan
+            root = two.root(q) if code == st.OK else (0.0, 0.0)
+            assembled = code == st.OK or code == st.DEAD_POINT
+            w = two.scale(root, r.branch)
+            place = two.add(y, w)[0] * unit if assembled else math.nan
+            if s is not None:
+                s[i, j] = place
+            if pressure_angle is not None:
+                pressure_angle[i, j] = math.atan2(math.hypot(m[0], n[0]), root[0]) if assembled else math.nan
+            if joints is not None:
+                joints[0, i, j], joints[1, i, j], joints[2, i, j] = r.a * u[0] * unit, y[0] * unit, n[0] * unit
+                joints[3, i, j], joints[5, i, j] = (r.e * unit, 0.0) if assembled else (math.nan, math.nan)
+                joints[4, i, j] = place
+            if ds is not None or d2s is not None or d3s is not None:
+                per_w = 1.0 / w[0] if code == st.OK else math.nan
+                q1 = two.subtract(two.multiply(hu, y), two.multiply(ae, v))
+                w1 = two.divide(q1, w, per_w)
+                if ds is not None:
+                    ds[i, j] = two.add(hu, w1)[0] * unit
+                if d2s is not None or d3s is not None:
+                    q2 = two.subtract(two.multiply(hu, hu), two.add(two.multiply(hv, y), two.multiply(ae, u)))
+                    w2 = two.divide(two.subtract(q2, two.multiply(w1, w1)), w, per_w)
+                    if d2s is not None:
+                        d2s[i, j] = two.subtract(w2, hv)[0] * unit
+                    if d3s is not None:
+                        q3 = two.add(two.multiply(hu, hv), two.multiply(w1, w2))
+                        w3 = two.divide(two.add(q1, two.scale(q3, 3.0)), w, per_w)  # negative
+                        d3s[i, j] = -two.add(w3, hu)[0] * unit
