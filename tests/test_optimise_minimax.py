@@ -60,8 +60,8 @@ def test_limit_holds_the_optimum_back(limit, active):
     assert result.design[:2] == pytest.approx([2.0, -2.0], abs=1e-6)
     assert result.active == (active,)
     assert result.violation <= 1e-9
-    # dJ/dp = 2 at p = 2; in scaled terms 2/J(start) per unit of swell/bound: positive and finite
-    assert abs(result.multipliers[active]) > 0.0
+    # dJ/dp = 2 at p = 2, J = 2: twice the relative change of the bound, whatever the start was worth
+    assert abs(result.multipliers[active]) == pytest.approx(2.0, rel=1e-6)
 
 
 def test_bound_holds_the_optimum_back():

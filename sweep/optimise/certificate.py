@@ -85,9 +85,10 @@ class Result:
     ``design`` (P,) in the family's units.  ``gap`` is the difference between the maximum the search worked with and the
     true one found afterwards on a finer grid, relative to the objective.  ``violation`` is the largest scaled
     violation; ``relaxation`` says by how much every violated limit would have to give way, in the unit of its output.
-    ``multipliers`` are changes of the scaled objective per unit of each active limit, scaled likewise.  ``status`` is
-    OK, LIMIT_EXCEEDED (infeasible) or NOT_CONVERGED, and ``ended`` says how the search ended: "converged", "stalled",
-    "infeasible", "time" or "interrupted".
+    ``multipliers`` are relative changes of the objective (of cos^2 of a pressure angle) per relative change of each
+    active limit (of sin^2 of a pressure angle, of a margin itself; per width between the bounds of a variable), not
+    negative but for equations.  ``status`` is OK, LIMIT_EXCEEDED (infeasible) or NOT_CONVERGED, and ``ended`` says how the search ended:
+    "converged", "stalled", "infeasible", "time" or "interrupted".
     """
 
     start: int

@@ -54,7 +54,8 @@ def _result(number: int, problem: Problem, program: Program, descent: Descent, e
     if exists:
         found = descent.model.certificate(state)
         residual = found.residual
-        words = in_words(state.form.labels, found, problem.variables)
+        size = abs(state.objective) or 1.0  # of the objective here, in units of the start's
+        words = {text: weight / size for text, weight in in_words(state.form.labels, found, problem.variables).items()}
     values = {
         r.measure.name: program.value(r.measure, state.form, descent.model.curves, state.design, state.atoms)
         for r in program.requirements
