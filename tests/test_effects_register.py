@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -91,3 +92,9 @@ def test_the_command_lists_and_explains():
     wrong = CliRunner().invoke(main, ["effects", "frction"])
     assert wrong.exit_code == 2
     assert "did you mean 'friction'?" in wrong.output
+
+
+def test_an_effect_says_the_unit_of_all_it_takes_and_gives():
+    words = CliRunner().invoke(main, ["effects", "friction"]).output
+    for name, unit in (("m_crank", "t"), ("j_rocker_xy", r"t\*mm\^2"), ("mu_b", "1"), ("load_support_d1", "N")):
+        assert re.search(rf"^  {name} +{unit} ", words, re.MULTILINE), name

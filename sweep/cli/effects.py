@@ -52,6 +52,8 @@ def chain_words(entry: Effect) -> str:
 
 def explain(entry: Effect) -> list[str]:
     """One effect in full, line by line."""
+    from sweep.study.units import internal_unit
+
     lines = [f"{entry.name} ({entry.key}): {entry.title}", ""]
     kind = "whole turn: it couples the crank angles" if entry.whole_turn else "pointwise in the crank angle"
     lines += aligned(
@@ -61,6 +63,7 @@ def explain(entry: Effect) -> list[str]:
             ("needs", ", ".join(entry.needs) or "the motion"),
             ("kind", kind),
             ("cost", cost_words(entry)),
+            ("units", "of studies and datasets; in tables any consistent set"),
             ("called for", entry.called_for),
             ("negligible", entry.negligible),
         ]
@@ -74,12 +77,14 @@ def explain(entry: Effect) -> list[str]:
         lines += aligned(_output_rows(entry.design_result.outputs))
     if entry.inputs:
         lines += ["", "inputs"]
-        lines += aligned([(p.name, p.unit, input_words(p)) for p in entry.inputs])
+        lines += aligned([(p.name, internal_unit(p.unit), input_words(p)) for p in entry.inputs])
     return lines
 
 
 def _output_rows(outputs: tuple[Output, ...]) -> list[tuple[str, str, str, str]]:
-    return [(o.name, o.unit, o.text, o.equation) for o in outputs]
+    from sweep.study.units import internal_unit
+
+    return [(o.name, internal_unit(o.unit), o.text, o.equation) for o in outputs]
 
 
 def input_words(p: Parameter) -> str:

@@ -24,8 +24,12 @@ def _body(body: str) -> tuple[Parameter, ...]:
     )
     text = f"inertia of the {body} about its centre of mass"
     moments = (
-        Parameter(f"j_{body}_{axes}", "inertia", text, default=0.0, not_negative=axes[0] == axes[1])
-        for axes in ("xx", "xy", "xz", "yy", "yz", "zz")
+        Parameter(f"j_{body}_{x}{x}", "inertia", text, default=0.0, not_negative=True)
+        if x == y
+        else Parameter(
+            f"j_{body}_{x}{y}", "inertia", f"{text}: entry of the tensor, - integral {x} {y} dm", default=0.0
+        )
+        for x, y in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
     return Parameter(f"m_{body}", "mass", f"mass of the {body}", not_negative=True), *centre, *moments
 
