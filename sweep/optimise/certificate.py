@@ -87,8 +87,8 @@ class Result:
     violation; ``relaxation`` says by how much every violated limit would have to give way, in the unit of its output.
     ``multipliers`` are relative changes of the objective (of cos^2 of a pressure angle) per relative change of each
     active limit (of sin^2 of a pressure angle, of a margin itself; per width between the bounds of a variable), not
-    negative but for equations.  ``status`` is OK, LIMIT_EXCEEDED (infeasible) or NOT_CONVERGED, and ``ended`` says how the search ended:
-    "converged", "stalled", "infeasible", "time" or "interrupted".
+    negative but for equations.  ``status`` is OK, LIMIT_EXCEEDED (infeasible) or NOT_CONVERGED, and ``ended`` says how
+    the search ended: "converged", "stalled", "infeasible", "time" or "interrupted".
     """
 
     start: int
