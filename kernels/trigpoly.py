@@ -10,6 +10,8 @@ Write the polynomial about a stationary point t0 as ``c cos d + s sin d + C cos 
 
 so t0 is the global minimum if and only if ``-c - 2 C >= 2 hypot(C, S)``, and if it is not, the direction (C, S) of d
 leads below p(t0).  A polynomial of degree 2 has at most two minima, so one restart from there finds the global one.
+The proof needs t0 itself: a place beside it by r is judged wrong where the two minima differ by less than about r, so
+where it is that close both are found and their values decide.
 """
 
 from __future__ import annotations
@@ -19,8 +21,8 @@ from typing import NamedTuple
 
 from kernels._jit import inline
 
-EPS = 2.0**-53
 LAST_STEP = 1e-4  # a cubically converging step below this leaves 1e-11, which float64 does not show in the value
+NEARLY = 1e-3  # of the coefficients: the proof changes by less over 1e-4, what is left of the way to a flat minimum
 _R = 0.5**0.5
 _C = 0.5 * (2.0 + 2.0**0.5) ** 0.5  # cos(pi/8)
 _S = 0.5 * (2.0 - 2.0**0.5) ** 0.5  # sin(pi/8)
@@ -106,10 +108,9 @@ def approach(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> 
 
 @inline
 def shortfall(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> float:
-    """Positive if and only if the stationary point (u, v) is not the global minimum; 0 within rounding counts as it."""
-    size = math.sqrt(c2 * c2 + s2 * s2)
-    c, even = c1 * u + s1 * v, c2 * ((u - v) * (u + v)) + s2 * (2.0 * u * v)
-    return 2.0 * size + c + 2.0 * even - 8.0 * EPS * (abs(c) + 4.0 * size)
+    """Positive if and only if the stationary point (u, v) is not the global minimum."""
+    even = c2 * ((u - v) * (u + v)) + s2 * (2.0 * u * v)
+    return 2.0 * math.sqrt(c2 * c2 + s2 * s2) + (c1 * u + s1 * v) + 2.0 * even
 
 
 @inline
@@ -152,7 +153,11 @@ def minimum(c1: float, s1: float, c2: float, s2: float) -> Minimum:
     """
     u, v = lowest_of_16(c1, s1, c2, s2)
     u, v = _descend(c1, s1, c2, s2, u, v)
-    if shortfall(c1, s1, c2, s2, u, v) > 0.0:
+    here = point(c1, s1, c2, s2, u, v)
+    if shortfall(c1, s1, c2, s2, u, v) > -NEARLY * (abs(c1) + abs(s1) + abs(c2) + abs(s2)):
         u, v = far_minimum(c2, s2, u, v)
         u, v = _descend(c1, s1, c2, s2, u, v)
-    return point(c1, s1, c2, s2, u, v)
+        there = point(c1, s1, c2, s2, u, v)
+        if there.value < here.value:
+            return there
+    return here

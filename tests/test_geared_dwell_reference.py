@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
+from mpmath import mp
 
 from kernels import status as st
 from kernels.families import geared_dwell
@@ -80,6 +81,28 @@ def test_maximum_is_met_by_a_fine_scan_and_never_exceeded(k, a):
     assert size.max() >= got["max_abs_d2psi"][0] * (1.0 - 1e-3)
     there = poses(k, a, got["phi_max_abs_d2psi"])["d2psi"][0, 0]
     assert abs(there) == pytest.approx(got["max_abs_d2psi"][0], rel=1e-11, abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("k", "a", "order"),
+    [
+        (2.2186470778856346, -466672.36837168813, 1),  # psi' is small everywhere
+        (0.16495896040741598, 3713.7803505649217, 1),
+        (22792400.266410917, -24360389.95470524, 2),  # the pin is nearest to the axis just where the half turns meet
+        (93173443.38945767, -116654518.54592405, 2),
+    ],
+)
+def test_errors_of_maxima_hold_for_offsets_and_pins_far_out(k, a, order):
+    name = MAXIMA[order - 1]
+    got = step("stationary points", [(k, a)], [name])
+    with mp.workdps(50):
+        places = [mp.pi * i / 400 for i in range(401)]
+        start = max(places, key=lambda phi: abs(derivatives(k, a, phi)[order - 1]))
+        if 0 < start < mp.pi:
+            ends = (start - places[1], start + places[1])
+            start = mp.findroot(lambda phi: derivatives(k, a, phi)[order], ends, solver="illinois", verify=False)
+        error = float(abs(mp.mpf(float(got[name][0])) - abs(derivatives(k, a, start)[order - 1])))
+    assert error <= got[f"err_{name}"][0]
 
 
 @pytest.mark.parametrize("samples", [360, 361, 362, 7])

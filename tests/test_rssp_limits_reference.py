@@ -52,6 +52,39 @@ def test_limits_are_the_extremes_of_the_motion():
             assert columns[f"err_{name}"][row] < 1e-12
 
 
+@pytest.mark.parametrize(
+    "design",
+    [
+        (0.9156694153827526, 153125.804726411, 0.7518401918250965, 153093.08559841683, -0.6997877999593956, 1.0),
+        (0.5797536651829513, 1.15078897550208, -2.8504666715231437e-07, -0.9915894035245809, -1.4176715885555362, -1.0),
+        (0.9177776008254614, 1.1170132756632343, 2.660216937976385e-05, 0.6367121675577532, -1.3499089814149792, 1.0),
+        (0.5816465378735323, 1.0082751993815842, 2.816717530130745e-06, 0.8235905107085677, 1.3548974719757266, -1.0),
+        (
+            0.9278532771362085,
+            2.8503111846897533,
+            -7.671861582560828e-15,
+            -0.17347362231624253,
+            -1.3041402458925866,
+            1.0,
+        ),
+        (0.5896896938701731, 2.6880973701066777, 7.294341599270926e-15, 0.8825590525203351, -0.500493803336483, 1.0),
+        (0.3, 30000.0, 0.2, 0.1, 0.4, 1.0),
+    ],
+)
+def test_errors_hold_for_long_offsets_balls_near_the_crank_axis_and_almost_symmetric_mechanisms(design):
+    """A stroke of some 1e-5 comes from distances that are small themselves, a margin from two almost equal dips."""
+    columns = found(design, LENGTHS + ANGLES + MARGINS)
+    exact = naive.limit_positions(design)
+    with mp.workdps(50):
+        b = mpf(design[1])
+        exact["margin"] = naive.least_discriminant(design) / b**2
+        exact["max_pressure_angle"] = mp.acos(mp.sqrt(exact["margin"]))
+        for name in LENGTHS + ANGLES + MARGINS[1:]:
+            error = float(abs(mpf(float(columns[name][0])) - exact[name]))
+            assert error <= columns[f"err_{name}"][0], name
+    assert columns["err_max_pressure_angle"][0] < 1e-8 * columns["max_pressure_angle"][0]
+
+
 def test_limits_recover_the_requirements_of_the_synthesis_table():
     """The table gives a, b to 25 digits; rounded to doubles they move the limits by rounding errors times 1/|w|."""
     rows = [row for row in SYNTHESIS if row["mechanism"] == "RSSP"]

@@ -118,6 +118,25 @@ def test_stroke_ratio_keeps_its_digits_where_both_limits_nearly_coincide(design,
     assert found["stroke_ratio"][0] == pytest.approx(stroke_ratio, rel=0.0, abs=4.0 * 2.0**-53)
 
 
+@pytest.mark.parametrize(
+    ("design", "swing"),
+    [
+        ((0.19878513407076476, 4.264731383184888, 3.7559023120821258, -1.8225764339733483, -0.7341732898957085,
+          1.2272837972358586, 1.193212526974253, 1.0), -0.004805849876982996093833),
+        ((0.38143623081368705, 280.1607292260518, 1.7154028972401056, -0.9022488485304225, -279.50588235610513,
+          0.7006400763364398, 0.4222217235069572, 1.0), -0.003308349093291862500487),
+        ((0.9958324141476641, 2669.5075693930426, 3.1392671699815082, 2.3851357682119234, -2669.9833738972206,
+          -0.7419462682174038, 0.8612705195631452, -1.0), 0.0002958969898832275954455),
+        ((0.5148462645783128, 24722.92788485492, 3.1395545694837037, -2.3193150931820252, -24724.679920578226,
+          1.7432843730439926, 2.8967628069244475, 1.0), -0.00004556020963487921518213),
+    ],
+)  # fmt: skip
+def test_error_of_a_tiny_swing_counts_what_its_lever_and_distances_round_by(design, swing):
+    """Expected at 50 digits; the estimate stays below what the difference of two angles would have."""
+    found = design_outputs(RSSR, np.array([design]), ["swing", "psi_ext"], Accuracy(target=1e-8))
+    assert abs(found["swing"][0] - swing) <= found["err_swing"][0] < found["err_psi_ext"][0]
+
+
 def test_swing_of_a_general_chain_is_unwrapped():
     designs = crank_rockers(300, 42)
     found = design_outputs(PLAIN_RSSR, designs, ["swing", "psi_ext", "psi_fold", "range_psi"], Accuracy(target=1e-8))

@@ -69,6 +69,26 @@ def test_no_minimum_is_missed_among_half_a_million():
     assert np.all(found[:, 3] >= -1e-12 * size)
 
 
+def test_of_two_minima_almost_of_one_height_the_lower_one_is_found():
+    """The proof of a global minimum errs by what is left of the way to a stationary point, more than minima differ."""
+    r = np.random.default_rng(5)
+    n = 20_000
+    c2, odd = r.uniform(0.3, 2.0, n), 10.0 ** r.uniform(-15.0, -5.0, n) * r.choice([-1.0, 1.0], n)
+    # Two minima where cos t = -c1/(4 c2); towards |c1| = 4 c2 they merge and are flat.
+    c1 = 4.0 * c2 * (1.0 - 10.0 ** r.uniform(-6.0, 0.0, n)) * r.choice([-1.0, 1.0], n)
+    coefficients = np.column_stack([c1, odd, c2, np.zeros(n)])
+    start = np.arccos(-c1 / (4.0 * c2))
+    lowest = np.full(n, np.inf)
+    for t in (start, -start):
+        for _ in range(3):
+            slope = odd * np.cos(t) - c1 * np.sin(t) - 2.0 * c2 * np.sin(2.0 * t)
+            t = t + slope / (odd * np.sin(t) + c1 * np.cos(t) + 4.0 * c2 * np.cos(2.0 * t))
+        lowest = np.minimum(lowest, value(coefficients, t[:, None])[:, 0])
+    found = least(coefficients)
+    at = value(coefficients, np.arctan2(found[:, 1], found[:, 0])[:, None])[:, 0]
+    assert (at <= lowest + 4.0 * 2.0**-53 * np.abs(coefficients).sum(axis=1)).all()
+
+
 def test_two_minima_of_one_height_and_flat_ones_are_no_trouble():
     cases = {
         (0.0, 0.0, 1.0, 0.0): -1.0,  # two equal minima

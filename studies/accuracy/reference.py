@@ -69,6 +69,20 @@ def _motion(inputs: list[Any], branch: int) -> tuple[Any, ...]:
     return mpmath.atan2(s, k), d1, d2, d3
 
 
+def turning_point(design: Array, phi: float) -> tuple[Any, Any]:
+    """Crank angle and rocker angle where the rocker turns back next to phi, by Newton's method in 60 digits."""
+    import mpmath
+
+    with mpmath.workdps(DIGITS):
+        inputs, branch, here = [mpmath.mpf(float(x)) for x in design[:7]], int(design[7]), mpmath.mpf(phi)
+        for _ in range(_SECANTS):
+            _, velocity, acceleration, _ = _motion([*inputs, here], branch)
+            here -= velocity / acceleration
+            if abs(velocity) < mpmath.mpf(10) ** -40:
+                break
+        return here, _motion([*inputs, here], branch)[0]
+
+
 def condition(design: Array, phi: float) -> tuple[float, ...]:
     """Absolute condition numbers sum |x dy/dx| of psi and its derivatives over all inputs, by 60-digit differences."""
     import mpmath

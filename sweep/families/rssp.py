@@ -74,17 +74,18 @@ def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
     rssp.margin(designs, status, least, turns, angle, None)
     with np.errstate(all="ignore"):  # lengths beyond any drawing have their status
         scale = designs[:, 1] ** 2
-        # Rounding errors of Q = (b - m)(b + m) - n^2, taken where m and n are largest.
+        # Rounding errors of sin^2 = (m^2 + n^2)/b^2, taken where m and n are largest; cos^2 has that of b^2 as well.
         size = (np.abs(designs[:, 2]) + designs[:, 0]) ** 2 + (np.abs(designs[:, 3]) + designs[:, 0]) ** 2
-        err_margin = 18.0 * EPS * size / scale + 4.0 * EPS
-        # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
-        err_angle = np.minimum(err_margin / np.abs(np.sin(2.0 * angle)), np.sqrt(err_margin)) + 4.0 * EPS
+        err_square = 18.0 * EPS * size / scale
+        # d(angle) = d(sin^2)/sin(2 angle), and sqrt(d(sin^2)) where that is too steep to be linear.
+        err_angle = np.minimum(err_square / np.abs(np.sin(2.0 * angle)), np.sqrt(err_square))
+        err_angle += 4.0 * EPS * (angle + np.tan(angle))
     columns: Columns = {
         "rotatable": turns == 1.0,
         "margin": least,
         "max_pressure_angle": angle,
         "err_rotatable": np.zeros(n),
-        "err_margin": err_margin,
+        "err_margin": err_square + 8.0 * EPS,
         "err_max_pressure_angle": err_angle,
     }
     return _chosen(columns, wanted, status)
@@ -101,9 +102,10 @@ def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) 
     stroke, ratio = np.abs(values["stroke"]), values["stroke_ratio"]
     ca, e = np.abs(np.cos(designs[:, 4])), np.abs(designs[:, 2])
     rho2 = [np.hypot(e, values[f"s_{end}"] * ca) ** 2 for end in ("ext", "fold")]
-    err_phi = [e * ca * err / square + 8.0 * EPS for err, square in zip((err_ext, err_fold), rho2, strict=True)]
-    # |s_ext + s_fold - 2 f sin(alpha)|, the denominator of the half-stroke identity
-    between = 2.0 * designs[:, 0] * sum(np.sqrt(square) for square in rho2) / stroke
+    err_phi = [e * ca * err / square + 16.0 * EPS for err, square in zip((err_ext, err_fold), rho2, strict=True)]
+    # Half-stroke identity: both distances from the crank axis, over |s_ext + s_fold - 2 f sin(alpha)|
+    distances = sum(np.sqrt(square) for square in rho2)
+    between = 2.0 * designs[:, 0] * distances / stroke
     err_phi0 = err_phi[0] + err_phi[1]
     columns: Columns = values | {
         "stroke": stroke,
@@ -113,7 +115,7 @@ def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) 
         "err_phi_fold": err_phi[1],
         "err_phi0": err_phi0,
         "err_stroke_ratio": err_phi0 * (1.0 + ratio) ** 2 / (2.0 * np.pi),
-        "err_stroke": stroke * (2.0 * (err_ext + err_fold) / between + 16.0 * EPS),
+        "err_stroke": stroke * ((err_ext + err_fold) * (2.0 / between + ca / distances) + 16.0 * EPS),
     }
     return _chosen(columns, wanted, status)
 

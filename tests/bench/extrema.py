@@ -2,7 +2,7 @@
 
 The two tables of docs/extrema.md.  Errors against poses in twice the working precision about the peaks that eight times
 the samples find, which tests/test_extrema_reference.py compares with brute force.  Families without their own steps.
-Then the crank-rocker's own search against the proof of its maxima.
+Then the crank-rocker's own search against the proof of its maxima, and limit positions against 50 digits.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from sweep.families.base import Accuracy
 from sweep.reductions import extrema
 from sweep.reductions.extrema import Mode, Request
 from sweep.summaries import design_outputs
+from tests.bench.limits import limits
 from tests.climbing import climbed
 from tests.turn_designs import GUIDE, NEEDLE, RSSP, RSSR, crank_rockers, guided_four_bars, needle_drives, slider_cranks
 
@@ -130,4 +131,5 @@ if __name__ == "__main__":
     print(description())
     errors()
     missed()
+    limits()
     times()

@@ -8,7 +8,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.families.geared_dwell.closure import Array, Reduced, Status, reduce_design
+from kernels.families.geared_dwell.closure import Array, Reduced, Status, reduce_design, velocity
 from kernels.polynomial import roots_up_to, value_and_slope
 
 
@@ -18,16 +18,15 @@ def stretch(
 ) -> tuple[float, float]:
     """Quadratics of a stretch of the half turn in its own variable tau >= 0; its length and |dtau/dcos(phi)|.
 
-    ``s2`` is sin^2(phi), ``q`` and ``d`` are Q and D, and psi' = 1 - lean/D.  The turn is cut at phi = pi/2 with
-    tau = t (number 0) and tau = 1 + cos(phi) (number 1).  Where the pin passes nearest to the axis at cos(phi) = 1/k,
-    near a = -k, number 0 is replaced by two stretches in tau = 1 - k cos(phi) (number 2) and its negative (number 3).
+    ``s2`` is sin^2(phi), ``q`` and ``d`` are Q and D.  The turn is cut at phi = pi/2 with tau = t (number 0) and
+    tau = 1 + cos(phi) (number 1).  Where the pin passes nearest to the axis at cos(phi) = 1/k, near a = -k, it is cut
+    there, with tau = 1 - k cos(phi) (number 2) and its negative (number 3), and psi' = 1 - lean/D.
     """
     h = r.front if number != 1 else r.back
     if number < 2:
         s2[0], s2[1], s2[2] = 0.0, 2.0, -1.0
         q[0], q[1], q[2] = h.q0, h.q1, r.ak4
         d[0], d[1], d[2] = h.e * h.e, h.d1, -r.ak4
-        lean[0], lean[1] = h.total * h.e, -2.0 * h.total
         return 1.0, 1.0
     g, per_k, total = (1.0 if number == 2 else -1.0), 1.0 / k, h.total
     s2[0], s2[1], s2[2] = (1.0 - per_k) * (1.0 + per_k), 2.0 * g * per_k * per_k, -per_k * per_k
@@ -38,7 +37,7 @@ def stretch(
     )
     d[0], d[1], d[2] = total * total, 4.0 * g * total * per_k, -4.0 * a * per_k
     lean[0], lean[1] = total * (2.0 * per_k + (a - k)), -2.0 * g * total * per_k
-    return (1.0 if number == 2 else k - 1.0), k
+    return k + g, k
 
 
 @inline
@@ -92,15 +91,18 @@ def turn_maxima(
             code = st.SINGULAR
         near = k > 1.0 and 2.0 * abs(total) < abs(r.front.e)
         m1, m2, m3, phi2 = 0.0, -1.0, 0.0, 0.0
-        for number in range(4 if code == st.OK else 0):
-            if (number == 0 and near) or (number >= 2 and not near):
-                continue
+        first = 2 if near else 0
+        for number in range(first, first + 2 if code == st.OK else first):
             end, steep = stretch(r, k, a, number, s2, q, d, lean)
             if max_abs_dpsi is not None:
                 count = roots_up_to(end, q, 2, scratch, found)
                 for n in range(-2, count):
                     tau = found[n] if n >= 0 else (0.0 if n == -1 else end)
-                    value = abs(1.0 - (lean[0] + lean[1] * tau) / quadratic(d, tau))
+                    square = quadratic(d, tau)
+                    if number < 2:
+                        value = abs(velocity(r.front if number == 0 else r.back, r.ak4, tau, square))
+                    else:
+                        value = abs(1.0 - (lean[0] + lean[1] * tau) / square)
                     m1 = value if not value <= m1 else m1  # nan, a root that did not settle, stays
             if max_abs_d2psi is not None or phi_max_abs_d2psi is not None or max_abs_d3psi is not None:
                 # bend = s2'/2 q d + s2 (q' d - 2 q d'): psi'' is stationary where it vanishes, psi''' ~ bend/d^3.

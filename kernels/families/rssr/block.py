@@ -16,12 +16,12 @@ from kernels.reduce import largest, smallest
 from kernels.trigpoly import approach, far_minimum, lowest_of_16, minimum, point, shortfall
 
 BLOCK = 64
-# After a second step of at most _LONGEST the way to the minimum is below _NEAR (3e-6 was seen); its third power
-# float64 does not show.  The test for the global minimum is as blunt: what is not _SURE is done again, with care.
-_LONGEST, _NEAR, _SURE = 1e-2, 1e-5, 1e-4
+# From nearer than _NEAR one step of Newton's method reaches the minimum as well as float64 shows.  Farther are flat
+# ones, after two steps from the lowest of 16 points.  They, and what is not _SURE to be the global one, are done again.
+_NEAR, _SURE = 1e-5, 1e-4
 # Rows: the fields of Reduced, the polynomial of Delta, its minimum.  During loading they hold the design itself.
 E, Y0, CA, K0, K1, K2, W_SIZE, COUPLER, ROCKER, Z0, SA, BRANCH, VALID = (k * BLOCK for k in range(13))
-C1, S1, C2, S2, COS, SIN, STEP, DELTA, CURVATURE, TOLERANCE, ACROSS = (k * BLOCK for k in range(13, 24))
+C1, S1, C2, S2, COS, SIN, AGAIN, DELTA, CURVATURE, TOLERANCE, ACROSS = (k * BLOCK for k in range(13, 24))
 ROWS = 24
 
 
@@ -67,40 +67,50 @@ def least_delta(count: int, at: Array) -> None:
 
     The bound of the rounding error is from standard error analysis (docs/rssr.md, section 4.2): the numbers of the
     closure carry errors of at most 5 (X), 7 (Y) and 18 (W) units of 2^-53 of their terms, the unit length of (cos, sin)
-    included, and near Delta = 0 |W| <= |X| + |Y|.
+    included, and near Delta = 0 |W| <= |X| + |Y|; where it is not, far from turning, W itself stands for them.
     """
     for k in range(count):
         at[k + COS], at[k + SIN] = lowest_of_16(at[k + C1], at[k + S1], at[k + C2], at[k + S2])
     for k in range(count):
         c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2]
-        u, v, step = approach(c1, s1, c2, s2, at[k + COS], at[k + SIN])
+        u, v, _ = approach(c1, s1, c2, s2, at[k + COS], at[k + SIN])
         at[k + COS], at[k + SIN] = u, v
         size = abs(c1) + abs(s1) + abs(c2) + abs(s2)
-        at[k + STEP] = math.inf if shortfall(c1, s1, c2, s2, u, v) > -_SURE * size else step
+        at[k + AGAIN] = 1.0 if shortfall(c1, s1, c2, s2, u, v) > -_SURE * size else 0.0
     for k in range(count):
-        if at[k + STEP] > _LONGEST:
+        _evaluate(at, k)
+    for k in range(count):
+        if at[k + AGAIN] != 0.0:
             m = minimum(at[k + C1], at[k + S1], at[k + C2], at[k + S2])
             at[k + COS], at[k + SIN] = m.cos, m.sin
-    for k in range(count):
-        u, v, e, y0, ca = at[k + COS], at[k + SIN], at[k + E], at[k + Y0], at[k + CA]
-        k0, k1, k2 = at[k + K0], at[k + K1], at[k + K2]
-        # The expanded coefficients only place the minimum; its value comes from X, Y, W themselves, and its slope there
-        # takes off what is left of the way to it.
-        x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
-        slope = x * v + y * ca * u - w * (k1 * u + k2 * v)
-        curvature = -(at[k + C1] * u + at[k + S1] * v) - 4.0 * (
-            at[k + C2] * ((u - v) * (u + v)) + at[k + S2] * (2.0 * u * v)
-        )
-        step = -2.0 * slope / curvature
-        step = step if (curvature > 0.0) & (abs(step) <= _NEAR) else 0.0
-        at[k + DELTA] = (x * x + y * y - w * w) + slope * step
-        shrink = 1.0 - 0.5 * step * step
-        u, v = (u - v * step) * shrink, (v + u * step) * shrink
-        at[k + COS], at[k + SIN] = u, v
-        at[k + CURVATURE] = curvature
-        mx, my, mw = abs(e) + 1.0, abs(y0) + abs(ca), at[k + W_SIZE]
-        w_error = 18.0 * EPS * mw
-        at[k + TOLERANCE] = EPS * (14.0 * mx * mx + 18.0 * my * my + 38.0 * (mx + my) * mw) + w_error * w_error
+            _evaluate(at, k)
+
+
+@inline
+def _evaluate(at: Array, k: int) -> None:
+    """Delta at the minimum next to the place given, and whether that was too far from it."""
+    u, v, e, y0, ca = at[k + COS], at[k + SIN], at[k + E], at[k + Y0], at[k + CA]
+    k0, k1, k2 = at[k + K0], at[k + K1], at[k + K2]
+    # The expanded coefficients only place the minimum; its value comes from X, Y, W themselves, and its slope there
+    # takes off what is left of the way to it.
+    x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
+    slope = x * v + y * ca * u - w * (k1 * u + k2 * v)
+    curvature = -(at[k + C1] * u + at[k + S1] * v) - 4.0 * (
+        at[k + C2] * ((u - v) * (u + v)) + at[k + S2] * (2.0 * u * v)
+    )
+    step = -2.0 * slope / curvature
+    near = (curvature > 0.0) & (abs(step) <= _NEAR)
+    step = step if near else 0.0
+    at[k + AGAIN] = at[k + AGAIN] if near else 1.0
+    at[k + DELTA] = (x * x + y * y - w * w) + slope * step
+    shrink = 1.0 - 0.5 * step * step
+    u, v = (u - v * step) * shrink, (v + u * step) * shrink
+    at[k + COS], at[k + SIN] = u, v
+    at[k + CURVATURE] = curvature
+    mx, my, mw = abs(e) + 1.0, abs(y0) + abs(ca), at[k + W_SIZE]
+    reach = mx + my if mx + my > abs(w) else abs(w)
+    w_error = 18.0 * EPS * mw
+    at[k + TOLERANCE] = EPS * (14.0 * mx * mx + 18.0 * my * my + 38.0 * reach * mw) + w_error * w_error
 
 
 @inline

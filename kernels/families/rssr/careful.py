@@ -32,21 +32,26 @@ def rounding(
     u: float,
     v: float,
     height: float,
-) -> float:
-    """Relative rounding error of the transfer function of that order where it is ``height``.
+) -> tuple[float, float]:
+    """Relative rounding errors of the transfer function of that order where it is ``height``, and of its slope.
 
     It behaves like Delta^(1/2 - order), so it is off relatively by what Delta is.  And it is a sum of terms of the size
-    1, k1, k2 over T, whose rounding, and that of the angle in them, stays however small the sum is.
+    1, k1, k2 over T, whose rounding stays however small the sum is, and so does that of the angle in them: what the
+    closure X C - Y S + W is off, over T.  Where W is small and the terms it is made of are not, Delta shows none of it,
+    but its slope does, and with it that of the function [1/rad].
     """
     x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
     mx, my = abs(e) + 1.0, abs(y0) + abs(ca)
     tolerance = 4.0 * EPS * (abs(x) * mx + abs(y) * my + abs(w) * w_size)
+    slope = 4.0 * EPS * (abs(v) * mx + abs(ca * u) * my + abs(k1 * u + k2 * v) * w_size)
     delta = x * x + y * y - w * w
     per_t = 1.0 / math.sqrt(largest(delta, 1e-300))
-    terms = (2.0 * EPS * (2.0 + abs(k1) + abs(k2)) + 0.5 * tolerance * per_t) * per_t
+    angle = 4.0 * EPS * (mx + my + w_size) * per_t
+    terms = (2.0 * EPS * (2.0 + abs(k1) + abs(k2)) + angle) * per_t
     more = 1.0 + per_t
     terms *= 1.0 if order == 1 else (more if order == 2 else more * more)
-    return (order + 0.5) * tolerance * (per_t * per_t) + 8.0 * EPS + terms / abs(height)
+    per_delta = (order + 0.5) * (per_t * per_t)
+    return tolerance * per_delta + 8.0 * EPS + terms / abs(height), slope * per_delta
 
 
 @inline
@@ -101,7 +106,7 @@ def careful_maximum(
                     if peak > best:
                         best, place, error, reach = peak, where, bound, width
             phi, y, dy = following, y2, dy2
-        relative = rounding(order, e, y0, ca, k0, k1, k2, w_size, math.cos(place), math.sin(place), best)
+        relative, _ = rounding(order, e, y0, ca, k0, k1, k2, w_size, math.cos(place), math.sin(place), best)
         error += best * relative
         change = abs(best - before)
         if not missed and best > 0.0 and change <= 0.1 * target * best + error:

@@ -141,22 +141,27 @@ def _wrapped(angle: float) -> float:
 
 
 @inline
-def _swing(at: Array, k: int, s1: float, c1: float, s2: float, c2: float, rho: float) -> tuple[float, float]:
-    """Signed swing of the mirrored mechanism, always negative, and how much its error exceeds those of the angles.
+def _swing(at: Array, k: int, s1: float, c1: float, s2: float, c2: float, rho: float) -> tuple[float, float, float]:
+    """Signed swing of the mirrored mechanism, always negative; how its error grows with that of the angles; its own.
 
     rho is the sum of the two distances of the ball from the crank axis.  The half-swing identity keeps its relative
-    accuracy for tiny swings; its sign also tells a swing near 2 pi from one near 0.
+    accuracy for tiny swings; its sign also tells a swing near 2 pi from one near 0.  Angles that are off turn the lever
+    and move the balls, by no more than the rocker's length times as much; lever and distances round by the terms they
+    are sums of, which may be much larger.
     """
     difference = math.atan2(s2 * c1 - c2 * s1, c1 * c2 + s1 * s2)
     if abs(difference) > _TINY_SWING:
-        return (difference if difference < 0.0 else difference - TURN), math.inf
+        return (difference if difference < 0.0 else difference - TURN), 1.0, 0.0
+    e, y0, rocker = at[k + E], at[k + Y0], at[k + ROCKER]
     sm, cm = s1 + s2, c1 + c2
     length = math.hypot(sm, cm)
     sm, cm = sm / length, cm / length
-    lever = at[k + E] * sm + at[k + Y0] * cm
-    half = math.asin(max(min(rho / (2.0 * at[k + ROCKER] * lever), 0.5), -0.5))
-    across = at[k + E] * cm - at[k + Y0] * sm
-    return (2.0 * half if half < 0.0 else 2.0 * half - TURN), abs(2.0 * half * across / lever)
+    lever = e * sm + y0 * cm
+    half = math.asin(max(min(rho / (2.0 * rocker * lever), 0.5), -0.5))
+    swing = 2.0 * half if half < 0.0 else 2.0 * half - TURN
+    turned = abs((e * cm - y0 * sm) / lever) + rocker / rho
+    terms = (abs(e * sm) + abs(y0 * cm)) / abs(lever) + (abs(e) + rocker * (1.0 + abs(at[k + K1]))) / rho
+    return swing, abs(2.0 * half) * turned, abs(swing) * 16.0 * EPS * (1.0 + terms)
 
 
 @kernel
@@ -219,7 +224,7 @@ def _fill(at: Array, k: int, n: int, begin: Array, out: Array, error: Array | No
     if not (xi1 > 0.0 and xi2 < 0.0):
         return False
     branch, rocker, ca = at[k + BRANCH], at[k + ROCKER], at[k + CA]
-    swing, lever = _swing(at, k, s1, c1, s2, c2, xi1 - xi2)
+    swing, growth, own = _swing(at, k, s1, c1, s2, c2, xi1 - xi2)
     dc, ds = c2 - c1, s2 - s1
     if abs(swing) < _TINY_SWING:
         half = math.tan(0.5 * swing)
@@ -236,7 +241,7 @@ def _fill(at: Array, k: int, n: int, begin: Array, out: Array, error: Array | No
         error[0], error[1] = size / t1 + 4.0 * EPS, size / t2 + 4.0 * EPS
         error[2], error[3] = error[0] * rocker / xi1 + 16.0 * EPS, error[1] * rocker / -xi2 + 16.0 * EPS
         both = error[0] + error[1]
-        error[4] = min(both, both * lever + 32.0 * EPS * abs(swing))
+        error[4] = min(both, both * growth + own)
         error[5] = error[2] + error[3]
         error[6] = error[5] * TURN / ((math.pi - beyond) * (math.pi - beyond))
     return True

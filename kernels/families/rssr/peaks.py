@@ -14,6 +14,7 @@ from kernels.families.rssr.block import BLOCK, CA, K0, K1, K2, W_SIZE, Y0, E
 from kernels.families.rssr.careful import rounding
 from kernels.families.rssr.closure import Array
 from kernels.families.rssr.derivatives import follower
+from kernels.reduce import largest
 from kernels.trigpoly import rotate
 
 TURN = 2.0 * math.pi
@@ -91,6 +92,7 @@ def refine(begin: int, end: int, m: Array, rounds: int, first: Array | None, sec
             step = -dy / d2y if y * d2y < 0.0 else math.copysign(width, y * dy)
             step = min(max(step, -0.5 * width), 0.5 * width)
             m[i + MOVED] += step
+            m[i + LAST] = step
             u, v = rotate(m[i + _U], m[i + _V], step)
             m[i + _U] = u
             m[i + _V] = v
@@ -113,9 +115,8 @@ def finish(
         trusted = trusted & (peak - m[i + _PEAK] >= _NEAREST * bend * moved * moved - _LEVEL * peak)
         trusted = trusted & (peak - m[i + _LEFT] >= _NEXT * bend * before * before)
         trusted = trusted & (peak - m[i + _RIGHT] >= _NEXT * bend * after * after)
-        m[i + HEIGHT], m[i + LAST] = peak, step
         m[i + ERROR] = rise if trusted else math.inf
-        relative = rounding(
+        relative, slope = rounding(
             order,
             m[i + _E],
             m[i + _Y0],
@@ -129,9 +130,12 @@ def finish(
             peak,
         )
         m[i + ROUNDING] = relative
-        # What a step of Newton's method leaves is quadratic; that of the jerk has a slope good to a thousandth.
-        left = step * (4.0 * step / width + (1e-3 if order == 3 else 0.0) * math.copysign(1.0, step))
-        m[i + REACH] = left + 4.0 * relative * math.sqrt(abs(y / d2y)) + _TURNED
+        # What a step of Newton's method leaves is quadratic, the step before shows how much; that of the jerk has a
+        # slope good to a thousandth.
+        last, across = m[i + LAST], math.sqrt(abs(y / d2y))
+        left = 4.0 * largest(abs(step) / width, step * step / (last * last + 1e-300)) + (1e-3 if order == 3 else 0.0)
+        m[i + HEIGHT], m[i + LAST] = peak, step
+        m[i + REACH] = left * abs(step) + 4.0 * across * (relative + across * slope) + _TURNED
 
 
 @kernel
