@@ -156,6 +156,18 @@ def test_planar_locus_is_the_circle_of_alt():
     np.testing.assert_allclose(moved["b"], rows["b"], rtol=1e-12)  # only f - g matters in the plane
 
 
+def test_straight_locus_of_the_plane_has_one_phi1_and_is_found_by_psi1():
+    """alpha = 0, phi0 = swing + 180 deg: Alt's circle is a line through the crank axis, the same phi1 all along it."""
+    table = {"swing": math.radians(20.0), "phi0": math.radians(200.0), "e": 1.0, "f": 0.0, "g": 0.0, "alpha": 0.0}
+    assert set(sweep.synthesise("rssr", table | {"phi1": np.linspace(0.0, 6.2, 40)})["failed"]) == {"point"}
+    rows = accepted(sweep.synthesise("rssr", table | {"psi1": np.linspace(-3.1, 3.1, 200)}))
+    assert len(rows) > 5
+    assert np.ptp(rows["phi_ext"]) < 1e-12
+    limits = sweep.summarise("rssr", rows[list(RSSR_NAMES)], ["swing", "phi0"], accuracy=1e-12)
+    np.testing.assert_allclose(limits["swing"], table["swing"], rtol=1e-9)
+    np.testing.assert_allclose(limits["phi0"], table["phi0"], rtol=1e-9)
+
+
 def test_right_angle_locus_is_the_hyperbola():
     rows = accepted(sweep.synthesise("rssr", requirements(2000, 78, alpha=math.pi / 2)))
     assert len(rows) > 80

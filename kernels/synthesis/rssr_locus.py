@@ -245,7 +245,8 @@ def rssr_at_direction(
             way = math.copysign(1.0, u1 * cosine + v1 * sine)
             u1, v1 = way * cosine, way * sine
         side = (qx1 * qx2 + qy1 * qy2) * c0 + (qx1 * qy2 - qy1 * qx2) * s0
-        point = inner >= 0.0 and c > 0.0 and rho1 > 0.0
+        near = abs(p2) > 8.0 * EPS * (abs(ca * r.sin_swing * c0) + abs(s0)) or root[i] < 0.0  # else at infinity
+        point = near and inner >= 0.0 and c > 0.0 and rho1 > 0.0
         back = -rho2 if side < 0.0 else rho2
         _finish(r, point, x1, y1, rho1, back, u1, v1, i, status, failed, designs)
         if phi1 is not None:
