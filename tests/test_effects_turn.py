@@ -87,7 +87,9 @@ def test_all_extrema_of_the_pressure_angle_are_found(b, c, e, f, g, alpha):
     change = np.diff(square, append=square[:1])
     clear = change[np.abs(change) > 1e-12]
     turns = int((np.sign(clear) != np.sign(np.roll(clear, 1))).sum())
-    assert turns in (got["pressure_extrema"], got["pressure_extrema"] - 2) or got["pressure_extrema"] == 0
+    # Of a curve that is flat to its rounding the samples show no extremum; it may have some all the same.
+    flat = np.ptp(square) < 1e-9
+    assert flat or turns in (got["pressure_extrema"], got["pressure_extrema"] - 2) or got["pressure_extrema"] == 0
     assert got["pressure_max"] >= got["pressure_max2"] >= got["pressure_min2"] >= got["pressure_min"]
 
 
