@@ -16,7 +16,7 @@ from studies.accuracy.regions import regions
 from sweep.families.base import Accuracy
 from sweep.reductions.extrema import Request, true_extrema
 from sweep.summaries import design_outputs
-from tests.climbing import climbed, turning_points
+from tests.climbing import climbed, turning_points, values
 from tests.turn_designs import GUIDE, NEEDLE, RSSP, RSSR, crank_rockers, guided_four_bars, needle_drives, slider_cranks
 
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
@@ -125,6 +125,24 @@ def test_places_lie_within_their_errors(case, target):
         off = np.abs(np.angle(np.exp(1j * (found[request].phi - exact))))
         assert (off <= found[request].err_phi).all()
         assert found[request].err_phi.max() <= max(target, 1e-10)
+
+
+@pytest.mark.parametrize("target", [1e-6, 1e-8, 1e-12])
+def test_places_of_the_jerk_lie_within_their_errors(target):
+    """The general search has no derivative of the jerk; here it is a difference of order four, good to 2e-12 rad."""
+    h, request = 3e-5, Request("d3s", 0)
+    designs = guided_four_bars(12000, 21)
+    margin = design_outputs(GUIDE, designs, ["margin"], Accuracy(target=1e-8))
+    designs = designs[(margin["status"] == st.OK) & (margin["margin"] > 1e-3)][:1000]
+    found, _ = true_extrema(GUIDE, designs, [request], target, locate=True)
+    place, error = found[request].phi, np.maximum(found[request].err_phi, 2e-12)
+
+    def slope(phi):
+        y = np.abs(values(GUIDE, designs, "d3s", phi[:, None] + h * np.array([-2.0, -1.0, 1.0, 2.0])))
+        return 8.0 * (y[:, 2] - y[:, 1]) - (y[:, 3] - y[:, 0])
+
+    assert (slope(place - error) >= 0.0).all() and (slope(place + error) <= 0.0).all()
+    assert error.max() <= max(target, 1e-9)
 
 
 def _off(value, exact, request):

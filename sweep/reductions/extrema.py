@@ -15,7 +15,7 @@ from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
 from sweep.reductions.breaks import jumps, near_jumps, search
-from sweep.reductions.refine import EPS, Peaks, Sampler, confirmed, first_peaks, polish_places, sharpen
+from sweep.reductions.refine import EPS, SHRINK, Peaks, Sampler, confirmed, first_peaks, polish_places, sharpen
 from sweep.reductions.window import Window, edges
 from sweep.sampling import (
     TWO_PI,
@@ -253,7 +253,8 @@ class _Search:
         centre = np.multiply(column, spacing, dtype=np.float64)
         first = first_peaks(centre, np.full(row.size, spacing), around)
         sample = self._sampler(self.family, rows, candidates, sign * around[:, 3])
-        peaks = sharpen(sample, first, tolerance, self.target if self.locate else None)
+        place = np.full(row.size, self.target if self.locate else np.inf)
+        peaks = sharpen(sample, first, tolerance, place)
         rounding = self._rounding(columns, candidates, self.guards) * np.abs(peaks.height)
         peaks = peaks._replace(err_height=peaks.err_height + rounding)
         if self.family.precise_poses is not None:
@@ -277,7 +278,13 @@ class _Search:
             tolerance = np.where(tied, np.minimum(tolerance, TIE * size[rivals]), tolerance)
         mine, peak = candidates.only(rivals), peaks.only(rivals)
         sample = self._sampler(self.family.precise(), rows, mine, sign[rivals] * peak.height)
-        peak = confirmed(sample, peak, tolerance)
+        locate = np.full(rivals.size, np.inf)
+        if self.locate:
+            # Without a derivative to polish it by, a place is no better than the rounding of the heights: precise ones.
+            bare = np.array([request.pose not in self.family.derivative_of for request in self.requests])[mine.request]
+            locate[bare] = self.target
+            peak.err_phi[bare] = np.maximum(peak.step, SHRINK**3 * peak.spacing)[bare]
+        peak = confirmed(sample, peak, tolerance, locate)
         # The first stage of a chain is given its exact input, those behind it a rounded one.
         rounding = self._rounding(columns, mine, self.guards[1:]) * np.abs(peak.height)
         for column, found in zip(peaks, peak._replace(err_height=peak.err_height + rounding), strict=True):

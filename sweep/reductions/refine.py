@@ -68,7 +68,7 @@ def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
     return Peaks(centre + spacing * place, height, err_phi, err_height, height, spacing, SHRINK * spacing)
 
 
-def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: float | None = None) -> Peaks:
+def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> Peaks:
     """Highest points near the given ones, by quartics through five points ever closer together.
 
     Parameters
@@ -76,7 +76,7 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: float | Non
     sample : evaluates the measured quantity; called with the candidates that are not finished yet
     peaks : k peaks as known so far
     tolerance : (k,) error allowed in the height
-    locate : error allowed in the place [rad]; without it the place is as good as the height left it
+    locate : (k,) error allowed in the place [rad]; inf leaves the place as good as the height makes it
 
     Notes
     -----
@@ -85,10 +85,7 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: float | Non
     followed.
     """
     phi, height, err_phi, err_height, guess, spacing, step = (column.copy() for column in peaks)
-    enough = err_height <= tolerance
-    if locate is not None:
-        enough &= err_phi <= locate
-    active = np.flatnonzero(~enough)
+    active = np.flatnonzero((err_height > tolerance) | (err_phi > locate))
     for _ in range(PASSES):
         if not active.size:
             break
@@ -105,33 +102,32 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: float | Non
         height[active] = top
         err_height[active] = error
         err_phi[active[sharper]] = err_place[sharper]
-        enough = inside & (error <= tolerance[active])
-        if locate is not None:
-            enough &= (err_phi[active] <= locate) | ~sharper
+        enough = inside & (error <= tolerance[active]) & ((err_phi[active] <= locate[active]) | ~sharper)
         # A window that has lost its peak was too small for its place.
         step[active] = np.where(inside, SHRINK * u, np.minimum(u / SHRINK, SHRINK * spacing[active]))
         active = active[~enough & (step[active] > 1e-6 * spacing[active])]
     return Peaks(phi, height, err_phi, err_height, guess, spacing, step)
 
 
-def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array) -> Peaks:
+def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> Peaks:
     """Peaks as poses of higher precision have them: their heights are values at their places.
 
     One pose at the place of a peak measures how far rounding, and what was left of interpolation, have moved its
-    value.  Only where that is more than the ``tolerance`` the peak is sharpened again.
+    value.  Only where that is more than the ``tolerance``, or the place is not known to ``locate``, the peak is
+    sharpened again.
 
     Parameters
     ----------
     sample : evaluates the measured quantity with less rounding than what the peaks come from
-    peaks, tolerance : as in `sharpen`
+    peaks, tolerance, locate : as in `sharpen`
     """
     peaks = _attained(sample, peaks, np.arange(peaks.phi.size))
-    again = np.flatnonzero(peaks.err_height > tolerance)
+    again = np.flatnonzero((peaks.err_height > tolerance) | (peaks.err_phi > locate))
     if again.size:
         # Rounding may have spoilt the place too: begin as wide as it is uncertain.
         step = np.maximum(peaks.step, np.minimum(peaks.err_phi, SHRINK * peaks.spacing))
         rough = peaks._replace(step=step).only(again)
-        sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, tolerance[again])
+        sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, tolerance[again], locate[again])
         sharper = _attained(sample, sharper, again)
         for column, found in zip(peaks, sharper, strict=True):
             column[again] = found
@@ -176,7 +172,9 @@ def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target
     top = (inner >= values[:, 2:-4]) & (inner >= values[:, 4:-2]) & (inner >= 0.9 * values.max(axis=1)[:, None])
     row, column = np.nonzero(top)
     first = first_peaks(angles[row, column + 3], spacing[row], values[row[:, None], column[:, None] + np.arange(7)])
-    peaks = confirmed(lambda active, at: measured(row[active], at), first, target * first.height)
+    peaks = confirmed(
+        lambda active, at: measured(row[active], at), first, target * first.height, np.full(row.size, np.inf)
+    )
     best, which = np.full(phi.size, -np.inf), np.full(phi.size, -1)
     scan.best_candidate(row, peaks.height, best, which)
     highest, slope = peaks.only(which), family.derivative_of.get(pose)
