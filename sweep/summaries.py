@@ -233,7 +233,8 @@ def _run(family: Family, job: _Job, designs: Array, accuracy: Accuracy, window: 
         for plain in own.values():
             # A step that serves a target promises it; one that estimates its error says so itself.
             found.setdefault(f"err_{plain}", accuracy.target * np.abs(np.asarray(found[plain], np.float64)))
-            if plain.startswith("max_abs_") and mechanism.precise_poses is not None and not accuracy.certify:
+            located = any(o.name == f"phi_{plain}" for o in job.group.provides)
+            if plain.startswith("max_abs_") and located and mechanism.precise_poses and not accuracy.certify:
                 _sharpen(mechanism, job.group, part, plain, found, accuracy.target)
     return {"status": found["status"]} | {
         key: found[own_key]
