@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 from sweep.errors import InputError, LinksweepError, StudyError
 
 if TYPE_CHECKING:
-    from sweep.comparison import compare
-    from sweep.engine import run
-    from sweep.poses import evaluate
-    from sweep.store import is_complete, load
-    from sweep.summaries import summarise
+    from sweep.dataset.comparison import compare
+    from sweep.dataset.store import is_complete, load
+    from sweep.engine.run import run
+    from sweep.evaluation.poses import evaluate
+    from sweep.evaluation.summaries import summarise
     from sweep.synthesis.mechanisms import synthesise
 
 __all__ = [
@@ -30,12 +30,12 @@ __all__ = [
 
 # Imported when first used, so that the command line answers at once: numba alone takes a quarter of a second.
 _HOMES = {
-    "compare": "sweep.comparison",
-    "evaluate": "sweep.poses",
-    "is_complete": "sweep.store",
-    "load": "sweep.store",
-    "run": "sweep.engine",
-    "summarise": "sweep.summaries",
+    "compare": "sweep.dataset.comparison",
+    "evaluate": "sweep.evaluation.poses",
+    "is_complete": "sweep.dataset.store",
+    "load": "sweep.dataset.store",
+    "run": "sweep.engine.run",
+    "summarise": "sweep.evaluation.summaries",
     "synthesise": "sweep.synthesis.mechanisms",
 }
 

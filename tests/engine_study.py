@@ -8,14 +8,14 @@ import sys
 import time
 from pathlib import Path
 
-import sweep.plan
-from sweep.engine import run
+import sweep.chunks.plan
+from sweep.engine.run import run
 from sweep.errors import LinksweepError
 
 # Plan and log are smaller than this, chunks larger.
 SMALL = 6000
 
-# What to set in `sweep.plan` for chunks of so many designs, whatever they cost.
+# What to set in `sweep.chunks.plan` for chunks of so many designs, whatever they cost.
 CHUNK = 4096
 SMALL_CHUNKS = {"CHUNK_SECONDS": 1e-9, "CHUNK_STEP": CHUNK}
 
@@ -73,7 +73,7 @@ def main(study: str, out: str, jobs: str, backend: str, pause: str) -> None:
         sync(descriptor)
 
     os.fsync = slow_sync  # type: ignore[assignment]
-    vars(sweep.plan).update(SMALL_CHUNKS)
+    vars(sweep.chunks.plan).update(SMALL_CHUNKS)
     try:
         run(study, out, int(jobs), backend)  # type: ignore[arg-type]
     except LinksweepError as error:

@@ -15,9 +15,9 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from sweep import store
-from sweep.chunk import ChunkResult
-from sweep.plan import make_plan
+from sweep.chunks.chunk import ChunkResult
+from sweep.chunks.plan import make_plan
+from sweep.dataset import store
 from sweep.study import Study, study_from_data
 
 CHUNK = 4096

@@ -15,7 +15,7 @@ from kernels.families.rssr.single import dense_acceleration_single
 from studies.accuracy import answer, digits, lookup, marks, oracle, publish, reference, tables
 from studies.accuracy.methods import acceleration_methods, swing_methods
 from studies.accuracy.regions import margins, regions, rotatable
-from sweep.sampling import turn
+from sweep.reductions.sampling import turn
 
 NAMES = ("a", "b", "c", "e", "f", "g", "alpha", "sigma")
 ROOT = Path(__file__).parents[1]

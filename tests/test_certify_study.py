@@ -13,12 +13,12 @@ from click.testing import CliRunner
 import sweep
 from kernels import status as st
 from sweep.cli import main
+from sweep.engine.estimate import other_accuracies
 from sweep.errors import InputError, StudyError
-from sweep.estimate import other_accuracies
+from sweep.evaluation.summaries import routes
 from sweep.families import rssr as entry
 from sweep.families.base import Accuracy
 from sweep.study import load_study, with_accuracy
-from sweep.summaries import routes
 from tests.rssr_designs import random_designs
 
 COLUMNS = ("a", "b", "c", "e", "f", "g", "alpha", "branch")

@@ -147,7 +147,7 @@ def test_unexpected_error_keeps_its_traceback(table: Path, monkeypatch: pytest.M
     def broken(*_: object) -> None:
         raise ZeroDivisionError("a bug")
 
-    monkeypatch.setattr("sweep.poses.evaluate", broken)
+    monkeypatch.setattr("sweep.evaluation.poses.evaluate", broken)
     result = call("eval", "geared_dwell", table, "--want", "psi")
     assert isinstance(result.exception, ZeroDivisionError)
     assert result.exit_code == 1
@@ -228,7 +228,7 @@ def test_run_passes_its_options_on(study: Path, monkeypatch: pytest.MonkeyPatch)
         given.update(options, positional=arguments)
         return Path("somewhere")
 
-    monkeypatch.setattr("sweep.engine.run", run)
+    monkeypatch.setattr("sweep.engine.run.run", run)
     options = ("--jobs", 3, "--backend", "loky", "--accuracy", 1e-5, "--smoke", "--force", "--out", "x")
     assert call("run", study, *options).output == "dataset: somewhere\n"
     assert given["positional"] == (study, Path("x"), 3, "loky")
@@ -239,7 +239,7 @@ def test_interrupt_ends_with_130(study: Path, monkeypatch: pytest.MonkeyPatch) -
     def run(*_: object, **__: object) -> Path:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sweep.engine.run", run)
+    monkeypatch.setattr("sweep.engine.run.run", run)
     assert call("run", study).exit_code == 130
 
 

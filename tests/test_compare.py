@@ -11,12 +11,12 @@ import pytest
 from click.testing import CliRunner
 
 import sweep
-import sweep.plan
-from sweep import store
-from sweep.chunk import ChunkResult
+import sweep.chunks.plan
+from sweep.chunks.chunk import ChunkResult
+from sweep.chunks.plan import make_plan
 from sweep.cli import main
+from sweep.dataset import store
 from sweep.errors import InputError, StoreError
-from sweep.plan import make_plan
 from sweep.study import Study, load_study
 from tests.engine_study import SMALL_CHUNKS, write_study
 
@@ -30,7 +30,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
 def dataset(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         for name, value in SMALL_CHUNKS.items():
-            patch.setattr(sweep.plan, name, value)
+            patch.setattr(sweep.chunks.plan, name, value)
         return sweep.run(study, tmp_path_factory.mktemp("old") / "designs")
 
 
@@ -164,7 +164,7 @@ def test_bad_arguments_are_refused(dataset: Path, tmp_path: Path) -> None:
 
 def test_it_needs_no_more_memory_for_more_chunks(study: Study, dataset: Path, tmp_path: Path) -> None:
     """A chunk at a time: what was read and compared is let go."""
-    from sweep.comparison import _Rows
+    from sweep.dataset.comparison import _Rows
 
     side = _Rows(dataset)
     sizes = [len(side.until(stop)) for stop in side.stops]

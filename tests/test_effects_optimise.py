@@ -8,11 +8,11 @@ import pytest
 from sweep.effects import extended
 from sweep.effects.costs import CENTRE, INPUTS
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem, minimise
 from sweep.study import Limit, OptimiseSettings
-from sweep.summaries import design_outputs
 
 VARIABLES = ("b", "f")
 ONCE = OptimiseSettings(starts=1, seed=1, time_budget=None)

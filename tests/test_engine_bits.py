@@ -10,25 +10,25 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import sweep.plan
+import sweep.chunks.plan
 from kernels import status as codes
-from sweep.cascade import Batch, Cascade, Level, levels, meets
-from sweep.chunk import compute_chunk, output_columns, parameter_matrix
-from sweep.engine import run
+from sweep.chunks.cascade import Batch, Cascade, Level, levels, meets
+from sweep.chunks.chunk import compute_chunk, output_columns, parameter_matrix
+from sweep.chunks.plan import make_plan
+from sweep.dataset.store import is_complete, load, read_plan, read_runs
+from sweep.engine.run import run
 from sweep.errors import InputError
+from sweep.evaluation.summaries import Route, design_outputs
+from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Array, Columns
-from sweep.plan import make_plan
-from sweep.store import is_complete, load, read_plan, read_runs
 from sweep.study import Limit, OutputSettings, Study, load_study
-from sweep.summaries import Route, design_outputs
-from sweep.tables import design_matrix
 from tests.engine_study import CHUNK, SMALL_CHUNKS, chunk_bytes, write_study
 
 
 @pytest.fixture(autouse=True)
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in SMALL_CHUNKS.items():
-        monkeypatch.setattr(sweep.plan, name, value)
+        monkeypatch.setattr(sweep.chunks.plan, name, value)
 
 
 @pytest.fixture
@@ -101,8 +101,8 @@ def test_cascade_runs_a_route_only_on_survivors(
     study: Study, monkeypatch: pytest.MonkeyPatch, keep: Literal["all", "feasible"]
 ) -> None:
     recorder = Recorder()
-    monkeypatch.setattr("sweep.cascade.routes", recorder.routes)
-    monkeypatch.setattr("sweep.cascade.design_outputs", recorder.design_outputs)
+    monkeypatch.setattr("sweep.chunks.cascade.routes", recorder.routes)
+    monkeypatch.setattr("sweep.chunks.cascade.design_outputs", recorder.design_outputs)
     limits = (Limit("x", 20.0, None), Limit("y", None, 100.0))
     tiny = replace(study, want=("x", "y", "z"), limits=limits, output=OutputSettings(keep))
     matrix, made = parameter_matrix(tiny, 0, tiny.space.count)
@@ -133,8 +133,8 @@ def test_cascade_runs_a_route_only_on_survivors(
 def test_survivors_wait_until_they_are_enough(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
     """Twenty pieces, but each route is called with full batches and once with what is left over."""
     recorder = Recorder()
-    monkeypatch.setattr("sweep.cascade.routes", recorder.routes)
-    monkeypatch.setattr("sweep.cascade.design_outputs", recorder.design_outputs)
+    monkeypatch.setattr("sweep.chunks.cascade.routes", recorder.routes)
+    monkeypatch.setattr("sweep.chunks.cascade.design_outputs", recorder.design_outputs)
     monkeypatch.setattr(Level, "batch", 1000)
     tiny = replace(study, want=("x", "y", "z"), limits=(Limit("y", None, 80.0),), output=OutputSettings("feasible"))
     matrix, made = parameter_matrix(tiny, 0, 20_000)
@@ -230,11 +230,11 @@ def test_plan_does_not_depend_on_jobs_and_knows_its_bounds(study: Study) -> None
 
 
 def test_chunk_size_follows_cost_and_memory(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep.plan, "CHUNK_SECONDS", 1e9)
-    monkeypatch.setattr(sweep.plan, "CHUNKS_AT_LEAST", 1e-9)
+    monkeypatch.setattr(sweep.chunks.plan, "CHUNK_SECONDS", 1e9)
+    monkeypatch.setattr(sweep.chunks.plan, "CHUNKS_AT_LEAST", 1e-9)
     size = make_plan(study).chunk_size
-    row = sweep.plan.row_bytes(study)
-    assert sweep.plan.CHUNK_BYTES - CHUNK * row < size * row <= sweep.plan.CHUNK_BYTES
+    row = sweep.chunks.plan.row_bytes(study)
+    assert sweep.chunks.plan.CHUNK_BYTES - CHUNK * row < size * row <= sweep.chunks.plan.CHUNK_BYTES
 
 
 @pytest.mark.parametrize("name", ["swing", "stroke", "swing1", "stroke2"])

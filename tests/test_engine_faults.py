@@ -17,10 +17,11 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-import sweep.engine
-import sweep.plan
-from sweep.chunk import ChunkResult, compute_chunk
-from sweep.engine import run
+import sweep.chunks.plan
+import sweep.engine.run
+from sweep.chunks.chunk import ChunkResult, compute_chunk
+from sweep.dataset.store import BAD, LOCK, OLD, PLAN, is_complete, load, locked, parts, read_runs
+from sweep.engine.run import run
 from sweep.errors import (
     InputError,
     Interrupted,
@@ -31,8 +32,7 @@ from sweep.errors import (
     TimeUsedUp,
     WorkerDied,
 )
-from sweep.progress import Progress
-from sweep.store import BAD, LOCK, OLD, PLAN, is_complete, load, locked, parts, read_runs
+from sweep.jobs.progress import Progress
 from sweep.study import Budget, Study, load_study
 from tests.engine_study import CHUNK, ROOT, SMALL, SMALL_CHUNKS, chunk_bytes, write_study
 
@@ -42,7 +42,7 @@ PAUSE = 0.05
 @pytest.fixture(autouse=True)
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in SMALL_CHUNKS.items():
-        monkeypatch.setattr(sweep.plan, name, value)
+        monkeypatch.setattr(sweep.chunks.plan, name, value)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def whole(path: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, byt
     """Chunks of an uninterrupted run."""
     with pytest.MonkeyPatch.context() as patch:
         for name, value in SMALL_CHUNKS.items():
-            patch.setattr(sweep.plan, name, value)
+            patch.setattr(sweep.chunks.plan, name, value)
         return chunk_bytes(run(path, tmp_path_factory.mktemp("whole")))
 
 
@@ -245,21 +245,21 @@ def test_foreign_chunk_without_plan_is_refused(study: Study, whole: dict[str, by
 
 def test_change_of_code_is_foreign_too(study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = run(study, tmp_path / "out")
-    monkeypatch.setattr(sweep.plan, "code_hash", lambda: "0123456789abcdef")
+    monkeypatch.setattr(sweep.chunks.plan, "code_hash", lambda: "0123456789abcdef")
     with pytest.raises(InputError, match="code 0123456789ab"):
         run(study, out)
 
 
 def test_code_is_what_was_imported_whatever_its_files_have_become(monkeypatch: pytest.MonkeyPatch) -> None:
-    imported = sweep.plan.code_hash(), sweep.plan.optimiser_hash()
-    sweep.plan.code_hash.cache_clear()
-    sweep.plan.optimiser_hash.cache_clear()
+    imported = sweep.chunks.plan.code_hash(), sweep.chunks.plan.optimiser_hash()
+    sweep.chunks.plan.code_hash.cache_clear()
+    sweep.chunks.plan.optimiser_hash.cache_clear()
     monkeypatch.setattr(Path, "read_bytes", lambda path: b"edited")
-    assert (sweep.plan.code_hash(), sweep.plan.optimiser_hash()) == imported
+    assert (sweep.chunks.plan.code_hash(), sweep.chunks.plan.optimiser_hash()) == imported
 
 
 def test_progress_that_nobody_reads_any_more_does_not_stop_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.progress.LINE_SECONDS", -1.0)
+    monkeypatch.setattr("sweep.jobs.progress.LINE_SECONDS", -1.0)
     reading, writing = os.pipe()
     stream = os.fdopen(writing, "w", buffering=1)
     with Progress("x", 3, 0, True, stream) as shown:
@@ -315,7 +315,7 @@ def test_bug_in_a_worker_surfaces_with_its_chunk(study: Study, tmp_path: Path, m
     def broken(study: Study, start: int, stop: int, should_stop: object) -> ChunkResult:
         raise ZeroDivisionError("broken")
 
-    monkeypatch.setattr("sweep.worker.compute_chunk", broken)
+    monkeypatch.setattr("sweep.engine.worker.compute_chunk", broken)
     with pytest.raises(ZeroDivisionError) as caught:
         run(study, tmp_path / "out", jobs=1)
     assert read_runs(tmp_path / "out")[-1]["outcome"] == "ZeroDivisionError"
@@ -356,7 +356,7 @@ def test_a_sweep_that_outlasts_its_budget_stops_with_124_and_continues(
     short = replace(study, budget=Budget(disk_bytes=1e9, seconds=4.0))
     with monkeypatch.context() as patch:
         ticking = SimpleNamespace(monotonic=lambda: next(clock), strftime=time.strftime, gmtime=time.gmtime)
-        patch.setattr(sweep.engine, "time", ticking)
+        patch.setattr(sweep.engine.run, "time", ticking)
         with pytest.raises(TimeUsedUp, match=r"the 4 s of budget.time are used up, \d of 5 chunks to go") as caught:
             run(short, tmp_path / "out", jobs=1)
     assert caught.value.exit_code == 124

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-import sweep.plan
-from sweep.engine import run
+import sweep.chunks.plan
+from sweep.dataset.store import OPTIMUM, is_complete, read_runs
+from sweep.engine.run import run
 from sweep.errors import Interrupted
-from sweep.store import OPTIMUM, is_complete, read_runs
 from sweep.study import Objective, OptimiseSettings, Study, load_study
 from tests.engine_study import chunk_bytes, write_study
 
@@ -77,7 +77,7 @@ def test_change_of_the_optimisers_sources_seeks_the_optimum_anew(
     study: Study, optimiser: Optimiser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = run(study, tmp_path / "out")
-    monkeypatch.setattr(sweep.plan, "optimiser_hash", lambda: "0123456789abcdef")
+    monkeypatch.setattr(sweep.chunks.plan, "optimiser_hash", lambda: "0123456789abcdef")
     run(study, out)
     assert len(optimiser.calls) == 2
 

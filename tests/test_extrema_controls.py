@@ -12,7 +12,7 @@ from kernels import status as st
 from sweep.families.base import Family, Output, Parameter
 from sweep.reductions import extrema
 from sweep.reductions.extrema import Request, true_extrema
-from sweep.sampling import sample_turn
+from sweep.reductions.sampling import sample_turn
 from tests.turn_designs import RSSR, crank_rockers
 
 NAMES = ("centre", "width", "height", "level", "hole")

@@ -13,9 +13,9 @@ import pytest
 
 from kernels import status as st
 from studies.accuracy.regions import regions
+from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
 from sweep.reductions.extrema import Request, true_extrema
-from sweep.summaries import design_outputs
 from tests.climbing import climbed, turning_points, values
 from tests.turn_designs import GUIDE, NEEDLE, RSSP, RSSR, crank_rockers, guided_four_bars, needle_drives, slider_cranks
 

@@ -8,9 +8,9 @@ import pytest
 from kernels import status as st
 from sweep.effects import extended
 from sweep.effects.costs import designs
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
-from sweep.summaries import design_outputs
 from tests.optimise_family import FAMILY as WAVES
 
 DENSE = 100_000

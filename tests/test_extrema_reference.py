@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from kernels import status as st
+from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Angles
 from sweep.reductions.extrema import Request, true_extrema
-from sweep.summaries import design_outputs
 from tests.reference import turn
 from tests.turn_designs import MAKERS
 

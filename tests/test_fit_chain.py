@@ -11,10 +11,10 @@ import pytest
 
 from kernels import status as st
 from sweep.errors import InputError, StudyError
+from sweep.evaluation.summaries import summarise
 from sweep.families import family
-from sweep.fit import LineFit, fit_line
 from sweep.study import load_study
-from sweep.summaries import summarise
+from sweep.synthesis.fit import LineFit, fit_line
 
 CHAIN = ["rssr", "guide"]
 

@@ -11,8 +11,8 @@ import pytest
 
 import sweep
 from kernels import status as st
+from sweep.evaluation.summaries import design_outputs
 from sweep.study import load_study
-from sweep.summaries import design_outputs
 
 FOLDER = Path(__file__).parents[1] / "studies" / "geared-dwell"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text())

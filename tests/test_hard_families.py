@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from kernels import status as st
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
 from sweep.families.chain import Chain
-from sweep.summaries import design_outputs
 
 RSSR = {"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "branch": -1.0}
 RSSP = {"a": 1.3, "b": 5.2, "e": 0.7, "f": 0.4, "alpha": 0.3, "branch": -1.0}

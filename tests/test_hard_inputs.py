@@ -13,9 +13,9 @@ import pytest
 
 from kernels import status as st
 from studies.accuracy.reference import condition, transfer_functions
+from sweep.evaluation.summaries import design_outputs, summarise
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
-from sweep.summaries import design_outputs, summarise
 
 RSSR = family("rssr")
 ORDINARY = np.array([0.5, 3.0, 2.0, 2.5, 0.7, -0.4, 0.9, 1.0])

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 import sweep
-from sweep.chunk import compute_chunk
+from sweep.chunks.chunk import compute_chunk
 from sweep.cli import main
 from sweep.errors import StudyError
 from sweep.study import load_study

@@ -16,14 +16,14 @@ import pandas as pd
 import pytest
 
 import sweep
-from sweep.cascade import meets
-from sweep.chunk import compute_chunk
+from sweep.chunks.cascade import meets
+from sweep.chunks.chunk import compute_chunk
+from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
 from sweep.optimise import minimise
 from sweep.optimise.study import problem_of
 from sweep.study import OptimiseSettings, load_study, study_from_data
 from sweep.study.study import Limit
-from sweep.summaries import design_outputs
-from sweep.tables import design_matrix
 
 STUDIES = Path(__file__).parents[1] / "studies"
 OPTIMISED = ("needle51", "looper-dwell")

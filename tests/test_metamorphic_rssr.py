@@ -18,9 +18,9 @@ from hypothesis import strategies as some
 import sweep
 from kernels import status as st
 from studies.accuracy.reference import condition
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
-from sweep.summaries import design_outputs
 from tests.turn_designs import crank_rockers
 
 RSSR = family("rssr")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sweep
-from sweep.cascade import levels
+from sweep.chunks.cascade import levels
 from sweep.study import load_study
 
 FOLDER = Path(__file__).parents[1] / "studies" / "needle208"

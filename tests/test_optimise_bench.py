@@ -6,8 +6,8 @@ from itertools import islice
 
 import pytest
 
+from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
-from sweep.summaries import design_outputs
 from tests.bench.optimise import RSSR, measure, page, solve, specifications
 
 

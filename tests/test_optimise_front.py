@@ -15,13 +15,13 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-import sweep.engine
-from sweep.engine import run
+import sweep.engine.run
+from sweep.dataset.store import OPTIMUM, PARETO, is_complete
+from sweep.engine.run import run
 from sweep.errors import Interrupted, StudyError
 from sweep.optimise import front_study
 from sweep.optimise.front import saved, within
 from sweep.report import write_report
-from sweep.store import OPTIMUM, PARETO, is_complete
 from sweep.study import ParetoSettings, Study, load_study
 from tests.test_optimise_study import STUDY
 
@@ -133,7 +133,7 @@ def test_interrupted_run_says_so_and_keeps_the_optimum(
     with monkeypatch.context() as patched:
         patched.setattr("sweep.optimise.front_study", stopped)
         with pytest.raises(Interrupted, match="front"):
-            sweep.engine.run(study, again, jobs=1)
+            sweep.engine.run.run(study, again, jobs=1)
     assert (again / OPTIMUM).read_bytes() == (folder / OPTIMUM).read_bytes()
     assert not is_complete(again)
 

@@ -9,6 +9,7 @@ import pytest
 
 from kernels import status as st
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem, minimise, newton
@@ -17,7 +18,6 @@ from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.starts import diverse
 from sweep.study import Limit, OptimiseSettings
-from sweep.summaries import design_outputs
 
 ONCE = OptimiseSettings(starts=1)
 RSSR = family("rssr")

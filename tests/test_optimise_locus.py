@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from sweep.engine import run
+from sweep.engine.run import run
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem, minimise, on_locus, optimise_study, optimum
@@ -18,7 +19,6 @@ from sweep.optimise.candidates import from_sample, ranking
 from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.study import Limit, OptimiseSettings, load_study
-from sweep.summaries import design_outputs
 from tests.bench.optimise import specifications
 
 RSSR, RSSP = family("rssr"), family("rssp")

@@ -10,12 +10,12 @@ import pytest
 
 from kernels import status as st
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem, minimise, pareto
 from sweep.optimise.pareto import Front, advance, bounded, steps
 from sweep.study import Limit, OptimiseSettings, ParetoSettings
-from sweep.summaries import design_outputs
 from tests.optimise_family import FAMILY
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.engine import run
+from sweep.engine.run import run
 from sweep.errors import InputError
 from sweep.optimise import optimise_study
 from sweep.optimise.starts import best_rows

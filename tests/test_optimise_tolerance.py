@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from sweep.engine import run
+from sweep.engine.run import run
 from sweep.errors import StudyError
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise.sensitivity import sensitivities
 from sweep.optimise.tolerance import deviating, tolerance_rows
 from sweep.study import Limit, Tolerance, load_study
-from sweep.summaries import design_outputs
 from tests.test_optimise_study import STUDY
 
 RSSR = family("rssr")

@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep import run, store
+from sweep import run
+from sweep.dataset import store
 from sweep.errors import InputError, StoreError
 from sweep.report import write_report
 from sweep.report.answer import answer

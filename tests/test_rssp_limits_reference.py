@@ -16,9 +16,9 @@ from mpmath import mp, mpf
 import sweep
 from kernels import status as st
 from kernels.families import rssp
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
-from sweep.summaries import design_outputs
 from tests.reference import rssp as naive
 from tests.turn_designs import slider_cranks
 

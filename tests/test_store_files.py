@@ -9,10 +9,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.chunk import ChunkResult
-from sweep.errors import InputError, StoreError
-from sweep.plan import Column, Plan
-from sweep.store import (
+from sweep.chunks.chunk import ChunkResult
+from sweep.chunks.plan import Column, Plan
+from sweep.dataset.store import (
     METADATA,
     append_run,
     content_hash,
@@ -27,6 +26,7 @@ from sweep.store import (
     write_atomically,
     write_chunk,
 )
+from sweep.errors import InputError, StoreError
 
 PLAN = Plan(
     name="tiny",

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from sweep.engine.estimate import check_budget, estimate, other_accuracies
 from sweep.errors import BudgetError
-from sweep.estimate import check_budget, estimate, other_accuracies
 from sweep.study import Budget, Study, load_study
 
 PROOF = "with the proof that no peak is missed"
@@ -67,7 +67,7 @@ def test_dropping_infeasible_designs_saves_disk(tmp_path: Path) -> None:
 
 
 def test_disk_estimate_is_close_to_that_of_a_run(tmp_path: Path) -> None:
-    from sweep.engine import run
+    from sweep.engine.run import run
 
     question = study(tmp_path, 400)
     expected = estimate(question, 2)

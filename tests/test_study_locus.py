@@ -18,8 +18,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from kernels import status as st
-from sweep.chunk import compute_chunk
-from sweep.engine import run
+from sweep.chunks.chunk import compute_chunk
+from sweep.engine.run import run
 from sweep.errors import StudyError
 from sweep.optimise.study import problem_of
 from sweep.study import Study, load_study

@@ -9,9 +9,9 @@ import pytest
 import sweep
 from kernels import status as st
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs, output, output_names, routes
 from sweep.families import family
 from sweep.families.base import Accuracy
-from sweep.summaries import design_outputs, output, output_names, routes
 from tests.turn_designs import NEEDLE, RSSR, crank_rockers, needle_drives
 
 TABLE = {"a": [1.0], "b": [3.0], "c": [2.0], "e": [3.5], "f": [0.1], "g": [0.2], "alpha": [0.3]}

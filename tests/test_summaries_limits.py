@@ -12,9 +12,9 @@ import pytest
 
 import sweep
 from kernels import status as st
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy
-from sweep.summaries import design_outputs
 from tests.turn_designs import RSSR, crank_rockers, guided_four_bars, slider_cranks
 
 ROWS = json.loads((Path(__file__).parent / "oracle" / "limits_open.json").read_text())["rows"]

@@ -9,9 +9,9 @@ import pytest
 
 import sweep
 from kernels import status as st
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
-from sweep.summaries import design_outputs
 from tests.turn_designs import GUIDE, MAKERS, NEEDLE, RSSR, crank_rockers, guided_four_bars, needle_drives
 
 WANTED = ["rotatable", "margin", "max_pressure_angle"]

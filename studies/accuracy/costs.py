@@ -15,9 +15,9 @@ from studies.accuracy.reference import RSSR
 from studies.accuracy.timing import seconds
 from sweep.effects import NAMES, effect
 from sweep.effects import costs as effects
+from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
-from sweep.sampling import turn
-from sweep.summaries import design_outputs
+from sweep.reductions.sampling import turn
 
 if TYPE_CHECKING:
     import pandas as pd

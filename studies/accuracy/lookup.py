@@ -14,7 +14,7 @@ from kernels.reduce import largest
 from studies.accuracy.methods import Method, Way
 from studies.accuracy.reference import RSSR
 from sweep.families.base import Angles, Array, Family
-from sweep.sampling import BLOCK, turn
+from sweep.reductions.sampling import BLOCK, turn
 
 Singles: TypeAlias = NDArray[np.float32]
 

@@ -20,7 +20,7 @@ from studies.accuracy import reference
 from studies.accuracy.regions import BRANCH, drawn, rotatable
 from studies.accuracy.timing import seconds
 from sweep.families.base import Array
-from sweep.sampling import Index, Status, turn
+from sweep.reductions.sampling import Index, Status, turn
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,9 +12,9 @@ from kernels import status as st
 from kernels.families import rssr
 from kernels.families.rssr.single import dense_acceleration_single
 from studies.accuracy.reference import RSSR
+from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Angles, Array
-from sweep.sampling import pose_columns, sample_turn, turn
-from sweep.summaries import design_outputs
+from sweep.reductions.sampling import pose_columns, sample_turn, turn
 
 Way: TypeAlias = Callable[[Array], Array]
 """Designs (n, 8) to one value each (n,); nan where the method itself says that it has no answer."""

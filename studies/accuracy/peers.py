@@ -19,7 +19,7 @@ from studies.accuracy.machine import description
 from studies.accuracy.reference import RSSR
 from studies.accuracy.timing import seconds
 from sweep.families.base import Array
-from sweep.sampling import turn
+from sweep.reductions.sampling import turn
 
 A, B, C, E = 1.0, 3.0, 2.5, 3.2  # crank, coupler, rocker, frame; turns fully
 ANGLES = 7200

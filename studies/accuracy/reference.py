@@ -9,7 +9,7 @@ import numpy as np
 from kernels.families import rssr
 from sweep.families import family
 from sweep.families.base import Array
-from sweep.sampling import pose_columns
+from sweep.reductions.sampling import pose_columns
 
 SAMPLES = 65536
 DIGITS = 60

@@ -36,7 +36,7 @@ def families(name: str | None) -> None:
 
 def describe(family: Family) -> list[str]:
     """Parameters, pose outputs and design outputs of a family with their units, one per line."""
-    from sweep.summaries import output
+    from sweep.evaluation.summaries import output
 
     lines = [f"{family.name}: {family.title}", "", "parameters (one length unit throughout, angles in rad)"]
     parameters = []
@@ -56,7 +56,7 @@ def describe(family: Family) -> list[str]:
 
 def main_outputs(family: Family) -> list[str]:
     """Design outputs but for the reductions of every pose output, of which only those a designer asks for first."""
-    from sweep.summaries import output_names
+    from sweep.evaluation.summaries import output_names
 
     general = {f"{prefix}{name}" for prefix in REDUCTIONS for name in family.pose_names}
     first = {f"max_abs_{name}" for name in (*family.derivative_of.values(), "dev")}

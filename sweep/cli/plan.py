@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sweep.cli.listing import aligned, main_outputs
 
 if TYPE_CHECKING:
-    from sweep.estimate import Estimate
+    from sweep.engine.estimate import Estimate
     from sweep.study import Study
     from sweep.study.space import Axis
 
@@ -28,11 +28,11 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     cost : its estimate
     others : what other accuracies would take [s], in words
     """
-    from sweep.cascade import ordered_routes
-    from sweep.plan import PARAMETER_UNITS
+    from sweep.chunks.cascade import ordered_routes
+    from sweep.chunks.plan import PARAMETER_UNITS
+    from sweep.evaluation.summaries import output
     from sweep.report.limits import bound_words
     from sweep.report.quantities import quantity
-    from sweep.summaries import output
 
     lines = [f"{study.name}: {study.title}" if study.title else study.name]
     lines += [f"mechanism {study.family.name} ({study.family.title})"]
@@ -95,7 +95,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
 
 
 def _kept(cost: Estimate) -> str:
-    from sweep.estimate import LEAST_KEPT
+    from sweep.engine.estimate import LEAST_KEPT
 
     words = f"{cost.kept:.3g} of all designs"
     return f"none of a pilot's designs, {words} assumed" if cost.kept <= LEAST_KEPT else words
@@ -107,9 +107,9 @@ def _times(ratio: float) -> str:
 
 def _front(study: Study) -> list[str]:
     """The front of [pareto]: what is set against what, from where to where, and how much searching that is."""
+    from sweep.evaluation.summaries import output
     from sweep.optimise.pareto import searches
     from sweep.report.quantities import number, quantity
-    from sweep.summaries import output
 
     if study.pareto is None:
         return []
@@ -127,9 +127,9 @@ def _front(study: Study) -> list[str]:
 
 def _effects(study: Study) -> list[str]:
     """The effects of the scene: what is computed, what is not, and which rules of negligibility hold."""
+    from sweep.chunks.plan import spread_designs
     from sweep.effects.advice import findings, left_out, tree
     from sweep.families import family as find_family
-    from sweep.plan import spread_designs
 
     bare = find_family(study.families)
     out = left_out(bare, study.want)

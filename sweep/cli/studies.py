@@ -40,7 +40,7 @@ def run(
     An interrupted run is resumed by the same command.  Finished chunks are never computed twice, and the result is the
     same, bit for bit, with any number of workers.
     """
-    from sweep.engine import run as run_study
+    from sweep.engine.run import run as run_study
 
     proof = True if certify else None
     folder = run_study(
@@ -59,7 +59,7 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
     A study over its budget ends with exit code 3.
     """
     from sweep.cli.plan import plan_lines
-    from sweep.estimate import check_budget, estimate, other_accuracies
+    from sweep.engine.estimate import check_budget, estimate, other_accuracies
     from sweep.study import load_study
 
     model = load_study(study, smoke=smoke)
@@ -99,7 +99,7 @@ def compare(old: Path, new: Path, rtol: float, slower: float) -> None:
     Ends with 11 if rows, a status or the pattern of missing values changed, else with 10 if values changed, else with
     12 if the new run was slower; with 0 if nothing moved.
     """
-    from sweep.comparison import compare as compare_datasets
+    from sweep.dataset.comparison import compare as compare_datasets
 
     found = compare_datasets(old, new, rtol, slower)
     for line in found.lines():

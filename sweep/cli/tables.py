@@ -43,7 +43,7 @@ def evaluate_table(family: str, table: Path, want: tuple[str, ...], poses: int |
     out = checked_format(out)
     import numpy as np
 
-    from sweep.poses import evaluate
+    from sweep.evaluation.poses import evaluate
 
     phi = None if poses is None else np.arange(poses) * (2.0 * np.pi / poses)
     designs = read_table(table)
@@ -83,7 +83,7 @@ def summarise_table(
     such as rssr+guide.  A value that is nan has a status that says why.
     """
     out = checked_format(out)
-    from sweep.summaries import summarise
+    from sweep.evaluation.summaries import summarise
 
     designs = read_table(table)
     found = summarise(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.cascade import compared
+from sweep.chunks.cascade import compared
 from sweep.families.base import Accuracy, Array
 from sweep.optimise.problem import Problem
 from sweep.optimise.starts import spread
@@ -154,7 +154,7 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
 
 def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accuracy) -> dict[str, Array]:
     """Outputs and parameters (n,) of designs."""
-    from sweep.summaries import design_outputs
+    from sweep.evaluation.summaries import design_outputs
 
     names = problem.family.parameter_names
     columns: dict[str, Any] = {name: designs[:, names.index(name)] for name in wanted if name in names}

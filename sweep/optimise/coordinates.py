@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from sweep.families.base import Accuracy, Array, Family
-from sweep.locus import OnLocus
+from sweep.synthesis.prescription import OnLocus
 
 EXACT = Accuracy(target=1e-12)
 
@@ -87,7 +87,7 @@ class LocusCoordinates:
 
     def read(self, family: Family, designs: Array) -> Mapping[str, Array]:
         """Limit positions of designs; nan where there are none."""
-        from sweep.summaries import design_outputs
+        from sweep.evaluation.summaries import design_outputs
 
         number, direction = self.stage.number, f"direction{self.stage.number}"
         asked = [name for name in self.given if name != direction]

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from sweep.families.chain import Chain
-from sweep.locus import OnLocus
 from sweep.optimise.coordinates import LocusCoordinates
 from sweep.optimise.problem import Problem
+from sweep.synthesis.prescription import OnLocus
 
 # The place on the locus is an angle without ends: a search that begins within one turn may leave it on either side.
 PLACE_BOUNDS = (-math.pi, 3.0 * math.pi)

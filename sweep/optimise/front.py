@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as st
-from sweep import store
-from sweep.cascade import MAGNITUDES
+from sweep.chunks.cascade import MAGNITUDES
+from sweep.dataset import store
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.optimise.certificate import Result
@@ -117,8 +117,8 @@ def _write(path: Path, study: Study, settings: ParetoSettings, best: Front, key:
 
 
 def _unit(study: Study, name: str) -> str:
+    from sweep.evaluation.summaries import output
     from sweep.study.units import internal_unit
-    from sweep.summaries import output
 
     return internal_unit(output(study.family, name).unit)
 

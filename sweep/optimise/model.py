@@ -159,7 +159,7 @@ class Model:
         names = self.problem.family.parameter_names
         if name in names:
             return designs[:, names.index(name)]
-        from sweep.summaries import design_outputs
+        from sweep.evaluation.summaries import design_outputs
 
         columns = design_outputs(self.problem.family, designs, [name], self.problem.accuracy, self.problem.window)
         return np.asarray(columns[name], dtype=np.float64)

@@ -15,10 +15,10 @@ from typing import Any
 
 from sweep.errors import WorkerDied
 from sweep.families.base import Array
+from sweep.jobs.signals import SIGNALS, depend_on_parent
 from sweep.optimise.certificate import Result
 from sweep.optimise.problem import Problem
 from sweep.optimise.search import search
-from sweep.signals import SIGNALS, depend_on_parent
 
 POLL = 0.05  # between two looks at whether to stop [s]
 GRACE = 1.0  # for workers to hand back what they have once they are to stop [s]

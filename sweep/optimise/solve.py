@@ -15,12 +15,12 @@ import numpy as np
 from kernels import status as st
 from sweep.errors import InputError
 from sweep.families.base import Array
+from sweep.jobs.signals import Stop, stop_on_signal
 from sweep.optimise.certificate import AGREE, Result
 from sweep.optimise.form import Program
 from sweep.optimise.parallel import in_processes
 from sweep.optimise.problem import PLACE, Problem
 from sweep.optimise.search import search
-from sweep.signals import Stop, stop_on_signal
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings

@@ -66,8 +66,8 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
     """
     import pyarrow.parquet as pq
 
-    from sweep.cascade import compared
-    from sweep.store import parts
+    from sweep.chunks.cascade import compared
+    from sweep.dataset.store import parts
 
     names = family.parameter_names
     designs, merit = np.empty((0, len(names))), np.empty(0)
@@ -86,8 +86,8 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
 
 def drawn(study: Study, count: int, seed: int) -> Array:
     """Designs of a study's space at random, finished by its [locus] and [fit]: for datasets without feasible rows."""
-    from sweep.chunk import parameter_matrix
-    from sweep.fit import fit_line
+    from sweep.chunks.chunk import parameter_matrix
+    from sweep.synthesis.fit import fit_line
 
     length = min(64, study.space.count)
     blocks = max(1, SCREENED * count // length)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as st
-from sweep import store
+from sweep.dataset import store
 from sweep.errors import InputError
+from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Angles, Array, Parameter
 from sweep.optimise.candidates import ranking
 from sweep.optimise.certificate import Result
@@ -24,7 +25,6 @@ from sweep.optimise.solve import minimise
 from sweep.optimise.starts import best_rows, diverse, drawn
 from sweep.optimise.tolerance import tolerance_rows
 from sweep.optimise.written import certificates, outputs, write
-from sweep.tables import design_matrix
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study

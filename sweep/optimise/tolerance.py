@@ -68,8 +68,8 @@ def tolerance_rows(
     ``missing`` (share without it), ``within`` (share that keeps its limits; nan without a limit); a last row
     "all limits" has only ``within``.  The share of 2048 designs is good to about 1 %.
     """
-    from sweep.cascade import meets
-    from sweep.summaries import design_outputs
+    from sweep.chunks.cascade import meets
+    from sweep.evaluation.summaries import design_outputs
 
     designs = np.concatenate([design[None, :], deviating(family, design, tolerance, seed)])
     columns: dict[str, Any] = design_outputs(family, designs, list(outputs), accuracy, window)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep import store
+from sweep.dataset import store
 from sweep.families.base import Array
 from sweep.optimise.certificate import CAVEAT, Result
 
@@ -57,7 +57,7 @@ def certificates(results: list[Result]) -> dict[str, list[Any]]:
 
 def outputs(study: Study, designs: Array) -> dict[str, Any]:
     """Every wanted output of designs (k, P) with its error estimate."""
-    from sweep.summaries import design_outputs
+    from sweep.evaluation.summaries import design_outputs
 
     columns = design_outputs(study.family, designs, study.want, study.accuracy, study.window)
     return {name: values for name, values in columns.items() if name != "status"}
@@ -77,8 +77,8 @@ def write(
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    from sweep.plan import PARAMETER_UNITS, error_words
-    from sweep.summaries import output
+    from sweep.chunks.plan import PARAMETER_UNITS, error_words
+    from sweep.evaluation.summaries import output
 
     family = study.family
     texts = (

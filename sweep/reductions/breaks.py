@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from sweep.families.base import Array
-from sweep.sampling import TWO_PI, Index, Mask
+from sweep.reductions.sampling import TWO_PI, Index, Mask
 
 Curve: TypeAlias = Callable[[Array], Array]
 """Values (k,) of the k curves at angles (k,)."""

@@ -13,9 +13,9 @@ from sweep.families.base import Accuracy, Family, Output, Step
 from sweep.families.chain import Chain, Stage
 from sweep.reductions.extrema import Mode, Request
 from sweep.reductions.margins import margin_suffixes
+from sweep.reductions.sampling import is_angle_of_follower
 from sweep.reductions.size import SIZE, lengths, size_step
 from sweep.reductions.travel import certified_travel
-from sweep.sampling import is_angle_of_follower
 
 REDUCTIONS = {
     "max_abs": "largest magnitude over one turn of",

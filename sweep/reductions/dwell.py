@@ -6,8 +6,8 @@ import numpy as np
 
 from sweep.families.base import Array, Family
 from sweep.reductions.refine import EPS
+from sweep.reductions.sampling import TWO_PI, blocks, sample_turn
 from sweep.reductions.window import Window, edges
-from sweep.sampling import TWO_PI, blocks, sample_turn
 
 # The follower may pass a level twice between two of these; what lies between counts only if the stay is longer.
 SAMPLES = 512

@@ -16,8 +16,7 @@ from kernels import status as st
 from sweep.families.base import Array, Family
 from sweep.reductions.breaks import jumps, near_jumps, search
 from sweep.reductions.refine import EPS, SHRINK, Peaks, Sampler, confirmed, first_peaks, polish_places, sharpen
-from sweep.reductions.window import Window, edges
-from sweep.sampling import (
+from sweep.reductions.sampling import (
     TWO_PI,
     Index,
     Mask,
@@ -28,6 +27,7 @@ from sweep.sampling import (
     pose_columns,
     sample_turn,
 )
+from sweep.reductions.window import Window, edges
 
 Mode: TypeAlias = Literal[-1, 0, 1]
 

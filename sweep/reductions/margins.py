@@ -8,7 +8,7 @@ from kernels import status as st
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.chain import Chain, Stage
 from sweep.reductions.extrema import DESIGN_STATUS, Request, true_extrema
-from sweep.sampling import pose_columns
+from sweep.reductions.sampling import pose_columns
 
 NAMES = ("rotatable", "margin", "max_pressure_angle")
 # Smallest values are refined to this part of themselves: their sign is what matters.

@@ -13,7 +13,7 @@ import numpy as np
 from kernels import status as st
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.reductions.extrema import DESIGN_STATUS, LIMIT, START
-from sweep.sampling import Index, Status, blocks, sample_turn
+from sweep.reductions.sampling import Index, Status, blocks, sample_turn
 
 EPS = 2.0**-53
 KINKED = 1e-2  # relative change of a mean from which on its convergence tells kinks from smooth curves

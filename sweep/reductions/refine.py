@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels import scan
 from sweep.families.base import Array, Family
-from sweep.sampling import Index, Mask, pose_columns
+from sweep.reductions.sampling import Index, Mask, pose_columns
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""

@@ -16,8 +16,8 @@ from sweep.reductions.catalogue import STAY, Way, general_way
 from sweep.reductions.dwell import window_angle
 from sweep.reductions.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
 from sweep.reductions.margins import combined, margin_suffixes, margins, own_step
+from sweep.reductions.sampling import TWO_PI, Mask, Status, blocks, sample_turn
 from sweep.reductions.window import Window
-from sweep.sampling import TWO_PI, Mask, Status, blocks, sample_turn
 
 Group: TypeAlias = Literal["margin", "limits", "reductions", "means"]
 Found: TypeAlias = dict[Request, Extremum]

@@ -9,7 +9,7 @@ import numpy as np
 from kernels import scan
 from sweep.families.base import Array, Family
 from sweep.reductions.refine import EPS
-from sweep.sampling import TWO_PI, Index, Mask, is_angle_of_follower, pose_columns
+from sweep.reductions.sampling import TWO_PI, Index, Mask, is_angle_of_follower, pose_columns
 
 PASSES = 60
 

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from kernels import status as codes
-from sweep.cascade import compared
+from sweep.chunks.cascade import compared
 from sweep.report.front import front_sentence
 from sweep.report.limits import LimitState, Row, limit_state, limit_states, limited, value_of
 from sweep.report.quantities import Quantity, change, number, quantity

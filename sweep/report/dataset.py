@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kernels.status import MEANING
-from sweep import store
+from sweep.dataset import store
 from sweep.errors import InputError
 
 if TYPE_CHECKING:

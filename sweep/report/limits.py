@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from sweep.cascade import compared, meets
+from sweep.chunks.cascade import compared, meets
 from sweep.report.quantities import Quantity, number, quantity
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
-from sweep.cascade import compared
+from sweep.chunks.cascade import compared
 from sweep.errors import StoreError
 from sweep.report import answer, front, limits, robust, tables
 from sweep.report.curves import motion_caption, motion_figure

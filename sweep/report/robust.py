@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from sweep import store
+from sweep.dataset import store
 from sweep.report.quantities import number, quantity
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sweep.cascade import compared
+from sweep.chunks.cascade import compared
 from sweep.families.base import Array
 
 ROWS_PER_BATCH = 262_144

@@ -23,8 +23,8 @@ def reference_row(study: Study) -> dict[str, float] | None:
     """Parameters and outputs of the study's reference design, computed as the sweep computes its designs."""
     if study.reference is None:
         return None
-    from sweep.summaries import design_outputs
-    from sweep.tables import design_matrix
+    from sweep.evaluation.summaries import design_outputs
+    from sweep.evaluation.tables import design_matrix
 
     matrix, _ = design_matrix(study.family, study.reference)
     outputs = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)

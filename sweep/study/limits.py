@@ -15,14 +15,14 @@ from sweep.study.model import LimitEntry
 from sweep.study.study import Limit
 
 if TYPE_CHECKING:
-    from sweep.fit import LineFit
+    from sweep.synthesis.fit import LineFit
 
 _YES_OR_NO = re.compile(r"rotatable\d*")
 
 
 def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Output | None:
     """The design output named by the value at ``key``, or by the key itself; or a fault that gives the nearest."""
-    from sweep.summaries import output
+    from sweep.evaluation.summaries import output
 
     try:
         return output(family, name)

@@ -41,7 +41,7 @@ from sweep.study.prescribed import prescribed_limits, read_locus, read_prescribe
 from sweep.study.study import Budget, Objective, OptimiseSettings, OutputSettings, Study, Tolerance
 
 if TYPE_CHECKING:
-    from sweep.fit import LineFit
+    from sweep.synthesis.fit import LineFit
 
 DEFAULT_TARGET = 1e-8
 
@@ -302,7 +302,7 @@ def _window(scene: SceneSection, faults: Faults) -> tuple[float, float] | None:
 
 
 def _fit(section: FitSection, family: Family, faults: Faults) -> LineFit | None:
-    from sweep.fit import LineFit
+    from sweep.synthesis.fit import LineFit
 
     fit = LineFit(_quantity(section.stroke, "mm", ("fit", "stroke"), faults), section.direction == "free")
     try:

@@ -9,12 +9,12 @@ import numpy as np
 
 from sweep.families.base import Family
 from sweep.families.chain import Chain
-from sweep.locus import OnLocus
 from sweep.study.design import Entry, missing_parameter, read_entry
 from sweep.study.faults import Faults
 from sweep.study.space import Axis
 from sweep.study.study import Limit
 from sweep.synthesis import LOCI
+from sweep.synthesis.prescription import OnLocus
 
 WHOLE_TURN = 2.0 * np.pi * (1.0 - 1e-12)
 

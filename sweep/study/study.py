@@ -16,8 +16,8 @@ from sweep.families.base import Accuracy, Family
 from sweep.study.space import DesignSpace
 
 if TYPE_CHECKING:
-    from sweep.fit import LineFit
-    from sweep.locus import OnLocus
+    from sweep.synthesis.fit import LineFit
+    from sweep.synthesis.prescription import OnLocus
 
 
 @dataclass(frozen=True)

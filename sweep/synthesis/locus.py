@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from kernels import synthesis as kernels
 from sweep.errors import InputError, nearest
+from sweep.evaluation.tables import design_matrix
 from sweep.families import family as find_family
 from sweep.families.base import Array, Columns, Parameter
-from sweep.tables import design_matrix
 
 if TYPE_CHECKING:
-    from sweep.tables import Table
+    from sweep.evaluation.tables import Table
 
 TWO_PI = 2.0 * np.pi
 Status = NDArray[np.uint8]

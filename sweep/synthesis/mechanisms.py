@@ -9,15 +9,15 @@ import numpy as np
 from kernels import status as st
 from kernels.synthesis import acceptance
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array
-from sweep.summaries import design_outputs
 from sweep.synthesis.locus import TWO_PI, Found, locus
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.tables import Table
+    from sweep.evaluation.tables import Table
 
 _EXACT = Accuracy(target=1e-12)
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from sweep.effects import NAMES, applicable, extended, measured
 from sweep.effects.costs import MOTION, Cost, costs, designs, least_time
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Family
-from sweep.summaries import design_outputs
 
 SAMPLES = 360
 CHUNK = 256

@@ -11,8 +11,8 @@ import sys
 import time
 from pathlib import Path
 
-from sweep.chunk import compute_chunk, warm
-from sweep.estimate import estimate, neighbours
+from sweep.chunks.chunk import compute_chunk, warm
+from sweep.engine.estimate import estimate, neighbours
 from sweep.study import Study, load_study
 
 STUDIES = Path(__file__).resolve().parents[2] / "studies"

@@ -17,10 +17,10 @@ from kernels import status as st
 from studies.accuracy.machine import description
 from studies.accuracy.regions import regions, rotatable
 from studies.accuracy.timing import seconds
+from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
 from sweep.reductions import extrema
 from sweep.reductions.extrema import Mode, Request
-from sweep.summaries import design_outputs
 from tests.bench.limits import limits
 from tests.climbing import climbed
 from tests.turn_designs import GUIDE, NEEDLE, RSSP, RSSR, crank_rockers, guided_four_bars, needle_drives, slider_cranks

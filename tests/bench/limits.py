@@ -10,8 +10,8 @@ from mpmath import mp, mpf
 from kernels import status as st
 from studies.accuracy.reference import turning_point
 from studies.accuracy.regions import regions
+from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
-from sweep.summaries import design_outputs
 from tests.reference import rssp as slider
 from tests.turn_designs import RSSP, RSSR, slider_cranks
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from studies.accuracy.machine import description
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem, on_locus, optimum
@@ -20,7 +21,6 @@ from sweep.optimise.candidates import BLOCK, ranking
 from sweep.optimise.certificate import AGREE, Result
 from sweep.optimise.descent import KKT
 from sweep.study import Limit, OptimiseSettings
-from sweep.summaries import design_outputs
 
 STARTS, LARGER, SEED = 6, 50, 1971
 CPU = 1.5  # seconds per specification

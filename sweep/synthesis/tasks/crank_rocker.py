@@ -10,9 +10,9 @@ import numpy as np
 
 from kernels import synthesis as kernels
 from sweep.errors import InputError, nearest
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Columns
-from sweep.summaries import design_outputs
 
 POSES = 180
 RSSR = family("rssr")

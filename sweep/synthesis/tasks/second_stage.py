@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.summaries import design_outputs
 from sweep.synthesis.tasks.crank_rocker import RSSR, turn
-from sweep.tables import design_matrix
 
 
 class Drive(NamedTuple):

@@ -11,8 +11,9 @@ import numpy as np
 from kernels import synthesis as kernels
 from kernels.synthesis.sensitivity import PARAMETERS
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Accuracy, Array
-from sweep.summaries import design_outputs
 from sweep.synthesis.tasks.crank_rocker import (
     RSSR,
     designs_on_locus,
@@ -25,7 +26,6 @@ from sweep.synthesis.tasks.crank_rocker import (
 )
 from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
-from sweep.tables import design_matrix
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
-from sweep.summaries import design_outputs
 from sweep.synthesis.tasks.crank_rocker import (
     RSSR,
     designs_on_locus,

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from kernels import status as codes
 from kernels.line_fit import line_fit
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Family
 from sweep.families.chain import Chain
-from sweep.summaries import design_outputs
 
 FITTED = ("xi", "eta", "lam", "h")
 SCALED = ("a", "b", "c", "e", "xi", "eta", "h")

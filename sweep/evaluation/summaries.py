@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from sweep.effects import extended, input_names
 from sweep.errors import InputError
+from sweep.evaluation.tables import design_matrix, wanted_names
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.chain import Stage
@@ -28,14 +29,13 @@ from sweep.reductions.catalogue import (
 from sweep.reductions.margins import margin_suffixes
 from sweep.reductions.means import mean_squares
 from sweep.reductions.refine import precise_maxima
+from sweep.reductions.sampling import TWO_PI, Index
 from sweep.reductions.turn import Group, group_ns, limits_and_reductions, margin_group
-from sweep.sampling import TWO_PI, Index
-from sweep.tables import design_matrix, wanted_names
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.tables import Table
+    from sweep.evaluation.tables import Table
 
 __all__ = ["Route", "design_outputs", "output", "output_names", "routes", "summarise"]
 

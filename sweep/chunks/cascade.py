@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as codes
+from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array
-from sweep.fit import NS_FIT, fit_line
-from sweep.summaries import Route, design_outputs, routes
+from sweep.synthesis.fit import NS_FIT, fit_line
 
 if TYPE_CHECKING:
     from sweep.study import Limit, Study

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep import store
+from sweep.dataset import store
 from sweep.errors import InputError, StoreError
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.cascade import BLOCK, Cascade, levels
+from sweep.chunks.cascade import BLOCK, Cascade, levels
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Array, Columns
-from sweep.fit import fit_line
 from sweep.reductions.catalogue import is_proven
-from sweep.summaries import design_outputs
-from sweep.tables import design_matrix
+from sweep.synthesis.fit import fit_line
 
 if TYPE_CHECKING:
     from sweep.study import Study

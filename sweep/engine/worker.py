@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sweep.cascade import Dropped
-from sweep.chunk import compute_chunk
+from sweep.chunks.cascade import Dropped
+from sweep.chunks.chunk import compute_chunk
+from sweep.dataset.store import write_chunk
 from sweep.errors import LinksweepError
-from sweep.signals import depend_on_parent
-from sweep.store import write_chunk
+from sweep.jobs.signals import depend_on_parent
 
 if TYPE_CHECKING:
-    from sweep.plan import Plan
+    from sweep.chunks.plan import Plan
     from sweep.study import Study
 
 

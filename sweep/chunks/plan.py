@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 import numpy as np
 
 from kernels.status import OK
-from sweep.cascade import BLOCK, CALL_SECONDS, Cascade, levels
-from sweep.chunk import output_columns, parameter_matrix, parameter_ns
+from sweep.chunks.cascade import BLOCK, CALL_SECONDS, Cascade, levels
+from sweep.chunks.chunk import output_columns, parameter_matrix, parameter_ns
+from sweep.evaluation.summaries import output
 from sweep.families.base import Array, Unit
 from sweep.reductions.catalogue import is_proven
 from sweep.sources import DIGESTS
 from sweep.study.units import internal_unit
-from sweep.summaries import output
 
 if TYPE_CHECKING:
     from sweep.study import Study
@@ -37,10 +37,8 @@ PILOT_RUNS, PILOT_LENGTH = 32, 32
 
 PARAMETER_UNITS = {word: internal_unit(word) for word in get_args(Unit)}
 
-# Parts of the package that decide no value in a chunk; everything else does.
-NOT_VALUES = frozenset(
-    ["optimise", "report", "cli", "__init__.py", "__main__.py", "engine.py", "progress.py", "signals.py", "poses.py"]
-) | {"comparison.py"}
+# The folders of the package whose sources decide values in a chunk.
+VALUES = frozenset(["families", "effects", "reductions", "evaluation", "synthesis", "study", "chunks"])
 
 # Sections of the study file that decide no value in a chunk.
 NOT_IN_CHUNKS = ("study", "optimise", "pareto", "tolerance", "reference", "budget", "report")
@@ -215,7 +213,7 @@ def code_hash() -> str:
 
     from kernels._cache import source_hash
 
-    values = [path for path in DIGESTS if path.split("/")[0] not in NOT_VALUES]
+    values = [path for path in DIGESTS if path.split("/")[0] in VALUES]
     return _hash_sources(values, f"{source_hash()} {np.__version__} {scipy.__version__}")
 
 

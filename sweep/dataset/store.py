@@ -26,8 +26,8 @@ from sweep.errors import InputError, LockedError, StoreError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.chunk import ChunkResult
-    from sweep.plan import Plan
+    from sweep.chunks.chunk import ChunkResult
+    from sweep.chunks.plan import Plan
 
 PLAN, RUNS, LOCK, BAD, OLD = "_plan.json", "_runs.jsonl", "_lock", "_bad", "_old"
 OPTIMUM, CURVES = "_optimum.parquet", "_curves.parquet"

@@ -60,8 +60,8 @@ def estimate(study: Study, jobs: int) -> Estimate:
         assumed.  ``disk_bytes`` takes every result of a row as computed and free of repetition, which is too much where
         rows of infeasible designs are kept or symmetries make values repeat.
     """
-    from sweep.cascade import CALL_SECONDS, levels
-    from sweep.plan import choose_chunk_size, describe_columns, pilot, row_bytes
+    from sweep.chunks.cascade import CALL_SECONDS, levels
+    from sweep.chunks.plan import choose_chunk_size, describe_columns, pilot, row_bytes
 
     found = pilot(study)
     chunk_size = choose_chunk_size(study)
@@ -101,9 +101,9 @@ def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
     With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range
     of `sweep.summarise` is left out.
     """
+    from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
     from sweep.reductions.catalogue import certified_names
     from sweep.study.load import study_from_data, with_accuracy
-    from sweep.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
 
     target, samples = study.accuracy.target, study.accuracy.samples
     if target is not None:

@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike
 
 from sweep.effects import elsewhere, extended, input_names, offered
 from sweep.errors import InputError, nearest
+from sweep.evaluation.tables import design_matrix, numbers, wanted_names
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Family
 from sweep.reductions.catalogue import output_names
-from sweep.tables import design_matrix, numbers, wanted_names
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.tables import Table
+    from sweep.evaluation.tables import Table
 
 
 def evaluate(

@@ -17,14 +17,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from sweep import store
+from sweep.dataset import store
 from sweep.errors import InputError, Interrupted, StoreError, TimeUsedUp, WorkerDied, nearest
-from sweep.signals import Stop, stop_on_signal
+from sweep.jobs.signals import Stop, stop_on_signal
 
 if TYPE_CHECKING:
-    from sweep.plan import Plan
+    from sweep.chunks.plan import Plan
+    from sweep.engine.worker import Done
     from sweep.study import Study
-    from sweep.worker import Done
 
 BACKENDS = ("threading", "loky")
 LIBRARIES = ("linksweep", "numpy", "numba", "llvmlite", "scipy", "pandas", "pyarrow", "joblib")
@@ -106,7 +106,7 @@ def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certi
 
 
 def _check_budget(study: Study, jobs: int, force: bool) -> None:
-    from sweep.estimate import check_budget, estimate
+    from sweep.engine.estimate import check_budget, estimate
 
     if not force:
         check_budget(study, estimate(study, jobs))
@@ -114,7 +114,7 @@ def _check_budget(study: Study, jobs: int, force: bool) -> None:
 
 def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, progress: bool) -> int:
     """Compute the missing chunks and note the totals; returns the number of chunks computed."""
-    from sweep.progress import Progress
+    from sweep.jobs.progress import Progress
 
     failure: Exception | None = None
     allowed = math.inf if force else study.budget.seconds
@@ -147,7 +147,7 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
 
 def _open_plan(study: Study, folder: Path, force: bool) -> Plan:
     """The plan in the folder if it is this study's, otherwise a new one; foreign data only go with ``force``."""
-    from sweep.plan import make_plan
+    from sweep.chunks.plan import make_plan
 
     noted = store.read_plan(folder)
     if noted is not None:
@@ -204,8 +204,8 @@ def _results(
     allowed: float,
 ) -> Iterator[Done]:
     """Finished chunks in the order they become ready; no new one is begun when the allowed time [s] is over."""
-    from sweep.chunk import warm
-    from sweep.worker import work
+    from sweep.chunks.chunk import warm
+    from sweep.engine.worker import work
 
     if missing:
         warm(study)  # one process compiles, the others load the machine code
@@ -240,8 +240,8 @@ def _raise_if_signalled(stop: Stop, folder: Path) -> None:
 
 def _optimise(study: Study, folder: Path, jobs: int) -> None:
     """Run the optimiser unless its result for these very sources is there already."""
+    from sweep.chunks.plan import optimiser_hash
     from sweep.optimise import optimise_study
-    from sweep.plan import optimiser_hash
 
     note = store.read_plan(folder) or {}
     key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
@@ -263,8 +263,8 @@ def _front(study: Study, folder: Path, jobs: int) -> None:
     if study.pareto is None:
         (folder / store.PARETO).unlink(missing_ok=True)
         return
+    from sweep.chunks.plan import optimiser_hash
     from sweep.optimise import front_study
-    from sweep.plan import optimiser_hash
 
     note = store.read_plan(folder) or {}
     key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"

@@ -1,0 +1,1 @@
+"""What long work needs whatever it computes: signals that set a flag, and progress with remaining time."""
