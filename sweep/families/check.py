@@ -63,6 +63,7 @@ def _outputs(family: Family) -> list[str]:
         sign = next((p for p in family.parameters if p.name == family.outward), None)
         if sign is None or sign.choices != (-1.0, 1.0):
             faults.append(f"outward {family.outward!r} is no parameter with the choices -1 and +1")
+    faults += [f"event {e.name} is about {e.of!r}, which is no pose output" for e in family.events if e.of not in names]
     for o in family.pose_outputs:
         if o.windowed and family.position in names and names[family.position].wraps:
             faults.append(f"{o.name} is windowed, but the position is an angle: a window is a part of a stroke")
