@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from kernels._jit import inline, kernel
-from kernels.families.rssr.closure import EPS
+from kernels.families.rssr.closure import EPS, closure_terms
 from kernels.families.rssr.derivatives import follower, order_pair
 from kernels.reduce import largest
 
@@ -40,7 +40,7 @@ def rounding(
     closure X C - Y S + W is off, over T.  Where W is small and the terms it is made of are not, Delta shows none of it,
     but its slope does, and with it that of the function [1/rad].
     """
-    x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
+    x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
     mx, my = abs(e) + 1.0, abs(y0) + abs(ca)
     tolerance = 4.0 * EPS * (abs(x) * mx + abs(y) * my + abs(w) * w_size)
     slope = 4.0 * EPS * (abs(v) * mx + abs(ca * u) * my + abs(k1 * u + k2 * v) * w_size)

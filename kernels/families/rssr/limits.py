@@ -32,10 +32,10 @@ from kernels.families.rssr.block import (
     load_block,
     new_block,
 )
-from kernels.families.rssr.closure import EPS, Array, Status
+from kernels.families.rssr.closure import EPS, Array, Status, closure_terms
 from kernels.families.rssr.derivatives import follower
-from kernels.families.rssr.margin import turning_status
 from kernels.trigpoly import minimum
+from kernels.verdict import turning_status
 
 LIMIT_NAMES = ("psi_ext", "psi_fold", "phi_ext", "phi_fold", "swing", "phi0", "stroke_ratio")
 TURN = 2.0 * math.pi
@@ -48,7 +48,7 @@ def _ball(at: Array, k: int, phi: float) -> tuple[float, float, float, float, fl
     """In units of the crank at phi: eta, xi, d eta/d phi along the motion, sin psi, cos psi, T."""
     e, y0, ca, k0, k1, k2, c = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + ROCKER]
     u, v = math.cos(phi), math.sin(phi)
-    x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
+    x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
     rr = x * x + y * y
     t = math.sqrt(max(rr - w * w, 0.0))
     cos, sin = -(x * w + y * t) / rr, (y * w - x * t) / rr

@@ -29,14 +29,7 @@ from kernels.families.rssr.block import (
     new_block,
 )
 from kernels.families.rssr.closure import EPS, Array, Status
-
-
-@inline
-def turning_status(delta: float, tolerance: float, valid: bool) -> int:
-    """Whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT."""
-    code = st.OK if delta > tolerance else st.UNDECIDABLE
-    code = st.NOT_ROTATABLE if delta < -tolerance else code
-    return code if valid & (delta == delta) else st.INVALID_INPUT
+from kernels.verdict import turning_status
 
 
 @inline

@@ -42,7 +42,6 @@ from kernels.families.rssr.block import (
 from kernels.families.rssr.careful import careful_maximum
 from kernels.families.rssr.closure import Array, Status
 from kernels.families.rssr.derivatives import follower
-from kernels.families.rssr.margin import turning_status
 from kernels.families.rssr.peaks import (
     ERROR,
     HEIGHT,
@@ -62,6 +61,7 @@ from kernels.families.rssr.peaks import (
 )
 from kernels.reduce import largest
 from kernels.trigpoly import far_minimum, point
+from kernels.verdict import turning_status
 
 FEWEST, MOST = 16, 1024
 _NONE = (math.nan, math.nan, math.nan, math.nan)

@@ -15,7 +15,9 @@ from kernels import status as st
 from kernels import twofold as two
 from kernels._jit import inline, kernel
 from kernels.families.rssr.closure import EPS, Array, Status, reduce_scaled, unit_scale
+from kernels.families.rssr.motion import Joints, put
 from kernels.twofold import Twofold
+from kernels.verdict import pose_status
 
 # Columns of the constants: high and low parts in units of the crank, mirrored to branch +1; then plain numbers.
 E, Y0, CA, K0, K1, K2, RHO, Z0, SA = range(0, 18, 2)
@@ -104,12 +106,7 @@ def precise_poses(
     cos_psi: Array | None,
     discriminant: Array | None,
     pressure_angle: Array | None,
-    x_b: Array | None,
-    y_b: Array | None,
-    z_b: Array | None,
-    x_c: Array | None,
-    y_c: Array | None,
-    z_c: Array | None,
+    joints: Joints | None,
 ) -> None:
     """As :func:`kernels.families.rssr.motion.poses`, for float64 designs only, correct to a few roundings.
 
@@ -145,13 +142,7 @@ def precise_poses(
             delta = two.subtract(rr, two.multiply(w, w))
             tolerance = BAND * (abs(x[0]) * mx + abs(y[0]) * my + abs(w[0]) * mw)
             tolerance += BAND * BAND * (mx * mx + my * my + mw * mw)
-            code = st.OK
-            if not valid or delta[0] != delta[0]:
-                code = st.INVALID_INPUT
-            elif delta[0] < -tolerance:
-                code = st.NOT_ASSEMBLED
-            elif delta[0] <= tolerance:
-                code = st.DEAD_POINT if rr[0] > tolerance else st.SINGULAR
+            code = pose_status(valid, delta[0], tolerance, rr[0])
             status[i, j] = code
             if discriminant is not None:
                 discriminant[i, j] = (delta[0] * two_ac) * two_ac if valid else math.nan
@@ -168,19 +159,14 @@ def precise_poses(
                 sin_psi[i, j] = sine
             if psi is not None:
                 psi[i, j] = math.atan2(sine, -c[0])
-            if x_b is not None:
-                x_b[i, j] = designs[i, 0] * u[0] if valid else math.nan
-            if y_b is not None:
-                y_b[i, j] = branch * designs[i, 0] * y[0] if valid else math.nan
             z = two.subtract(z0, two.multiply(sa, v))
-            if z_b is not None:
-                z_b[i, j] = designs[i, 0] * z[0] + designs[i, 5] if valid else math.nan
-            if x_c is not None:
-                x_c[i, j] = designs[i, 3] - designs[i, 2] * c[0]
-            if y_c is not None:
-                y_c[i, j] = -branch * designs[i, 2] * s[0]
-            if z_c is not None:
-                z_c[i, j] = designs[i, 5] if has_angle else math.nan
+            if joints is not None:
+                put(joints.x_b, i, j, designs[i, 0] * u[0] if valid else math.nan)
+                put(joints.y_b, i, j, branch * designs[i, 0] * y[0] if valid else math.nan)
+                put(joints.z_b, i, j, designs[i, 0] * z[0] + designs[i, 5] if valid else math.nan)
+                put(joints.x_c, i, j, designs[i, 3] - designs[i, 2] * c[0])
+                put(joints.y_c, i, j, -branch * designs[i, 2] * s[0])
+                put(joints.z_c, i, j, designs[i, 5] if has_angle else math.nan)
             if pressure_angle is not None:
                 across = math.hypot(two.subtract(rho, w)[0], z[0])
                 pressure_angle[i, j] = math.atan2(across, t[0]) if has_angle else math.nan
