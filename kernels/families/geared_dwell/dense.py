@@ -43,6 +43,7 @@ def dense_maxima(
             grid = front if side == 0 else back
             for j in range(grid.shape[1]):
                 t, s = grid[0, j], grid[1, j]
+                # The pin as in closure.pin near phi = 0, written out without that one's branch, so that it vectorises.
                 ss = s * s
                 x, y = h.e - 2.0 * t + 2.0 * h.k * ss, 2.0 * s * (h.below + h.k * t)
                 square = x * x + y * y

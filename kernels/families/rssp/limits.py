@@ -18,7 +18,8 @@ import math
 from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.families.rssp.closure import EPS, Array, Reduced, Status, reduce_design
-from kernels.families.rssp.margin import least_q, turning_status
+from kernels.families.rssp.margin import least_q
+from kernels.verdict import turning_status
 
 _TWO_PI = 2.0 * math.pi
 _MOST_STEPS = 200
@@ -123,7 +124,7 @@ def limits(
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
         least = least_q(r)
-        code = turning_status(least, r.valid)
+        code = turning_status(least.q, least.tolerance, r.valid)
         far, near = math.nan, math.nan
         rho_ext, rho_fold, slope_ext, slope_fold = math.nan, math.nan, math.nan, math.nan
         sa, ca, f = math.sin(designs[i, 4]), math.cos(designs[i, 4]), designs[i, 3] / r.unit
