@@ -7,7 +7,7 @@ from kernels._jit import inline
 
 
 @inline
-def pose_status(valid: bool, discriminant: float, tolerance: float, square: float) -> int:
+def pose_status(valid: bool, discriminant: float, tolerance: float, square: float | None) -> int:
     """Whether the links reach at a pose: OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT.
 
     Parameters
@@ -16,7 +16,7 @@ def pose_status(valid: bool, discriminant: float, tolerance: float, square: floa
     discriminant : its real part; the links reach where it is positive
     tolerance : bound of its rounding error
     square : squared distance of the crank pin from the axis of the follower, in the unit of the discriminant.  A pin on
-        that axis leaves a rocker free to take every angle, which is SINGULAR; a slider has no such axis: give inf
+        that axis leaves a rocker free to take every angle, which is SINGULAR; a slider has no such axis, so it is None
     """
     code = st.OK
     # A comparison with nan is false, so nan would pass every other test.
@@ -25,7 +25,9 @@ def pose_status(valid: bool, discriminant: float, tolerance: float, square: floa
     elif discriminant < -tolerance:
         code = st.NOT_ASSEMBLED
     elif discriminant <= tolerance:
-        code = st.DEAD_POINT if square > tolerance else st.SINGULAR
+        code = st.DEAD_POINT
+        if square is not None and not square > tolerance:
+            code = st.SINGULAR
     return code
 
 

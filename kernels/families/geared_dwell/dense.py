@@ -48,6 +48,7 @@ def dense_maxima(
                 x, y = h.e - 2.0 * t + 2.0 * h.k * ss, 2.0 * s * (h.below + h.k * t)
                 square = x * x + y * y
                 least = smallest(least, square)
+                # A clamp instead of a branch; ``least`` tells that it was used.
                 per = 1.0 / largest(square, 1e-100)
                 if max_abs_dpsi is not None:
                     m1 = largest(m1, abs(1.0 - h.total * (h.e - 2.0 * t) * per))

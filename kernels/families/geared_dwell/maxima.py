@@ -116,6 +116,7 @@ def turn_maxima(
         m1, m2, m3, phi2 = 0.0, -1.0, 0.0, 0.0
         first = 2 if near else 0
         for number in range(first, first + 2 if code == st.OK else first):
+            # In the variable that vanishes at the pin's nearest approach no coefficient cancels there.
             end, steep = stretch(r, k, a, number, s2, q, d, lean)
             if max_abs_dpsi is not None:
                 count = roots_up_to(end, q, 2, scratch, found)

@@ -39,10 +39,12 @@ def _excess(r: Reduced, crank: float, ca: float, sa: float, f: float, s: float) 
 @inline
 def _folded(r: Reduced, ca: float, sa: float, f: float) -> tuple[float, bool]:
     """Outer root of the convex E_fold on the side of the branch, by Newton's method from outside."""
+    # A product instead of b^2 - (f cos alpha)^2, which would cancel where the two are nearly equal.
     far = (r.b - f * ca) * (r.b + f * ca)
     s = f * sa + r.branch * math.sqrt(max(far, 0.0))
     for _ in range(_MOST_STEPS):
         value, slope, _ = _excess(r, -r.a, ca, sa, f, s)
+        # From outside a convex function's Newton steps never pass the root: where one does, rounding is reached.
         if value <= 0.0 or slope * r.branch <= 0.0:
             return s, True
         following = s - value / slope
@@ -71,6 +73,7 @@ def _extended(r: Reduced, ca: float, sa: float, f: float, folded: float) -> tupl
         inside = (following - inner) * r.branch > 0.0 and (outer - following) * r.branch > 0.0
         if abs(following - s) <= 2.0 * EPS * abs(s):
             return following if inside else s, True
+        # Bisect where a step leaves the bracket or does not halve the one before.
         if not inside or abs(following - s) > 0.5 * before:
             following = 0.5 * (inner + outer)
             if following in (inner, outer):
@@ -146,8 +149,10 @@ def limits(
         # The ball's direction from the crank axis; at the folded position the crank points the other way.
         towards, away = math.atan2(far * ca, r.e), math.atan2(-near * ca, -r.e)
         phi_ext[i], phi_fold[i] = _turn(towards), _turn(away)
+        # The stroke by the half-stroke identity: the difference far - near would lose the digits of a small stroke.
         step = -2.0 * r.a * (rho_ext + rho_fold) / (far + near - 2.0 * f * sa)
         stroke[i] = step * r.unit
+        # phi0 - pi as one arctangent: small for nearly central mechanisms, without a difference of angles.
         beyond = math.atan2(r.e * ca * step, r.e * r.e + (far * ca) * (near * ca))
         phi0[i] = math.pi + beyond
         stroke_ratio[i] = (math.pi + beyond) / (math.pi - beyond)

@@ -57,7 +57,7 @@ def poses(
             error = 8.0 * EPS
             tolerance = error * (abs(m.real) * r.m_size + abs(n.real) * r.n_size)
             tolerance += error * error * (r.m_size * r.m_size + r.n_size * r.n_size)
-            code = pose_status(r.valid, q.real, tolerance, math.inf)
+            code = pose_status(r.valid, q.real, tolerance, None)
             status[i, j] = code
 
             if discriminant is not None:

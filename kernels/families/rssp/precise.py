@@ -53,7 +53,7 @@ def precise_poses(
             q = two.subtract(q, two.multiply(n, n))
             tolerance = BAND * (abs(m[0]) * r.m_size + abs(n[0]) * r.n_size)
             tolerance += BAND * BAND * (r.m_size * r.m_size + r.n_size * r.n_size)
-            code = pose_status(r.valid, q[0], tolerance, math.inf)
+            code = pose_status(r.valid, q[0], tolerance, None)
             status[i, j] = code
 
             if discriminant is not None:

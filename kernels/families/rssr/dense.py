@@ -52,11 +52,13 @@ def dense_maxima(
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
+        # The helpers of this loop are contracted like the loop itself: a product and a sum become one instruction.
         least, m1, m2, m3 = 1e300, 0.0, 0.0, 0.0
         for j in range(cos_phi.size):
             place = place_fused(r.e, r.y0, r.ca, r.k0, r.k1, r.k2, cos_phi[j], sin_phi[j])
             least = smallest(least, place.delta)
             if max_abs_dpsi is not None or max_abs_d2psi is not None or max_abs_d3psi is not None:
+                # A clamp instead of a branch; the minimum of the discriminant itself tells that it was used.
                 t = math.sqrt(largest(place.delta, 1e-300))
                 rocker = rocker_fused(place, t, 1.0 / (place.rr * t))
                 first = velocity_fused(r.k1, r.k2, rocker, place)
@@ -84,6 +86,7 @@ def dense_maxima(
             max_abs_d3psi[i] = m3
         if at is not None and values is not None:
             most = m3 if max_abs_d3psi is not None else (m2 if max_abs_d2psi is not None else m1)
+            # The maximum is one of the stored values, so it is found again by equality.
             at[i] = 0
             for j in range(cos_phi.size):
                 if values[j] == most:

@@ -69,6 +69,7 @@ FEWEST, MOST = 16, 1024
 _NONE = (math.nan, math.nan, math.nan, math.nan)
 _NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # what the search needs of a design
 _FLOOR, _MARKS = (FEWEST + 2) * BLOCK, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
+# Powers of two below 2^18 leave different remainders modulo 19, so a table turns 2^k into k without a loop.
 _EXPONENT = np.array([0, 0, 1, 13, 2, 16, 14, 6, 3, 8, 17, 12, 15, 5, 7, 11, 4, 10, 9])  # k of 2^k modulo 19
 
 
@@ -128,6 +129,7 @@ def _list_marked(at: Array, k: int, cos: Array, sin: Array, size: Array, m: Arra
     """Append the marked local maxima of design k to the list; returns its new length."""
     marks = int(size[_MARKS + k])
     while marks != 0:
+        # The lowest bit that is set.
         lowest = marks & -marks
         i = _EXPONENT[lowest % 19]
         here = (i + 1) * BLOCK + k
@@ -139,7 +141,7 @@ def _list_marked(at: Array, k: int, cos: Array, sin: Array, size: Array, m: Arra
 
 @inline
 def _list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, m: Array, count: int) -> int:
-    """As the two above for the samples of one design by :func:`_sample`; none if there are implausibly many."""
+    """Append the local maxima among the samples of one design by :func:`_sample`; none if there are too many."""
     most = 0.0
     for i in range(n):
         most = largest(most, size[i])

@@ -30,6 +30,7 @@ def dense_acceleration_single(designs: Array, cos_phi: Singles, sin_phi: Singles
     cos_phi, sin_phi : (m,) the grid
     max_abs_d2psi : (n,) out; nan for an invalid design, meaningless where the crank does not turn fully
     """
+    # Constants of type float32: a Python number would make the whole expression float64.
     one, least = np.float32(1.0), np.float32(1e-30)
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
