@@ -224,6 +224,9 @@ class _Layout:
             many = above == (m.kind == "max")
             ends = maxima if m.kind == "max" else minima
             return [({k: m.sign}, 0.0) for k in (ends if many else ends[:1])]
+        if m.kind in ("phi_max", "phi_min"):
+            ends = maxima if m.kind == "phi_max" else minima
+            return [({len(self.points) + k: 1.0}, self._turns(k)) for k in ends[:1]]
         if m.kind in ("max_abs", "phi_max_abs"):
             value = self.points.value
             ends = sorted([*maxima, *minima], key=lambda k: -self.points.sense[k] * value[k])
@@ -259,12 +262,10 @@ class _Layout:
         return [({first + self.scalars.index(name): math.copysign(1.0, sizes[name])}, 0.0)]
 
     def _outward(self, position: str) -> float:
-        """+1 where the extended position is the largest: the branch of the stage (of the last one) says so."""
-        names = self.curves.family.parameter_names
-        branches = [name for name in names if name.rstrip("0123456789") == "branch"]
-        own = "branch" + position.lstrip("abcdefghijklmnopqrstuvwxyz")
-        chosen = own if own in branches else max(branches, default="")
-        return float(self.design[names.index(chosen)]) if chosen else 1.0
+        """+1 where the extended position of that follower is the largest, -1 where it is the smallest."""
+        family = self.curves.family
+        sign = family.outward_sign(position)
+        return float(self.design[family.parameter_names.index(sign)]) if sign else 1.0
 
     def _turns(self, k: int) -> float:
         return -2.0 * math.pi * math.floor(float(self.points.phi[k]) / (2.0 * math.pi))
