@@ -41,7 +41,7 @@ def poses(
     designs : (n, 9) columns of :class:`Design`; k = 0 is the fork slot, k > 0 the bar
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT
-    psi ... pressure_angle : (n, m) out [rad; length; length^2], or None: what is None is neither computed nor compiled
+    psi ... pressure_angle : (n, m) out [rad; length; 1], or None: what is None is neither computed nor compiled
     joints : (6, n, m) out, ball x y z and the point of the slot or bar that guides it x y z, or None
 
     Notes
@@ -86,8 +86,12 @@ def poses(
 
             has_angle = code == st.OK or code == st.DEAD_POINT
             if discriminant is not None:
-                reached = has_angle or (code == st.NOT_ASSEMBLED and delta.real < 0.0)
-                discriminant[i, j] = (delta * r.unit) * r.unit if reached else math.nan
+                # signed cos^2 of the pressure angle: negative where either part of the closure has no solution
+                part = delta / rr
+                if is_bar:
+                    reach = (r.k - z) * (r.k + z) / (r.k * r.k)
+                    part = reach * magnitude(part) if reach.real < 0.0 else reach * part
+                discriminant[i, j] = part if r.valid else math.nan
             p = r.branch * np.sqrt(delta) if code == st.OK else 0.0 * delta
             per_rr = 1.0 / rr if has_angle else math.nan
             c, s = (x * p + y * q) * per_rr, (y * p - x * q) * per_rr + 0.0  # never -0.0, which would turn pi into -pi
@@ -100,9 +104,9 @@ def poses(
             if rho is not None:
                 rho[i, j] = p * r.unit if has_angle else math.nan
             if pressure_angle is not None:
-                # The force is normal to the slot, or along the arm of the bar, and acts at rho t + s n of the link.
+                # The force is normal to the slot, or along the arm of the bar, and goes through the ball.
                 along = magnitude(p) * (magnitude(arm) if is_bar else 1.0)
-                across = hypotenuse(r.s * r.k, z * p) if is_bar else magnitude(r.s)
+                across = hypotenuse(np.sqrt(rr) * z, q * arm) if is_bar else magnitude(r.s)
                 pressure_angle[i, j] = arctan2(across, along) if has_angle else math.nan
             if joints is not None:
                 joints[0, i, j], joints[1, i, j] = (x + r.e) * r.unit, y * r.unit

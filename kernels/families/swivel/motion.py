@@ -18,10 +18,7 @@ def poses(
     cos_phi: Numbers,
     sin_phi: Numbers,
     status: Status,
-    rho: Numbers | None,
-    drho: Numbers | None,
-    d2rho: Numbers | None,
-    d3rho: Numbers | None,
+    rod: Numbers | None,
     point: Numbers | None,
     velocity: Numbers | None,
     acceleration: Numbers | None,
@@ -37,14 +34,14 @@ def poses(
     designs : (n, 6) columns of :class:`Design`
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, SINGULAR (the crank pin lies in the block's centre) or INVALID_INPUT
-    rho ... d3rho : (n, m) out [length], or None: what is None is neither computed nor compiled
+    rod : (4, n, m) out [length], distance of crank pin and block and its three derivatives, or None
     point, velocity, acceleration, jerk : (3, n, m) out [length], x y z of the working point and of its derivatives, or
         None
     joints : (6, n, m) out, crank pin x y z and direction of the rod x y z, or None
 
     Notes
     -----
-    Where the status is not OK the values are nan.
+    What is None is neither computed nor compiled.  Where the status is not OK the values are nan.
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
@@ -52,9 +49,9 @@ def poses(
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
             pin = (r.a * u, r.y0 + r.ka * v, r.lift - r.na * v)
-            rod = (r.e - pin[0], -pin[1], r.g - pin[2])
-            rod1, rod2 = (r.a * v, -r.ka * u, r.na * u), (r.a * u, r.ka * v, -r.na * v)
-            square = dot(rod, rod)
+            reach = (r.e - pin[0], -pin[1], r.g - pin[2])
+            reach1, reach2 = (r.a * v, -r.ka * u, r.na * u), (r.a * u, r.ka * v, -r.na * v)
+            square = dot(reach, reach)
             tolerance = 4.0 * EPS * r.size
             code = st.OK
             if not r.valid or square.real != square.real:
@@ -66,31 +63,28 @@ def poses(
                 square = square * math.nan
             length = np.sqrt(square)
             per = 1.0 / length
-            n = scale(per, rod)
+            n = scale(per, reach)
             # rho rho' = E.E', and so on; then n = E/rho
-            h1 = dot(n, rod1)
-            n1 = scale(per, mix(1.0, rod1, -h1, n))
-            h2 = dot(n1, rod1) + dot(n, rod2)
-            n2 = scale(per, mix(1.0, mix(1.0, rod2, -h2, n), -2.0 * h1, n1))
-            h3 = dot(n2, rod1) + 2.0 * dot(n1, rod2) - h1  # the third derivative of the rod is minus the first
-            if rho is not None:
-                rho[i, j] = length * r.unit
-            if drho is not None:
-                drho[i, j] = h1 * r.unit
-            if d2rho is not None:
-                d2rho[i, j] = h2 * r.unit
-            if d3rho is not None:
-                d3rho[i, j] = h3 * r.unit
+            h1 = dot(n, reach1)
+            n1 = scale(per, mix(1.0, reach1, -h1, n))
+            h2 = dot(n1, reach1) + dot(n, reach2)
+            n2 = scale(per, mix(1.0, mix(1.0, reach2, -h2, n), -2.0 * h1, n1))
+            h3 = dot(n2, reach1) + 2.0 * dot(n1, reach2) - h1  # the third derivative of the rod is minus the first
+            if rod is not None:
+                rod[0, i, j] = length * r.unit
+                rod[1, i, j] = h1 * r.unit
+                rod[2, i, j] = h2 * r.unit
+                rod[3, i, j] = h3 * r.unit
             for k in range(3):
                 if point is not None:
                     point[k, i, j] = (pin[k] + r.length * n[k]) * r.unit
                 if velocity is not None:
-                    velocity[k, i, j] = (r.length * n1[k] - rod1[k]) * r.unit
+                    velocity[k, i, j] = (r.length * n1[k] - reach1[k]) * r.unit
                 if acceleration is not None:
-                    acceleration[k, i, j] = (r.length * n2[k] - rod2[k]) * r.unit
+                    acceleration[k, i, j] = (r.length * n2[k] - reach2[k]) * r.unit
                 if jerk is not None:
-                    bend = per * (-rod1[k] - h3 * n[k] - 3.0 * (h2 * n1[k] + h1 * n2[k]))
-                    jerk[k, i, j] = (r.length * bend + rod1[k]) * r.unit
+                    bend = per * (-reach1[k] - h3 * n[k] - 3.0 * (h2 * n1[k] + h1 * n2[k]))
+                    jerk[k, i, j] = (r.length * bend + reach1[k]) * r.unit
                 if joints is not None:
                     joints[k, i, j] = pin[k] * r.unit if code == st.OK else math.nan
                     joints[3 + k, i, j] = n[k]
