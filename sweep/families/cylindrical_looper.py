@@ -44,18 +44,23 @@ SLIDE_OUTPUTS = (
     Output("d2s", "length", "acceleration analogue of s", "(1)"),
     Output("d3s", "length", "jerk analogue of s", "(1)"),
 )
-ASSEMBLY_OUTPUTS = (
+SHAFT_LOOP_OUTPUTS = (
     Output("discriminant1", "length^2", "b1^2 cos^2(pressure_angle1); negative where the links do not reach", "(3)"),
-    Output("discriminant2", "length^2", "b2^2 cos^2(pressure_angle2); negative where the links do not reach", "(1)"),
     Output("pressure_angle1", "rad", "between the force of coupler 1 and the turning velocity of the rocker's ball",
            "(3)"),
-    Output("pressure_angle2", "rad", "between the force of coupler 2 and the shaft's direction", "(1)"),
 )  # fmt: skip
+SLIDE_LOOP_OUTPUTS = (
+    Output("discriminant2", "length^2", "b2^2 cos^2(pressure_angle2); negative where the links do not reach", "(1)"),
+    Output("pressure_angle2", "rad", "between the force of coupler 2 and the shaft's direction", "(1)"),
+)
 POINT_OUTPUTS = point_outputs("(4)")
 MAGNITUDE_OUTPUTS = magnitude_outputs("(5)")
 JOINT_OUTPUTS = joint_outputs((("b1", "pin of crank 1"), ("c1", "rocker's ball")), "(2)")
 
-_BLOCKS = (SHAFT_OUTPUTS, SLIDE_OUTPUTS, ASSEMBLY_OUTPUTS, *POINT_OUTPUTS, MAGNITUDE_OUTPUTS, JOINT_OUTPUTS)
+_BLOCKS = (
+    SHAFT_OUTPUTS, SHAFT_LOOP_OUTPUTS, SLIDE_OUTPUTS, SLIDE_LOOP_OUTPUTS,
+    *POINT_OUTPUTS, MAGNITUDE_OUTPUTS, JOINT_OUTPUTS,
+)  # fmt: skip
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:

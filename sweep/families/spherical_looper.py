@@ -50,10 +50,12 @@ LOOPER_OUTPUTS = (
     Output("d2chi", "1", "acceleration analogue of chi", "(4)"),
     Output("d3chi", "1", "jerk analogue of chi", "(4)"),
 )
-ASSEMBLY_OUTPUTS = (
+CARRIER_LOOP_OUTPUTS = (
     Output("discriminant1", "length^2", "b1^2 cos^2(pressure_angle1); negative where the links do not reach", "(1)"),
-    Output("discriminant2", "length^2", "b2^2 cos^2(pressure_angle2); negative where the links do not reach", "(3)"),
     Output("pressure_angle1", "rad", "between the force of coupler 1 and the velocity of the carrier's ball", "(1)"),
+)
+LOOPER_LOOP_OUTPUTS = (
+    Output("discriminant2", "length^2", "b2^2 cos^2(pressure_angle2); negative where the links do not reach", "(3)"),
     Output("pressure_angle2", "rad", "between the force of coupler 2 and the velocity of the looper's ball in the "
            "carrier", "(3)"),
 )  # fmt: skip
@@ -63,7 +65,10 @@ JOINT_OUTPUTS = joint_outputs(
     (("b1", "pin of crank 1"), ("c1", "carrier's ball"), ("b2", "pin of crank 2"), ("c2", "looper's ball")), "(1), (2)"
 )
 
-_BLOCKS = (CARRIER_OUTPUTS, LOOPER_OUTPUTS, ASSEMBLY_OUTPUTS, *POINT_OUTPUTS, MAGNITUDE_OUTPUTS, JOINT_OUTPUTS)
+_BLOCKS = (
+    CARRIER_OUTPUTS, CARRIER_LOOP_OUTPUTS, LOOPER_OUTPUTS, LOOPER_LOOP_OUTPUTS,
+    *POINT_OUTPUTS, MAGNITUDE_OUTPUTS, JOINT_OUTPUTS,
+)  # fmt: skip
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:

@@ -76,8 +76,9 @@ def poses(
     sin_phi: Numbers,
     status: Status,
     shaft: Numbers | None,
+    shaft_loop: Numbers | None,
     slide: Numbers | None,
-    assembly: Numbers | None,
+    slide_loop: Numbers | None,
     point: Numbers | None,
     velocity: Numbers | None,
     acceleration: Numbers | None,
@@ -93,11 +94,10 @@ def poses(
     ----------
     designs : (n, 19) columns of :class:`Design`
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
-    status : (n, m) out; OK, or that of the first loop that is not, the slider-crank's before the crank-rocker's where
-        the rocker slides along: NOT_ASSEMBLED, DEAD_POINT, SINGULAR (crank pin 1 on the shaft's axis); INVALID_INPUT
+    status : (n, m) out; OK, or that of the first loop that is not, the slider-crank's before the crank-rocker's: NOT_ASSEMBLED, DEAD_POINT, SINGULAR (crank pin 1 on the shaft's axis); INVALID_INPUT.
+        A loop that nothing wanted depends on does not count
     shaft, slide : (4, n, m) out, psi [rad] and s [length] and their three derivatives, or None
-    assembly : (4, n, m) out, discriminants of crank-rocker and slider-crank [length^2], both pressure angles [rad], or
-        None
+    shaft_loop, slide_loop : (2, n, m) out, discriminant [length^2] and pressure angle [rad], or None
     point, velocity, acceleration, jerk : (3, n, m) out [length], x y z of the working point and derivatives, or None
     magnitudes : (3, n, m) out [length], lengths of velocity, acceleration and jerk, or None
     joints : (6, n, m) out [length], x y z of crank pin 1 and of the rocker's ball, or None
@@ -115,10 +115,21 @@ def poses(
             two = _slide(r, u * r.cos_offset - v * r.sin_offset, v * r.cos_offset + u * r.sin_offset)
             first = _first_crank(r, two, u, v)
             one = swing(first, r.size1, r.b1, r.c1, r.branch1)
-            code = st.INVALID_INPUT
-            if r.valid:
-                leading = two.status if r.slides == 1.0 else one.status
-                code = leading if leading != st.OK else max(one.status, two.status)
+            slide_counts, shaft_counts = r.slides == 1.0, False
+            if slide is not None or slide_loop is not None:
+                slide_counts = True
+            if shaft is not None or shaft_loop is not None:
+                shaft_counts = True
+            if (
+                point is not None or velocity is not None or acceleration is not None or jerk is not None
+                or magnitudes is not None or joints is not None
+            ):  # fmt: skip
+                slide_counts, shaft_counts = True, True
+            code = st.OK if r.valid else st.INVALID_INPUT
+            if code == st.OK and slide_counts:
+                code = two.status
+            if code == st.OK and shaft_counts:
+                code = one.status
             status[i, j] = code
             undefined = 0.0 if r.valid else math.nan
             scale = r.unit + undefined
@@ -132,12 +143,13 @@ def poses(
                 slide[1, i, j] = two.first * scale
                 slide[2, i, j] = two.second * scale
                 slide[3, i, j] = two.third * scale
-            if assembly is not None:
-                assembly[0, i, j] = (one.delta * r.unit) * r.unit + undefined
-                assembly[1, i, j] = (two.delta * r.unit) * r.unit + undefined
-                # arctangent, not acos: acos loses half the digits near zero.
-                assembly[2, i, j] = arctan2(np.sqrt(one.across) + undefined, magnitude(one.root))
-                assembly[3, i, j] = arctan2(np.sqrt(two.across) + undefined, two.root)
+            # arctangent, not acos: acos loses half the digits near zero.
+            if shaft_loop is not None:
+                shaft_loop[0, i, j] = (one.delta * r.unit) * r.unit + undefined
+                shaft_loop[1, i, j] = arctan2(np.sqrt(one.across) + undefined, magnitude(one.root))
+            if slide_loop is not None:
+                slide_loop[0, i, j] = (two.delta * r.unit) * r.unit + undefined
+                slide_loop[1, i, j] = arctan2(np.sqrt(two.across) + undefined, two.root)
             along = (
                 (r.point[0], r.point[1], r.point[2] + two.s),
                 (0.0 * r.e1, 0.0 * r.e1, two.first),

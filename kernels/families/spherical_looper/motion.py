@@ -67,8 +67,9 @@ def poses(
     sin_phi: Numbers,
     status: Status,
     carrier: Numbers | None,
+    carrier_loop: Numbers | None,
     looper: Numbers | None,
-    assembly: Numbers | None,
+    looper_loop: Numbers | None,
     point: Numbers | None,
     velocity: Numbers | None,
     acceleration: Numbers | None,
@@ -85,9 +86,10 @@ def poses(
     designs : (n, 26) columns of :class:`Design`
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, or that of the first loop that is not: NOT_ASSEMBLED, DEAD_POINT, SINGULAR (a driving ball
-        on the axis it turns the link about, or the looper's ball on the looper's axis); INVALID_INPUT
+        on the axis it turns the link about, or the looper's ball on the looper's axis); INVALID_INPUT.  Where nothing
+        but the carrier's outputs is wanted, the looper's loop does not count
     carrier, looper : (4, n, m) out, psi and chi [rad] and their three derivatives, or None
-    assembly : (4, n, m) out, discriminants of both loops [length^2], both pressure angles [rad], or None
+    carrier_loop, looper_loop : (2, n, m) out, discriminant [length^2] and pressure angle [rad], or None
     point, velocity, acceleration, jerk : (3, n, m) out [length], x y z of the working point and derivatives, or None
     magnitudes : (3, n, m) out [length], lengths of velocity, acceleration and jerk, or None
     joints : (12, n, m) out [length], x y z of crank pin 1, carrier's ball, crank pin 2, looper's ball, or None
@@ -105,9 +107,12 @@ def poses(
             first, second = _first_crank(r, u, v), _second_crank(r, u, v)
             one = swing(first, r.size1, r.b1, r.c1, r.branch1)
             two = swing(_seen_from_carrier(r, one, second), r.size2, r.b2, r.c2, r.branch2)
-            code = st.INVALID_INPUT
-            if r.valid:
-                code = one.status if one.status != st.OK else two.status
+            code = one.status if r.valid else st.INVALID_INPUT
+            if (
+                looper is not None or looper_loop is not None or point is not None or velocity is not None
+                or acceleration is not None or jerk is not None or magnitudes is not None or joints is not None
+            ):  # fmt: skip
+                code = two.status if code == st.OK else code
             status[i, j] = code
             undefined = 0.0 if r.valid else math.nan
             if carrier is not None:
@@ -120,12 +125,13 @@ def poses(
                 looper[1, i, j] = two.first + undefined
                 looper[2, i, j] = two.second + undefined
                 looper[3, i, j] = two.third + undefined
-            if assembly is not None:
-                assembly[0, i, j] = (one.delta * r.unit) * r.unit + undefined
-                assembly[1, i, j] = (two.delta * r.unit) * r.unit + undefined
-                # arctangent, not acos: acos loses half the digits near zero.
-                assembly[2, i, j] = arctan2(np.sqrt(one.across) + undefined, magnitude(one.root))
-                assembly[3, i, j] = arctan2(np.sqrt(two.across) + undefined, magnitude(two.root))
+            # arctangent, not acos: acos loses half the digits near zero.
+            if carrier_loop is not None:
+                carrier_loop[0, i, j] = (one.delta * r.unit) * r.unit + undefined
+                carrier_loop[1, i, j] = arctan2(np.sqrt(one.across) + undefined, magnitude(one.root))
+            if looper_loop is not None:
+                looper_loop[0, i, j] = (two.delta * r.unit) * r.unit + undefined
+                looper_loop[1, i, j] = arctan2(np.sqrt(two.across) + undefined, magnitude(two.root))
             p, p1, p2, p3 = _carried(r, one, two, r.point)
             centre = (r.e1, 0.0 * r.e1, r.o)
             scale = r.unit + undefined
