@@ -27,7 +27,7 @@ ROD_OUTPUTS = (
 POINT_OUTPUTS = point_outputs("(4)")
 JOINT_OUTPUTS = (
     *joint_outputs((("b", "crank pin"),), "(1)"),
-    *(Output(f"n_{axis}", "1", f"direction of the rod from the crank pin, along {axis}", "(2)") for axis in "xyz"),
+    *(Output(f"{axis}_n", "1", f"direction of the rod from the crank pin, along {axis}", "(2)") for axis in "xyz"),
 )
 
 _BLOCKS = (ROD_OUTPUTS, *POINT_OUTPUTS, JOINT_OUTPUTS)

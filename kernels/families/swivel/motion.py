@@ -59,10 +59,8 @@ def poses(
             elif square.real <= tolerance * tolerance:
                 code = st.SINGULAR
             status[i, j] = code
-            if code != st.OK:
-                square = square * math.nan
-            length = np.sqrt(square)
-            per = 1.0 / length
+            length = np.sqrt(square) if code == st.OK else square * math.nan
+            per = 1.0 / length if code == st.OK else length
             n = scale(per, reach)
             # rho rho' = E.E', and so on; then n = E/rho
             h1 = dot(n, reach1)
