@@ -48,7 +48,7 @@ def loopers(count, seed):
 
 
 def test_cylindrical_looper_equals_joint_geometry():
-    # The inputs are rounded once and two closures in series add a few roundings each; 16 is asked.
+    # The inputs are rounded once and two closures in series add a few roundings each; 16 is asked, 3 measured.
     for design, phi in loopers(12, 1):
         expected = naive.outputs(design, phi)
         found = factors("cylindrical_looper", design, phi, expected, evaluated(design, phi, ALL).iloc[0])

@@ -41,7 +41,7 @@ def random_designs(count, seed):
 
 
 def test_slotted_equals_joint_geometry():
-    # The inputs are rounded once and the closed form adds a few roundings of the same size: 16 is asked, 6 measured.
+    # The inputs are rounded once and the closed form adds a few roundings of the same size: 16 is asked, 2 measured.
     for design, phi in random_designs(12, 1):
         expected = naive.outputs(design, phi)
         found = factors("slotted", design, phi, expected, evaluated(design, phi, ALL).iloc[0])

@@ -26,7 +26,7 @@ def evaluated(design, phi, want):
 
 
 def test_swivel_equals_point_geometry():
-    # The inputs are rounded once and the closed form adds a few roundings of the same size: 16 is asked, 5 measured.
+    # The inputs are rounded once and the closed form adds a few roundings of the same size: 16 is asked, 2 measured.
     generator = np.random.default_rng(1)
     for _ in range(40):
         design = (1.0, *generator.uniform(-3.0, 3.0, 5))
