@@ -1,4 +1,4 @@
-"""Slotted link against joint coordinates, plain Python, virtual power, exact gradients, and the synthesis of its crank."""
+"""Slotted link against joint coordinates, plain Python, virtual power, exact gradients; synthesis of its crank."""
 
 from __future__ import annotations
 

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from sweep.families.base import Angles, Array, Columns, Output
 
 AXES = "xyz"
-_TEXT = ("working point along {axis}", "velocity analogue of the working point along {axis}",
-         "acceleration analogue of the working point along {axis}", "jerk analogue of the working point along {axis}")  # fmt: skip
+_KINDS = ("", "velocity analogue of the ", "acceleration analogue of the ", "jerk analogue of the ")
+_ORDERS = ("", "d", "d2", "d3")
 
 
 def point_outputs(equation: str) -> tuple[tuple[Output, ...], ...]:
     """Place, velocity, acceleration and jerk of the working point, three components each."""
     return tuple(
-        tuple(Output(f"{prefix}{axis}_p", "length", text.format(axis=axis), equation) for axis in AXES)
-        for prefix, text in zip(("", "d", "d2", "d3"), _TEXT, strict=True)
+        tuple(Output(f"{order}{axis}_p", "length", f"{kind}working point along {axis}", equation) for axis in AXES)
+        for order, kind in zip(_ORDERS, _KINDS, strict=True)
     )
 
 
@@ -39,8 +40,7 @@ def joint_outputs(joints: Sequence[tuple[str, str]], equation: str) -> tuple[Out
 
 def ladders(*names: str) -> dict[str, str]:
     """For each name and its first two derivatives the next derivative."""
-    steps = ("", "d", "d2", "d3")
-    return {f"{low}{name}": f"{high}{name}" for name in names for low, high in zip(steps[:-1], steps[1:], strict=True)}
+    return {f"{low}{name}": f"{high}{name}" for name in names for low, high in pairwise(_ORDERS)}
 
 
 def filled_blocks(

@@ -94,8 +94,9 @@ def poses(
     ----------
     designs : (n, 19) columns of :class:`Design`
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
-    status : (n, m) out; OK, or that of the first loop that is not, the slider-crank's before the crank-rocker's: NOT_ASSEMBLED, DEAD_POINT, SINGULAR (crank pin 1 on the shaft's axis); INVALID_INPUT.
-        A loop that nothing wanted depends on does not count
+    status : (n, m) out; OK, or that of the first loop that is not, the slider-crank's before the crank-rocker's:
+        NOT_ASSEMBLED, DEAD_POINT, SINGULAR (crank pin 1 on the shaft's axis); INVALID_INPUT.  A loop that nothing
+        wanted depends on does not count
     shaft, slide : (4, n, m) out, psi [rad] and s [length] and their three derivatives, or None
     shaft_loop, slide_loop : (2, n, m) out, discriminant [length^2] and pressure angle [rad], or None
     point, velocity, acceleration, jerk : (3, n, m) out [length], x y z of the working point and derivatives, or None
