@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import sweep
+from sweep.errors import InputError
+from sweep.families import family
 from sweep.synthesis.tasks.task5 import Task5
 
 RSSR = ("a", "b", "c", "e", "f", "g", "alpha", "branch")
@@ -40,3 +42,9 @@ def test_slotted_drives_a_crank_rocker():
     turn = np.angle(np.exp(1j * (ahead.psi - behind.psi)))
     # a central difference errs like h^2 and like rounding over h: both below 1e-9 here
     np.testing.assert_allclose(frame.dpsi, turn / (2.0 * h), atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["spherical_looper", "cylindrical_looper"])
+def test_chain_refuses_a_looper_with_two_drives_and_names_the_remedy(name):
+    with pytest.raises(InputError, match="member of a machine"):
+        family(["rssr", name])
