@@ -89,10 +89,15 @@ FAMILY = Family(
     poses=poses,
     derivative_of=ladders("psi", "s", "x_p", "y_p", "z_p"),
     outward="branch1",
+    example={
+        "a1": 1.0, "b1": 4.2, "c1": 2.5, "e1": 3.5, "f1": 0.5, "g1": -0.3, "alpha1": 1.0,
+        "a2": 0.5, "b2": 3.0, "e2": 0.3, "f2": 0.1, "alpha2": 0.2, "offset2": 0.5, "slides": 1.0,
+        "p0x": 2.0, "p0y": 0.3, "p0z": 3.0,
+    },
     uses_phi=False,
     capabilities=(
         Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
         Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")}),
     ),
-)
+)  # fmt: skip

@@ -76,6 +76,7 @@ FAMILY = Family(
     derivative_of={
         "psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi", "rho": "drho", "drho": "d2rho", "d2rho": "d3rho",
     },
+    example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "s": 0.5},
     uses_phi=False,
     capabilities=(
         Assembly("discriminant", "pressure_angle", unit),

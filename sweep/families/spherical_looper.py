@@ -97,10 +97,15 @@ FAMILY = Family(
     poses=poses,
     derivative_of=ladders("psi", "chi", "x_p", "y_p", "z_p"),
     outward="branch1",
+    example={
+        "a1": 1.0, "b1": 4.1, "c1": 3.2, "e1": 2.9, "f1": 0.6, "g1": -0.4, "alpha1": 0.7, "branch1": -1.0,
+        "o": 1.5, "delta": 1.2, "gamma": 2.5, "c0x": -1.0, "c0y": 1.4, "c0z": 0.3, "p0x": -3.0, "p0y": 2.0, "p0z": 2.5,
+        "a2": 0.3, "b2": 7.0, "x2": 0.0, "y2": -4.0, "z2": -4.0, "theta2": 1.0, "beta2": 1.57, "offset2": 0.5,
+    },
     uses_phi=False,
     capabilities=(
         Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
         Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "b2", "c2", "p")}),
     ),
-)
+)  # fmt: skip

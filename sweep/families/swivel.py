@@ -46,6 +46,7 @@ FAMILY = Family(
     pose_outputs=tuple(chain.from_iterable(_BLOCKS)),
     poses=poses,
     derivative_of=ladders("rho", "x_p", "y_p", "z_p"),
+    example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "Lw": 5.0},
     uses_phi=False,
     capabilities=(Points({"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")}),),
 )
