@@ -135,6 +135,23 @@ def test_slotted_crank_of_phi0_refuses_what_has_none(phi0, e, f, alpha):
     assert status[0] == st.NOT_ADMISSIBLE and np.isnan(a[0])
 
 
+def test_synthesise_gives_central_slots_with_the_wanted_crank_angle():
+    table = {"phi0": [2.0, 2.9, 1.0], "e": [1.0, -3.0, 0.0], "f": [0.5, 1.0, 1.0], "alpha": [0.4, -1.2, 0.0]}
+    found = sweep.synthesise("slotted", table)
+    assert list(found.status) == [st.OK, st.OK, st.NOT_ADMISSIBLE] and np.isnan(found.a[2])
+    shorter = np.minimum(found.phi0, 2.0 * np.pi - found.phi0)[:2]
+    np.testing.assert_allclose(shorter, table["phi0"][:2], rtol=1e-7)
+    # the swing is the angle between the tangents from the pivot to the ellipse of the ball, on a fine grid of it
+    phi = np.linspace(0.0, 2.0 * np.pi, 200_000)
+    for k in range(2):
+        x = found.a[k] * np.cos(phi) - found.e[k]
+        y = found.f[k] * np.sin(found.alpha[k]) + found.a[k] * np.cos(found.alpha[k]) * np.sin(phi)
+        angle = np.unwrap(np.arctan2(y, x))
+        assert abs(found.swing[k]) == pytest.approx(np.ptp(angle), rel=1e-8)
+    with pytest.raises(sweep.InputError, match="between 0 and pi"):
+        sweep.synthesise("slotted", {"phi0": [4.0], "e": [1.0]})
+
+
 def test_slotted_margin_is_the_least_squared_cosine_of_the_turn():
     phi = np.linspace(0.0, 2.0 * np.pi, 3601)
     for design in (FORK, (*BAR[:5], 0.2, 2.4, 1.0, 1.0)):
