@@ -16,7 +16,7 @@ from sweep.families.check import check_family
 if TYPE_CHECKING:
     from sweep.families.members import Machine
 
-NAMES = ("rssr", "rssp", "guide", "geared_dwell")
+NAMES = ("rssr", "rssp", "guide", "geared_dwell", "slotted", "swivel", "spherical_looper", "cylindrical_looper")
 
 
 @dataclass(frozen=True)
