@@ -102,7 +102,7 @@ def reduce_design(designs: Numbers, i: int) -> tuple[Reduced, Joint]:
 
 @inline
 def axial_reach(joint: Joint, s: Any) -> tuple[Any, Any]:
-    """z and rho^2 = b^2 - z^2, from the sine of the rocker angle."""
+    """Axial distance z and rho^2 = b^2 - z^2, from the sine of the rocker angle."""
     z = joint.sweep * s + joint.axial
     return z, (joint.coupler - z) * (joint.coupler + z)
 
@@ -125,4 +125,5 @@ def slope(joint: Joint, x: Any, y: Any, w: Any, c: Any, s: Any) -> Slope:
 @inline
 def residual_size(r: Reduced, joint: Joint, x: Any, y: Any) -> float:
     """Rounding error of G5: what its terms are made of, times 8 x 2^-53."""
-    return 8.0 * EPS * (abs(x.real) + abs(y.real) + abs(r.e.real) + 2.0 + abs(r.y0.real) + r.w_size + joint.size)
+    terms = abs(x.real) + abs(y.real) + abs(r.e.real) + 2.0 + abs(r.y0.real) + r.w_size + joint.size
+    return float(8.0 * EPS * terms)

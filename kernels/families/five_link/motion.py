@@ -41,7 +41,7 @@ def _bends(joint: Joint, c: Any, s: Any) -> Bends:
 
 @inline
 def transfer(r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any, t: Any) -> tuple[Any, Any, Any]:
-    """psi', psi'', psi''' of the mirrored mechanism, from minus cosine and minus sine of its angle and dG5/dpsi; (5)."""
+    """First three derivatives of the mirrored angle, from minus its cosine, minus its sine and dG5/dpsi; (5)."""
     bends = _bends(joint, -c, -s)
     hu, hv = r.ca * u, r.ca * v
     w1 = r.k2 * u - r.k1 * v
@@ -55,10 +55,19 @@ def transfer(r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any, t: Any) -
     q = -(g_phph + p * (2.0 * g_phps + g_psps * p)) * per_t
     g_phphps = u * s - hv * c
     g_phpsps = w_ph - g_ph
-    jerk = (
-        g_ph - p * (3.0 * g_phphps + p * (3.0 * g_phpsps - turn * p)) - 3.0 * q * (g_phps + g_psps * p)
-    ) * per_t
+    jerk = (g_ph - p * (3.0 * g_phphps + p * (3.0 * g_phpsps - turn * p)) - 3.0 * q * (g_phps + g_psps * p)) * per_t
     return p, q, jerk
+
+
+@inline
+def _extreme(joint: Joint, x: Any, y: Any, w: Any, c: float, s: float) -> Any:
+    """G5 at the place of an extreme; errors and changes of the place count only at the end of an arc."""
+    if reaches(real_joint(joint), s):
+        return slope(joint, x, y, w, c, s).value
+    z, _ = axial_reach(real_joint(joint), s)
+    sine = ((joint.coupler if z > 0.0 else -joint.coupler) - joint.axial) / joint.sweep
+    cosine = np.sqrt((1.0 - sine) * (1.0 + sine))
+    return x * (cosine if c > 0.0 else -cosine) - y * sine + (w - joint.shift)
 
 
 @inline
@@ -80,11 +89,7 @@ def discriminant_of(r: Reduced, joint: Joint, u: Any, v: Any) -> Any:
         if not low.value < math.inf:
             return math.nan * x
         c0, s0, c1, s1 = math.cos(low.psi), math.sin(low.psi), math.cos(high.psi), math.sin(high.psi)
-        if not reaches(real, s0) or not reaches(real, s1):
-            return -low.value * high.value + 0.0 * x  # an extreme at an end of the arc
-    # The places are stationary, so their own errors do not count and complex parts pass through the values.
-    low_value, high_value = slope(joint, x, y, w, c0, s0).value, slope(joint, x, y, w, c1, s1).value
-    return -low_value * high_value
+    return -_extreme(joint, x, y, w, c0, s0) * _extreme(joint, x, y, w, c1, s1)
 
 
 @inline
@@ -162,7 +167,9 @@ def poses(
             if pressure_angle is not None:
                 pressure_angle[i, j] = pressure(r, joint, v, w, c, s, t)
             if dpsi is not None or d2psi is not None or d3psi is not None:
-                p, q, jerk = transfer(r, joint, u, v, c, s, t) if code == st.OK else (math.nan * t, math.nan * t, math.nan * t)
+                p, q, jerk = (
+                    transfer(r, joint, u, v, c, s, t) if code == st.OK else (math.nan * t, math.nan * t, math.nan * t)
+                )
                 if dpsi is not None:
                     dpsi[i, j] = r.branch * p
                 if d2psi is not None:

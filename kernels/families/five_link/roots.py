@@ -39,7 +39,7 @@ def _closure(joint: Joint, x: float, y: float, w: float, psi: float) -> float:
     """G5 with rho^2 < 0 by rounding at the end of an arc taken as 0."""
     c, s = math.cos(psi), math.sin(psi)
     _, square = axial_reach(joint, s)
-    return x * c - y * s + (w - joint.shift) - joint.share * math.sqrt(max(square, 0.0))
+    return float(x * c - y * s + (w - joint.shift) - joint.share * math.sqrt(max(square, 0.0)))
 
 
 @kernel

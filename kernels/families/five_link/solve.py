@@ -75,7 +75,7 @@ def turning_places(joint: Joint, x: float, y: float, w: float) -> tuple[bool, fl
 def reaches(joint: Joint, s: float) -> bool:
     """Whether rho is positive beyond rounding at the rocker angle of sine s."""
     _, square = axial_reach(joint, s)
-    return square > 32.0 * EPS * joint.coupler * joint.coupler
+    return bool(square > 32.0 * EPS * joint.coupler * joint.coupler)
 
 
 @kernel
@@ -111,7 +111,7 @@ def _scanned(joint: Joint, x: float, y: float, w: float, noise: float, at: Array
 
 @inline
 def solve_plain(r: Reduced, joint: Joint, x: Any, y: Any, w: Any) -> tuple[int, Any, Any, Any]:
-    """Status, minus cosine, minus sine and dG5/dpsi where the closure is that of a crank-rocker: (2*) of docs/rssr.md."""
+    """Status, minus cosine, minus sine and dG5/dpsi of a crank-rocker's closure: (2*) of docs/rssr.md."""
     square = x * x + y * y
     delta = square - w * w
     tolerance = discriminant_tolerance(r, x, y, w) + 16.0 * EPS * abs(w.real) * joint.size
@@ -126,9 +126,7 @@ def solve_plain(r: Reduced, joint: Joint, x: Any, y: Any, w: Any) -> tuple[int, 
 
 
 @inline
-def solve_general(
-    r: Reduced, joint: Joint, x: Any, y: Any, w: Any, at: Array
-) -> tuple[int, Any, Any, Any]:
+def solve_general(r: Reduced, joint: Joint, x: Any, y: Any, w: Any, at: Array) -> tuple[int, Any, Any, Any]:
     """As :func:`solve_plain`, for every five-link."""
     xr, yr, wr = x.real, y.real, w.real
     noise = residual_size(r, joint, x, y)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from kernels._jit import inline
-from kernels.crank_closure import Array as Array
 from kernels.crank_closure import EPS as EPS
+from kernels.crank_closure import Array as Array
 from kernels.crank_closure import Numbers as Numbers
 from kernels.crank_closure import Reduced as Reduced
 from kernels.crank_closure import Status as Status
