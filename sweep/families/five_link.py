@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from kernels.families import five_link
+from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
+from sweep.families.capabilities import Assembly, OutputLink, Points
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -20,15 +22,21 @@ PARAMETERS = (
 )
 
 VALUE_OUTPUTS = (
-    Output("psi", "rad", "rocker angle in (-pi, pi]", "(1)"),
+    Output("psi", "rad", "rocker angle in (-pi, pi]", "(1)", wraps=True),
     Output("dpsi", "1", "velocity analogue dpsi/dphi", "(5)"),
     Output("d2psi", "1", "acceleration analogue", "(5)"),
     Output("d3psi", "1", "jerk analogue", "(5)"),
     Output("sin_psi", "1", "sine of the rocker angle", "(1)"),
     Output("cos_psi", "1", "cosine of the rocker angle", "(1)"),
-    Output("discriminant", "length^4", "product of the extremes of the closure; positive where the links reach", "(7)"),
+    Output("discriminant", "length^4", "(2 b c)^2 cos^2(pressure angle); negative where the links do not reach", "(7)"),
     Output("pressure_angle", "rad", "between the force through the rocker ball and its velocity", "(6)"),
-    Output("theta", "rad", "angle of the coupler's plane about the crank pin, from the common perpendicular", "(8)"),
+    Output(
+        "theta",
+        "rad",
+        "angle of the coupler's plane about the crank pin, from the common perpendicular",
+        "(8)",
+        wraps=True,
+    ),
     Output("beta", "rad", "angle of the coupler against the crank plane, in (-pi/2, pi/2)", "(8)"),
 )
 
@@ -61,5 +69,11 @@ FAMILY = Family(
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
     poses=poses,
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
+    outward="branch",
     uses_phi=False,
+    capabilities=(
+        Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
+        Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")}),
+        OutputLink(crank_rocker.rocker_origin),
+    ),
 )

@@ -6,7 +6,6 @@ units of the crank and mirrored to the assembly mode +1, as in :mod:`kernels.cra
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,7 +45,6 @@ class Joint(NamedTuple):
     h: Any
     s2: Any
     plain: bool  # rho does not depend on psi, or does not matter: the closure is that of a crank-rocker
-    unique: float  # with X^2 + Y^2 above this there is one rocker angle for each sign of dG5/dpsi; (4)
     size: float  # magnitude of the terms this joint adds, for their rounding errors
     mode: int
     valid: bool
@@ -78,17 +76,6 @@ def reduce_design(designs: Numbers, i: int) -> tuple[Reduced, Joint]:
     sweep, axial, coupler = branch * (r.sa * r.rocker), rise * per_a, r.coupler
     shift, share = 0.5 * (h * h + s2 * s2) * per_c * per_a, h * per_c
     plain = (share == 0.0) | (sweep == 0.0)
-    # Bounds of |share rho'| and |share rho''| over all psi where rho stays positive: the second of (4).
-    lift, reach = abs(sweep.real), abs(axial.real) + abs(sweep.real)
-    least = (coupler.real - reach) * (coupler.real + reach)
-    unique = math.inf
-    if plain:
-        unique = 0.0
-    elif least > 0.0:
-        root = math.sqrt(least)
-        once = reach * lift / root
-        twice = (lift * lift + reach * lift + once * once) / root
-        unique = share.real * share.real * (once * once + twice * twice)
     size = abs(shift.real) + abs((share * coupler).real)
     whole = mode == 1.0 or mode == 2.0 or mode == 3.0
     valid = r.valid and whole and size < 1e140 and (s2 * per_a).real == (s2 * per_a).real
@@ -96,7 +83,7 @@ def reduce_design(designs: Numbers, i: int) -> tuple[Reduced, Joint]:
     if valid:
         number = int(mode)
     return r, Joint(
-        coupler, sweep, axial, shift, share, h * per_a, s2 * per_a, plain, unique, size, number, valid
+        coupler, sweep, axial, shift, share, h * per_a, s2 * per_a, plain, size, number, valid
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from kernels.complex_step import arctan2, hypotenuse
 from kernels.crank_closure import Numbers, Reduced, Status
 from kernels.families.five_link.closure import Joint, axial_reach, reduce_design, slope
 from kernels.families.five_link.roots import MOST, extremes
-from kernels.families.five_link.solve import pose_terms, reaches, real_joint, solve, turning_places
+from kernels.families.five_link.solve import pose_terms, reaches, real_joint, solve
 
 
 class Bends(NamedTuple):
@@ -71,30 +71,29 @@ def _extreme(joint: Joint, x: Any, y: Any, w: Any, c: float, s: float) -> Any:
 
 
 @inline
-def discriminant_of(r: Reduced, joint: Joint, u: Any, v: Any) -> Any:
-    """Minus least times largest G5 over all rocker angles, in units of the crank: Delta of a crank-rocker; (7)."""
+def _shortfall(r: Reduced, joint: Joint, u: Any, v: Any) -> Any:
+    """Negative number that says how far the links are from reaching; Delta of a crank-rocker; (7)."""
     x, y, w = pose_terms(r, u, v)
+    real = real_joint(joint)
     if joint.plain:
         close = w - joint.shift
-        if joint.share != 0.0:
-            _, square = axial_reach(joint, 0.0 * x)
+        _, square = axial_reach(joint, 0.0 * x)
+        if joint.share != 0.0 and square.real > 0.0:
             close = close - joint.share * np.sqrt(square)
-        return x * x + y * y - close * close
-    real = real_joint(joint)
-    settled, c0, s0, c1, s1 = False, 0.0, 0.0, 0.0, 0.0
-    if x.real * x.real + y.real * y.real > joint.unique:
-        settled, c0, s0, c1, s1 = turning_places(real, x.real, y.real, w.real)
-    if not settled:
-        low, high = extremes(real, x.real, y.real, w.real)
-        if not low.value < math.inf:
-            return math.nan * x
-        c0, s0, c1, s1 = math.cos(low.psi), math.sin(low.psi), math.cos(high.psi), math.sin(high.psi)
-    return -_extreme(joint, x, y, w, c0, s0) * _extreme(joint, x, y, w, c1, s1)
+        value = x * x + y * y - close * close
+        return value if value.real < 0.0 else square
+    low, high = extremes(real, x.real, y.real, w.real)
+    if not low.value < math.inf:
+        nearest = joint.axial - joint.sweep if (joint.axial * joint.sweep).real > 0.0 else joint.axial + joint.sweep
+        return (joint.coupler - nearest) * (joint.coupler + nearest)
+    product = _extreme(joint, x, y, w, math.cos(low.psi), math.sin(low.psi))
+    product *= _extreme(joint, x, y, w, math.cos(high.psi), math.sin(high.psi))
+    return -product if product.real > 0.0 else product
 
 
 @inline
-def pressure(r: Reduced, joint: Joint, v: Any, w: Any, c: Any, s: Any, t: Any) -> Any:
-    """Angle between the force through the ball on the rocker and its velocity; (6)."""
+def across(r: Reduced, joint: Joint, v: Any, w: Any, c: Any, s: Any) -> tuple[Any, Any]:
+    """Force through the rocker ball along the rocker and along its axis; dG5/dpsi is its third part; (6)."""
     _, square = axial_reach(joint, -s)
     rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
     close = w - joint.shift
@@ -104,8 +103,19 @@ def pressure(r: Reduced, joint: Joint, v: Any, w: Any, c: Any, s: Any, t: Any) -
         z, _ = axial_reach(joint, -s)
         lean = joint.h * z / rho
     along = (r.rocker - close) - lean * joint.sweep * s / r.rocker
-    rise = (r.z0 - r.sa * v) - lean * (r.branch * r.ca)
-    return arctan2(hypotenuse(along, rise), t)
+    return along, (r.z0 - r.sa * v) - lean * (r.branch * r.ca)
+
+
+@inline
+def discriminant_of(r: Reduced, joint: Joint, code: int, u: Any, v: Any, w: Any, c: Any, s: Any, t: Any) -> Any:
+    """b^2 cos^2(pressure angle) in units of the crank; negative where the links do not reach; (7)."""
+    if joint.h == 0.0 and joint.s2 == 0.0:
+        x, y, _ = pose_terms(r, u, v)
+        return x * x + y * y - w * w
+    if code == st.OK or code == st.DEAD_POINT:
+        along, rise = across(r, joint, v, w, c, s)
+        return joint.coupler * joint.coupler * (t * t / (along * along + rise * rise + t * t))
+    return _shortfall(r, joint, u, v)
 
 
 @kernel
@@ -156,7 +166,7 @@ def poses(
             if discriminant is not None:
                 discriminant[i, j] = math.nan
                 if code != st.INVALID_INPUT:
-                    discriminant[i, j] = (discriminant_of(r, joint, u, v) * two_ac) * two_ac
+                    discriminant[i, j] = (discriminant_of(r, joint, code, u, v, w, c, s, t) * two_ac) * two_ac
             if cos_psi is not None:
                 cos_psi[i, j] = -c
             sine = 0.0 - r.branch * s  # never -0.0, which would turn the angle pi into -pi
@@ -165,7 +175,8 @@ def poses(
             if psi is not None:
                 psi[i, j] = arctan2(sine, -c)
             if pressure_angle is not None:
-                pressure_angle[i, j] = pressure(r, joint, v, w, c, s, t)
+                along, rise = across(r, joint, v, w, c, s)
+                pressure_angle[i, j] = arctan2(hypotenuse(along, rise), t)
             if dpsi is not None or d2psi is not None or d3psi is not None:
                 p, q, jerk = (
                     transfer(r, joint, u, v, c, s, t) if code == st.OK else (math.nan * t, math.nan * t, math.nan * t)

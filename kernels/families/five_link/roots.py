@@ -115,14 +115,13 @@ def _scan_arc(
 
 
 @kernel
-def _extremes_of_arc(
-    joint: Joint, x: float, y: float, w: float, centre: float, half: float, low: Place, high: Place
-) -> tuple[Place, Place]:
-    """Smallest and largest G5 on one arc, and of those given."""
+def _extremes_of_arc(joint: Joint, x: float, y: float, w: float, centre: float, half: float) -> tuple[Place, Place]:
+    """Places of the smallest and the largest G5 on one arc."""
     whole = half >= math.pi
     begin, width = (-math.pi, 2.0 * math.pi) if whole else (0.0, math.pi)
     step = width / SAMPLES
     least, most, at_least, at_most = math.inf, -math.inf, 0, 0
+    low, high = Place(0.0, math.inf), Place(0.0, -math.inf)
     for k in range(SAMPLES + 1):
         f = _closure(joint, x, y, w, _angle(centre, half, begin + step * k))
         if f < least:
@@ -180,11 +179,13 @@ def all_roots(joint: Joint, x: float, y: float, w: float, noise: float, at: Arra
 
 @kernel
 def extremes(joint: Joint, x: float, y: float, w: float) -> tuple[Place, Place]:
-    """Smallest and largest G5 over all rocker angles where it is defined; infinite where it is nowhere."""
+    """Where G5 is smallest and largest, on the arc where their product is nearest to zero; infinite without an arc."""
     number, centre, half, centre2, half2 = arcs(joint)
     low, high = Place(0.0, math.inf), Place(0.0, -math.inf)
     if number > 0:
-        low, high = _extremes_of_arc(joint, x, y, w, centre, half, low, high)
+        low, high = _extremes_of_arc(joint, x, y, w, centre, half)
     if number > 1:
-        low, high = _extremes_of_arc(joint, x, y, w, centre2, half2, low, high)
+        low2, high2 = _extremes_of_arc(joint, x, y, w, centre2, half2)
+        if abs(low2.value * high2.value) < abs(low.value * high.value):
+            low, high = low2, high2
     return low, high

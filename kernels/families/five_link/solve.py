@@ -50,27 +50,6 @@ def _newton(joint: Joint, x: float, y: float, w: float) -> tuple[bool, float, fl
     return False, c, s
 
 
-@kernel
-def turning_places(joint: Joint, x: float, y: float, w: float) -> tuple[bool, float, float, float, float]:
-    """Whether Newton's method settled, and cosine and sine where G5 is least and where it is largest.
-
-    For X^2 + Y^2 above ``joint.unique`` only: there each side of the crank pin's direction has one such place.
-    """
-    r = math.sqrt(x * x + y * y)
-    c0, s0, c1, s1, settled = -x / r, y / r, x / r, -y / r, False
-    for _ in range(ROUNDS):
-        low, high = slope(joint, x, y, w, c0, s0), slope(joint, x, y, w, c1, s1)
-        down, up = -low.first / low.second, -high.first / high.second
-        if not (low.second > 0.0 and high.second < 0.0):
-            return False, c0, s0, c1, s1
-        c0, s0 = rotate(c0, s0, min(max(down, -0.5), 0.5))
-        c1, s1 = rotate(c1, s1, min(max(up, -0.5), 0.5))
-        if max(abs(down), abs(up)) < NEAR:
-            settled = True
-            break
-    return settled, c0, s0, c1, s1
-
-
 @inline
 def reaches(joint: Joint, s: float) -> bool:
     """Whether rho is positive beyond rounding at the rocker angle of sine s."""
@@ -132,9 +111,7 @@ def solve_general(r: Reduced, joint: Joint, x: Any, y: Any, w: Any, at: Array) -
     noise = residual_size(r, joint, x, y)
     real = real_joint(joint)
     code, settled, c0, s0 = st.OK, False, 0.0, 0.0
-    few = ONE
-    if not xr * xr + yr * yr > joint.unique:
-        few = solutions(real, xr, yr, wr)
+    few = solutions(real, xr, yr, wr)
     if few == NONE or (few == ONE and joint.mode > 1):
         return st.NOT_ASSEMBLED, x, y, w
     if few == ONE:
@@ -162,7 +139,7 @@ def real_joint(joint: Joint) -> Joint:
     """The same constants without their imaginary parts."""
     return Joint(
         joint.coupler.real, joint.sweep.real, joint.axial.real, joint.shift.real, joint.share.real, joint.h.real,
-        joint.s2.real, joint.plain, joint.unique, joint.size, joint.mode, joint.valid,
+        joint.s2.real, joint.plain, joint.size, joint.mode, joint.valid,
     )  # fmt: skip
 
 
