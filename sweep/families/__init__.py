@@ -10,7 +10,20 @@ import sweep.sources  # noqa: F401 (read before any source that makes a value is
 from sweep.errors import InputError, nearest
 from sweep.families.base import Family
 
-NAMES = ("rssr", "rssp", "guide", "geared_dwell", "five_link", "kim_dison")
+NAMES = (
+    "rssr",
+    "rssp",
+    "guide",
+    "geared_dwell",
+    "five_link",
+    "kim_dison",
+    "slider_crank",
+    "four_bar",
+    "inverted_slider_crank",
+    "epicyclic_dwell",
+    "cam",
+    "cam_lever",
+)
 
 
 def family(name: str | Sequence[str]) -> Family:

@@ -80,9 +80,11 @@ def _ours(name: str) -> str:
 
 
 def as_crank_rocker(designs: Array) -> Array:
-    """Design matrix of the same linkage as a crank-rocker, (n, 8)."""
+    """Design matrix of the same linkage as a crank-rocker, (n, 8); no number where the crank's motion is none."""
     matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)), designs.dtype)
     matrix[:, :5] = designs[:, :5]
+    with np.errstate(invalid="ignore"):
+        matrix[:, 0] += 0.0 * designs[:, 5] + 0.0 * designs[:, 6]
     matrix[:, 6] = 0.5 * np.pi
     matrix[:, 7] = -designs[:, 7]
     return matrix
