@@ -26,7 +26,7 @@ PARAMETERS = (
 )
 
 POSE_OUTPUTS = (
-    Output("psi", "rad", "lever angle in (-pi, pi), 0 away from the cam", "(9)"),
+    Output("psi", "rad", "lever angle in (-pi, pi), 0 away from the cam", "(9)", wraps=True),
     Output("dpsi", "1", "velocity analogue dpsi/dphi", "(9)"),
     Output("d2psi", "1", "acceleration analogue", "(9)"),
     Output("d3psi", "1", "jerk analogue", "(9)"),

@@ -48,7 +48,7 @@ def poses(
         if reaches:
             rest = math.pi - 2.0 * arctan2(np.sqrt(near), np.sqrt(far))
         for j in range(phi.shape[1]):
-            angle = phi[row, j]
+            angle = phi[row, j] + 0.0 * lift  # complex where the designs are
             known = valid and abs(angle.real) < 1e5
             status[i, j] = st.INVALID_INPUT
             if known:

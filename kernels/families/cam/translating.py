@@ -42,7 +42,7 @@ def poses(
         valid = law_is_valid(designs, i, TABLE) and r0.real > 0.0 and abs(e.real) < r0.real and r0.real < 1e140
         base = np.sqrt((r0 - e) * (r0 + e)) if valid else math.nan * r0
         for j in range(phi.shape[1]):
-            angle = phi[row, j]
+            angle = phi[row, j] + 0.0 * lift  # complex where the designs are
             known = valid and abs(angle.real) < 1e5
             status[i, j] = st.OK if known else st.INVALID_INPUT
             y, d1, d2, d3 = math.nan * angle, math.nan * angle, math.nan * angle, math.nan * angle
