@@ -17,21 +17,34 @@ from kernels import status as st
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
+from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
 
 RSSR = {"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "branch": -1.0}
 RSSP = {"a": 1.3, "b": 5.2, "e": 0.7, "f": 0.4, "alpha": 0.3, "branch": -1.0}
 GUIDE = {"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "lam": 1.1, "h": -0.6, "branch": 1.0}
 SECOND = {"a": 1.9, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "lam": 1.1, "h": -0.6, "branch": 1.0}
+FIVE = RSSR | {"h": 0.4, "s2": 0.1}
+KIM = {"r": 1.0, "l": 6.0, "h": 3.2, "a": 2.9, "b": 4.0, "branch": -1.0}
+BAR = {"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "branch": 1.0}
+LEVER = {"lift": 0.4, "r0": 3.0, "c": 5.0, "e": 6.0, "branch": -1.0}
 CASES = {
     "rssr": ("rssr", (RSSR,)),
     "rssp": ("rssp", (RSSP,)),
     "guide": ("guide", (GUIDE,)),
     "geared_dwell": ("geared_dwell", ({"k": 1.4, "a": 0.3},)),
+    "five_link": ("five_link", (FIVE,)),
+    "kim_dison": ("kim_dison", (KIM,)),
+    "slider_crank": ("slider_crank", ({"a": 1.0, "b": 3.0, "e": 0.4, "branch": -1.0},)),
+    "four_bar": ("four_bar", (BAR,)),
+    "inverted_slider_crank": ("inverted_slider_crank", ({"a": 1.0, "e": 2.2, "h": 0.3, "branch": -1.0},)),
+    "epicyclic_dwell": ("epicyclic_dwell", ({"k": 1.3, "a": 0.2, "n": 3.0},)),
+    "cam": ("cam", ({"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0},)),
+    "cam_lever": ("cam_lever", (LEVER,)),
     "rssr, guide": (["rssr", "guide"], (RSSR, SECOND)),
     "rssr, rssp": (["rssr", "rssp"], (RSSR, RSSP)),
 }
-LINKED = [name for name in CASES if name != "geared_dwell"]  # those with lengths; the other has ratios
+LINKED = [name for name in CASES if "dwell" not in name]  # those with lengths; the others have ratios
 PHI = np.linspace(0.0, 2.0 * math.pi, 19)[None, :]
 FINE = Accuracy(target=1e-6)
 SECONDS = 60.0  # far more than any of these takes, far less than a hang
@@ -65,7 +78,7 @@ def poses(mechanism, designs, phi=PHI):
 
 
 def of_turn(mechanism):
-    return [f"max_abs_{ladder(mechanism)[2]}"] + (["margin"] if mechanism.name != "geared_dwell" else [])
+    return [f"max_abs_{ladder(mechanism)[2]}"] + (["margin"] if mechanism.every(Assembly) else [])
 
 
 def summary(mechanism, designs, accuracy=FINE):
