@@ -44,7 +44,7 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
     """
     import pandas as pd
 
-    designs = design_matrix(family("rssr"), table)
+    designs, _ = design_matrix(family("rssr"), table)
     n = len(designs)
     state, limits = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
     rssr.limits(designs, state, limits, None)

@@ -37,10 +37,14 @@ def poses(
     psi ... y_p : (n, m) out, or None: what is None is neither computed nor compiled
     """
     for i in range(designs.shape[0]):
-        lift, r0, c, e, branch = designs[i, LIFT], designs[i, R0], designs[i, C], designs[i, E], designs[i, BRANCH].real
+        # lengths divided by a power of two near the lever's: no square leaves float64
+        _, exponent = math.frexp(designs[i, C].real)
+        unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+        lift, branch = designs[i, LIFT], designs[i, BRANCH].real
+        r0, c, e = designs[i, R0] * per_unit, designs[i, C] * per_unit, designs[i, E] * per_unit
         row = i if phi.shape[0] > 1 else 0
-        valid = law_is_valid(designs, i, TABLE) and r0.real > 0.0 and c.real > 0.0 and e.real > 0.0
-        valid = valid and r0.real < 1e140 and c.real < 1e140 and e.real < 1e140 and branch * branch == 1.0
+        valid = law_is_valid(designs, i, TABLE) and r0.real > 0.0 and 0.0 < c.real <= 1.0 and e.real > 0.0
+        valid = valid and r0.real < 1e140 and e.real < 1e140 and 1e-140 < lift.real < 1e140 and branch * branch == 1.0
         # the angle at the lever's axis between the line to the cam's axis and the lever, of the triangle e, c, r0
         far, near = (e + c - r0) * (e + c + r0), (r0 - (e - c)) * (r0 + (e - c))
         reaches = valid and far.real > 0.0 and near.real > 0.0
@@ -72,6 +76,6 @@ def poses(
             if x_p is not None or y_p is not None:
                 x, z = e + c * np.cos(value), c * np.sin(value)
                 if x_p is not None:
-                    x_p[i, j] = x * np.cos(angle) + z * np.sin(angle)
+                    x_p[i, j] = (x * np.cos(angle) + z * np.sin(angle)) * unit
                 if y_p is not None:
-                    y_p[i, j] = z * np.cos(angle) - x * np.sin(angle)
+                    y_p[i, j] = (z * np.cos(angle) - x * np.sin(angle)) * unit

@@ -37,9 +37,13 @@ def poses(
     s ... y_p : (n, m) out, or None: what is None is neither computed nor compiled
     """
     for i in range(designs.shape[0]):
-        lift, r0, e = designs[i, LIFT], designs[i, R0], designs[i, E]
+        # lengths divided by a power of two near the prime circle's radius: no square leaves float64
+        _, exponent = math.frexp(designs[i, R0].real)
+        unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+        lift, r0, e = designs[i, LIFT] * per_unit, designs[i, R0] * per_unit, designs[i, E] * per_unit
         row = i if phi.shape[0] > 1 else 0
-        valid = law_is_valid(designs, i, TABLE) and r0.real > 0.0 and abs(e.real) < r0.real and r0.real < 1e140
+        valid = law_is_valid(designs, i, TABLE) and 0.0 < r0.real <= 1.0 and abs(e.real) < r0.real
+        valid = valid and 1e-140 < lift.real < 1e140
         base = np.sqrt((r0 - e) * (r0 + e)) if valid else math.nan * r0
         for j in range(phi.shape[1]):
             angle = phi[row, j] + 0.0 * lift  # complex where the designs are
@@ -52,18 +56,18 @@ def poses(
             if known and not reach.real > 0.0:
                 status[i, j] = st.SINGULAR
             if s is not None:
-                s[i, j] = lift * y
+                s[i, j] = lift * y * unit
             if ds is not None:
-                ds[i, j] = lift * d1
+                ds[i, j] = lift * d1 * unit
             if d2s is not None:
-                d2s[i, j] = lift * d2
+                d2s[i, j] = lift * d2 * unit
             if d3s is not None:
-                d3s[i, j] = lift * d3
+                d3s[i, j] = lift * d3 * unit
             if pressure_angle is not None:
                 pressure_angle[i, j] = (
                     arctan2(magnitude(lift * d1 - e), reach) if reach.real > 0.0 else math.nan * reach
                 )
             if x_p is not None:
-                x_p[i, j] = reach * np.cos(angle) - e * np.sin(angle)
+                x_p[i, j] = (reach * np.cos(angle) - e * np.sin(angle)) * unit
             if y_p is not None:
-                y_p[i, j] = -(reach * np.sin(angle) + e * np.cos(angle))
+                y_p[i, j] = -(reach * np.sin(angle) + e * np.cos(angle)) * unit

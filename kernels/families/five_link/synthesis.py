@@ -49,7 +49,7 @@ def with_limits_of(
         across = rho1 - found - h[i]
         admissible = found > 0.0 and across > 0.0 and rho2 + found > h[i]
         status[i] = st.OK if admissible else st.NOT_ADMISSIBLE
-        if not found - found == 0.0:
+        if found - found != 0.0:  # infinite or no number
             status[i] = st.INVALID_INPUT
         a[i] = found if status[i] == st.OK else math.nan
         b[i] = np.hypot(across, y1 * sa + g * ca - f) if status[i] == st.OK else math.nan

@@ -71,7 +71,7 @@ def poses(
             designs[i, 2] * per_unit,
             designs[i, 3].real,
         )
-        valid = a.real > 0.0 and abs(e.real) < 1e140 and abs(h.real) < 1e140 and branch * branch == 1.0
+        valid = 0.0 < a.real < 1e140 and abs(e.real) < 1e140 and abs(h.real) < 1e140 and branch * branch == 1.0
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
