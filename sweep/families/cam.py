@@ -67,6 +67,7 @@ FAMILY = Family(
     position="s",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
+    example={"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0},
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
     capabilities=(Points({"p": ("x_p", "y_p", None)}),),
 )

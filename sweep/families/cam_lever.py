@@ -55,6 +55,7 @@ FAMILY = Family(
     position="psi",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
+    example={"lift": 0.4, "r0": 3.0, "c": 5.0, "e": 6.0, "branch": -1.0},
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     capabilities=(OutputLink(lever_origin),),
 )

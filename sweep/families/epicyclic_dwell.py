@@ -61,6 +61,7 @@ FAMILY = Family(
     position="psi",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
+    example={"k": 1.3, "a": 0.2, "n": 3.0},
     steps=(Step("dwell", DWELL_OUTPUTS, dwell, 20000.0),),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     uses_phi=False,

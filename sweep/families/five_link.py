@@ -68,6 +68,7 @@ FAMILY = Family(
     position="psi",
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
     poses=poses,
+    example={"a": 1.0, "b": 3.9, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "h": 0.3, "s2": 0.1},
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     outward="branch",
     uses_phi=False,

@@ -122,6 +122,7 @@ FAMILY = Family(
     position="psi",
     pose_outputs=ROCKER_OUTPUTS + POINT_OUTPUTS,
     poses=poses,
+    example={"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "branch": 1.0},
     steps=tuple(_as_ours(step) for step in crank_rocker.FAMILY.steps),
     derivative_of={
         "psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi",

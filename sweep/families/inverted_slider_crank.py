@@ -64,6 +64,7 @@ FAMILY = Family(
     position="psi",
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
     poses=poses,
+    example={"a": 1.0, "e": 2.2, "h": 0.3, "branch": -1.0},
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi", "s": "ds", "ds": "d2s"},
     uses_phi=False,
     capabilities=(

@@ -187,6 +187,7 @@ FAMILY = Family(
     position="alpha",
     pose_outputs=MOTION_OUTPUTS + OWN_OUTPUTS,
     poses=poses,
+    example={"r": 1.0, "l": 6.0, "h": 3.2, "a": 2.9, "b": 4.0, "branch": -1.0},
     steps=(
         Step("swing", SWING_OUTPUTS, swing, 700.0),
         *(_as_ours(step) for step in crank_rocker.FAMILY.steps if step.name != "limit positions"),

@@ -95,6 +95,7 @@ FAMILY = Family(
     position="s",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
+    example={"a": 1.0, "b": 3.0, "e": 0.4, "branch": -1.0},
     steps=tuple(_as_ours(step) for step in rssp.FAMILY.steps),
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
     outward="branch",

@@ -16,26 +16,11 @@ from sweep.families.base import Angles, Family
 from sweep.families.domain import Turn
 
 DESIGNS, SAMPLES, ROUNDS = 500, 360, 7
-# One design of each family that turns; parameters that are not named have their defaults.
-ORDINARY: dict[str, dict[str, float]] = {
-    "rssr": {"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7},
-    "rssp": {"a": 1.3, "b": 5.2, "e": 0.7, "f": 0.4, "alpha": 0.3},
-    "guide": {"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "lam": 1.1, "h": -0.6},
-    "geared_dwell": {"k": 1.4, "a": 0.3},
-    "five_link": {"a": 1.0, "b": 3.9, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "h": 0.3},
-    "kim_dison": {"r": 1.0, "l": 6.0, "h": 3.2, "a": 2.9, "b": 4.0},
-    "slider_crank": {"a": 1.0, "b": 3.0, "e": 0.4},
-    "four_bar": {"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8},
-    "inverted_slider_crank": {"a": 1.0, "e": 2.2, "h": 0.3},
-    "epicyclic_dwell": {"k": 1.3, "a": 0.2, "n": 3.0},
-    "cam": {"lift": 1.0, "r0": 3.0, "law": 2.0},
-    "cam_lever": {"lift": 0.4, "r0": 3.0, "c": 5.0, "e": 6.0, "law": 2.0},
-}
 
 
 def designs_of(mechanism: Family) -> np.ndarray:  # type: ignore[type-arg]
     """Designs within 2 % of the ordinary one in every parameter that has no choices."""
-    given, random = ORDINARY[mechanism.name], np.random.default_rng(1)
+    given, random = mechanism.example, np.random.default_rng(1)
     columns = []
     for parameter in mechanism.parameters:
         value = given.get(parameter.name, parameter.default if parameter.default is not None else 0.0)
@@ -53,9 +38,9 @@ def ladder(mechanism: Family) -> list[str]:
 
 
 def measure(rounds: int) -> dict[str, float]:
-    """Least ns per pose of every family over a turn that has an ordinary design here."""
+    """Least ns per pose of every family over a turn."""
     angles = Angles.of(np.arange(SAMPLES)[None, :] * (2.0 * np.pi / SAMPLES))
-    ready = [mechanism for name in NAMES if isinstance((mechanism := family(name)).domain, Turn) and name in ORDINARY]
+    ready = [mechanism for name in NAMES if isinstance((mechanism := family(name)).domain, Turn)]
     runs = {m.name: (m, designs_of(m), frozenset(ladder(m))) for m in ready}
     best = dict.fromkeys(runs, np.inf)
     for turn in range(rounds + 1):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from kernels._jit import inline
 from kernels.crank_closure import EPS as EPS
@@ -37,3 +37,43 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     a, b, c = designs[i, 0] * unit, designs[i, 1] * unit, designs[i, 2] * unit
     e, f, g = designs[i, 3] * unit, designs[i, 4] * unit, designs[i, 5] * unit
     return reduce_scaled(a, b, c, e, f, g, designs[i, 6], designs[i, 7].real)
+
+
+class Place(NamedTuple):
+    """The closure at one crank angle; ``hu``, ``hv`` are cos(phi), sin(phi) times the cosine of the axes' angle."""
+
+    u: Any  # cos phi
+    v: Any  # sin phi
+    hu: Any
+    hv: Any
+    x: Any  # X, Y, W of the closure
+    y: Any
+    w1: Any  # W = k0 - w1
+    w: Any
+    rr: Any  # X^2 + Y^2, squared distance of the crank pin from the rocker axis
+    delta: Any  # the discriminant X^2 + Y^2 - W^2
+
+
+@inline
+def place(e: Any, y0: Any, ca: Any, k0: Any, k1: Any, k2: Any, u: Any, v: Any) -> Place:
+    """Evaluate the closure of a reduced design at (cos phi, sin phi) = (u, v); (2).
+
+    It takes float32, float64 and complex128 alike, so no literal number may stand in it.
+    """
+    hu, hv = ca * u, ca * v
+    x, y, w1 = e - u, y0 + hv, k2 * u - k1 * v
+    w = k0 - w1
+    rr = x * x + y * y
+    return Place(u, v, hu, hv, x, y, w1, w, rr, rr - w * w)
+
+
+@inline
+def closure_terms(
+    e: float, y0: float, ca: float, k0: float, k1: float, k2: float, u: float, v: float
+) -> tuple[float, ...]:
+    """X, Y, W of the closure alone, for margins, limit positions, error estimates and enclosures.
+
+    W is summed in another order than in :func:`place`.  The order decides its last bit and with it that of every
+    margin, so both are kept.
+    """
+    return e - u, y0 + ca * v, k0 + k1 * v - k2 * u
