@@ -173,7 +173,7 @@ def test_a_scale_that_leaves_float64_gives_the_same_numbers_or_a_status(name, ex
     assert explained(big, [n for n in wanted(mechanism) if n != "discriminant"])
     found = summary(mechanism, scaled)
     assert explained(found, of_turn(mechanism))
-    if found["status"][0] == st.OK:
+    if found["status"][0] == st.OK and mechanism.every(Assembly):
         np.testing.assert_array_equal(found["margin"], summary(mechanism, design)["margin"])
 
 
