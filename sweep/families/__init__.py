@@ -16,7 +16,24 @@ from sweep.families.check import check_family
 if TYPE_CHECKING:
     from sweep.families.members import Machine
 
-NAMES = ("rssr", "rssp", "guide", "geared_dwell", "slotted", "swivel", "spherical_looper", "cylindrical_looper")
+NAMES = (
+    "rssr",
+    "rssp",
+    "guide",
+    "geared_dwell",
+    "five_link",
+    "kim_dison",
+    "slotted",
+    "swivel",
+    "spherical_looper",
+    "cylindrical_looper",
+    "slider_crank",
+    "four_bar",
+    "inverted_slider_crank",
+    "epicyclic_dwell",
+    "cam",
+    "cam_lever",
+)
 
 
 @dataclass(frozen=True)
