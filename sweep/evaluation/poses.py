@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from sweep.effects import elsewhere, extended, input_names, offered
 from sweep.errors import InputError, nearest
-from sweep.evaluation.tables import design_matrix, numbers, wanted_names
+from sweep.evaluation.statuses import meanings
+from sweep.evaluation.tables import design_matrix, kept_columns, numbers, wanted_names
 from sweep.families import family as find_family
-from sweep.families.base import Angles, Family
+from sweep.families.base import Angles, Array, Family
 from sweep.reductions.catalogue import output_names
 
 if TYPE_CHECKING:
@@ -22,7 +23,13 @@ if TYPE_CHECKING:
 
 
 def evaluate(
-    family: str | Sequence[str], table: Table, want: str | Sequence[str], phi: ArrayLike | None = None
+    family: str | Sequence[str],
+    table: Table,
+    want: str | Sequence[str],
+    phi: ArrayLike | None = None,
+    *,
+    keep: bool | str | Sequence[str] = False,
+    status_text: bool = False,
 ) -> pd.DataFrame:
     """Pose outputs of mechanisms at given crank angles, one row per pose, in the order of the input.
 
@@ -31,13 +38,17 @@ def evaluate(
     family : "rssr", "guide", ... or a list of them for a chain
     table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1
     want : names of pose outputs (see ``sweep families``)
-    phi : crank angles [rad]; without it the table must have a column ``phi``
+    phi : crank angles [rad], one or a plain list of them, for every design; without it the table must have a column
+        ``phi``, and with it none
+    keep : columns of the table that the result repeats in front: names, or True for all of them
+    status_text : add a column ``status_text``, the meaning of ``status`` in words
 
     Returns
     -------
     DataFrame
-        the wanted columns and ``status``; with ``phi=`` preceded by ``design`` (row of the table) and ``phi``,
-        otherwise indexed like the table.  Where a value is nan, ``status`` says why (see :mod:`kernels.status`).
+        the wanted columns and ``status``; with ``phi=`` preceded by ``design`` (row of the table, from 0) and ``phi``.
+        Each row has the index label of its design.  Where a value is nan, ``status`` says why (see
+        :mod:`kernels.status`).
 
     Raises
     ------
@@ -51,20 +62,41 @@ def evaluate(
     wanted = pose_wants(mechanism, want)
     extra = () if phi is not None else ("phi",)
     matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))
+    index = table.index if isinstance(table, pd.DataFrame) else None
     if phi is None:
         if "phi" not in extras:
             raise InputError("phi", None, "a column phi, or the argument phi=", f"table of {mechanism.name}")
-        columns = mechanism.poses(matrix, Angles.of(np.ascontiguousarray(extras["phi"])[:, None]), frozenset(wanted))
-        index = table.index if isinstance(table, pd.DataFrame) else None
-        return pd.DataFrame({name: columns[name].ravel() for name in [*wanted, "status"]}, index=index)
+        angles, head, repeats = np.ascontiguousarray(extras["phi"])[:, None], {}, 1
+    else:
+        if "phi" in map(str, table):
+            allowed = "either phi= for every design, or a column phi, not both"
+            raise InputError("phi", "a column", allowed, f"table of {mechanism.name}")
+        grid = _crank_angles(phi)
+        angles, repeats = grid[None, :], grid.size
+        head = {"design": np.repeat(np.arange(len(matrix)), repeats), "phi": np.tile(grid, len(matrix))}
+        index = None if index is None else index.repeat(repeats)
+    columns = mechanism.poses(matrix, Angles.of(angles), frozenset(wanted))
+    made = head | {name: columns[name].ravel() for name in [*wanted, "status"]}
+    if status_text:
+        made["status_text"] = np.array(meanings(made["status"]), dtype=object)
+    result = pd.DataFrame(made, index=index)
+    kept = kept_columns(table, keep, made, len(matrix))
+    if not kept:
+        return result
+    input_columns = pd.DataFrame(kept).loc[np.repeat(np.arange(len(matrix)), repeats)].set_axis(result.index)
+    return pd.concat([input_columns, result], axis=1)
 
-    grid = np.atleast_1d(numbers(phi, "phi", "phi, position")).ravel()
+
+def _crank_angles(phi: ArrayLike) -> Array:
+    """The argument phi= as a plain array."""
+    grid = numbers(phi, "phi", "phi, position")
+    if grid.ndim > 1:
+        raise InputError("phi", f"shape {grid.shape}", "one angle, or a plain list of angles for every design", "phi")
+    grid = np.atleast_1d(grid)
     if not np.isfinite(grid).all():
         position = int(np.argmin(np.isfinite(grid)))
         raise InputError("phi", float(grid[position]), "a finite number", f"phi, position {position}")
-    columns = mechanism.poses(matrix, Angles.of(grid[None, :]), frozenset(wanted))
-    head = {"design": np.repeat(np.arange(len(matrix)), grid.size), "phi": np.tile(grid, len(matrix))}
-    return pd.DataFrame(head | {name: columns[name].ravel() for name in [*wanted, "status"]})
+    return grid
 
 
 def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from kernels import status as st
 from sweep.effects import extended, input_names
 from sweep.errors import InputError
-from sweep.evaluation.tables import design_matrix, wanted_names
+from sweep.evaluation.statuses import meanings
+from sweep.evaluation.tables import design_matrix, kept_columns, wanted_names
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.chain import Stage
@@ -28,8 +29,8 @@ from sweep.reductions.catalogue import (
 )
 from sweep.reductions.margins import margin_suffixes
 from sweep.reductions.means import mean_squares
-from sweep.reductions.refine import precise_maxima
-from sweep.reductions.sampling import TWO_PI, Index
+from sweep.reductions.precise import sharpen_maxima
+from sweep.reductions.sampling import Index
 from sweep.reductions.turn import Group, group_ns, limits_and_reductions, margin_group
 
 if TYPE_CHECKING:
@@ -78,6 +79,8 @@ def summarise(
     accuracy: float | None = None,
     certify: bool | Sequence[str] = False,
     window: tuple[float, float] | None = None,
+    keep: bool | str | Sequence[str] = False,
+    status_text: bool = False,
 ) -> pd.DataFrame:
     """Design outputs of mechanisms, one row per design, in the order of the input.
 
@@ -94,6 +97,8 @@ def summarise(
         ``err_`` are then bounds instead of estimates
     window : ``max_abs_dev`` and the other reductions of ``dev`` count only poses whose position lies between these
         fractions of the stroke, measured from its smallest position; default the whole turn
+    keep : columns of the table that the result repeats in front: names, or True for all of them
+    status_text : add a column ``status_text``, the meaning of ``status`` in words
 
     Returns
     -------
@@ -121,7 +126,10 @@ def summarise(
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
     errors = [f"err_{name}" for name in wanted] if chosen.target is not None else []
     index = table.index if isinstance(table, pd.DataFrame) else None
-    return pd.DataFrame({name: columns[name] for name in [*wanted, *errors, "status"]}, index=index)
+    made: dict[str, Any] = {name: columns[name] for name in [*wanted, *errors, "status"]}
+    if status_text:
+        made["status_text"] = np.array(meanings(columns["status"]), dtype=object)
+    return pd.DataFrame(kept_columns(table, keep, made, len(matrix)) | made, index=index)
 
 
 def design_outputs(
@@ -235,29 +243,13 @@ def _run(family: Family, job: _Job, designs: Array, accuracy: Accuracy, window: 
             found.setdefault(f"err_{plain}", accuracy.target * np.abs(np.asarray(found[plain], np.float64)))
             located = any(o.name == f"phi_{plain}" for o in job.group.provides)
             if plain.startswith("max_abs_") and located and mechanism.precise_poses and not accuracy.certify:
-                _sharpen(mechanism, job.group, part, plain, found, accuracy.target)
+                sharpen_maxima(mechanism, job.group, part, plain, found, accuracy.target)
     return {"status": found["status"]} | {
         key: found[own_key]
         for name, plain in own.items()
         for key, own_key in ((name, plain), (f"err_{name}", f"err_{plain}"))
         if own_key in found
     }
-
-
-def _sharpen(family: Family, step: Step, designs: Array, name: str, columns: Columns, target: float) -> None:
-    """Take a step's maxima that rounding left less accurate than was asked from the family's precise poses."""
-    place = f"phi_{name}"
-    value, err = (np.asarray(columns[key], np.float64) for key in (name, f"err_{name}"))
-    rows = np.flatnonzero(err > target * np.abs(value))
-    if not rows.size:
-        return
-    phi = np.asarray(step.run(designs[rows], frozenset((name, place)), Accuracy(target=target))[place], np.float64)
-    peaks = precise_maxima(family, designs[rows], name.removeprefix("max_abs_"), phi, target, place in columns)
-    better = peaks.err_height < err[rows]
-    rows, peaks = rows[better], peaks.only(better)
-    value[rows], err[rows] = peaks.height, peaks.err_height
-    if place in columns:
-        columns[place][rows], columns[f"err_{place}"][rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
 
 
 def _spread(values: NDArray[np.generic], rows: Index, n: int) -> NDArray[np.generic]:
