@@ -38,7 +38,7 @@ def placed(n, r, longest):
 
 
 def near_change_points(n, seed, longest=1e5, lowest=1e-10, highest=1e-4):
-    """(n, 8) designs whose margin lies between two small numbers: the rocker is stretched until the crank just turns."""
+    """(n, 8) designs whose margin lies between two small numbers: rockers just long enough to turn."""
     r, found = np.random.default_rng(seed), []
     while sum(map(len, found)) < n:
         designs = placed(8 * n, r, longest)

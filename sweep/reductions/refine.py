@@ -120,14 +120,27 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) ->
     sample : evaluates the measured quantity with less rounding than what the peaks come from
     peaks, tolerance, locate : as in `sharpen`
     """
+    before = peaks.height
     peaks = _attained(sample, peaks, np.arange(peaks.phi.size))
+    rounded = np.abs(peaks.height - before)
     again = np.flatnonzero((peaks.err_height > tolerance) | (peaks.err_phi > locate))
     if again.size:
-        # Rounding may have spoilt the place too: begin as wide as it is uncertain.
-        step = np.maximum(peaks.step, np.minimum(peaks.err_phi, SHRINK * peaks.spacing))
-        rough = peaks._replace(step=step).only(again)
+        # Rounding may have spoilt the place too, and rounding that is alike at neighbouring poses hides that: where it
+        # has changed the height begin anew, else as wide as the place is uncertain.
+        fresh = SHRINK * peaks.spacing
+        err_phi = np.where(rounded > tolerance, np.maximum(peaks.err_phi, fresh), peaks.err_phi)
+        step = np.maximum(peaks.step, np.minimum(err_phi, fresh))
+        rough = peaks._replace(step=step, err_phi=err_phi).only(again)
         sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, tolerance[again], locate[again])
         sharper = _attained(sample, sharper, again)
+        # Both heights are attained, so the higher one is nearer; a narrow window may see noise, or another peak.
+        rougher = peaks.only(again)
+        lower = np.maximum(rougher.height - sharper.height, 0.0)
+        moved = np.abs(sharper.phi - rougher.phi)
+        kept = lower > 0.0
+        sharper.phi[kept], sharper.height[kept] = rougher.phi[kept], rougher.height[kept]
+        sharper.err_height[:] += lower
+        sharper.err_phi[kept] += moved[kept]
         for column, found in zip(peaks, sharper, strict=True):
             column[again] = found
     return peaks
