@@ -11,8 +11,8 @@ import sweep
 from kernels import status as st
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
-from sweep.reductions import singularities as nearest
-from sweep.reductions.singularities import crowded, singularities
+from sweep.numerics.singularities import Singularities, crowded
+from sweep.reductions.precise import nearest
 from tests.near_change_points import LONG, RSSR, brute_maxima, near_change_points
 from tests.rssr_designs import margins
 
@@ -46,7 +46,7 @@ def test_maxima_near_change_points_are_those_of_brute_force_within_their_errors(
 
 def test_singularities_are_where_the_margin_is_least() -> None:
     designs = near_change_points(500, 3)
-    near, exact = singularities(RSSR, designs), margins(designs)
+    near, exact = nearest(RSSR, designs), margins(designs)
     closest = np.argmin(near.rho, axis=1)[:, None]
     places = np.take_along_axis(near.phi, closest, axis=1)[:, 0]
     rho = np.take_along_axis(near.rho, closest, axis=1)[:, 0]
@@ -58,11 +58,11 @@ def test_singularities_are_where_the_margin_is_least() -> None:
 
 def test_crowded_angles_stand_no_wider_than_a_share_of_the_distance() -> None:
     designs = near_change_points(200, 4)
-    near = singularities(RSSR, designs)
+    near = nearest(RSSR, designs)
     angles = crowded(near, 0.25)
     gaps = np.diff(np.concatenate([angles, angles[:, :1] + 2.0 * np.pi], axis=1), axis=1)
     middle = angles + 0.5 * gaps
     assert (gaps <= 0.26 * near.distance(middle)).all()
-    wide = crowded(nearest.Singularities(near.phi, 30.0 * near.rho), 0.25)  # negative control: a distance too large
+    wide = crowded(Singularities(near.phi, 30.0 * near.rho), 0.25)  # negative control: a distance too large
     gaps = np.diff(np.concatenate([wide, wide[:, :1] + 2.0 * np.pi], axis=1), axis=1)
     assert not (gaps <= 0.26 * near.distance(wide + 0.5 * gaps)).all()

@@ -1,4 +1,4 @@
-"""Where the motion is nearly singular: complex zeros of the discriminants, and crank angles that crowd about them.
+"""Where a motion is nearly singular: complex zeros of its discriminants, and crank angles that crowd about them.
 
 Near a change point everything of interest happens within a few distances of such a zero from its place, so crank angles
 whose spacing is a share of that distance resolve a curve however close to the change point it is.
@@ -6,12 +6,17 @@ whose spacing is a share of that distance resolve a curve however close to the c
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from sweep.families.base import Array, Family
-from sweep.reductions.sampling import TWO_PI, discriminants, pose_columns, sample_turn
+from sweep.numerics.quadrature import Array, Index
+
+TWO_PI = 2.0 * np.pi
+
+Curve: TypeAlias = Callable[[Index, Array], Array]
+"""``f(rows, phi)``: values (k, m) of a discriminant of the designs ``rows`` (k,) at crank angles (k, m)."""
 
 SAMPLES = 64  # of a discriminant, which is smooth whatever the motion does
 NEAREST = 3  # dips of each discriminant that count
@@ -36,23 +41,22 @@ class Singularities(NamedTuple):
         return nearest.reshape(phi.shape)
 
 
-def singularities(family: Family, designs: Array) -> Singularities:
-    """The nearest complex zeros of the discriminants of every design, from their dips over the turn.
+def singularities(discriminants: Sequence[Curve], n: int) -> Singularities:
+    """The nearest complex zeros of the discriminants of n designs, from their dips over the turn.
 
     A dip D + D''/2 x^2 vanishes at x = +- i rho with rho^2 = D/(D''/2).  The parabola through three samples is taken
-    again ever closer to the dip, from the family's most accurate poses.
+    again ever closer to the dip.
     """
-    names = discriminants(family)
-    n = len(designs)
-    if not names:
-        return Singularities(np.zeros((n, 1)), np.full((n, 1), FAR))
-    columns, _, _ = sample_turn(family, designs, SAMPLES, names)
-    found = [_dips(family, designs, name, columns[name]) for name in names]
+    if not discriminants:
+        return Singularities(np.ones((n, 1)), np.full((n, 1), FAR))
+    found = [_dips(curve, n, number) for number, curve in enumerate(discriminants)]
     return Singularities(*(np.concatenate(parts, axis=1) for parts in zip(*found, strict=True)))
 
 
-def _dips(family: Family, designs: Array, name: str, values: Array) -> Singularities:
+def _dips(curve: Curve, n: int, number: int) -> Singularities:
     spacing = TWO_PI / SAMPLES
+    turn = np.tile(np.arange(SAMPLES) * spacing, (n, 1))
+    values = curve(np.arange(n), turn)
     before, after = np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
     half_bend = 0.5 * (before + after) - values
     dip = (values <= before) & (values <= after) & (half_bend > 0.0)
@@ -61,10 +65,8 @@ def _dips(family: Family, designs: Array, name: str, values: Array) -> Singulari
     row, which = np.nonzero(np.take_along_axis(dip, column, axis=1))
     phi = column[row, which] * spacing
     rho, step = np.full(phi.size, FAR), np.full(phi.size, spacing)
-    precise = family.precise()
     for _ in range(PASSES):
-        angles = phi[:, None] + step[:, None] * np.arange(-1.0, 2.0)
-        left, here, right = pose_columns(precise, designs[row], angles, [name])[0][name].T
+        left, here, right = curve(row, phi[:, None] + step[:, None] * np.arange(-1.0, 2.0)).T
         bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
         usable = bend > 0.0
         per_bend = np.divide(1.0, bend, out=np.zeros(phi.size), where=usable)
@@ -74,8 +76,8 @@ def _dips(family: Family, designs: Array, name: str, values: Array) -> Singulari
         phi += step * move
         step = np.maximum(CLOSER * step, np.maximum(CLOSER * np.minimum(rho, spacing), SHORTEST))
     # Where there are fewer dips the others stand somewhere, each elsewhere: no two of their angles coincide.
-    places = np.tile(np.arange(1.0, 1.0 + NEAREST), (len(designs), 1))
-    distances = np.full((len(designs), NEAREST), FAR)
+    places = np.tile(np.arange(1.0, 1.0 + NEAREST) + 0.1 * number, (n, 1))
+    distances = np.full((n, NEAREST), FAR)
     places[row, which], distances[row, which] = phi, np.minimum(rho, FAR)
     return Singularities(places, distances)
 
