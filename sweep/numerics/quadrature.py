@@ -38,8 +38,8 @@ GAUSS = np.array([*_GAUSS, 0.417959183673469387755102040816327, *_GAUSS[::-1]])
 EPS = 2.0**-53
 PASSES = 60  # halvings of a first panel, after which a jump between two doubles is all that can be left
 MOST = 4096  # panels of one curve
-SHRINKS = 0.65  # of the error of a panel is left by its halves, at least, where it is noise; a jump leaves a half
-NOISE = 5  # generations that do not shrink, after which it is taken for noise
+SHARED = 0.1  # of the error of a panel is left in each of its halves, where it is noise
+NOISE = 4  # such generations, after which it is taken for noise
 SMALL = 1e-4  # of the integral: what noise can be
 
 
@@ -56,7 +56,7 @@ class Integrals(NamedTuple):
 
 
 class _Panels(NamedTuple):
-    """Panels of all curves, each (k,); integrals and errors (k, q), generations without progress (k, 1)."""
+    """Panels of all curves, each (k,); integrals and errors (k, q), generations of noise (k, 1)."""
 
     row: Index
     origin: Index
@@ -91,7 +91,7 @@ def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
     row, origin = np.repeat(np.arange(n), p), np.tile(np.arange(p), n)
     low, high = edges[:, :-1].ravel(), edges[:, 1:].ravel()
     wide = high > low
-    new = _evaluated(function, row[wide], origin[wide], low[wide], high[wide], np.zeros((int(wide.sum()), 1)))
+    new = _evaluated(function, row[wide], origin[wide], low[wide], high[wide])
     shape = (n, new.value.shape[1])
     done, done_err, size = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     panels = new
@@ -129,17 +129,17 @@ def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
 
 def _halved(function: Integrand, panels: _Panels) -> _Panels:
     middle = 0.5 * (panels.low + panels.high)
-    row, origin, idle = (np.concatenate([x, x]) for x in (panels.row, panels.origin, panels.idle))
+    row, origin = (np.concatenate([x, x]) for x in (panels.row, panels.origin))
     low, high = np.concatenate([panels.low, middle]), np.concatenate([middle, panels.high])
-    halves = _evaluated(function, row, origin, low, high, idle)
+    halves = _evaluated(function, row, origin, low, high)
     k = panels.row.size
-    left = (halves.err[:k] + halves.err[k:]).max(axis=1)
-    shrinks = left <= SHRINKS * panels.err.max(axis=1)
-    idle = np.where(shrinks[:, None], 0.0, panels.idle + 1.0)
+    # Beside a kink or a jump one half is smooth; of noise both halves have their share.
+    both = np.minimum(halves.err[:k].max(axis=1), halves.err[k:].max(axis=1)) > SHARED * panels.err.max(axis=1)
+    idle = np.where(both[:, None], panels.idle + 1.0, np.maximum(panels.idle - 1.0, 0.0))
     return halves._replace(idle=np.concatenate([idle, idle]))
 
 
-def _evaluated(function: Integrand, row: Index, origin: Index, low: Array, high: Array, idle: Array) -> _Panels:
+def _evaluated(function: Integrand, row: Index, origin: Index, low: Array, high: Array) -> _Panels:
     half = 0.5 * (high - low)
     x = (0.5 * (low + high))[:, None] + half[:, None] * NODES
     y = function(row, origin, x)
@@ -151,4 +151,4 @@ def _evaluated(function: Integrand, row: Index, origin: Index, low: Array, high:
     sharp = np.minimum(200.0 * off / np.maximum(spread, 1e-300), 1.0) ** 1.5 * spread
     err = np.where(spread > 0.0, np.maximum(np.minimum(sharp, spread), 0.0), off)
     err = np.maximum(err, 8.0 * EPS * half[:, None] * np.einsum("j,kjq->kq", KRONROD, np.abs(y)))
-    return _Panels(row, origin, low, high, value, err, idle)
+    return _Panels(row, origin, low, high, value, err, np.zeros((row.size, 1)))

@@ -32,6 +32,10 @@ class Singularities(NamedTuple):
     phi: Array
     rho: Array
 
+    def only(self, which: Index) -> Singularities:
+        """Those of some designs."""
+        return Singularities(self.phi[which], self.rho[which])
+
     def distance(self, phi: Array) -> Array:
         """How far the nearest zero is from crank angles (n,), or (n, m)."""
         one = phi.reshape(len(self.phi), -1)
@@ -93,3 +97,10 @@ def crowded(near: Singularities, share: float) -> Array:
     t = reach[:, :, None] * (np.arange(-half, half + 1) / half)
     angles = near.phi[:, :, None] + near.rho[:, :, None] * np.sinh(t)
     return np.sort(np.mod(angles.reshape(n, k * (2 * half + 1)), TWO_PI), axis=1)
+
+
+def turn_edges(near: Singularities, share: float) -> Array:
+    """Ends of panels of a turn from 0 to 2 pi, (n, p + 1), no longer than a share of the distance of a zero."""
+    inner = crowded(near, share)
+    ends = np.zeros((len(inner), 1))
+    return np.concatenate([ends, inner, ends + TWO_PI], axis=1)

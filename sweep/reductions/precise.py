@@ -35,6 +35,8 @@ def sharpen_maxima(family: Family, step: Step, designs: Array, name: str, column
     place = f"phi_{name}"
     value, err = (np.asarray(columns[key], np.float64) for key in (name, f"err_{name}"))
     wanting = np.flatnonzero(err > target * np.abs(value))
+    # The larger its error the nearer the singularity, as a rule, and the more poses a block of such designs takes.
+    wanting = wanting[np.argsort(err[wanting] / np.abs(value[wanting]), kind="stable")]
     for rows in blocks(wanting, POSES):
         searched = step.run(designs[rows], frozenset((name, place)), Accuracy(target=target))
         phi = np.asarray(searched[place], np.float64)
@@ -88,7 +90,7 @@ def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target
     top = (values >= np.roll(values, 1, axis=1)) & (values >= np.roll(values, -1, axis=1))
     row, column = np.nonzero(top & (values >= RIVAL * highest[:, None]))
     row, centre = np.concatenate([row, every]), np.concatenate([angles[row, column], phi])
-    spacing = SPACING * Singularities(near.phi[row], near.rho[row]).distance(centre)
+    spacing = SPACING * near.only(row).distance(centre)
     around = measured(row, centre[:, None] + spacing[:, None] * AROUND)
     np.maximum.at(highest, row, around.max(axis=1))
     first = first_peaks(centre, spacing, around)
