@@ -54,6 +54,28 @@ def near_change_points(n, seed, longest=1e5, lowest=1e-10, highest=1e-4):
     return np.ascontiguousarray(np.concatenate(found)[:n])
 
 
+def tiny_cranks(n, seed):
+    """Cranks of 1e-12 to 1e-5 of the other links, couplers just longer than the shortest that lets them turn."""
+    r, found = np.random.default_rng(seed), []
+    while sum(map(len, found)) < n:
+        designs = placed(8 * n, r, 1.0)
+        a, _, c, e, f, g, alpha, _ = designs.T
+        a[:] = 10.0 ** r.uniform(-12.0, -5.0, len(designs))
+        across, along = np.hypot(e, f * np.sin(alpha)), g - f * np.cos(alpha)
+        turning = np.hypot(across - c, along) * (1.0 + a * r.uniform(0.0, 3.0, len(designs)))
+        designs[:, 1] = turning
+        keep = margins(designs)["rotatable"] == 1.0
+        designs, turning = designs[keep], turning[keep]
+        not_turning = np.zeros(len(designs))
+        for _ in range(80):
+            designs[:, 1] = 0.5 * (turning + not_turning)
+            turns = margins(designs)["margin"] > 0.0
+            turning, not_turning = np.where(turns, designs[:, 1], turning), np.where(turns, not_turning, designs[:, 1])
+        designs[:, 1] = turning * (1.0 + 10.0 ** r.uniform(-10.0, -2.0, len(designs)))
+        found.append(designs[margins(designs)["margin"] > 1e-11])
+    return np.ascontiguousarray(np.concatenate(found)[:n])
+
+
 def crowded_angles(designs):
     """Some 2000 crank angles per design, crowding about the deepest dip of the discriminant, by its own kernel."""
     deepest = margins(designs)["phi_min"]
@@ -78,3 +100,26 @@ def brute_maxima(designs, pose):
         for width in (3e-3, 1e-5, 1e-7):
             best = np.maximum(best, climbed(RSSR, designs, pose, 0, start, width))
     return best
+
+
+def brute_range(designs):
+    """Largest minus smallest rocker angle: both climbed from the best of the crowded poses."""
+    precise, rows = RSSR.precise(), np.arange(len(designs))
+    phi = np.sort(np.mod(crowded_angles(designs), 2.0 * np.pi), axis=1)
+    psi = np.unwrap(precise.poses(designs, Angles.of(phi), frozenset(["psi"]))["psi"], axis=1)
+    ends = []
+    for sign in (1.0, -1.0):
+        column = (sign * psi).argmax(axis=1)
+        at, start = phi[rows, column], psi[rows, column]
+        best, width = sign * start, 3e-3
+        while width > 1e-12:
+            angles = at[:, None] + width * np.arange(-4.0, 5.0) / 4.0
+            values = precise.poses(designs, Angles.of(angles), frozenset(["psi"]))["psi"]
+            values = sign * (values + 2.0 * np.pi * np.rint((start[:, None] - values) / (2.0 * np.pi)))
+            which = values.argmax(axis=1)
+            better = values[rows, which] >= best
+            at = np.where(better, angles[rows, which], at)
+            best = np.maximum(best, values[rows, which])
+            width *= 0.5
+        ends.append(best)
+    return ends[0] + ends[1]

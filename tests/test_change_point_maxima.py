@@ -13,7 +13,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
 from sweep.numerics.singularities import Singularities, crowded
 from sweep.reductions.precise import nearest
-from tests.near_change_points import LONG, RSSR, brute_maxima, near_change_points
+from tests.near_change_points import LONG, RSSR, brute_maxima, brute_range, near_change_points, tiny_cranks
 from tests.rssr_designs import margins
 
 ALONE = replace(RSSR, steps=())
@@ -66,3 +66,18 @@ def test_crowded_angles_stand_no_wider_than_a_share_of_the_distance() -> None:
     wide = crowded(Singularities(near.phi, 30.0 * near.rho), 0.25)  # negative control: a distance too large
     gaps = np.diff(np.concatenate([wide, wide[:, :1] + 2.0 * np.pi], axis=1), axis=1)
     assert not (gaps <= 0.26 * near.distance(wide + 0.5 * gaps)).all()
+
+
+@pytest.mark.parametrize("seed", [4, 6])
+@pytest.mark.parametrize("target", [1e-8, 1e-12])
+def test_range_of_the_rocker_angle_of_tiny_cranks_holds_its_error(target: float, seed: int) -> None:
+    designs = tiny_cranks(1000, seed)
+    exact = brute_range(designs)
+    found = design_outputs(RSSR, designs, ["range_psi", "swing"], Accuracy(target=target))
+    assert (found["status"] == st.OK).all()
+    for value, err in ((found["range_psi"], found["err_range_psi"]), (np.abs(found["swing"]), found["err_swing"])):
+        off = np.abs(value - exact)
+        # Brute force rounds two angles of up to pi.
+        limit = err + 8.0 * 2.0**-53 * np.pi
+        assert (off <= 5.0 * limit).all()
+        assert (off > limit).mean() <= 0.003, "rounding that is alike at neighbouring poses is told by one pose in all"

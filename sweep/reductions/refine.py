@@ -23,6 +23,7 @@ NARROW, WIDE = 1e-8, 1e-4  # secants [rad]: shorter ones would see the rounding 
 # next divides the error by at least 8^4; a sixty-fourth of the last change is claimed, which leaves a factor of 64.
 CLAIM = 1.0 / 64.0
 RIPPLE = 0.25  # of the fourth difference: eight times the noise of one sample on average, and what a quartic leaves out
+VARIES = 8.0  # times the rounding at one pose: what that of its neighbours may be
 EPS = 2.0**-53
 
 
@@ -124,6 +125,8 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) ->
     peaks = _attained(sample, peaks, np.arange(peaks.phi.size))
     rounded = np.abs(peaks.height - before)
     again = np.flatnonzero((peaks.err_height > tolerance) | (peaks.err_phi > locate))
+    # The same rounding has moved the places; it varies along the curve, and one pose sees one value of it.
+    peaks.err_height[:] += VARIES * rounded
     if again.size:
         # Rounding may have spoilt the place too, and rounding that is alike at neighbouring poses hides that: where it
         # has changed the height begin anew, else as wide as the place is uncertain.
