@@ -64,7 +64,7 @@ class Way:
 
     def requests(self, windowed: bool) -> tuple[Request, ...]:
         """The extrema it is made of; a window concerns the deviation across a line only."""
-        return tuple(Request(self.of, mode, windowed and is_deviation(self.of)) for mode in self.modes)
+        return tuple(Request(self.of, mode, windowed and is_deviation(self.of), self.locates) for mode in self.modes)
 
 
 def is_deviation(pose: str) -> bool:

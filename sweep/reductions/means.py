@@ -53,33 +53,45 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
         the names and ``err_<name>`` (nan on samples), each (n,), and ``status``: as of extrema, NOT_CONVERGED where
         neither grids nor panels settle the value; it stays, with its error.  Errors include the rounding of the poses.
     """
-    poses = [name.removeprefix(PREFIX) for name in names]
-    n = len(designs)
+    n, poses = len(designs), [name.removeprefix(PREFIX) for name in names]
     if accuracy.samples is not None:
         found, status = _on_grid(family, designs, np.arange(n), accuracy.samples, poses)
         return _columns(names, found, np.full_like(found, np.nan), status)
     assert accuracy.target is not None
+    columns: Columns = {}
+    status = np.zeros(n, np.uint8)
+    for name, pose in zip(names, poses, strict=True):
+        # Each by itself, so that no bit of it depends on what is wanted beside it.
+        found, err, now = _refined(family, designs, [pose], accuracy.target)
+        columns |= {name: found[:, 0], f"err_{name}": err[:, 0]}
+        status = np.where(status == st.OK, now, status)
+    return columns | {"status": status}
+
+
+def _refined(family: Family, designs: Array, poses: Sequence[str], target: float) -> tuple[Array, Array, Status]:
+    """Means and their errors (n, q), and the status."""
+    n = len(designs)
     found, status = _on_grid(family, designs, np.arange(n), START, poses)
     err = np.full_like(found, np.nan)
     alive = np.flatnonzero(status == st.OK)
     near = _singularities(family, designs[alive])
     needed = np.zeros(n)
     needed[alive] = PER_SINGULARITY / near.rho.min(axis=1, initial=np.inf)
-    unresolved = _by_grids(family, designs, poses, accuracy.target, found, err, status, needed)
+    unresolved = _by_grids(family, designs, poses, target, found, err, status, needed)
     settled = np.setdiff1d(np.flatnonzero(status == st.OK), unresolved)
     rounding = _rounding(family, designs[settled], poses, near.only(np.searchsorted(alive, settled)))
     err[settled] += rounding
     if family.precise_poses is not None:
         # Panels are made of the most accurate poses there are: they serve where rounding is too much as well.
-        rough = rounding > np.maximum(accuracy.target, 64.0 * EPS) * found[settled]
+        rough = rounding > np.maximum(target, 64.0 * EPS) * found[settled]
         unresolved = np.concatenate([unresolved, settled[rough.any(axis=1)]])
     for k in range(0, unresolved.size, PANELS_AT_ONCE):
         rows = unresolved[k : k + PANELS_AT_ONCE]
         edges = turn_edges(near.only(np.searchsorted(alive, rows)), PANEL)
-        found[rows], err[rows], status[rows] = _on_panels(family, designs[rows], poses, edges, accuracy.target)
+        found[rows], err[rows], status[rows] = _on_panels(family, designs[rows], poses, edges, target)
     lost = (status != st.OK) & (status != st.NOT_CONVERGED)
     found[lost], err[lost] = np.nan, np.nan
-    return _columns(names, found, err, status)
+    return found, err, status
 
 
 def _by_grids(
