@@ -13,6 +13,7 @@ from sweep.effects.base import DesignResult, Effect, Rows, Scene, Status, refuse
 from sweep.effects.bearings import CATALOGUE, SUPPORTS, together
 from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Array, Columns, Output, filled
+from sweep.families.capabilities import Assembly
 from sweep.numerics.events import sign_changes, with_events
 from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import TWO_PI, crowded, singularities, turn_edges
@@ -136,8 +137,9 @@ def _switches(scene: Scene) -> Array:
     return np.stack([scene.records[0][:, :, 22], axial, np.abs(axial) - limit], axis=2)
 
 
-def _discriminant(scene: Scene, rows: Rows, stage: int, which: Rows, phi: Array) -> Array:
-    return np.asarray(scene.posed(rows[which], phi).stage(stage).motion["discriminant"], np.float64)
+def _discriminant(scene: Scene, rows: Rows, stage: int, name: str, which: Rows, phi: Array) -> Array:
+    posed = scene.posed(rows[which], phi).stage(stage)
+    return np.asarray(posed.family.poses(posed.designs, posed.angles, frozenset([name]))[name], np.float64)
 
 
 def _refined(scene: Scene, rows: Rows, size: Array, target: float) -> tuple[Array, Array, Status]:
@@ -154,7 +156,12 @@ def _refined(scene: Scene, rows: Rows, size: Array, target: float) -> tuple[Arra
     def switches(which: Rows, phi: Array) -> Array:
         return _switches(scene.posed(rows[which], phi))
 
-    curves = [partial(_discriminant, scene, rows, stage) for stage in range(1 + len(scene.after))]
+    families = [scene.family, *(driven.family for driven in scene.after)]
+    curves = [
+        partial(_discriminant, scene, rows, stage, loop.discriminant)
+        for stage, one in enumerate(families)
+        for loop in one.every(Assembly)
+    ]
     near = singularities(curves, rows.size)
     places = sign_changes(switches, crowded(near, LOOK))
     edges = with_events(turn_edges(near, PANEL), *places)
@@ -171,7 +178,7 @@ EFFECT = Effect(
     title="rolling bearings of the rocker under the joint reactions: loads, mean load over the turn, life",
     equation=EQUATION,
     formulas=FORMULAS,
-    families=loads.ROCKER.families,
+    followers=(loads.ROCKER.name,),
     needs=("kinetostatics",),
     inputs=(*loads.ROCKER.parameters, *SUPPORTS, *CATALOGUE),
     outputs=OUTPUTS,

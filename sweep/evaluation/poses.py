@@ -6,14 +6,16 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sweep.effects import elsewhere, extended, input_names, offered
 from sweep.errors import InputError, nearest
 from sweep.evaluation.statuses import meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, wanted_names
+from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Angles, Array, Family
+from sweep.families.base import Angles, Family
+from sweep.families.domain import TWO_PI, March
 from sweep.reductions.catalogue import output_names
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def evaluate(
-    family: str | Sequence[str],
+    family: Mechanism,
     table: Table,
     want: str | Sequence[str],
     phi: ArrayLike | None = None,
@@ -35,11 +37,12 @@ def evaluate(
 
     Parameters
     ----------
-    family : "rssr", "guide", ... or a list of them for a chain
+    family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1
     want : names of pose outputs (see ``sweep families``)
     phi : crank angles [rad], one or a plain list of them, for every design; without it the table must have a column
-        ``phi``, and with it none
+        ``phi``, and with it none.  A family over an interval takes values of its own variable here, or in a column of
+        that name; one whose poses depend on those before takes equal steps of one turn from 0, in order
     keep : columns of the table that the result repeats in front: names, or True for all of them
     status_text : add a column ``status_text``, the meaning of ``status`` in words
 
@@ -60,20 +63,24 @@ def evaluate(
     bare = find_family(family).precise()
     mechanism = extended(bare, wanted_names(want, f"pose outputs of {bare.name}"))
     wanted = pose_wants(mechanism, want)
-    extra = () if phi is not None else ("phi",)
+    variable = mechanism.domain.name
+    extra = () if phi is not None else (variable,)
     matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))
     index = table.index if isinstance(table, pd.DataFrame) else None
     if phi is None:
-        if "phi" not in extras:
-            raise InputError("phi", None, "a column phi, or the argument phi=", f"table of {mechanism.name}")
-        angles, head, repeats = np.ascontiguousarray(extras["phi"])[:, None], {}, 1
+        _refuse_single_poses(mechanism)
+        if variable not in extras:
+            allowed = f"a column {variable}, or the argument phi="
+            raise InputError(variable, None, allowed, f"table of {mechanism.name}")
+        angles, head, repeats = np.ascontiguousarray(extras[variable])[:, None], {}, 1
     else:
-        if "phi" in map(str, table):
-            allowed = "either phi= for every design, or a column phi, not both"
-            raise InputError("phi", "a column", allowed, f"table of {mechanism.name}")
-        grid = _crank_angles(phi)
+        if variable in map(str, table):
+            allowed = f"either phi= for every design, or a column {variable}, not both"
+            raise InputError(variable, "a column", allowed, f"table of {mechanism.name}")
+        grid = _values_of_the_variable(phi)
+        _check_march(mechanism, grid)
         angles, repeats = grid[None, :], grid.size
-        head = {"design": np.repeat(np.arange(len(matrix)), repeats), "phi": np.tile(grid, len(matrix))}
+        head = {"design": np.repeat(np.arange(len(matrix)), repeats), variable: np.tile(grid, len(matrix))}
         index = None if index is None else index.repeat(repeats)
     columns = mechanism.poses(matrix, Angles.of(angles), frozenset(wanted))
     made = head | {name: columns[name].ravel() for name in [*wanted, "status"]}
@@ -87,7 +94,7 @@ def evaluate(
     return pd.concat([input_columns, result], axis=1)
 
 
-def _crank_angles(phi: ArrayLike) -> Array:
+def _values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
     """The argument phi= as a plain array."""
     grid = numbers(phi, "phi", "phi, position")
     if grid.ndim > 1:
@@ -97,6 +104,24 @@ def _crank_angles(phi: ArrayLike) -> Array:
         position = int(np.argmin(np.isfinite(grid)))
         raise InputError("phi", float(grid[position]), "a finite number", f"phi, position {position}")
     return grid
+
+
+def _refuse_single_poses(mechanism: Family) -> None:
+    if isinstance(mechanism.domain, March):
+        allowed = "the argument phi=, equal steps of one turn from 0: a pose depends on those before it"
+        raise InputError("phi", "a column", allowed, f"table of {mechanism.name}")
+
+
+def _check_march(mechanism: Family, grid: NDArray[np.float64]) -> None:
+    """Refuse crank angles that are no march over one turn."""
+    if not isinstance(mechanism.domain, March):
+        return
+    steps = np.arange(grid.size) * (TWO_PI / grid.size)
+    off = np.abs(grid - steps) > 1e-12 * TWO_PI
+    if off.any():
+        k = int(np.argmax(off))
+        allowed = f"equal steps of one turn from 0, here {steps[k]:.6g}: a pose depends on those before it"
+        raise InputError("phi", float(grid[k]), allowed, f"phi, position {k}")
 
 
 def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:

@@ -24,7 +24,6 @@ from sweep.reductions.sampling import (
     Status,
     blocks,
     discriminants,
-    is_angle_of_follower,
     pose_columns,
     sample_turn,
 )
@@ -146,7 +145,7 @@ def _on_panels(
     names = list(dict.fromkeys(poses))
     starts, codes = pose_columns(family, designs, edges, names)
     scan.worst_status(codes, status)
-    for name in filter(is_angle_of_follower, names):
+    for name in (name for name in names if family.pose_output[name].wraps):
         scan.unwrap(starts[name], np.empty(n, np.int64))
     size = np.stack([np.abs(starts[name]).max(axis=1) for name in poses], axis=1)
     size = np.where((size > 0.0) & np.isfinite(size), size, 1.0)
@@ -161,7 +160,7 @@ def _on_panels(
         out = np.empty((*phi.shape, len(poses)))
         for k, name in enumerate(poses):
             values = columns[name]
-            if is_angle_of_follower(name):
+            if family.pose_output[name].wraps:
                 from_start = starts[name][rows, origins][:, None]
                 values = values + TWO_PI * np.rint((from_start - values) / TWO_PI)
             scaled = values / size[rows, k, None]
@@ -223,7 +222,7 @@ def _rounding(family: Family, designs: Array, poses: Sequence[str], near: Singul
         better, _ = pose_columns(precise, designs[part], angles, names)
         for k, name in enumerate(poses):
             off = columns[name] - better[name]
-            if is_angle_of_follower(name):
+            if family.pose_output[name].wraps:
                 off -= TWO_PI * np.rint(off / TWO_PI)
             off = np.where(np.isfinite(off), np.abs(off), 0.0)
             size = np.abs(np.where(np.isfinite(better[name]), better[name], 0.0))

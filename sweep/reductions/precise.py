@@ -17,14 +17,16 @@ LEVEL = 8.0 * EPS
 AROUND = np.arange(-3.0, 4.0)
 
 
-def sharpen_maxima(family: Family, step: Step, designs: Array, name: str, columns: Columns, target: float) -> None:
+def sharpen_maxima(
+    family: Family, step: Step, designs: Array, pose: str, name: str, columns: Columns, target: float
+) -> None:
     """Replace those maxima of a step whose errors exceed the target by more accurate ones, in place.
 
     Parameters
     ----------
-    family : with precise poses;  step : provides ``name`` and ``phi_<name>``
+    family : with precise poses;  step : provides ``name`` and its place
     designs : the (n, P) design matrix
-    name : ``max_abs_x``
+    pose : the pose output x;  name : the largest magnitude of it
     columns : what the step found, with ``err_<name>``, and perhaps the place and its error; changed in place
     target : relative accuracy
 
@@ -32,7 +34,7 @@ def sharpen_maxima(family: Family, step: Step, designs: Array, name: str, column
     -----
     A maximum below what the step has found, by more than both errors, is another peak: then the step's stands.
     """
-    place = f"phi_{name}"
+    place = f"{family.domain.name}_{name}"
     value, err = (np.asarray(columns[key], np.float64) for key in (name, f"err_{name}"))
     wanting = np.flatnonzero(err > target * np.abs(value))
     # The larger its error the nearer the singularity, as a rule, and the more poses a block of such designs takes.
@@ -40,7 +42,7 @@ def sharpen_maxima(family: Family, step: Step, designs: Array, name: str, column
     for rows in blocks(wanting, POSES):
         searched = step.run(designs[rows], frozenset((name, place)), Accuracy(target=target))
         phi = np.asarray(searched[place], np.float64)
-        peaks = precise_maxima(family, designs[rows], name.removeprefix("max_abs_"), phi, target, place in columns)
+        peaks = precise_maxima(family, designs[rows], pose, phi, target, place in columns)
         better = (peaks.err_height < err[rows]) & (peaks.height >= value[rows] - err[rows] - peaks.err_height)
         rows, peaks = rows[better], peaks.only(better)
         value[rows], err[rows] = peaks.height, peaks.err_height
