@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sweep.effects import elsewhere, extended, input_names, offered
 from sweep.errors import InputError, nearest
-from sweep.evaluation.statuses import meanings
+from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
@@ -82,7 +82,8 @@ def evaluate(
         angles, repeats = grid[None, :], grid.size
         head = {"design": np.repeat(np.arange(len(matrix)), repeats), variable: np.tile(grid, len(matrix))}
         index = None if index is None else index.repeat(repeats)
-    columns = mechanism.poses(matrix, Angles.of(angles), frozenset(wanted))
+    with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+        columns = explained(mechanism.poses(matrix, Angles.of(angles), frozenset(wanted)), wanted)
     made = head | {name: columns[name].ravel() for name in [*wanted, "status"]}
     if status_text:
         made["status_text"] = np.array(meanings(made["status"]), dtype=object)

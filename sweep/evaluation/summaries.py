@@ -14,7 +14,7 @@ from sweep.effects import extended, input_names
 from sweep.errors import InputError
 from sweep.evaluation.route import Part, Route
 from sweep.evaluation.routes import routes
-from sweep.evaluation.statuses import meanings
+from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
@@ -153,7 +153,8 @@ def design_outputs(
         assert route.run is not None
         # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
         alive = np.flatnonzero(np.isin(status, PARTIAL))
-        found = route.run(designs[alive], accuracy, window)
+        with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+            found = route.run(designs[alive], accuracy, window)
         for name in route.outputs:
             for key in (name, error_of(name)) if accuracy.target is not None else (name,):
                 columns[key] = _spread(found[key], alive, n)
@@ -161,7 +162,8 @@ def design_outputs(
         status[alive] = np.where(status[alive] == st.OK, now, status[alive])
     if isinstance(family.domain, Interval):
         status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
-    return {name: columns[name] for name in dict.fromkeys(_with_errors(wanted, accuracy))} | {"status": status}
+    chosen = {name: columns[name] for name in dict.fromkeys(_with_errors(wanted, accuracy))}
+    return explained(chosen | {"status": status}, dict.fromkeys(wanted))
 
 
 def _spread(values: NDArray[np.generic], rows: Index, n: int) -> NDArray[np.generic]:
