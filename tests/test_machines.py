@@ -77,7 +77,7 @@ def test_least_distance_and_timing_agree_with_a_dense_grid() -> None:
     phi = np.linspace(0.0, 2.0 * np.pi, 200001)
     grid = sweep.evaluate(two(), TABLE, ["clearance", "needle.s"], phi=phi)
     least, lowest = int(grid["clearance"].argmin()), int(grid["needle.s"].argmin())
-    assert found["min_clearance"][0] == pytest.approx(grid["clearance"][least], rel=1e-7)
+    assert found["min_clearance"][0] == pytest.approx(grid["clearance"].iloc[least], rel=1e-7)
     assert found["phi_min_clearance"][0] == pytest.approx(phi[least], abs=1e-4)
     assert found["lag"][0] == pytest.approx(np.remainder(phi[least] - phi[lowest] + np.pi, 2 * np.pi) - np.pi, abs=2e-4)
 
