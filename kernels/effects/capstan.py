@@ -44,4 +44,6 @@ def capstan(
                 tension[i, j] = good * t2
             if force is not None:
                 # As a sum of squares it keeps its digits for a nearly straight thread.
-                force[i, j] = good * math.hypot(t1 * math.expm1(mu * angle), 2.0 * math.sqrt(t1 * t2) * math.sin(0.5 * angle))
+                force[i, j] = good * math.hypot(
+                    t1 * math.expm1(mu * angle), 2.0 * math.sqrt(t1 * t2) * math.sin(0.5 * angle)
+                )

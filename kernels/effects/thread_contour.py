@@ -98,7 +98,7 @@ def least_radius(alpha: float, beta: float, stiff: float, thick: float) -> float
     """Radius of least tension, (2 B beta/alpha)^(1/3) - r, not below 0; inf without adhesion; (4)."""
     if alpha == 0.0:
         return math.inf if stiff * beta > 0.0 else math.nan
-    return max((2.0 * stiff * beta / alpha) ** (1.0 / 3.0) - thick, 0.0)
+    return max(math.pow(2.0 * stiff * beta / alpha, 1.0 / 3.0) - thick, 0.0)
 
 
 @kernel

@@ -57,9 +57,9 @@ def thread_over_point(
             good = 1.0 if status[i, j] == st.OK else math.nan
             if total is not None:
                 total[i, j] = good * length(e, n1, n2)
-            if first is not None:
+            if first is not None and velocity is not None:
                 first[i, j] = good * slope(e, n1, n2, _point(velocity[i, j]))
-            if second is not None:
+            if second is not None and velocity is not None and acceleration is not None:
                 second[i, j] = good * bend(e, n1, n2, _point(velocity[i, j]), _point(acceleration[i, j]))
             if wrap is not None:
                 wrap[i, j] = good * wrap_angle(e, n1, n2)

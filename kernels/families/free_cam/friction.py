@@ -77,7 +77,7 @@ def steepest_excess(cam: Cam, pull: Pull, low: float, high: float) -> float:
 
 @inline
 def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, most: float) -> float:
-    """The first limit point of one side from ``start`` along the edge, no further than ``most``; nan if there is none."""
+    """The first limit point of one side from ``start`` along the edge, within ``most``; nan if there is none."""
     end = reach(cam) + 1e-3
     at, value = start, excess(cam, pull, side, start)
     if value == 0.0:
@@ -118,9 +118,9 @@ def nearest_limit(cam: Cam, pull: Pull, side: float, centre: float) -> float:
     most = FAR * (reach(cam) + 1e-3)
     up = next_limit(cam, pull, side, centre, 1.0, most)
     down = next_limit(cam, pull, side, centre, -1.0, abs(up - centre) if up == up else most)
-    if not down == down:
+    if math.isnan(down):
         return up
-    return down if not up == up or abs(down - centre) < abs(up - centre) else up
+    return down if math.isnan(up) or abs(down - centre) < abs(up - centre) else up
 
 
 @kernel

@@ -33,7 +33,7 @@ class Design(NamedTuple):
 
 @inline
 def by_angle(a: float, x: float, y: float, z: float, at: float) -> tuple[float, float, float]:
-    """Distance of a guide: derivative by phi at a fixed point of the edge, second, and mixed with that along y; (21)."""
+    """Distance of a guide: first and second derivative by phi at a fixed y, and the mixed one; (21)."""
     cx, cy, tx = a * at * at, at, 2.0 * a * at
     dx, dy = cx - x, cy - y
     distance = np.sqrt(dx * dx + dy * dy + z * z)

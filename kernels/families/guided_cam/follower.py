@@ -43,9 +43,7 @@ def follow(s: float, thread: float, first: float, second: float) -> tuple[float,
 
 
 @kernel
-def follower(
-    data: Array, status: Status, S: Array | None, dS: Array | None, d2S: Array | None
-) -> None:
+def follower(data: Array, status: Status, S: Array | None, dS: Array | None, d2S: Array | None) -> None:
     """Displacement of the follower and its derivatives from the length of thread; (10) to (12) of docs/takeup.md.
 
     Parameters

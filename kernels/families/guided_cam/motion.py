@@ -41,9 +41,10 @@ class Reduced(NamedTuple):
 
 @inline
 def law(designs: Array, i: int, u: float, v: float) -> tuple[float, float, float]:
-    """P and its first two derivatives for u = cos(phi), v = sin(phi): cosines and sines of multiples by recursion; (9)."""
+    """P and its first two derivatives for u = cos(phi), v = sin(phi); (9)."""
     zero = 0.0 * (designs[i, FIRST] + u)
     value, first, second = zero, zero, zero
+    # Cosines and sines of the multiples by recursion.
     c, s = u, v
     for k in range(HARMONICS):
         a, b, order = designs[i, FIRST + k], designs[i, FIRST + HARMONICS + k], k + 1.0

@@ -26,8 +26,8 @@ def least_radius(designs: Array, status: Status, radius: Array, place: Array, an
     Parameters
     ----------
     designs : (n, 19), see :data:`kernels.families.guided_cam.motion.COLUMNS`; R0 is not used
-    status : (n,) out; NOT_ASSEMBLED where the thread does not reach all through the turn, JAMMED where the follower jams
-        at every pressure angle (mu1 mu2 >= 1), INVALID_INPUT
+    status : (n,) out; NOT_ASSEMBLED where the thread does not reach all through the turn, JAMMED where the follower
+        jams at every pressure angle (mu1 mu2 >= 1), INVALID_INPUT
     radius : (n,) out [length]; cam radius at the least displacement, not below 0
     place : (n,) out [rad]; cam angle that asks for it, -pi to pi
     angle : (n,) out [rad]; jamming angle;  displaced : (n,) out [length]; least displacement S over the turn
