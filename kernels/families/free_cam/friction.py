@@ -165,6 +165,26 @@ def slid(cam: Cam, pull: Pull, before: float) -> float:
     return before
 
 
+@inline
+def landed(designs: Array, i: int, u0: float, v0: float, u1: float, v1: float) -> float:
+    """Where the thread first touches the edge between two poses, off and on: by bisection of the angle between them.
+
+    Taken at the pose before instead, the place would change with the steps of the march.
+    """
+    low, high, y = 0.0, 1.0, 0.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        u, v = u0 + middle * (u1 - u0), v0 + middle * (v1 - v0)
+        length = math.sqrt(u * u + v * v)
+        line = straight(turned_cam(designs, i, u / length, v / length))
+        y = line.y
+        if line.inside:
+            high = middle
+        else:
+            low = middle
+    return y
+
+
 @kernel
 def march(
     designs: Array, friction: Array, cos_phi: Array, sin_phi: Array, turns: int, status: Status,
@@ -191,6 +211,7 @@ def march(
         fine = friction[i, 0] > 0.0 and friction[i, 1] >= 0.0 and friction[i, 2] >= 0.0
         row, m = i if cos_phi.shape[0] > 1 else 0, cos_phi.shape[1]
         at, code = math.nan, st.OK if fine else st.INVALID_INPUT
+        last, off = 0, False
         for count in range(turns * m):
             j = count % m
             cam = turned_cam(designs, i, cos_phi[row, j], sin_phi[row, j])
@@ -199,10 +220,14 @@ def march(
             if code == st.OK:
                 touching = line.inside
                 if not touching:
-                    at = line.y
+                    at, last, off = line.y, j, True
                 else:
+                    if off:
+                        at = landed(
+                            designs, i, cos_phi[row, last], sin_phi[row, last], cos_phi[row, j], sin_phi[row, j]
+                        )
                     before = at if at == at else shortest(cam).y
-                    at = slid(cam, pull, before)
+                    at, off = slid(cam, pull, before), False
                     stuck = at == before
                     code = st.OK if at == at else st.NOT_CONVERGED
             if count < (turns - 1) * m:

@@ -81,8 +81,8 @@ def wrap(table: Table) -> pd.DataFrame:
     -------
     DataFrame
         L; wrap [rad], 0 for a straight thread; x, distance of the eyelet from the line of the guides; y, its place
-        along the line from the middle of the guides; half_distance_c of the guides; status: SINGULAR where the eyelet is
-        at a guide, or where both guides are at one place, so that x and y have no meaning (L and wrap stay)
+        along the line from the middle of the guides; half_distance_c of the guides; status: SINGULAR where the eyelet
+        is at a guide, or where both guides are at one place, so that x and y have no meaning (L and wrap stay)
     """
     given = columns_of(_WRAP, table)
     guides, place = side_by_side(given, GUIDES), side_by_side(given, POINT)
