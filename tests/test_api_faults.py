@@ -68,7 +68,7 @@ def test_a_column_that_stands_twice() -> None:
 
 @pytest.mark.parametrize("family", [None, 3, [], ["rssr", None], [["rssr"]]])
 def test_families(family: Any) -> None:
-    refused("allowed: one of rssr, rssp, guide, geared_dwell, or a list", sweep.summarise, family, ROCKER, "swing")
+    refused(f"allowed: one of {', '.join(NAMES)}, or a list", sweep.summarise, family, ROCKER, "swing")
 
 
 @pytest.mark.parametrize("want", [None, 3, ["swing", 3]])
