@@ -10,6 +10,7 @@ import pytest
 
 import sweep
 from sweep.errors import InputError
+from sweep.families import NAMES
 
 ROCKER = {"a": 1.0, "b": 4.0, "c": 2.0, "e": 3.0, "f": 0.5, "g": 0.2, "alpha": 0.3}
 FRAME = pd.DataFrame(ROCKER, index=[0, 1])
