@@ -41,6 +41,9 @@ _ENTRIES = {
     "slider_elasticity": ("elasticity", "SLIDER_STATIC"),
     "dynamic_elasticity": ("elasticity", "DYNAMIC"),
     "slider_dynamic_elasticity": ("elasticity", "SLIDER_DYNAMIC"),
+    "thread_contour": ("thread", "CONTOUR"),
+    "thread_speed": ("thread", "SPEED"),
+    "capstan": ("thread", "CAPSTAN"),
 }
 NAMES = tuple(_ENTRIES)
 

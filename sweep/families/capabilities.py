@@ -98,3 +98,15 @@ class OutputLink:
     """
 
     origin: DesignMap
+
+
+@dataclass(frozen=True)
+class ThreadPath:
+    """A thread that is bent at one place: the pose outputs of its wrap angle there, and of the thread taken up.
+
+    ``rate`` and ``rate2`` are the first and second derivative of the thread taken up.
+    """
+
+    wrap: str
+    rate: str
+    rate2: str

@@ -6,7 +6,7 @@ import numpy as np
 
 from kernels.families import eyelet
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled
-from sweep.families.capabilities import Points
+from sweep.families.capabilities import Points, ThreadPath
 
 PARAMETERS = (
     Parameter("a", "length", "radius of the circle of the eyelet", positive=True),
@@ -52,5 +52,5 @@ FAMILY = Family(
     poses=poses,
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP"},
     uses_phi=False,
-    capabilities=(Points({"eyelet": ("X_E", "Y_E", "Z_E")}),),
+    capabilities=(Points({"eyelet": ("X_E", "Y_E", "Z_E")}), ThreadPath("wrap", "dP", "d2P")),
 )

@@ -6,7 +6,7 @@ import numpy as np
 
 from kernels.families import free_cam
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled
-from sweep.families.capabilities import Points
+from sweep.families.capabilities import Points, ThreadPath
 
 PARAMETERS = (
     Parameter("a", "none", "bend of the edge x = a y^2 in the axes of the cam, 1/length", not_negative=True),
@@ -52,5 +52,5 @@ FAMILY = Family(
     poses=poses,
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP"},
     uses_phi=False,
-    capabilities=(Points({"contact": ("X", "Y", None)}),),
+    capabilities=(Points({"contact": ("X", "Y", None)}), ThreadPath("wrap", "dP", "d2P")),
 )
