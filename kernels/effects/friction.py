@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.effects.coupler import orientation
-from kernels.effects.kinetostatics import SPEED, inertia_loads, pose_status, solve, store_forces
+from kernels.effects.kinetostatics import SPEED, inertia_loads, loaded, pose_status, solve, store_forces
 from kernels.joints import read
 from kernels.vectors import Vector, cross, dot, mix, norm, scale, sub
 
@@ -100,6 +100,7 @@ def friction_loads(
     couples: Array | None,
     losses: Array | None,
     contraction: Array | None,
+    wrench: Array | None = None,
 ) -> None:
     """Joint reactions and driving torque with friction.
 
@@ -112,6 +113,7 @@ def friction_loads(
         supports 1, 2 and follower supports 1, 2; passes of the iteration
     contraction : (n, m) or None; rho(L), below 1 the solution is proven unique; known also where the iteration jams
     status : also JAMMED where the iteration does not contract
+    wrench : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
     """
     answers, total, matrix = np.empty((4, ANSWER)), np.empty(ANSWER), np.empty((3, 3))
     for i in range(poses.shape[0]):
@@ -121,6 +123,8 @@ def friction_loads(
             coupler = orientation(j, finger[i])
             code = pose_status(status[i, k], j, coupler)
             load = inertia_loads(j, coupler, bodies[i], drive[i, k if drive.shape[1] > 1 else 0])
+            if wrench is not None:
+                load = loaded(load, wrench[i, k])
             turn_b = _unit(sub(load.omega2, load.omega1))
             turn_c = _unit(sub(load.omega2, load.omega3))
             speed_a = drive[i, k if drive.shape[1] > 1 else 0, SPEED]

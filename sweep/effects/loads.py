@@ -41,6 +41,11 @@ GRAVITY = tuple(
 )
 SPEED = Parameter("speed", "speed", "speed of the crank (scene.speed of a study)", positive=True)
 CHANGE = Parameter("speed_change", "angular_acceleration", "angular acceleration of the crank", default=0.0)
+# Of families with a ToolPoint; without mass and force nothing is computed for them.
+TOOL = (
+    Parameter("m_tool", "mass", "mass of the tool at the guided point (needle bar)", default=0.0, not_negative=True),
+    Parameter("tool_force", "force", "force on the tool along its way; a resisting one opposes ds", default=0.0),
+)
 _TORQUE = Parameter(
     "load_torque", "torque", "torque on the rocker about its axis; a resisting one opposes dpsi", default=0.0
 )

@@ -110,3 +110,15 @@ class ThreadPath:
     wrap: str
     rate: str
     rate2: str
+
+
+@dataclass(frozen=True)
+class ToolPoint:
+    """A point of the coupler that a tool hangs on, such as a needle bar, which moves along a fixed direction.
+
+    ``point(designs)``, (n, 3), is its place from B along the coupler, across it (k x s) and along the rocker's axis;
+    ``direction(designs)``, (n, 3), the unit vector of the tool's way in the family's frame.
+    """
+
+    point: DesignMap
+    direction: DesignMap
