@@ -146,17 +146,12 @@ def test_second_turn_of_the_march_is_what_every_later_turn_repeats():
     np.testing.assert_array_equal(*out)
 
 
-def test_order_of_the_angles_does_not_change_what_a_march_gives_at_them():
+def test_steps_of_the_march_hardly_change_what_it_gives():
+    # Sliding to a limit point and landing on the edge are found exactly, whatever the steps.
     cam = CAM | {"mu": 0.3, "tension_ratio": 1.5}
-    phi = np.array([5.9, 0.3, 5.2, TURN[6]])
-    one = sweep.evaluate("free_cam_friction", cam, ["P", "y_contact"], phi=phi)
-    two = sweep.evaluate("free_cam_friction", cam, ["P", "y_contact"], phi=phi[::-1])
-    np.testing.assert_array_equal(one[["P", "y_contact"]], two[["P", "y_contact"]][::-1])
-    column = sweep.evaluate("free_cam_friction", cam | {"phi": phi}, ["P"])
-    # Each row marches through other steps: sliding between two limit points is exact, so they hardly matter.
-    np.testing.assert_allclose(column.P, one.P, rtol=1e-9)
-    grid = sweep.evaluate("free_cam_friction", cam, ["P"], phi=TURN)
-    assert one.P[3] == pytest.approx(grid.P[6], rel=1e-9)
+    coarse = sweep.evaluate("free_cam_friction", cam, ["P"], phi=TURN)
+    fine = sweep.evaluate("free_cam_friction", cam, ["P"], phi=2.0 * np.pi * np.arange(2880) / 2880)
+    np.testing.assert_allclose(coarse.P, fine.P[::8], atol=1e-6)
 
 
 def test_without_friction_the_march_lies_where_the_length_is_a_minimum():

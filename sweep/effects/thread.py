@@ -36,10 +36,10 @@ CAPSTAN_INPUTS = (BEFORE, Parameter("mu_eyelet", "ratio", "coefficient of fricti
 
 CONTOUR_EQUATION = "docs/thread.md (1) to (3)"
 CONTOUR_OUTPUTS = (
-    Output("tension", "gf", "tension of the thread behind the eyelet", CONTOUR_EQUATION),
-    Output("tension_euler", "gf", "its part from the tension in front of the eyelet", CONTOUR_EQUATION),
-    Output("tension_bending", "gf", "its part from bending round the contour", CONTOUR_EQUATION),
-    Output("tension_adhesion", "gf", "its part from adhesion", CONTOUR_EQUATION),
+    Output("tension", "1", "tension of the thread behind the eyelet, gf", CONTOUR_EQUATION),
+    Output("tension_euler", "1", "its part from the tension in front of the eyelet, gf", CONTOUR_EQUATION),
+    Output("tension_bending", "1", "its part from bending round the contour, gf", CONTOUR_EQUATION),
+    Output("tension_adhesion", "1", "its part from adhesion, gf", CONTOUR_EQUATION),
 )
 SPEED_EQUATION = "docs/thread.md (7), (8)"
 SPEED_OUTPUTS = (
@@ -49,8 +49,8 @@ SPEED_OUTPUTS = (
 )
 CAPSTAN_EQUATION = "docs/thread.md (5), (6)"
 CAPSTAN_OUTPUTS = (
-    Output("capstan_tension", "gf", "tension behind the eyelet by Euler's law", CAPSTAN_EQUATION),
-    Output("eyelet_force", "gf", "force of the thread on the eyelet", CAPSTAN_EQUATION),
+    Output("capstan_tension", "1", "tension behind the eyelet by Euler's law, gf", CAPSTAN_EQUATION),
+    Output("eyelet_force", "1", "force of the thread on the eyelet, gf", CAPSTAN_EQUATION),
 )
 
 

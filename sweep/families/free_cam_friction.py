@@ -7,7 +7,7 @@ import numpy as np
 from kernels.families import free_cam
 from sweep.families import free_cam as frictionless
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, optional_outputs
-from sweep.families.domain import TWO_PI, March
+from sweep.families.domain import March
 
 PARAMETERS = (
     *frictionless.PARAMETERS,
@@ -29,46 +29,23 @@ POSE_OUTPUTS = (
 )
 _KERNEL = ("L", "wrap", "y_contact", "contact", "sticking")
 _OWN = len(frictionless.PARAMETERS)
-# Where single angles are asked for, the march passes through this many besides.
-STEPS = 720
+DOMAIN = March(text="cam angle")
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status, each (n, m), of the last of the turns that are marched.
-
-    Angles that are no equally spaced turn from 0 are met on a march over STEPS equal steps and themselves.
-    """
-    phi, back = _turn(angles.phi)
+    """Wanted pose outputs and status, each (n, m), of the last of the turns that are marched."""
     needed = wanted | {"L"} if "P" in wanted else wanted
-    outputs = optional_outputs(_KERNEL, needed, (len(designs), phi.shape[1]))
-    status = np.empty((len(designs), phi.shape[1]), np.uint8)
+    shape = (len(designs), angles.cos.shape[1])
+    outputs, status = optional_outputs(_KERNEL, needed, shape), np.empty(shape, np.uint8)
     own, friction = (
         np.ascontiguousarray(designs[:, :_OWN]),
         np.ascontiguousarray(designs[:, [_OWN + 1, _OWN + 2, _OWN]]),
     )
-    free_cam.march(own, friction, np.cos(phi), np.sin(phi), FAMILY.domain.turns, status, *outputs)  # type: ignore[union-attr]
+    free_cam.march(own, friction, angles.cos, angles.sin, DOMAIN.turns, status, *outputs)
     found: Columns = {name: out for name, out in zip(_KERNEL, outputs, strict=True) if out is not None}
     if "P" in wanted:
         found["P"] = np.asarray(found["L"], np.float64) - designs[:, _OWN - 1 : _OWN]
-    kept: Columns = {name: found[name] for name in found if name in wanted} | {"status": status}
-    if back is None:
-        return kept
-    rows = np.arange(len(designs))[:, None]
-    return {name: values[rows, back] for name, values in kept.items()}
-
-
-def _turn(phi: Array) -> tuple[Array, np.ndarray[tuple[int, ...], np.dtype[np.intp]] | None]:
-    """The angles to march over, (n, M) or (1, M), and where in them the given ones stand; None: they are these."""
-    count = phi.shape[1]
-    even = TWO_PI * np.arange(count) / count
-    if count > 2 and np.abs(phi - even).max(initial=0.0) < 1e-12:
-        return np.ascontiguousarray(phi), None
-    given = np.mod(phi, TWO_PI)
-    grid = np.broadcast_to(TWO_PI * np.arange(STEPS) / STEPS, (len(phi), STEPS))
-    merged = np.concatenate([grid, given], axis=1)
-    order = np.argsort(merged, axis=1, kind="stable")
-    place = np.argsort(order, axis=1, kind="stable")[:, STEPS:]
-    return np.ascontiguousarray(np.take_along_axis(merged, order, axis=1)), place
+    return {name: found[name] for name in found if name in wanted} | {"status": status}
 
 
 FAMILY = Family(
@@ -78,6 +55,6 @@ FAMILY = Family(
     position="P",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
-    domain=March(text="cam angle"),
+    domain=DOMAIN,
     analytic=False,
 )
