@@ -15,8 +15,8 @@ from sweep.families.check import FamilyError, check_family
 
 NEEDLE = {
     "a1": 9.16, "b1": 18.31, "c1": 10.66, "e1": 13.4, "f1": -14.68, "g1": 0.0, "alpha1": 1.5, "branch1": 1.0,
-    "a2": 2.4, "b2": 15.7, "c2": 3.6, "e2": 17.3, "xi2": -71.5, "eta2": 91.5, "lam2": 0.95, "h2": 114.0, "branch2": -1.0,
-    "offset2": 1.8,
+    "a2": 2.4, "b2": 15.7, "c2": 3.6, "e2": 17.3, "xi2": -71.5, "eta2": 91.5, "lam2": 0.95, "h2": 114.0,
+    "branch2": -1.0, "offset2": 1.8,
 }  # fmt: skip
 LOOPER = {"a": 10.0, "b": 40.0, "c": 25.0, "e": 35.0, "f": 5.0, "g": -3.0, "alpha": 1.05, "branch": 1.0}
 TABLE = pd.DataFrame([{f"needle.{k}": v for k, v in NEEDLE.items()} | {f"looper.{k}": v for k, v in LOOPER.items()}])

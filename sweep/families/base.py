@@ -177,6 +177,7 @@ class Family:
     uses_phi : False for poses that need no more than cos(phi) and sin(phi); in a chain that saves an arctangent a pose
     analytic : whether poses take complex designs and angles, for exact gradients by the complex step
     capabilities : typed objects that effects, proofs, drawings and fits ask for (:mod:`sweep.families.capabilities`)
+    example : an ordinary design, by parameter, whose poses all exist; hard inputs are made from it
     dear : for pose outputs that cost far more than the motion, what they are computed by and its cost [ns per pose]
     precise_poses : slower poses whose errors are a few roundings of what is given, where the family has them
     """
@@ -195,6 +196,7 @@ class Family:
     uses_phi: bool = True
     analytic: bool = True
     capabilities: tuple[object, ...] = ()
+    example: Mapping[str, float] = field(default_factory=dict)
     dear: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     precise_poses: PoseFunction | None = None
 

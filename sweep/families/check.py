@@ -25,7 +25,7 @@ def check_family(family: Family) -> Family:
     FamilyError
         naming the family, what is wrong and how it is mended.
     """
-    faults = [*_names(family), *_outputs(family), *_capabilities(family)]
+    faults = [*_names(family), *_outputs(family), *_capabilities(family), *_example(family)]
     if faults:
         raise FamilyError("\n".join([f"family {family.name}: {len(faults)} faults", *(f"  {x}" for x in faults)]))
     return family
@@ -50,6 +50,14 @@ def _names(family: Family) -> list[str]:
         if not p.text:
             faults.append(f"parameter {p.name}: say in words what it is (text)")
     return faults
+
+
+def _example(family: Family) -> list[str]:
+    needed = [p.name for p in family.parameters if p.default is None]
+    faults = [f"example lacks {name!r}: give an ordinary design" for name in needed if name not in family.example]
+    return faults + [
+        f"example has {x!r}, which is no parameter" for x in family.example if x not in family.parameter_names
+    ]
 
 
 def _outputs(family: Family) -> list[str]:

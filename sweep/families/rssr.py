@@ -299,4 +299,5 @@ FAMILY = Family(
         OutputLink(rocker_origin),
     ),
     precise_poses=precise_poses,
+    example={"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "branch": -1.0},
 )
