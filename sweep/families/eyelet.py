@@ -52,5 +52,6 @@ FAMILY = Family(
     poses=poses,
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP"},
     uses_phi=False,
+    example={"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "P_h": 8.0},
     capabilities=(Points({"eyelet": ("X_E", "Y_E", "Z_E")}), ThreadPath("wrap", "dP", "d2P")),
 )

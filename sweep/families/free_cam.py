@@ -52,5 +52,6 @@ FAMILY = Family(
     poses=poses,
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP"},
     uses_phi=False,
+    example={"a": 0.4, "X1": 0.83, "Y1": -2.08, "Z1": -3.56, "X2": 3.3, "Y2": -0.85, "Z2": 3.7},
     capabilities=(Points({"contact": ("X", "Y", None)}), ThreadPath("wrap", "dP", "d2P")),
 )

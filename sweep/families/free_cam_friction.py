@@ -57,4 +57,5 @@ FAMILY = Family(
     poses=poses,
     domain=DOMAIN,
     analytic=False,
+    example={**frictionless.FAMILY.example, "mu": 0.3, "tension_ratio": 1.5},
 )

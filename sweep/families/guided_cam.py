@@ -79,5 +79,6 @@ FAMILY = Family(
     steps=(Step("size", DESIGN_OUTPUTS, size, 40_000.0),),
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},
     uses_phi=False,
+    example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
     capabilities=(Points({"profile": ("X_P", "Y_P", None)}),),
 )
