@@ -67,6 +67,8 @@ FLOQUET = Output(
 # Odd grids of the steady state: the next one is tried for designs that the one before does not resolve.
 MULTIPLIER_ERROR = 1e-6
 GRIDS = (31, 61, 121, 241)
+# Stiff couplers of designs near a dead point: psi'' peaks within a few degrees.
+FINER = (481, 961)
 
 
 def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
@@ -86,7 +88,7 @@ def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Steady state on its own grid, carried to the wanted angles."""
-    return at_poses(scene, *on_finer_grids(scene, scene.angles.phi, GRIDS, _solve), wanted)
+    return at_poses(scene, *on_finer_grids(scene, scene.angles.phi, GRIDS + FINER, _solve), wanted)
 
 
 def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
