@@ -159,9 +159,26 @@ def test_crank_with_a_needle_bar_alone_runs_as_its_energy_says():
     assert uneven.unevenness[0] > 0.1
 
 
+def test_piercing_force_acts_from_entry_to_the_turning_point_and_not_on_the_way_back():
+    table = GUIDE | MASSLESS | {"speed": 500.0}
+    motion = turn(table, ["s", "ds", "tool_load"])
+    middle = float(motion.s.mean())
+    for sense in (1.0, -1.0):
+        pierced = {"pierce_force": 7.0, "pierce_at": middle, "pierce_sense": sense}
+        poses = turn(table | pierced, ["tool_load", "drive_torque", "force_b"])
+        inside = (sense * (motion.s - middle) > 0.0) & (sense * motion.ds > 0.0)
+        assert 0.15 < inside.mean() < 0.35
+        np.testing.assert_array_equal(poses.tool_load, np.where(inside, sense * 7.0, 0.0))
+        # The drive gives the work of piercing: force times the way from entry to the turning point.
+        depth = sense * (motion.s * sense).max() - middle
+        work = poses.drive_torque.mean() * 2.0 * np.pi
+        assert work == pytest.approx(7.0 * sense * depth, rel=2e-2)  # a jump on 512 samples
+        assert ((poses.force_b > 0.0) == inside).all()
+
+
 def test_families_without_a_guided_point_take_no_tool():
     names = {p.name for p in extended(family("rssr"), ["force_b"]).parameters}
-    assert names.isdisjoint(TOOL)
+    assert names.isdisjoint([*TOOL, "pierce_force"])
     chain = {p.name for p in extended(family(["rssr", "guide"]), ["force_b1"]).parameters}
     assert {"m_tool2", "tool_force2"} <= chain
     assert chain.isdisjoint({"m_tool1", "tool_force1"})
@@ -181,7 +198,7 @@ def test_compiled_tool_equals_plain_python_bit_for_bit():
     scene = first_scene(
         family("guide"), designs, Angles.of(PHI[None, :40:8]), {k: v.astype(float) for k, v in given.items()}
     )
-    data = np.array([[2.5e-5, 75.0, 12.0, 0.0, 0.2, 0.9, 0.0, 0.0, -9810.0, 0.0]])
+    data = np.array([[2.5e-5, 75.0, 12.0, 0.0, 0.2, 0.9, 0.0, 0.0, -9810.0, 0.0, 3.0, 50.0, -1.0]])
     drive, force = np.array([[[0.0, 500.0, 30.0]]]), np.array([[-12.0]])
     results = []
     for function, loads_of in ((tool_load, kinetostatics), (tool_load.py_func, kinetostatics.py_func)):

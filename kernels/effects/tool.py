@@ -5,8 +5,9 @@ with the point M of the coupler that it hangs on.  Its momentum along lam gives 
 
     F_M = -(m (s'' omega^2 + s' eps - g . lam) - F) lam,      s' = v_M . lam, s'' = a_M . lam                 (1), (2)
 
-with F the working force on the rod along lam.  What the rod's own guide bears across lam is statically undetermined:
-the coupler guides the point already.  Its least value is zero, and zero is taken.
+with F the working force on the rod along lam, of which a part may act while the rod pierces the fabric (5).  What the
+rod's own guide bears across lam is statically undetermined: the coupler guides the point already.  Its least value is
+zero, and zero is taken.
 """
 
 from __future__ import annotations
@@ -26,14 +27,21 @@ from kernels.vectors import Vector, add, cross, dot, mix, scale, spun
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
 
-# Columns of the data matrix: mass; point M from B along the coupler, across it, along the rocker's axis; lam; gravity.
-COLUMNS = 10
+# Columns of the data matrix: mass; point M from B along the coupler, across it, along the rocker's axis; lam; gravity;
+# piercing force, place of the fabric along lam, sense in which it lies.
+COLUMNS = 13
 
 
 @inline
 def arm(j: Joints, data: Array) -> Vector:
     """The point from B in fixed axes; ``across`` is k x s, so the finger of the ball joints does not matter."""
     return add(mix(data[1], j.s, data[2], cross(j.k, j.s)), scale(data[3], j.k))
+
+
+@inline
+def piercing(force: float, fabric: float, sense: float, s: float, ds: float) -> float:
+    """Force on the tool along lam while it goes into the fabric: from entry to the turning point, not back."""
+    return -sense * force if sense * (s - fabric) > 0.0 and sense * ds > 0.0 else 0.0
 
 
 @kernel
@@ -78,6 +86,9 @@ def tool_load(
             speed, change = drive[i, now, SPEED], drive[i, now, CHANGE]
             on_tool = mass * (second * speed * speed + first * change) - weight
             on_tool -= working[i, k if working.shape[1] > 1 else 0]
+            if data[i, 10] != 0.0:
+                way = speed * first
+                on_tool -= piercing(data[i, 10], data[i, 11], data[i, 12], dot(add(j.B, at), lam), way)
             if wrench is not None:
                 force = scale(-good * on_tool, lam)
                 moment = cross(at, force)

@@ -45,7 +45,12 @@ CHANGE = Parameter("speed_change", "angular_acceleration", "angular acceleration
 TOOL = (
     Parameter("m_tool", "mass", "mass of the tool at the guided point (needle bar)", default=0.0, not_negative=True),
     Parameter("tool_force", "force", "force on the tool along its way; a resisting one opposes ds", default=0.0),
-)
+    Parameter("pierce_force", "force", "force that resists the tool on its way into the fabric", default=0.0,
+              not_negative=True),
+    Parameter("pierce_at", "length", "place s at which the tool meets the fabric", default=0.0),
+    Parameter("pierce_sense", "sign", "side of pierce_at on which the fabric lies: towards growing or falling s",
+              default=1.0, choices=(-1.0, 1.0)),
+)  # fmt: skip
 _TORQUE = Parameter(
     "load_torque", "torque", "torque on the rocker about its axis; a resisting one opposes dpsi", default=0.0
 )

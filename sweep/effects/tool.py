@@ -20,7 +20,7 @@ OUTPUTS = (
 
 def _loaded(scene: Scene) -> bool:
     """Whether a tool with mass or force hangs on the coupler: without one nothing is computed."""
-    given = [scene.inputs[p.name] for p in loads.TOOL if p.name in scene.inputs]
+    given = [scene.inputs[name] for name in ("m_tool", "tool_force", "pierce_force") if name in scene.inputs]
     return any(bool(values.any()) for values in given)
 
 
@@ -29,8 +29,8 @@ def _data(scene: Scene) -> tuple[Array, Array]:
     place = scene.family.find(ToolPoint)
     assert place is not None
     gravity = scene.table(tuple(p.name for p in loads.GRAVITY))
-    mass, force = (scene.inputs[p.name][:, None] for p in loads.TOOL)
-    data = np.hstack([mass, place.point(scene.designs), place.direction(scene.designs), gravity])
+    mass, force, *pierce = (scene.inputs[p.name][:, None] for p in loads.TOOL)
+    data = np.hstack([mass, place.point(scene.designs), place.direction(scene.designs), gravity, *pierce])
     return np.ascontiguousarray(data), np.ascontiguousarray(force)
 
 
@@ -69,6 +69,7 @@ EFFECT = Effect(
     equation=EQUATION,
     formulas=(
         "(1) tool_load = m_tool (s'' omega^2 + s' eps - gravity . lam) - tool_force",
+        "    + pierce_force on the way from pierce_at into the fabric, to the turning point",
         "(2) it acts on the coupler at the guided point, reversed: loads, friction, drive torque, inertia",
     ),
     needs=(),
