@@ -9,7 +9,7 @@ from sweep.families.base import Angles, Array, Columns, Family, Output, Paramete
 from sweep.families.capabilities import Points, ThreadPath
 
 PARAMETERS = (
-    Parameter("a", "none", "bend of the edge x = a y^2 in the axes of the cam, 1/length", not_negative=True),
+    Parameter("a", "1/length", "bend of the edge x = a y^2 in the axes of the cam", not_negative=True),
     Parameter("X1", "length", "guide 1, x in fixed axes from the cam axis"),
     Parameter("Y1", "length", "guide 1, y in fixed axes"),
     Parameter("Z1", "length", "guide 1, distance from the plane of the cam along its axis"),

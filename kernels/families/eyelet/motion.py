@@ -58,7 +58,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     offsets = abs(designs[i, 8].real) + abs(designs[i, 9].real) + abs(designs[i, 10].real) + abs(designs[i, 11].real)
     turned = abs(designs[i, 3].real) + abs(designs[i, 6].real)
     _, exponent = math.frexp(size)
-    valid = size + offsets < 1e300 and size > 1e-300 and turned < 1e5 and designs[i, 0].real > 0.0
+    valid = size + offsets < 1e140 and size > 1e-140 and turned < 1e5 and designs[i, 0].real > 1e-140 * size
     exponent = exponent if valid else 0
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, e, f = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit

@@ -44,10 +44,10 @@ class Line(NamedTuple):
 
 @inline
 def turned_cam(designs: Array, i: int, u: float, v: float) -> Cam:
-    """Design i, (n, 7 or more) with columns a, X1, Y1, Z1, X2, Y2, Z2, at u = cos(phi), v = sin(phi)."""
+    """Design i, (n, 8) with columns a, X1, Y1, Z1, X2, Y2, Z2, P_h, at u = cos(phi), v = sin(phi)."""
     size = 0.0
-    for k in range(1, 7):
-        size = max(size, abs(designs[i, k].real))
+    for k in range(1, 8):
+        size += abs(designs[i, k].real)
     a = designs[i, 0]
     bent = a.real * size
     valid = 1e-140 < size < 1e140 and a.real >= 0.0 and bent < 1e6 and math.isfinite(u.real + v.real)

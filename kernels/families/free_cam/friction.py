@@ -41,6 +41,12 @@ def pull_of(ratio: float, along: float, across: float) -> Pull:
 
 
 @inline
+def _usable(friction: Array) -> bool:
+    """Whether a tension ratio and two coefficients of friction can be meant."""
+    return bool(1e-6 < friction[0] < 1e6 and 0.0 <= friction[1] < 100.0 and 0.0 <= friction[2] < 1e6)
+
+
+@inline
 def lean(cam: Cam, pull: Pull, at: float) -> tuple[float, float]:
     """T12 . tangent and |T12| at a point of the edge, in units of T1; (24)."""
     x, tx = cam.a * at * at, 2.0 * cam.a * at
@@ -139,7 +145,7 @@ def limit_points(
     """
     for i in range(designs.shape[0]):
         pull = pull_of(friction[i, 0], friction[i, 1], friction[i, 2])
-        fine = friction[i, 0] > 0.0 and friction[i, 1] >= 0.0 and friction[i, 2] >= 0.0
+        fine = _usable(friction[i])
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(cos_phi.shape[1]):
             cam = turned_cam(designs, i, cos_phi[row, j], sin_phi[row, j])
@@ -208,7 +214,7 @@ def march(
     """
     for i in range(designs.shape[0]):
         pull = pull_of(friction[i, 0], friction[i, 1], friction[i, 2])
-        fine = friction[i, 0] > 0.0 and friction[i, 1] >= 0.0 and friction[i, 2] >= 0.0
+        fine = _usable(friction[i])
         row, m = i if cos_phi.shape[0] > 1 else 0, cos_phi.shape[1]
         at, code = math.nan, st.OK if fine else st.INVALID_INPUT
         last, off = 0, False

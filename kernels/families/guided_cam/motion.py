@@ -81,7 +81,8 @@ def reduce_design(designs: Array, i: int) -> Reduced:
         if k != 5 and k != 6:
             size += abs(designs[i, k].real)
     valid = 1e-140 < size < 1e140 and designs[i, 0].real > 0.0 and designs[i, 4].real >= 0.0
-    valid = valid and designs[i, 5].real >= 0.0 and designs[i, 6].real >= 0.0
+    valid = valid and 0.0 <= designs[i, 5].real < 1e100 and 0.0 <= designs[i, 6].real < 1e100
+    valid = valid and designs[i, 0].real > 1e-140 * size
     _, exponent = math.frexp(size if valid else 1.0)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     u, v = lowest(designs, i)

@@ -60,7 +60,7 @@ _FOLLOWER = Sheet(
 _FREE_CAM = Sheet(
     "free_cam",
     (
-        Parameter("a", "none", "bend of the edge x = a y^2, 1/length", not_negative=True),
+        Parameter("a", "1/length", "bend of the edge x = a y^2", not_negative=True),
         Parameter("phi", "angle", "cam angle"),
         *_lengths(" ".join(GUIDES), "coordinate of a guide"),
         Parameter("mu", "ratio", "coefficient of friction along the edge", default=0.0, not_negative=True),
