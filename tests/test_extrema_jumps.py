@@ -49,14 +49,14 @@ def test_extremes_beside_jumps_are_found(name, output):
         assert (err < 1e-7 * size).all()
 
 
-def test_the_mean_of_a_curve_with_jumps_says_how_well_it_is_known():
-    """It is given up early, with an error that holds; a smooth curve goes on to its target."""
+def test_the_mean_of_a_curve_with_jumps_is_found_to_its_target():
+    """Where the follower reverses, friction jumps: panels close in on that."""
     got, values = found_and_dense("rssp", "drive_torque_friction")
     exact = np.sqrt((values**2).mean(axis=1))
-    assert (got["status"] == st.NOT_CONVERGED).all()
-    miss = np.abs(got["rms_drive_torque_friction"] - exact)
-    assert (miss <= got["err_rms_drive_torque_friction"] + 1e-4 * exact).all()
-    assert (got["err_rms_drive_torque_friction"] < 1e-2 * exact).all()
+    assert (got["status"] == st.OK).all()
+    # The dense sum errs by a sample at each jump.
+    assert (np.abs(got["rms_drive_torque_friction"] - exact) <= 1e-4 * exact).all()
+    assert (got["err_rms_drive_torque_friction"] < 1.1e-8 * exact).all()
     smooth, values = found_and_dense("rssp", "drive_torque")
     assert (smooth["status"] == st.OK).all()
     np.testing.assert_allclose(smooth["rms_drive_torque"], np.sqrt((values**2).mean(axis=1)), rtol=1e-8)

@@ -16,7 +16,28 @@ from sweep.families.check import check_family
 if TYPE_CHECKING:
     from sweep.families.members import Machine
 
-NAMES = ("rssr", "rssp", "guide", "geared_dwell", "eyelet", "guided_cam", "free_cam", "free_cam_friction")
+NAMES = (
+    "rssr",
+    "rssp",
+    "guide",
+    "geared_dwell",
+    "five_link",
+    "kim_dison",
+    "slotted",
+    "swivel",
+    "spherical_looper",
+    "cylindrical_looper",
+    "slider_crank",
+    "four_bar",
+    "inverted_slider_crank",
+    "epicyclic_dwell",
+    "cam",
+    "cam_lever",
+    "eyelet",
+    "guided_cam",
+    "free_cam",
+    "free_cam_friction",
+)
 
 
 @dataclass(frozen=True)

@@ -37,15 +37,20 @@ PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularit
 BREAKING = 512  # samples from which on what is still rough may be a jump
 DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
 RIVALS = 1e-3  # peaks lower than the best by no more of its size may turn out the highest
+NEVER = 2**40  # more samples than are ever needed
 TIE = 1e-10  # to which peaks are told apart where their places are wanted
 
 
 class Request(NamedTuple):
-    """An extremum that is wanted: of which pose output, and which (0 largest magnitude, +1 largest, -1 least)."""
+    """An extremum that is wanted: of which pose output, and which (0 largest magnitude, +1 largest, -1 least).
+
+    Each is searched for as if it were the only one, so that no bit of it depends on what is wanted beside it.
+    """
 
     pose: str
     mode: Mode
     windowed: bool = False  # only poses whose position lies in the search's window count
+    place: bool = False  # its crank angle is wanted, to the target [rad]
 
 
 class Extremum(NamedTuple):
@@ -85,7 +90,7 @@ def true_extrema(
     family, designs : the (n, P) design matrix of any family
     requests : which extrema of which pose outputs
     target : relative accuracy of each value
-    locate : whether crank angles are wanted to ``target`` rad too
+    locate : whether all crank angles are wanted, not only those of requests with ``place``
     anywhere : the requested pose outputs are known also where the links do not reach (discriminants): the whole turn
         counts whatever its status, and only nan in it makes the extremum nan
     window : for windowed requests, between which positions poses count
@@ -106,9 +111,9 @@ def true_extrema(
     search = _Search(family, designs, tuple(requests), target, locate, anywhere, window)
     pending, samples = np.arange(len(designs)), START
     while pending.size:
-        for rows in blocks(pending[search.needed[pending] <= samples], samples, len(search.names)):
+        for rows in blocks(pending[search.needed(pending) <= samples], samples, len(search.names)):
             search.block(rows, samples)
-        pending = pending[search.needed[pending] > samples]
+        pending = pending[search.needed(pending) > 0]
         if samples == LIMIT:
             search.status[pending] = st.NOT_CONVERGED
             break
@@ -145,7 +150,7 @@ class _Search:
     window: Window | None
     found: dict[Request, Extremum] = field(init=False)
     status: Status = field(init=False)
-    needed: Index = field(init=False)
+    undone: Index = field(init=False)
     names: list[str] = field(init=False)
     guards: list[str] = field(init=False)
 
@@ -153,11 +158,23 @@ class _Search:
         n = len(self.designs)
         self.found = {request: Extremum.unknown(n) for request in self.requests}
         self.status = np.zeros(n, np.uint8)
-        self.needed = np.full(n, START)
+        # Samples that each request still needs of each design; 0 once it is found.
+        self.undone = np.full((len(self.requests), n), START)
         # A discriminant is a smooth function whatever its sign; the motion is not where it vanishes.
         self.guards = [] if self.anywhere else list(discriminants(self.family))
         position = [self.family.position] if self.window is not None else []
         self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
+
+    def needed(self, rows: Index) -> Index:
+        """Fewest samples that a request of these designs still needs, 0 where all are found."""
+        left = np.where(self.undone[:, rows] > 0, self.undone[:, rows], NEVER).min(axis=0, initial=NEVER)
+        fewest: Index = np.where(left < NEVER, left, 0)
+        return fewest
+
+    def places(self, number: Index) -> Mask:
+        """Whether the crank angles of these requests are wanted."""
+        wanted: Mask = np.array([self.locate or request.place for request in self.requests], np.bool_)[number]
+        return wanted
 
     def block(self, rows: Index, samples: int) -> None:
         """Sample some designs, and refine those that the samples resolve."""
@@ -168,39 +185,43 @@ class _Search:
         else:
             self.status[rows] = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst])
             good = self.status[rows] == st.OK
-        self.needed[rows] = START
+        self.undone[:, rows[~good]] = 0
         if not good.all():
             rows, columns = rows[good], {name: values[good] for name, values in columns.items()}
         if not rows.size:
             return
+        looked = (self.undone[:, rows] > 0) & (self.undone[:, rows] <= samples)
         candidates, scales, needed, breaks = self._candidates(rows, columns, samples)
-        needed = np.maximum(needed, self._samples_by_singularity(columns, samples, needed))
-        resolved = (needed <= samples) | (samples == LIMIT)
-        candidates = candidates.only(resolved[candidates.row])
+        needed = np.maximum(needed, self._samples_by_singularity(columns, samples, rows.size))
+        resolved = looked & ((needed <= samples) | (samples == LIMIT))
+        candidates = candidates.only(resolved[candidates.request, candidates.row])
         peaks = self._refine(rows, columns, samples, candidates, scales)
         for number, request in enumerate(self.requests):
             mine = candidates.request == number
             row, found = candidates.row[mine], peaks.only(mine)
             if self.window is not None and request.windowed:
-                row, found = self._within_window(rows, columns, request, row, found, resolved)
+                row, found = self._within_window(rows, columns, request, row, found, resolved[number])
             elif request in breaks:
-                row, found = self._beside_jumps(rows, samples, request, row, found, breaks[request], resolved)
+                row, found = self._beside_jumps(rows, samples, request, row, found, breaks[request], resolved[number])
             moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[request]
-            needed = np.where(moved & resolved, np.maximum(needed, 2 * samples), needed)
+            again = moved & resolved[number]
+            needed[number, again] = np.maximum(needed[number, again], 2 * samples)
         # Everything is looked at with LIMIT samples before it is given up.
-        self.needed[rows] = np.minimum(needed, LIMIT if samples < LIMIT else 2 * LIMIT)
+        needed = np.minimum(needed, LIMIT if samples < LIMIT else 2 * LIMIT)
+        now = np.where(needed > samples, needed, 0)
+        self.undone[:, rows] = np.where(looked, now, self.undone[:, rows])
 
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
     ) -> tuple[Candidates, dict[Request, Array], Index, dict[Request, Mask]]:
         """Candidates of all requests, sizes and jumps of their curves, samples needed by the look of the curves."""
-        needed, pieces, scales, breaks = np.full(rows.size, START), [], {}, {}
+        needed, pieces, scales, breaks = np.full((len(self.requests), rows.size), START), [], {}, {}
         for number, request in enumerate(self.requests):
             values = columns[request.pose]
             allowed = None
             if self.window is not None and request.windowed:
                 allowed = self.window.holds(rows, columns[self.family.position])
-                needed[self.window.grazed(rows, columns[self.family.position])] = 2 * samples
+                needed[number, self.window.grazed(rows, columns[self.family.position])] = 2 * samples
             scale, rough = np.empty(rows.size), np.empty(rows.size)
             row, column = (np.empty(rows.size * (samples // 2 + 1), np.int64) for _ in range(2))
             count = scan.peaks(values, request.mode, SHARE, allowed, scale, rough, row, column)
@@ -215,14 +236,14 @@ class _Search:
             sign = np.sign(values[row, column]) if request.mode == 0 else np.full(count, float(request.mode))
             pieces.append(Candidates(np.full(count, number), row, column, sign))
             scales[request] = scale
-            needed[rough > ROUGH] = 2 * samples
+            needed[number, rough > ROUGH] = 2 * samples
         joined = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
         return Candidates(*joined), scales, needed, breaks
 
-    def _samples_by_singularity(self, columns: dict[str, Array], samples: int, needed: Index) -> Index:
-        distance = np.full(needed.size, np.inf)
+    def _samples_by_singularity(self, columns: dict[str, Array], samples: int, count: int) -> Index:
+        distance = np.full(count, np.inf)
         for name in self.guards:
-            one, largest = np.empty(needed.size), columns[name].max(axis=1)
+            one, largest = np.empty(count), columns[name].max(axis=1)
             scan.nearest_singularity(columns[name], one)
             distance = np.where(_tells(largest), np.minimum(distance, one), distance)
         # The first looks see a near zero only roughly: at most eight times as many samples at once.
@@ -251,7 +272,7 @@ class _Search:
         centre = np.multiply(column, spacing, dtype=np.float64)
         first = first_peaks(centre, np.full(row.size, spacing), around)
         sample = self._sampler(self.family, rows, candidates, sign * around[:, 3])
-        place = np.full(row.size, self.target if self.locate else np.inf)
+        place = np.where(self.places(number), self.target, np.inf)
         peaks = sharpen(sample, first, tolerance, place)
         rounding = self._rounding(columns, candidates, self.guards) * np.abs(peaks.height)
         peaks = peaks._replace(err_height=peaks.err_height + rounding)
@@ -270,18 +291,18 @@ class _Search:
         np.maximum.at(lowest, group, peaks.height - doubt)
         rivals = np.flatnonzero((peaks.height + doubt >= lowest[group]) | windowed)
         group, tolerance = group[rivals], self.target * size[rivals]
-        if self.locate:
-            # Which of several is the highest decides on the place.
-            tied = np.bincount(group, minlength=lowest.size)[group] > 1
-            tolerance = np.where(tied, np.minimum(tolerance, TIE * size[rivals]), tolerance)
+        # Which of several is the highest decides on the place.
+        located = self.places(number[rivals])
+        tied = (np.bincount(group, minlength=lowest.size)[group] > 1) & located
+        tolerance = np.where(tied, np.minimum(tolerance, TIE * size[rivals]), tolerance)
         mine, peak = candidates.only(rivals), peaks.only(rivals)
         sample = self._sampler(self.family.precise(), rows, mine, sign[rivals] * peak.height)
         locate = np.full(rivals.size, np.inf)
-        if self.locate:
-            # Without a derivative to polish it by, a place is no better than the rounding of the heights: precise ones.
-            bare = np.array([request.pose not in self.family.derivative_of for request in self.requests])[mine.request]
-            locate[bare] = self.target
-            peak.err_phi[bare] = np.maximum(peak.step, SHRINK**3 * peak.spacing)[bare]
+        # Without a derivative to polish it by, a place is no better than the rounding of the heights: precise ones.
+        bare = np.array([request.pose not in self.family.derivative_of for request in self.requests])[mine.request]
+        bare &= located
+        locate[bare] = self.target
+        peak.err_phi[bare] = np.maximum(peak.step, SHRINK**3 * peak.spacing)[bare]
         peak = confirmed(sample, peak, tolerance, locate)
         # The first stage of a chain is given its exact input, those behind it a rounded one.
         rounding = self._rounding(columns, mine, self.guards[1:]) * np.abs(peak.height)
@@ -369,7 +390,7 @@ class _Search:
         found.value[rows[has]] = peaks.height[chosen] * (-1.0 if request.mode == -1 else 1.0)
         phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
         slope = self.family.derivative_of.get(request.pose)
-        if self.locate and slope is not None and not request.windowed:
+        if (self.locate or request.place) and slope is not None and not request.windowed:
             phi, err_phi = self._polish(rows[has], slope, phi, err_phi)
         found.phi[rows[has]] = np.mod(phi, TWO_PI)
         found.err[rows[has]] = peaks.err_height[chosen]
