@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from sweep.dataset.comparison import compare
     from sweep.dataset.store import is_complete, load
     from sweep.engine.run import run
+    from sweep.evaluation import thread
     from sweep.evaluation.poses import evaluate
     from sweep.evaluation.summaries import summarise
     from sweep.families import machine
@@ -28,6 +29,7 @@ __all__ = [
     "run",
     "summarise",
     "synthesise",
+    "thread",
 ]
 
 # Imported when first used, so that the command line answers at once: numba alone takes a quarter of a second.
@@ -41,13 +43,16 @@ _HOMES = {
     "summarise": "sweep.evaluation.summaries",
     "synthesise": "sweep.synthesis.mechanisms",
 }
+_MODULES = {"thread": "sweep.evaluation.thread"}
 
 
 def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(_MODULES[name])
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES})
+    return sorted({*globals(), *_HOMES, *_MODULES})

@@ -96,6 +96,10 @@ class Interrupted(LinksweepError):
         return type(self), (self.signal_number, str(self))
 
 
+class MeasuredRangeWarning(UserWarning):
+    """Reported constants are used outside the range in which they were measured; the numbers extrapolate."""
+
+
 def closest(word: str, known: Iterable[str]) -> str | None:
     """The known word nearest to ``word``, or None if none is near."""
     choices = list(known)

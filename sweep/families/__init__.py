@@ -33,6 +33,10 @@ NAMES = (
     "epicyclic_dwell",
     "cam",
     "cam_lever",
+    "eyelet",
+    "guided_cam",
+    "free_cam",
+    "free_cam_friction",
 )
 
 

@@ -15,7 +15,7 @@ from sweep.families.domain import Domain, Turn
 Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = dict[str, NDArray[np.generic]]
 Unit = Literal[
-    "length", "angle", "ratio", "sign", "count", "none", "choice",
+    "length", "1/length", "angle", "ratio", "sign", "count", "none", "choice",
     "mass", "inertia", "force", "torque", "pressure", "stiffness", "damping", "speed", "angular_acceleration",
     "acceleration", "time",
 ]  # fmt: skip
