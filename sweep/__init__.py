@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from sweep.errors import InputError, LinksweepError, StudyError
+from sweep.errors import IncompleteWarning, InputError, LinksweepError, LinksweepWarning, StudyError
 
 if TYPE_CHECKING:
     from sweep.dataset.comparison import compare
@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     from sweep.synthesis.mechanisms import synthesise
 
 __all__ = [
+    "IncompleteWarning",
     "InputError",
     "LinksweepError",
+    "LinksweepWarning",
     "StudyError",
     "compare",
     "evaluate",

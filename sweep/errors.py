@@ -85,6 +85,14 @@ class Interrupted(LinksweepError):
         return type(self), (self.signal_number, str(self))
 
 
+class LinksweepWarning(UserWarning):
+    """What linksweep says without stopping; the command line prints it as one line."""
+
+
+class IncompleteWarning(LinksweepWarning):
+    """A dataset is read that lacks chunks: its run has not ended, or files are missing."""
+
+
 def closest(word: str, known: Iterable[str]) -> str | None:
     """The known word nearest to ``word``, or None if none is near."""
     choices = list(known)

@@ -1,19 +1,18 @@
-"""What runs in a worker, thread or process: compute one chunk, write it, say so."""
+"""What runs in a worker, wherever that is: compute one chunk, write it, say so."""
 
 from __future__ import annotations
 
-import os
-import threading
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sweep.chunks import plan as plans
 from sweep.chunks.cascade import Dropped
 from sweep.chunks.chunk import compute_chunk
 from sweep.dataset.store import write_chunk
-from sweep.errors import LinksweepError
-from sweep.jobs.signals import depend_on_parent
+from sweep.errors import InputError, LinksweepError
 
 if TYPE_CHECKING:
     from sweep.chunks.plan import Plan
@@ -30,34 +29,36 @@ class Done:
     error: Exception | None = None
 
 
-def work(study: Study, plan: Plan, folder: Path, index: int, parent: int, stop: threading.Event | None) -> Done:
-    """Compute and write one chunk.
+@dataclass(frozen=True)
+class ChunkTask:
+    """Compute and write a chunk of a study.
 
     An error is handed back as a value: the other workers finish what they hold, and the parent raises it when all is
-    quiet.
-
-    Parameters
-    ----------
-    study, plan, folder : what to compute and where to
-    index : of the chunk
-    parent : process id of the engine
-    stop : flag shared with the engine, None in another process
+    quiet.  A worker whose sources are not those of the plan computes nothing.
     """
-    if os.getpid() != parent:
-        depend_on_parent(parent)
 
-    def should_stop() -> bool:
-        return stop is not None and stop.is_set()
+    study: Study
+    plan: Plan
+    folder: Path
 
-    start, end = plan.bounds(index)
-    try:
-        result = compute_chunk(study, start, end, should_stop)
-        write_chunk(folder, plan, index, result)
-    except Dropped:
-        return Done(index, dropped=True)
-    except LinksweepError as error:
-        return Done(index, error=error)
-    except Exception as error:  # a bug: the parent raises it again, with the trace of this worker
-        error.add_note(f"in chunk {index}, designs {start}:{end}\n{traceback.format_exc()}")
-        return Done(index, error=error)
-    return Done(index, end - start)
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Done:
+        """The chunk of that index, unless ``should_stop`` answers true before it is ready."""
+        start, end = self.plan.bounds(number)
+        try:
+            self._check_sources()
+            result = compute_chunk(self.study, start, end, should_stop)
+            write_chunk(self.folder, self.plan, number, result)
+        except Dropped:
+            return Done(number, dropped=True)
+        except LinksweepError as error:
+            return Done(number, error=error)
+        except Exception as error:  # a bug: the parent raises it again, with the trace of this worker
+            error.add_note(f"in chunk {number}, designs {start}:{end}\n{traceback.format_exc()}")
+            return Done(number, error=error)
+        return Done(number, end - start)
+
+    def _check_sources(self) -> None:
+        own = plans.code_hash()
+        if own != self.plan.code:
+            allowed = f"{self.plan.code}, the sources and libraries of the process that plans"
+            raise InputError("code", own, allowed, "worker")

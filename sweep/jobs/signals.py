@@ -6,8 +6,8 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -21,14 +21,28 @@ class Stop:
     def __init__(self) -> None:
         self.event = threading.Event()
         self.signal_number: int | None = None
+        self._listeners: list[Callable[[], object]] = []
 
     def __bool__(self) -> bool:
         return self.event.is_set()
 
+    def set(self) -> None:
+        """Set the flag and tell whom it concerns."""
+        self.event.set()
+        for hear in self._listeners:
+            with suppress(OSError):  # who cannot be told any more is not there any more
+                hear()
+
+    def tell(self, hear: Callable[[], object]) -> None:
+        """Call this when the flag is set, by a signal handler perhaps; at once if it is set already."""
+        self._listeners.append(hear)
+        if self:
+            hear()
+
     def handle(self, number: int, frame: FrameType | None) -> None:
         """Set the flag; whoever asks a second time gets the system's own way, which stops at once."""
         self.signal_number = number
-        self.event.set()
+        self.set()
         signal.signal(number, signal.SIG_DFL)
 
 
@@ -45,6 +59,20 @@ def stop_on_signal() -> Iterator[Stop]:
     before = {number: signal.signal(number, stop.handle) for number in SIGNALS}
     try:
         yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def unheard() -> Iterator[None]:
+    """Processes begun within do not hear signals: Ctrl-C reaches the whole group, also who is still starting up."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python lets no other thread decide on signals
+        return
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in SIGNALS}
+    try:
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
