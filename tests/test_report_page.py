@@ -90,7 +90,7 @@ def test_counts_agree_with_the_designs(full: Path) -> None:
 def test_tables_and_figures_stand_beside_the_page(full: Path) -> None:
     out = full.parent
     for name in ("optimum", "curves"):
-        assert (out / f"{name}.parquet").read_bytes() == (full / f"_{name}.parquet").read_bytes()
+        assert (out / f"{name}.parquet").read_bytes() == (out / f"_{name}.parquet").read_bytes()
     assert {f.name for f in (out / "figures").iterdir()} == {"map.svg", "mechanism.svg", "motion.svg", "trade-off.svg"}
     assert pd.read_parquet(full).shape[0] == len(pd.read_parquet(out / "survivors.parquet"))
 

@@ -1,0 +1,158 @@
+"""Study files as they come from a hurried hand, a broken editor or an attacker: seeded mutations of sound ones."""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Callable
+
+ROCKER = """
+[study]
+name = "rocker"
+title = "A crank-rocker"
+[mechanism]
+family = "rssr"
+[scene]
+speed = "600 rpm"
+want = ["swing", "max_abs_d2psi", "margin"]
+[design]
+a = { from = 10, to = 30, count = 4, unit = "mm" }
+b = { values = [90, 110, 130], unit = "mm" }
+c = { value = 60, unit = "mm" }
+e = "100 mm"
+f = { from = 0, to = 10, count = 2, unit = "mm" }
+g = { value = 10, unit = "mm" }
+alpha = { from = 30, to = 60, count = 2, unit = "deg" }
+branch = { values = [1, -1] }
+[limits]
+rotatable = true
+max_pressure_angle = { max = 50, unit = "deg" }
+swing = { min = 10, max = 90, unit = "deg" }
+[objective]
+minimise = "max_abs_d2psi"
+[accuracy]
+target = 1e-6
+[optimise]
+starts = 1
+seed = 3
+time_budget = "0.2 s"
+[tolerance]
+lengths = "0.02 mm"
+angles = "0.05 deg"
+[reference]
+design = { a = "20 mm", b = "110 mm", c = "60 mm", e = "100 mm", f = "0 mm", g = "10 mm", alpha = "45 deg" }
+[output]
+keep = "all"
+dtype = "float64"
+[budget]
+disk = "1 MB"
+time = "2 s"
+[report]
+curves = [{ label = "line", x = "a", y = "f", points = [[10, 0], [30, 10]] }]
+"""
+
+DWELL = """
+[study]
+name = "dwell"
+[mechanism]
+family = "geared_dwell"
+[scene]
+want = ["dwell_angle", "dwell_deviation", "max_abs_d2psi"]
+[design]
+k = { from = 1.0, to = 2.0 }
+a = { from = 0.1, to = 3.0, scale = "log" }
+sample = { kind = "sobol", n = 64, seed = 5 }
+[limits]
+dwell_angle = { min = 30, unit = "deg" }
+max_abs_d2psi = { max = 20 }
+[objective]
+minimise = "max_abs_d2psi"
+[accuracy]
+samples = 64
+[budget]
+disk = "1 MB"
+time = "2 s"
+"""
+
+NUMBERS = [
+    "0", "-1", "1", "2", "1e308", "-1e308", "1e-320", "nan", "inf", "-inf", "1e400", "0x10", "1_0", "9" * 4300,
+    "9" * 5000, "123456789012345678901234567890", "2147483648", "9223372036854775807", "-9223372036854775808",
+    "1e100", "1e99", "-1e100", "0.0", "-0.0", "1e-300", "1e16", "90", "1.5",
+]  # fmt: skip
+TEXTS = [
+    '""', '"x"', '"1"', '"mm"', '"0 mm"', '"-1 mm"', '"1e999 mm"', '"nan mm"', '"1e-400 deg"', '"7 parsec"', '"1e308 m"',
+    '"1e300 rpm"', '"mm^9"', '"mm*mm*mm"', '"1/mm"', '"%"', '"\\u0000"', '"é"', '"' + "9" * 5000 + ' mm"', '"all"',
+    '"' + "mm*" * 3000 + 'mm"',
+]  # fmt: skip
+VALUES = [
+    "true", "false", "[]", "{}", "[[]]", "[1, 1]", "[1e308, -1e308]", '["swing"]', "[nan]", "[0, 1, 2]", "{ min = 1 }",
+    "{ from = 1, to = 1, count = 1 }", "{ value = 1 }", "{ values = [5] }", "{ values = [] }", "1979-05-27",
+    "[" * 60 + "]" * 60, "[" * 3000 + "]" * 3000, "{ a = " * 900 + "1" + " }" * 900, "{ values = [5], unit = 'mm' }",
+    "{ from = 1, to = 2, count = 1, unit = 'mm' }", "{ from = 1, to = 2, count = 1000000, unit = 'mm' }",
+    "{ from = 1e-300, to = 1e99, count = 3, scale = 'log' }", "{ max = 1e99 }", "{ min = 0, max = 0 }",
+]  # fmt: skip
+NAMES = ["count", "from", "to", "unit", "values", "value", "scale", "min", "max", "want", "x", "a", "branch", "stroke1"]
+
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])")
+_TEXT = re.compile(r'"[^"\n]*"')
+_ENTRY = re.compile(r"(?m)(?<== ).+$")
+_KEY = re.compile(r"(?m)[a-z_0-9]+(?= = )")
+_TABLE = re.compile(r"(?m)^\[[a-z]+\]$")
+
+
+def _swap(pattern: re.Pattern[str], choices: list[str]) -> Callable[[random.Random, str], str]:
+    def change(chance: random.Random, text: str) -> str:
+        places = list(pattern.finditer(text))
+        if not places:
+            return text
+        place = chance.choice(places)
+        return text[: place.start()] + chance.choice(choices) + text[place.end() :]
+
+    return change
+
+
+def _line(chance: random.Random, text: str) -> str:
+    """A line goes, comes twice, or moves."""
+    lines = text.splitlines()
+    line = lines.pop(chance.randrange(len(lines)))
+    for _ in range(chance.choice([0, 1, 2])):
+        lines.insert(chance.randrange(len(lines) + 1), line)
+    return "\n".join(lines)
+
+
+def _characters(chance: random.Random, text: str) -> str:
+    """Some characters go, or others come in."""
+    place = chance.randrange(len(text))
+    junk = chance.choice(["", "\x00", "é", "=", "[", "]", '"', "#", "\n", "'''", "\ufeff", "{", "}", ".", ",", "9", "-"])
+    return text[:place] + junk + text[place + chance.choice([0, 1, 1, 3, 20]) :]
+
+
+def _cut(chance: random.Random, text: str) -> str:
+    return text[: chance.randrange(len(text))]
+
+
+def _nested(chance: random.Random, text: str) -> str:
+    depth = chance.choice([3, 50, 500, 5000])
+    return text + f"\n[{'.'.join(['a'] * depth)}]\nx = 1\n"
+
+
+MUTATIONS = [
+    *[_swap(_NUMBER, NUMBERS)] * 5,
+    *[_swap(_TEXT, TEXTS)] * 2,
+    *[_swap(_ENTRY, [*VALUES, *TEXTS, *NUMBERS])] * 4,
+    _swap(_KEY, NAMES),
+    _swap(_TABLE, ["[x]", "[design]", "[limits]", "[fit]", "[locus]", "[pareto]", "[[design]]", "[study.name]", ""]),
+    *[_line] * 3,
+    *[_characters] * 2,
+    _cut,
+    _nested,
+]
+
+
+def mutated(seed: int) -> str:
+    """The study file of that seed: one to three changes of a sound one."""
+    chance = random.Random(seed)
+    text = chance.choice([ROCKER, ROCKER, DWELL])
+    for _ in range(chance.choice([1, 1, 2, 3])):
+        text = chance.choice(MUTATIONS)(chance, text)
+    return text
