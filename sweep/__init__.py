@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from sweep._kernels import check_kernels
 from sweep.errors import IncompleteWarning, InputError, LinksweepError, LinksweepWarning, StudyError
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ __all__ = [
     "summarise",
     "synthesise",
 ]
+
+check_kernels()
 
 # Imported when first used, so that the command line answers at once: numba alone takes a quarter of a second.
 _HOMES = {

@@ -74,15 +74,83 @@ disk = "1 MB"
 time = "2 s"
 """
 
+LOCUS = """
+[study]
+name = "locus"
+[mechanism]
+family = "rssr"
+[scene]
+want = ["swing", "max_abs_d2psi", "margin"]
+[locus]
+swing = "40 deg"
+phi0 = { from = 170, to = 190, count = 3, unit = "deg" }
+[design]
+alpha = { from = 60, to = 90, count = 3, unit = "deg" }
+e = "100 mm"
+f = "10 mm"
+g = { from = -10, to = 20, count = 2, unit = "mm" }
+psi_ext = { from = 20, to = 80, count = 5, unit = "deg" }
+[limits]
+max_pressure_angle = { max = 60, unit = "deg" }
+[objective]
+minimise = "max_abs_d2psi"
+[accuracy]
+target = 1e-6
+[optimise]
+starts = 1
+time_budget = "0.2 s"
+[pareto]
+output = "max_pressure_angle"
+at_most = { values = [40, 50], unit = "deg" }
+starts = 1
+time_budget = "0.2 s"
+[budget]
+time = "2 s"
+"""
+
+NEEDLE = """
+[study]
+name = "needle"
+[mechanism]
+chain = ["rssr", "guide"]
+[scene]
+want = ["stroke", "max_abs_d2s", "max_abs_dev"]
+window = { from = 0.0, to = 0.6 }
+[design]
+a1 = "18 mm"
+b1 = "90 mm"
+c1 = "45 mm"
+e1 = "80 mm"
+f1 = "5 mm"
+g1 = "0 mm"
+alpha1 = { from = 80, to = 90, count = 3, unit = "deg" }
+a2 = "30 mm"
+b2 = { from = 50, to = 70, count = 3, unit = "mm" }
+c2 = "40 mm"
+e2 = "60 mm"
+branch2 = { values = [1, -1] }
+lam2 = "90 deg"
+[fit]
+stroke = "24.5 mm"
+[limits]
+rotatable = true
+[objective]
+minimise = "max_abs_d2s"
+[accuracy]
+samples = 32
+[budget]
+time = "2 s"
+"""
+
 NUMBERS = [
     "0", "-1", "1", "2", "1e308", "-1e308", "1e-320", "nan", "inf", "-inf", "1e400", "0x10", "1_0", "9" * 4300,
     "9" * 5000, "123456789012345678901234567890", "2147483648", "9223372036854775807", "-9223372036854775808",
     "1e100", "1e99", "-1e100", "0.0", "-0.0", "1e-300", "1e16", "90", "1.5",
 ]  # fmt: skip
 TEXTS = [
-    '""', '"x"', '"1"', '"mm"', '"0 mm"', '"-1 mm"', '"1e999 mm"', '"nan mm"', '"1e-400 deg"', '"7 parsec"', '"1e308 m"',
-    '"1e300 rpm"', '"mm^9"', '"mm*mm*mm"', '"1/mm"', '"%"', '"\\u0000"', '"é"', '"' + "9" * 5000 + ' mm"', '"all"',
-    '"' + "mm*" * 3000 + 'mm"',
+    '""', '"x"', '"1"', '"mm"', '"0 mm"', '"-1 mm"', '"1e999 mm"', '"nan mm"', '"1e-400 deg"', '"7 parsec"', '"%"',
+    '"1e308 m"', '"1e300 rpm"', '"mm^9"', '"mm*mm*mm"', '"1/mm"', '"\\u0000"', '"é"', '"all"',
+    '"' + "9" * 5000 + ' mm"', '"' + "mm*" * 3000 + 'mm"',
 ]  # fmt: skip
 VALUES = [
     "true", "false", "[]", "{}", "[[]]", "[1, 1]", "[1e308, -1e308]", '["swing"]', "[nan]", "[0, 1, 2]", "{ min = 1 }",
@@ -123,7 +191,9 @@ def _line(chance: random.Random, text: str) -> str:
 def _characters(chance: random.Random, text: str) -> str:
     """Some characters go, or others come in."""
     place = chance.randrange(len(text))
-    junk = chance.choice(["", "\x00", "é", "=", "[", "]", '"', "#", "\n", "'''", "\ufeff", "{", "}", ".", ",", "9", "-"])
+    junk = chance.choice(
+        ["", "\x00", "é", "=", "[", "]", '"', "#", "\n", "'''", "\ufeff", "{", "}", ".", ",", "9", "-"]
+    )
     return text[:place] + junk + text[place + chance.choice([0, 1, 1, 3, 20]) :]
 
 
@@ -136,7 +206,28 @@ def _nested(chance: random.Random, text: str) -> str:
     return text + f"\n[{'.'.join(['a'] * depth)}]\nx = 1\n"
 
 
-MUTATIONS = [
+def _no_table(chance: random.Random, text: str) -> str:
+    """A table goes as a whole."""
+    tables = re.split(r"(?m)^(?=\[)", text)
+    del tables[chance.randrange(1, len(tables))]
+    return "".join(tables)
+
+
+# Nearly all of these files say nothing wrong, but ask for something rare.
+GENTLE = [
+    *[_swap(_NUMBER, ["0", "0.5", "1", "2", "3", "10", "45", "100", "1e-3", "-5", "180", "1e4", "1e-9", "1e7"])] * 4,
+    *[_swap(re.compile(r"count = \d+"), ["count = 1", "count = 2", "count = 7"])] * 2,
+    *[_swap(re.compile(r"values = \[[^]]*\]"), ["values = [1]", "values = [90]", "values = [60, 61, 59]"])] * 2,
+    _swap(re.compile(r"(?m)^\w+ = \{ from = .*"), ['e = { values = [70], unit = "mm" }', "k = { values = [1.5] }"]),
+    *[_no_table] * 3,
+    _swap(re.compile(r"(?m)^want = .*"), ["want = []", 'want = ["swing"]', 'want = ["rotatable", "margin"]']),
+    _swap(re.compile(r"(?m)^minimise = .*"), [f'minimise = "{name}"' for name in ("swing", "margin", "dwell_angle")]),
+    _swap(re.compile(r"(?m)^(?:target|samples) = .*"), ["target = 1e-12", "samples = 8", "samples = 97"]),
+    _swap(re.compile('keep = "all"|"float64"'), ['keep = "feasible"', '"float32"']),
+    _swap(re.compile(r"(?m)^rotatable = true$"), ["", "margin = { min = 0.2 }", 'a = { max = 15, unit = "mm" }']),
+    _swap(re.compile(r'"(?:mm|deg)"'), ['"mm"', '"m"', '"um"', '"in"', '"deg"', '"rad"', '"rev"']),
+]
+WILD = [
     *[_swap(_NUMBER, NUMBERS)] * 5,
     *[_swap(_TEXT, TEXTS)] * 2,
     *[_swap(_ENTRY, [*VALUES, *TEXTS, *NUMBERS])] * 4,
@@ -150,9 +241,10 @@ MUTATIONS = [
 
 
 def mutated(seed: int) -> str:
-    """The study file of that seed: one to three changes of a sound one."""
+    """The study file of that seed: one to four changes of a sound one, gentle or wild."""
     chance = random.Random(seed)
-    text = chance.choice([ROCKER, ROCKER, DWELL])
-    for _ in range(chance.choice([1, 1, 2, 3])):
-        text = chance.choice(MUTATIONS)(chance, text)
+    text = chance.choice([ROCKER, ROCKER, DWELL, LOCUS, NEEDLE])
+    kind = chance.choice([GENTLE, GENTLE, WILD])
+    for _ in range(chance.choice([1, 1, 2, 3, 4])):
+        text = chance.choice(kind)(chance, text)
     return text

@@ -1,4 +1,4 @@
-"""Whatever stands in a study file: an answer, or an error raised on purpose; never a traceback, a hang or a wrong OK."""
+"""Whatever stands in a study file: an answer, or an error raised on purpose; never a traceback, a hang, a wrong OK."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sweep.engine.run import run
 from sweep.errors import LinksweepError
 from sweep.report import write_report
 from sweep.study import load_study
-from tests.mutated_studies import DWELL, ROCKER, mutated
+from tests.mutated_studies import DWELL, LOCUS, NEEDLE, ROCKER, mutated
 
 SECONDS = 20
 MOST_DESIGNS = 3000
@@ -81,7 +81,7 @@ def wrong(seeds: range, folder: Path) -> tuple[list[str], Counter[str]]:
 
 
 def test_the_files_that_are_mutated_are_sound(tmp_path: Path) -> None:
-    for name, text in (("rocker", ROCKER), ("dwell", DWELL)):
+    for name, text in (("rocker", ROCKER), ("dwell", DWELL), ("locus", LOCUS), ("needle", NEEDLE)):
         assert outcome(text, tmp_path / name) == "answered"
 
 

@@ -187,7 +187,7 @@ class _Rows:
             if following is None:
                 break
             self._reached, part = following
-            pieces.append(pd.read_parquet(io.BytesIO(part.read()), columns=self.columns))
+            pieces.append(part.rows(self.columns))
         if not pieces:
             return pd.DataFrame({name: [] for name in self.columns})
         rows = pd.concat(pieces, ignore_index=True)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.dataset.files import read_plan, store_errors
 from sweep.errors import InputError, StoreError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 METADATA = b"linksweep"
 REMEDY = "run the study again to have it computed anew"
@@ -44,6 +48,12 @@ class Part:
             raise StoreError(f"{self.path}: damaged chunk; {REMEDY}")
         about(self, data)
         return data
+
+    def rows(self, columns: list[str] | None = None) -> pd.DataFrame:
+        """All columns or some, after the checks of `read`."""
+        import pandas as pd
+
+        return pd.read_parquet(io.BytesIO(self.read()), columns=columns)
 
 
 def about(part: Part, data: bytes | None = None) -> dict[str, Any]:

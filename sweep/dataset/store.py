@@ -11,7 +11,6 @@ Index and identity stand in the file's metadata too, so a file under another chu
 
 from __future__ import annotations
 
-import io
 import json
 import warnings
 from collections import Counter
@@ -268,7 +267,7 @@ def load(folder: str | Path) -> pd.DataFrame:
             raise StoreError(f"{place}: chunks of different studies or sources, {names}; they are not one table")
         if one.index == other.index:
             raise _twice(place, one, other)
-    frames = [pd.read_parquet(io.BytesIO(part.read())) for part in chunks]
+    frames = [part.rows() for part in chunks]
     missing = missing_chunks(place, chunks)
     if missing:
         text = f"{place}: incomplete, {len(missing)} of {len(missing) + len(chunks)} chunks are missing"

@@ -33,6 +33,8 @@ def open_plan(study: Study, folder: Path, force: bool) -> Plan:
             if force:
                 _set_foreign_aside(folder, plan, ())
             return plan
+        if _differs_in_limits_only(study, noted, plan):
+            return _with_other_limits(study, folder, plan)
         if not force:
             raise store.foreign(folder, _conflict(study, noted, plan), plan)
     plan = make_plan(study)
@@ -41,6 +43,33 @@ def open_plan(study: Study, folder: Path, force: bool) -> Plan:
     store.finished_chunks(folder, plan)  # refuses foreign chunks before the plan is written
     store.write_plan(folder, plan_note(study, folder, plan))
     return plan
+
+
+def _differs_in_limits_only(study: Study, noted: dict[str, Any], plan: Plan) -> bool:
+    """Whether the designs of a dataset can be sorted anew: every row and every bit of it has been kept."""
+    apart = ("limits", *NOT_IN_CHUNKS)
+    before, now = ({k: v for k, v in data.items() if k not in apart} for data in (noted.get("data") or {}, study.data))
+    kept = study.output.keep == "all" and study.output.dtype == "float64"
+    columns = [column.name for column in plan.columns]
+    same = before == now and [column["name"] for column in noted.get("columns", [])] == columns
+    return kept and same and noted.get("code") == plan.code
+
+
+def _with_other_limits(study: Study, folder: Path, plan: Plan) -> Plan:
+    """Set the chunks aside and note where: their designs are sorted by the new limits."""
+    where = old_name()
+    files = [store.beside(folder) / name for name in (*OWN_FILES, "report.html")]
+    store.set_aside(
+        folder, [*(part.path for part in store.parts(folder)), *(path for path in files if path.is_file())], where
+    )
+    store.write_plan(folder, plan_note(study, folder, plan) | {"known": where})
+    return plan
+
+
+def known_folder(folder: Path) -> Path | None:
+    """Where the chunks lie that this dataset's are made from."""
+    where = (store.read_plan(folder) or {}).get("known")
+    return store.beside(folder) / where if isinstance(where, str) else None
 
 
 def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
@@ -106,5 +135,6 @@ def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
         "pareto": study.pareto is not None,
         "counts": noted.get("counts"),
         "missed": noted.get("missed"),
+        "known": noted.get("known"),
         "complete": False,
     }

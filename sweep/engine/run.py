@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from sweep.dataset import store
 from sweep.engine.log import circumstances, command
-from sweep.engine.opening import open_plan, plan_note, refuse_or_clear_older
+from sweep.engine.opening import known_folder, open_plan, plan_note, refuse_or_clear_older
 from sweep.errors import Interrupted, StoreError, TimeUsedUp, WorkerDied
 from sweep.jobs.executors import Here, executor
 from sweep.jobs.signals import Stop, stop_on_signal
@@ -186,7 +186,7 @@ def _results(
     todo = (index for index in missing if not stop and time.monotonic() < deadline)
     place = Here() if jobs == 1 or len(missing) < 2 else executor(backend, jobs)
     try:
-        yield from place.outcomes(ChunkTask(study, plan, folder), todo, jobs, stop)
+        yield from place.outcomes(ChunkTask(study, plan, folder, known_folder(folder)), todo, jobs, stop)
     except WorkerDied as error:
         _raise_if_signalled(stop, folder)
         raise WorkerDied(f"{folder}: {error}; finished chunks are kept, run again to continue") from error

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 from sweep.chunks import plan as plans
 from sweep.chunks.cascade import Dropped
 from sweep.chunks.chunk import compute_chunk
-from sweep.dataset.store import write_chunk
-from sweep.errors import InputError, LinksweepError
+from sweep.dataset.store import parts, write_chunk
+from sweep.errors import InputError, LinksweepError, StoreError
 
 if TYPE_CHECKING:
     from sweep.chunks.plan import Plan
+    from sweep.families.base import Columns
     from sweep.study import Study
 
 
@@ -35,18 +36,21 @@ class ChunkTask:
 
     An error is handed back as a value: the other workers finish what they hold, and the parent raises it when all is
     quiet.  A worker whose sources are not those of the plan computes nothing.
+
+    In the folder ``known`` lie the same chunks under other limits.
     """
 
     study: Study
     plan: Plan
     folder: Path
+    known: Path | None = None
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Done:
         """The chunk of that index, unless ``should_stop`` answers true before it is ready."""
         start, end = self.plan.bounds(number)
         try:
             self._check_sources()
-            result = compute_chunk(self.study, start, end, should_stop)
+            result = compute_chunk(self.study, start, end, should_stop, self._known(number))
             write_chunk(self.folder, self.plan, number, result)
         except Dropped:
             return Done(number, dropped=True)
@@ -56,6 +60,15 @@ class ChunkTask:
             error.add_note(f"in chunk {number}, designs {start}:{end}\n{traceback.format_exc()}")
             return Done(number, error=error)
         return Done(number, end - start)
+
+    def _known(self, number: int) -> Columns | None:
+        if self.known is None or not self.known.is_dir():
+            return None
+        try:
+            rows = [part.rows() for part in parts(self.known) if part.index == number]
+        except StoreError:  # damaged since: it is computed
+            return None
+        return {str(name): rows[0][name].to_numpy() for name in rows[0].columns} if len(rows) == 1 else None
 
     def _check_sources(self) -> None:
         own = plans.code_hash()
