@@ -84,12 +84,12 @@ want = ["swing", "max_abs_d2psi", "margin"]
 [locus]
 swing = "40 deg"
 phi0 = { from = 170, to = 190, count = 3, unit = "deg" }
+phi_ext = { from = 0, to = 350, count = 8, unit = "deg" }
 [design]
 alpha = { from = 60, to = 90, count = 3, unit = "deg" }
 e = "100 mm"
 f = "10 mm"
 g = { from = -10, to = 20, count = 2, unit = "mm" }
-psi_ext = { from = 20, to = 80, count = 5, unit = "deg" }
 [limits]
 max_pressure_angle = { max = 60, unit = "deg" }
 [objective]
