@@ -116,7 +116,11 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
     computed = 0
     with stop_on_signal() as stop:
         store.remove_temporary(folder)
-        plan = open_plan(study, folder, force)
+        plan: Plan | None = None
+        with stop.raising():  # a pilot may have to compile
+            plan = open_plan(study, folder, force)
+        _raise_if_signalled(stop, folder)
+        assert plan is not None
         for _ in range(ROUNDS + 1):
             finished = store.finished_chunks(folder, plan)
             missing = [index for index in range(plan.chunks) if index not in finished]
@@ -181,7 +185,8 @@ def _results(
     from sweep.chunks.chunk import warm
     from sweep.engine.worker import ChunkTask
 
-    warm(study)  # one process compiles, the others load the machine code
+    with stop.raising():
+        warm(study)  # one process compiles, the others load the machine code
     deadline = time.monotonic() + allowed  # compiling does not count, so that every run gets on
     todo = (index for index in missing if not stop and time.monotonic() < deadline)
     place = Here() if jobs == 1 or len(missing) < 2 else executor(backend, jobs)

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from sweep.errors import InputError, WorkerDied, nearest
 from sweep.jobs.signals import Stop, depend_on_parent, unheard
@@ -84,13 +84,10 @@ class Processes:
         """See `Executor`."""
         from concurrent.futures.process import BrokenProcessPool
 
-        from joblib.externals.loky import get_reusable_executor
-
         with tempfile.TemporaryDirectory(prefix="linksweep-", ignore_cleanup_errors=True) as folder:
             flag = Path(folder, "stop")
             stop.tell(flag.touch)
-            with unheard():
-                pool = get_reusable_executor(max_workers=jobs, initializer=depend_on_parent, initargs=(os.getpid(),))
+            pool = worker_processes(jobs)
 
             def submit(number: int) -> Future[T]:
                 with unheard():
@@ -103,6 +100,16 @@ class Processes:
             finally:
                 if stop:  # whoever is still at work, or still starting up, does not listen
                     pool.shutdown(wait=False, kill_workers=True)
+
+
+def worker_processes(jobs: int) -> Any:
+    """The pool of worker processes; they hear no signals and end with this process."""
+    from joblib.externals.loky import get_reusable_executor
+    from joblib.externals.loky.backend import resource_tracker
+
+    resource_tracker.ensure_running()  # it would unblock signals in the middle
+    with unheard():
+        return get_reusable_executor(max_workers=jobs, initializer=depend_on_parent, initargs=(os.getpid(),))
 
 
 def _until_flag(task: Task[T], number: int, flag: Path) -> T:

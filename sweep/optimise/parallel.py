@@ -12,6 +12,7 @@ from typing import Any
 
 from sweep.errors import WorkerDied
 from sweep.families.base import Array
+from sweep.jobs.executors import worker_processes
 from sweep.jobs.signals import depend_on_parent, unheard
 from sweep.optimise.certificate import Result
 from sweep.optimise.problem import Problem
@@ -43,13 +44,10 @@ def in_processes(
     from concurrent.futures import FIRST_COMPLETED, wait
     from concurrent.futures.process import BrokenProcessPool
 
-    from joblib.externals.loky import get_reusable_executor
-
     workers = min(jobs, len(numbers))
     with tempfile.TemporaryDirectory(prefix="linksweep-") as folder:
         flag = Path(folder, "stop")
-        with unheard():
-            executor = get_reusable_executor(max_workers=workers)
+        executor = worker_processes(workers)
         todo, begun, late = list(reversed(numbers)), list[Any](), math.inf
         waiting: set[Any] = set()
         try:
@@ -68,6 +66,9 @@ def in_processes(
                 executor.shutdown(kill_workers=True)
             found = [future.result() for future in begun if future not in waiting]
         except BrokenProcessPool as error:
+            if asked():  # the signal that stops us may have hit them too
+                done = [future for future in begun if future.done() and future.exception() is None]
+                return [result for result in (future.result() for future in done) if result is not None]
             raise WorkerDied(f"optimiser: a worker process died ({error}); run again") from error
     return [result for result in found if result is not None]
 
