@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sweep.dataset import store
 from sweep.errors import InputError
+from sweep.quantities.names import is_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -172,7 +173,7 @@ class _Rows:
             raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "compare")
         self.stops = [store.about(part)["stop"] for part in chunks]
         names = pq.read_schema(io.BytesIO(chunks[0].read())).names
-        self.columns = [name for name in names if not name.startswith("err_")]
+        self.columns = [name for name in names if not is_error(name)]
         self._chunks: Iterator[tuple[int, store.Part]] = iter(zip(self.stops, chunks, strict=True))
         self._rows: pd.DataFrame | None = None
         self._reached = 0
