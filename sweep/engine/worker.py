@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sweep.chunks import plan as plans
 from sweep.chunks.cascade import Dropped
@@ -44,6 +44,10 @@ class ChunkTask:
     plan: Plan
     folder: Path
     known: Path | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A study remembers its family, which is made of functions; whoever unpickles it makes its own.
+        return self.__dict__ | {"study": replace(self.study)}
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Done:
         """The chunk of that index, unless ``should_stop`` answers true before it is ready."""

@@ -61,7 +61,7 @@ class Here:
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """See `Executor`."""
-        for number in numbers:
+        while not stop and (number := next(numbers, None)) is not None:
             yield task(number, stop.event.is_set)
 
 
@@ -123,7 +123,7 @@ def _flow(
     waiting: set[Future[T]] = set()
     late = math.inf
     while True:
-        while len(waiting) <= jobs and (number := next(numbers, None)) is not None:
+        while not stop and len(waiting) <= jobs and (number := next(numbers, None)) is not None:
             waiting.add(submit(number))
         if not waiting or time.monotonic() > late:
             return
