@@ -136,6 +136,15 @@ def test_dataset_of_an_earlier_version_is_not_continued_but_set_aside_by_force(
     assert {path.name for path in aside.iterdir()} == files
 
 
+def test_forced_new_data_do_not_keep_the_old_report(study: Study, copy: Path, tmp_path: Path) -> None:
+    other = write_study(tmp_path / "other", keep="feasible", count=10)
+    assert (copy.parent / "report.html").is_file()
+    sweep.run(other, copy, jobs=1, force=True)
+    assert not (copy.parent / "report.html").exists() and not (copy.parent / OPTIMUM).exists()
+    (aside,) = (copy.parent / OLD).iterdir()
+    assert {"report.html", OPTIMUM, PLAN} <= {path.name for path in aside.iterdir()}
+
+
 def test_exchanged_names_are_noticed_by_every_reader(study: Study, copy: Path) -> None:
     """Each file is whole, but lies under the other's index: names without their hashes exchanged."""
     one, other = store.parts(copy)[:2]

@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from sweep.chunks.plan import Plan
     from sweep.study import Study
 
-OWN_FILES = (store.PLAN, store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO)
+# What concerns only these designs; the report about them as well.
+OWN_FILES = (
+    store.PLAN, store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO, "report.html",
+)  # fmt: skip
 
 
 def open_plan(study: Study, folder: Path, force: bool) -> Plan:
@@ -58,7 +61,7 @@ def _differs_in_limits_only(study: Study, noted: dict[str, Any], plan: Plan) -> 
 def _with_other_limits(study: Study, folder: Path, plan: Plan) -> Plan:
     """Set the chunks aside and note where: their designs are sorted by the new limits."""
     where = old_name()
-    files = [store.beside(folder) / name for name in (*OWN_FILES, "report.html")]
+    files = [store.beside(folder) / name for name in OWN_FILES]
     store.set_aside(
         folder, [*(part.path for part in store.parts(folder)), *(path for path in files if path.is_file())], where
     )

@@ -66,13 +66,13 @@ def _said(text: str, message: str) -> str:
     table = _TABLE.fullmatch(lines[-1]) if lines else None
     if table is not None:
         earlier = _earlier(lines[:-1], lambda above, own: own is not None and own[1].strip() == table[1].strip())
-        return f"line {len(lines)}: the table [{table[1].strip()}] stands twice{earlier}"
+        return f"the table [{table[1].strip()}] stands twice {place[0]}{earlier}"
     number = next((k for k in range(len(lines), 0, -1) if _KEY.match(lines[k - 1])), None)
     if number is None or message.startswith("Duplicate inline"):
         return message
     key, here = _name(lines[number - 1]), _heading(lines[:number])
     earlier = _earlier(lines[: number - 1], lambda above, own: _name(above[-1]) == key and _heading(above) == here)
-    return f"line {number}: {f'{here}.' if here else ''}{key} is given twice{earlier}"
+    return f"{f'{here}.' if here else ''}{key} is given twice {place[0]}{earlier}"
 
 
 def _earlier(lines: list[str], is_it: Any) -> str:
