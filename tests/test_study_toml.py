@@ -24,12 +24,12 @@ def said(text: str, folder: Path) -> str:
         ("[limits]\na = 1\nb = 2\na = 3\n", "limits.a is given twice (at line 4, column 6), first in line 2"),
         (
             "[x]\na = 1\n[limits]\na = 1\nb = [\n1]\na = 2",
-            "limits.a is given twice (at line 7, column 6), first in line 4",
+            "limits.a is given twice (at line 7, column 6, the end of the file), first in line 4",
         ),
         ("x = 1\nx = 2\n", "x is given twice (at line 2, column 6), first in line 1"),
         ('[a]\n"b" = 1\nb = 2\n', "a.b is given twice (at line 3, column 6), first in line 2"),
         ("[x]\na = 1\n[y]\n[x]\nb = 2\n", "the table [x] stands twice (at line 4, column 3), first in line 1"),
-        ("[d]\nx = { a = 1, a = 2 }\n", "Duplicate inline table key 'a' (at line 2, column 20)"),
+        ("[d]\nx = { a = 1, a = 2 }\n", "Duplicate inline table key 'a' (at line 2, column 19)"),
         ("a = 1\nb = " + "9" * 5000, "line 2: a number of thousands of digits; allowed: numbers up to 1e100"),
         ("a = " + "[" * 3000 + "]" * 3000, f"tables or lists within each other too often; allowed: {DEEPEST} levels"),
         (

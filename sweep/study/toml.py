@@ -11,7 +11,7 @@ from sweep.errors import StudyError
 
 DEEPEST = 16  # tables within tables; a study needs four
 _DIGITS = re.compile(r"\d[\d_]{4000,}")
-_PLACE = re.compile(r"\(at line (\d+), column \d+\)")
+_PLACE = re.compile(r"\(at line (\d+), column \d+[^)]*\)")
 _KEY = re.compile(r"""\s*([\w."'-]+)\s*=""")
 _TABLE = re.compile(r"\s*\[+([^\[\]]+)\]+\s*(?:#.*)?")
 # What tomllib says where a key or a table comes a second time.
