@@ -128,8 +128,13 @@ def closest(word: str, known: Iterable[str]) -> str | None:
         alike = difflib.get_close_matches(word, choices, n=8, cutoff=0.5)
         # Letters in common are not enough: a slip changes few of them.
         near = sorted((edits(word, name), -alike.index(name), name) for name in alike)
-        matches = [name for count, _, name in near if count <= max(1.0, SLIPS * len(word))]
+        matches = [n for count, _, n in near if count <= max(1.0, SLIPS * len(word)) or _begins(word, n)]
     return matches[0] if matches else None
+
+
+def _begins(word: str, name: str) -> bool:
+    """Whether one is the beginning of the other, and not only a letter or two of it."""
+    return min(len(word), len(name)) > 3 and (name.startswith(word) or word.startswith(name))
 
 
 def edits(one: str, other: str) -> int:

@@ -29,6 +29,7 @@ PARAMETERS = ["a", "b", "c", "e", "f", "g", "alpha", "branch"]
         ("max_abs_dspi", OUTPUTS, "max_abs_d2psi"),
         ("arcmin", SYMBOLS, "deg"),
         ("inches", SYMBOLS, "in"),
+        ("thread", ["threading", "loky"], "threading"),
         ("rmp", SYMBOLS, "rpm"),
         ("E1", ["e1", "f1", "g1"], "e1"),
         ("alhpa", PARAMETERS, "alpha"),
