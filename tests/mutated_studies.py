@@ -142,6 +142,32 @@ samples = 32
 time = "2 s"
 """
 
+SWING, CRANK, K = (
+    'swing = { min = 10, max = 90, unit = "deg" }',
+    'a = { from = 10, to = 30, count = 4, unit = "mm" }',
+    "k = { from = 1.0, to = 2.0 }",
+)
+# Numbers at the ends of what a number can be: the sound file, what stands in it, and what takes its place.
+EDGES = [
+    (ROCKER, SWING, "margin = { min = 0, max = 0 }"),
+    (ROCKER, SWING, 'swing = { min = 0, max = 0, unit = "deg" }'),
+    (ROCKER, SWING, 'swing = { min = 1e-320, max = 1e-300, unit = "deg" }'),
+    (ROCKER, SWING, 'swing = { min = 1e-310, max = 1e-310, unit = "deg" }'),
+    (ROCKER, SWING, "max_abs_d2psi = { max = 1e-310 }"),
+    (ROCKER, CRANK, 'a = { from = 1e-300, to = 1e-299, count = 2, unit = "mm" }'),
+    (ROCKER, CRANK, 'a = { from = 1e99, to = 1e100, count = 2, unit = "m" }'),
+    (ROCKER, CRANK, 'a = { from = 10, to = 30, count = 1, unit = "mm" }'),
+    (ROCKER, "max = 50", "max = 0"),
+    (ROCKER, "max = 50", "max = 90"),
+    (ROCKER, '"0.02 mm"', '"1e90 mm"'),
+    (ROCKER, '"1 MB"', '"1e308 GB"'),
+    (ROCKER, '"600 rpm"', '"1e308 rpm"'),
+    (ROCKER, "[30, 10]", "[-1e100, 1e100]"),
+    (DWELL, K, "k = { from = 1e99, to = 1e100 }"),
+    (DWELL, K, "k = { from = 1e-300, to = 1e-299 }"),
+    (DWELL, "from = 0.1", "from = 5e-324"),
+]
+
 NUMBERS = [
     "0", "-1", "1", "2", "1e308", "-1e308", "1e-320", "nan", "inf", "-inf", "1e400", "0x10", "1_0", "9" * 4300,
     "9" * 5000, "123456789012345678901234567890", "2147483648", "9223372036854775807", "-9223372036854775808",

@@ -22,7 +22,7 @@ from sweep.errors import LinksweepError
 from sweep.report import write_report
 from sweep.report.page import gather
 from sweep.study import load_study
-from tests.mutated_studies import DWELL, LOCUS, NEEDLE, ROCKER, mutated
+from tests.mutated_studies import DWELL, EDGES, LOCUS, NEEDLE, ROCKER, mutated
 
 SECONDS = 20
 COMPILING = 200
@@ -102,6 +102,12 @@ def wrong(seeds: range, folder: Path) -> tuple[list[str], Counter[str]]:
 def test_the_files_that_are_mutated_are_sound(tmp_path: Path) -> None:
     for name, text in (("rocker", ROCKER), ("dwell", DWELL), ("locus", LOCUS), ("needle", NEEDLE)):
         assert outcome(text, tmp_path / name) == "answered"
+
+
+@pytest.mark.parametrize(("text", "old", "new"), EDGES, ids=range(len(EDGES)))
+def test_numbers_at_the_ends_of_what_a_number_can_be(text: str, old: str, new: str, tmp_path: Path) -> None:
+    assert text.count(old) == 1
+    assert outcome(text.replace(old, new), tmp_path / "study") in ("answered", "refused")
 
 
 def test_mutated_study_files_are_answered_or_refused(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sweep.chunks.cascade import compared
 from sweep.families.base import Accuracy, Array
+from sweep.optimise.form import measured_in
 from sweep.optimise.problem import Problem
 from sweep.optimise.starts import spread
 from sweep.quantities.names import is_flag, stem
@@ -172,6 +173,6 @@ def _missed(limit: Any, value: Array) -> Array:
     out = np.zeros(len(value))
     for bound, sense in ((limit.minimum, 1.0), (limit.maximum, -1.0)):
         if bound is not None:
-            size = max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)) or 1.0
+            size = measured_in(max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)))
             out = np.maximum(out, sense * (bound - value) / size)
     return np.nan_to_num(out, nan=ABSENT)
