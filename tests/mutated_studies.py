@@ -163,7 +163,7 @@ EDGES = [
     (ROCKER, '"1 MB"', '"1e308 GB"'),
     (ROCKER, '"600 rpm"', '"1e308 rpm"'),
     (ROCKER, "[30, 10]", "[-1e100, 1e100]"),
-    (ROCKER, 'e = "100 mm"', f"e = {10**400}"),
+    (ROCKER, 'e = "100 mm"\nf', f"e = {10**400}\nf"),
     (DWELL, K, "k = { from = 1e99, to = 1e100 }"),
     (DWELL, K, "k = { from = 1e-300, to = 1e-299 }"),
     (DWELL, "from = 0.1", "from = 5e-324"),
