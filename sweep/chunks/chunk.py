@@ -139,8 +139,11 @@ def compute_chunk(
     for low in range(start, stop, BLOCK):
         index = np.arange(low, min(low + BLOCK, stop))
         matrix, status = parameter_matrix(study, low, low + index.size)
+        if known is None:
+            cascades[0].feed(index, matrix, status)
+            continue
         recalled = np.isin(index, designs_known)
-        for cascade, mine in zip(cascades, (~recalled, recalled), strict=False):
+        for cascade, mine in zip(cascades, (~recalled, recalled), strict=True):
             if mine.any():
                 cascade.feed(index[mine], matrix[mine], status[mine])
     names = tuple(output_columns(study))

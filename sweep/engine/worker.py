@@ -54,7 +54,9 @@ class ChunkTask:
         start, end = self.plan.bounds(number)
         try:
             self._check_sources()
-            result = compute_chunk(self.study, start, end, should_stop, self._known(number))
+            known = self._known(number)
+            what = (self.study, start, end, should_stop)
+            result = compute_chunk(*what) if known is None else compute_chunk(*what, known)
             write_chunk(self.folder, self.plan, number, result)
         except Dropped:
             return Done(number, dropped=True)
