@@ -45,12 +45,12 @@ smoke: $(STUDIES:%=smoke-%) smoke-accuracy  ## every study's tiny version
 $(STUDIES:%=study-%): study-%: $(VENV)/ready
 	$(SWEEP) run studies/$* --out results/$*/designs
 	$(if $(wildcard studies/$*/figure.py),$(BIN)/python studies/$*/figure.py results/$*)
-	$(SWEEP) report results/$*/designs --out results/$*
+	$(SWEEP) report results/$*/designs
 
 $(STUDIES:%=smoke-%): smoke-%: $(VENV)/ready
 	$(SWEEP) run studies/$* --smoke --force --out results/smoke/$*/designs
 	$(if $(wildcard studies/$*/figure.py),$(BIN)/python studies/$*/figure.py results/smoke/$*)
-	$(SWEEP) report results/smoke/$*/designs --out results/smoke/$*
+	$(SWEEP) report results/smoke/$*/designs
 
 study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accuracy.md, about 10 minutes
 	$(BIN)/python -m studies.accuracy --out results/accuracy

@@ -5,7 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from sweep.errors import InputError, LinksweepError, StudyError
+from sweep._kernels import check_kernels
+from sweep.errors import IncompleteWarning, InputError, LinksweepError, LinksweepWarning, StudyError
 
 if TYPE_CHECKING:
     from sweep.dataset.comparison import compare
@@ -18,8 +19,10 @@ if TYPE_CHECKING:
     from sweep.synthesis.mechanisms import synthesise
 
 __all__ = [
+    "IncompleteWarning",
     "InputError",
     "LinksweepError",
+    "LinksweepWarning",
     "StudyError",
     "compare",
     "evaluate",
@@ -31,6 +34,8 @@ __all__ = [
     "synthesise",
     "thread",
 ]
+
+check_kernels()
 
 # Imported when first used, so that the command line answers at once: numba alone takes a quarter of a second.
 _HOMES = {

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import sweep.chunks.plan
-from sweep.dataset.store import OPTIMUM, is_complete, read_runs
+from sweep.dataset.store import OPTIMUM, beside, is_complete, read_runs
 from sweep.engine.run import run
 from sweep.errors import Interrupted
 from sweep.study import Objective, OptimiseSettings, Study, load_study
@@ -29,7 +29,7 @@ class Optimiser:
     def __call__(self, study: Study, folder: Path, stop: Callable[[], bool], jobs: int) -> Path:
         self.calls.append(study.optimise)
         self.begin()
-        path = folder / OPTIMUM
+        path = beside(folder) / OPTIMUM
         path.write_bytes(b"optimum")
         deadline = time.monotonic() + 0.3
         while time.monotonic() < deadline:
@@ -57,7 +57,7 @@ def test_optimum_is_sought_once(study: Study, optimiser: Optimiser, tmp_path: Pa
     assert is_complete(out)
     run(study, out)
     assert optimiser.calls == [study.optimise]
-    (out / OPTIMUM).unlink()
+    (beside(out) / OPTIMUM).unlink()
     assert not is_complete(out)
     run(study, out)
     assert len(optimiser.calls) == 2 and is_complete(out)
@@ -93,7 +93,7 @@ def test_interrupted_search_is_not_taken_for_the_whole(
         run(study, out)
     assert caught.value.exit_code == 128 + number
     assert signal.getsignal(number) is before
-    assert (out / OPTIMUM).is_file() and not is_complete(out)
+    assert (beside(out) / OPTIMUM).is_file() and not is_complete(out)
     optimiser.begin = lambda: None
     run(study, out)
     assert is_complete(out) and len(optimiser.calls) == 3

@@ -71,7 +71,7 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
 
 @click.command()
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default FOLDER/_report.")
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default: beside the chunks.")
 def report(folder: Path, out: Path | None) -> None:
     """Write report.html, figures and tables about a dataset.
 

@@ -20,6 +20,7 @@ from sweep.reductions.catalogue import output
 from sweep.reductions.measures import Measure, Series, margins, measure
 
 Term = dict[int, float]
+SMALLEST = 1e-100  # a limit nearer to zero is a limit at zero
 AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first
 FAR = 1e3  # stands for a row that cannot be computed at a trial design: far outside, but a number
 
@@ -117,6 +118,11 @@ class Form:
             equal=np.zeros(len(labels) + int(both.sum()), dtype=np.bool_),
             labels=labels + tuple(label for label, twice in zip(labels, both, strict=True) if twice),
         )
+
+
+def measured_in(size: float) -> float:
+    """What violations of a limit of that size are divided by: 1 where it is so small that they would overflow."""
+    return size if size > SMALLEST else 1.0
 
 
 class Program:
@@ -303,10 +309,10 @@ class _Layout:
         if any(s.pressure for s in r.measure.series):
             return 1.0
         if r.measure.numbers:
-            return max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)) or 1.0
+            return measured_in(max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)))
         ends = [k for side in self._ends(r.measure.series) for k in side]
         amplitude = 1.0 if r.measure.is_angle else max((abs(self.points.value[k]) for k in ends), default=0.0)
-        return max(abs(bound), 1e-3 * amplitude) or 1.0
+        return measured_in(max(abs(bound), 1e-3 * amplitude))
 
     def form(self, complete: bool, reaches: bool) -> Form:
         matrix = np.zeros((len(self.terms), 2 * len(self.points) + len(self.scalars)))

@@ -61,7 +61,7 @@ def front_study(
     if study.pareto is None:
         raise InputError("pareto", None, "a [pareto] section", str(study.path))
     place = Path(folder)
-    settings, path = study.pareto, place / store.PARETO
+    settings, path = study.pareto, store.beside(place) / store.PARETO
     front = saved(path, key) or Front.of(settings)
     if front.complete and path.exists():
         return path
@@ -126,7 +126,7 @@ def _unit(study: Study, name: str) -> str:
 def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path) -> list[Array]:
     """For each bound, the loosest first: the optimum, then diverse best designs of the dataset within the bound."""
     names = list(study.family.parameter_names)
-    optimum = _columns(folder / store.OPTIMUM, [*names, "role"])
+    optimum = _columns(store.beside(folder) / store.OPTIMUM, [*names, "role"])
     own = np.column_stack([optimum[name] for name in names])[optimum["role"] == "optimum"].astype(np.float64)
     chosen = []
     for designs, merit in within(study, settings, Front.of(settings).bounds, folder):

@@ -161,16 +161,17 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     settings, problem, starts = problem_and_starts(study, place)
     results = minimise(problem, starts, settings, stop, jobs)
     frame = _table(study, problem, results)
-    write(place / store.OPTIMUM, frame, study)
-    write(place / store.CURVES, _curves(study, frame), study)
-    write(place / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
+    side = store.beside(place)
+    write(side / store.OPTIMUM, frame, study)
+    write(side / store.CURVES, _curves(study, frame), study)
+    write(side / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
     if study.tolerance is None:
-        (place / store.TOLERANCE).unlink(missing_ok=True)
+        (side / store.TOLERANCE).unlink(missing_ok=True)
     else:
-        write(place / store.TOLERANCE, _by_role(study, frame, _tolerance), study)
+        write(side / store.TOLERANCE, _by_role(study, frame, _tolerance), study)
     if any(result.ended == "interrupted" for result in results) or (stop is not None and stop()):
         raise KeyboardInterrupt
-    return place / store.OPTIMUM
+    return side / store.OPTIMUM
 
 
 def _table(study: Study, problem: Problem, results: list[Result]) -> dict[str, Any]:

@@ -101,7 +101,8 @@ def write(
     metadata = {"study": study.name, "fingerprint": study.fingerprint, "caveat": CAVEAT} | dict(about)
     schema = pa.schema(fields, metadata=metadata)
     sink = pa.BufferOutputStream()
-    pq.write_table(pa.Table.from_arrays(list(arrays.values()), schema=schema), sink, compression="zstd")
+    table = pa.Table.from_arrays(list(arrays.values()), schema=schema)
+    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     store.write_atomically(path, bytes(sink.getvalue()))
 
 

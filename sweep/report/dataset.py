@@ -128,8 +128,6 @@ def read_dataset(folder: Path) -> Dataset:
     InputError
         if the folder is no complete dataset.
     """
-    import pandas as pd
-
     plan = store.read_plan(folder)
     if plan is None:
         allowed = f"a dataset folder, with a readable {store.PLAN} (sweep run makes one)"
@@ -140,7 +138,7 @@ def read_dataset(folder: Path) -> Dataset:
         counts, missed = store.totals(folder)
         plan |= {"counts": counts, "missed": missed}
     study = study_of(plan, folder)
-    optima, curves, front = folder / store.OPTIMUM, folder / store.CURVES, folder / store.PARETO
+    optima, curves, front = (store.beside(folder) / name for name in (store.OPTIMUM, store.CURVES, store.PARETO))
     parts = tuple(part.path for part in store.parts(folder))
     units, definitions = field_metadata([path for path in (*parts[:1], optima, curves, front) if path.exists()])
     return Dataset(
@@ -150,9 +148,9 @@ def read_dataset(folder: Path) -> Dataset:
         parts=parts,
         units={o.name: o.unit.replace("length", "mm") for o in study.family.pose_outputs} | units,
         definitions={o.name: o.text for o in study.family.pose_outputs} | definitions,
-        optima=pd.read_parquet(optima) if optima.exists() else None,
-        curves=pd.read_parquet(curves) if curves.exists() else None,
-        front=pd.read_parquet(front) if front.exists() else None,
+        optima=store.read_table(optima) if optima.exists() else None,
+        curves=store.read_table(curves) if curves.exists() else None,
+        front=store.read_table(front) if front.exists() else None,
         runs=tuple(store.read_runs(folder)),
     )
 
@@ -162,7 +160,7 @@ def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
     from sweep.study.load import study_from_data
 
     about = plan.get("about", {"name": plan["name"]})
-    return study_from_data({**plan["data"], "study": about}, folder / store.PLAN)
+    return study_from_data({**plan["data"], "study": about}, store.beside(folder) / store.PLAN)
 
 
 def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,6 +42,7 @@ from sweep.study.model import (
 from sweep.study.pareto import read_pareto
 from sweep.study.prescribed import prescribed_limits, read_locus, read_prescribed
 from sweep.study.study import Budget, Objective, OptimiseSettings, OutputSettings, Study, Tolerance
+from sweep.study.toml import read_toml
 
 if TYPE_CHECKING:
     from sweep.synthesis.fit import LineFit
@@ -65,10 +65,10 @@ def load_study(path: str | Path, smoke: bool = False) -> Study:
     """
     file = Path(path)
     file = file / "study.toml" if file.is_dir() else file
-    files = {file.name: _read_toml(file)}
+    files = {file.name: read_toml(file)}
     if smoke:
         beside = file.with_name("smoke.toml")
-        files[beside.name] = _read_toml(beside)
+        files[beside.name] = read_toml(beside)
         return _build(merged(files[file.name], files[beside.name]), file, files)
     return _build(files[file.name], file, files)
 
@@ -116,22 +116,6 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...
         else:
             result[name] = copy.deepcopy(new)
     return result
-
-
-def _read_toml(file: Path) -> dict[str, Any]:
-    try:
-        text = file.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise StudyError(str(file), [f"{file.name}: cannot be read: {error.strerror}"]) from None
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise StudyError(str(file), [f"{file.name}: line {line} is no UTF-8 text"]) from None
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        line, column = text.count("\n") + 1, len(text) - text.rfind("\n")
-        message = str(error).replace("at end of document", f"at line {line}, column {column}, the end of the file")
-        raise StudyError(str(file), [f"{file.name}: {message}"]) from None
 
 
 def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str, Any]]) -> Study:
