@@ -1,4 +1,4 @@
-"""Heddle drive at kernel level: the 25-digit table, points and circles in 50 digits, plain Python, symmetries, limits."""
+"""Heddle drive at kernel level: the 25-digit table, points and circles in 50 digits, symmetries, limits."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def test_heddle_scaled_by_a_power_of_two_keeps_every_bit(exponent):
 
 def test_heddle_toggles_are_named_and_never_invented():
     # B on the line through O3 at the distance BC + O3C, BC - O3C, and half a unit beyond
-    base = dict(O2B=100.0, O3C=60.0, O2O3=300.0, O4E=100.0, chi_mid=0.0)
+    base = {"O2B": 100.0, "O3C": 60.0, "O2O3": 300.0, "O4E": 100.0, "chi_mid": 0.0}
     codes = {}
     for name, rod in (("stretched", 140.0), ("beyond", 139.5), ("folded", 260.0), ("free", 200.0)):
         got = moved([design(BC=rod, **base)], [[0.0]])

@@ -1,4 +1,4 @@
-"""Synthesis of a heddle drive: extreme positions from the stroke, rod from the swing of the cam lever, arms of the shafts.
+"""Synthesis of a heddle drive: extreme positions from the stroke, rod from the lever swing, arms of the shafts.
 
 Equations (1), (2), (10) and (11) of docs/heddle.md.  O1, O2, O3 lie on one line; the arm O3D stands square to it at
 mid-stroke, and the rigid angle C-O3-D puts C above the line.
@@ -98,7 +98,7 @@ def heddle_lever_angles(positions: Array, angles: Array, status: Status) -> None
 
 
 @inline
-def _kept_rod(x: float, y: float, one: Array, two: Array, side: float) -> float:
+def _kept_rod(x: float, y: float, one: tuple[float, float], two: tuple[float, float], side: float) -> float:
     """Length of the rod from B = (x, y) to the first C, or nan if B stands on the wrong side of a ray."""
     if side * (one[0] * y - one[1] * x) > 0.0 and side * (two[0] * y - two[1] * x) > 0.0:
         return math.hypot(x - one[0], y - one[1])
@@ -120,7 +120,6 @@ def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) ->
     count : (n,) out; how many there are
     status : (n,) out; OK, NOT_ADMISSIBLE (no rod), SINGULAR (C does not move: every rod gives it) or INVALID_INPUT
     """
-    one, two = [0.0, 0.0], [0.0, 0.0]
     for i in range(positions.shape[0]):
         frame, arm, lever, side = positions[i, 0], positions[i, 1], positions[i, 4], positions[i, 6]
         xi1, xi2, swing = positions[i, 2], positions[i, 3], positions[i, 5]
@@ -131,12 +130,12 @@ def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) ->
             continue
         # (O2C_2)^2 - (O2C_1)^2 without the squares
         excess = -4.0 * frame * arm * math.sin(0.5 * (xi1 + xi2)) * math.sin(0.5 * (xi1 - xi2))
-        one[0], one[1] = frame - arm * math.cos(xi1), arm * math.sin(xi1)
+        one = (frame - arm * math.cos(xi1), arm * math.sin(xi1))
         x2, y2 = frame - arm * math.cos(xi2), arm * math.sin(xi2)
         singular = False
         for sense in (1.0, -1.0):
             cos, sin = math.cos(swing), sense * math.sin(swing)
-            two[0], two[1] = x2 * cos - y2 * sin, x2 * sin + y2 * cos
+            two = (x2 * cos - y2 * sin, x2 * sin + y2 * cos)
             nx, ny = two[0] - one[0], two[1] - one[1]
             size = math.hypot(nx, ny)
             if size <= 8.0 * EPS * (frame + arm):

@@ -50,7 +50,7 @@ def outputs(design: tuple[float, ...], theta: float) -> dict[str, Any]:
                 result[prefix + letter] = coefficients[order] * mp.factorial(order)
         at = positions(numbers, mp.mpf(theta))
         rod, arm = at["C"] - at["B"], at["C"] - numbers[3]
-        result["sin_transmission"] = (rod.real * arm.imag - rod.imag * arm.real) * -1 / (numbers[1] * numbers[2])
+        result["sin_transmission"] = (rod.imag * arm.real - rod.real * arm.imag) / (numbers[1] * numbers[2])
         return result
 
 

@@ -87,7 +87,12 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
     arm, chi_mid = designs[i, 4] * per_unit, designs[i, 5]
-    d, f, o, link = designs[i, 6] * per_unit, designs[i, 7] * per_unit, designs[i, 8] * per_unit, designs[i, 9] * per_unit
+    d, f, o, link = (
+        designs[i, 6] * per_unit,
+        designs[i, 7] * per_unit,
+        designs[i, 8] * per_unit,
+        designs[i, 9] * per_unit,
+    )
     heddle, slide = designs[i, 10] * per_unit, designs[i, 11] * per_unit
     side_f, side_c = designs[i, 12].real, designs[i, 13].real
     parallel = designs[i, 6] == designs[i, 7] and designs[i, 8] == designs[i, 9]

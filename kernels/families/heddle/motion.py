@@ -14,9 +14,7 @@ from kernels.families.heddle.closure import Array, Reduced, Status, driven, driv
 
 
 @inline
-def _shaft_lever(
-    r: Reduced, cos_turn: Any, sin_turn: Any, rates: bool
-) -> tuple[Any, Any, tuple[Any, Any, Any], int]:
+def _shaft_lever(r: Reduced, cos_turn: Any, sin_turn: Any, rates: bool) -> tuple[Any, Any, tuple[Any, Any, Any], int]:
     """Cosine and sine of the shaft lever's angle from mid-stroke, its rates by that of the bell crank, status; (6)."""
     if r.parallel:
         one = 1.0 + 0.0 * cos_turn
