@@ -20,6 +20,7 @@ JAMMED = 10
 NOT_LINEAR = 11
 NO_DWELL = 12
 NOT_ADMISSIBLE = 13
+NO_ROOT = 14
 
 MEANING: dict[int, str] = {
     OK: "ok",
@@ -38,4 +39,5 @@ MEANING: dict[int, str] = {
     JAMMED: "friction blocks the motion, or its iteration does not contract; the crank all but stops within the turn",
     NO_DWELL: "the output does not make one turn per turn of the input: no dwell is defined",
     NOT_ADMISSIBLE: "the point of the locus gives no mechanism that meets the requirement",
+    NO_ROOT: "the equation that fixes the position has no root in its interval, or fewer than asked for",
 }
