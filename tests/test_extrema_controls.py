@@ -151,7 +151,7 @@ def test_an_angle_that_makes_full_turns_has_no_extremum():
         psi = np.angle(np.exp(1j * (angles.phi + 0.1 * np.sin(angles.phi))))
         return {"psi": np.array(np.broadcast_to(psi, shape)), "status": np.zeros(shape, np.uint8)}
 
-    family = Family("turning", "", BUMPS.parameters, "psi", (Output("psi", "rad", ""),), turning)
+    family = Family("turning", "", BUMPS.parameters, "psi", (Output("psi", "rad", "", wraps=True),), turning)
     found, status = true_extrema(family, np.zeros((2, 5)), [Request("psi", 1)], 1e-6)
     assert (status == st.NOT_OSCILLATING).all()
     assert np.isnan(found[Request("psi", 1)].value).all()

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from kernels import status as codes
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array
+from sweep.quantities.names import by_magnitude
 from sweep.synthesis.fit import NS_FIT, fit_line
 
 if TYPE_CHECKING:
@@ -34,7 +35,6 @@ CALL_SECONDS = 1e-3
 Number = TypeVar("Number", float, Array)
 
 # A clockwise and an anticlockwise follower of the same amplitude meet the same requirement.
-MAGNITUDES = ("swing", "stroke")
 
 # With these one output is missing or rough, the others are worth having where all rows are kept.
 PARTIAL = (
@@ -242,7 +242,7 @@ def _before_fit(study: Study, route: Route) -> bool:
 
 def compared(name: str, values: Number) -> Number:
     """What limits and objectives compare: of a swing and a stroke the magnitude, of anything else the value itself."""
-    return abs(values) if name.rstrip("0123456789") in MAGNITUDES else values
+    return abs(values) if by_magnitude(name) else values
 
 
 def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:

@@ -11,8 +11,6 @@ import click
 if TYPE_CHECKING:
     from sweep.families.base import Family
 
-REDUCTIONS = ("max_abs_", "phi_max_abs_", "max_", "min_", "range_", "rms_")
-
 
 def family_names(text: str) -> str | list[str]:
     """``rssr`` is a family, ``rssr+guide`` or ``rssr,guide`` a chain of two."""
@@ -37,6 +35,7 @@ def families(name: str | None) -> None:
 def describe(family: Family) -> list[str]:
     """Parameters, pose outputs and design outputs of a family with their units, one per line."""
     from sweep.evaluation.summaries import output
+    from sweep.quantities.reduction import prefixes
 
     lines = [f"{family.name}: {family.title}", "", "parameters (one length unit throughout, angles in rad)"]
     parameters = []
@@ -50,17 +49,20 @@ def describe(family: Family) -> list[str]:
     lines += aligned([(o.name, o.unit, o.text) for o in family.pose_outputs])
     lines += ["", "design outputs (sweep summarise, and [scene] want of a study)"]
     lines += aligned([(o.name, o.unit, o.text) for o in (output(family, n) for n in main_outputs(family))])
-    lines += [f"  and of any pose output x: {', '.join(f'{prefix}x' for prefix in REDUCTIONS)}"]
+    lines += [f"  and of any pose output x: {', '.join(f'{prefix}x' for prefix in prefixes(family.domain))}"]
     return lines
 
 
 def main_outputs(family: Family) -> list[str]:
     """Design outputs but for the reductions of every pose output, of which only those a designer asks for first."""
     from sweep.evaluation.summaries import output_names
+    from sweep.families.capabilities import Assembly
+    from sweep.quantities.reduction import prefixes
 
-    general = {f"{prefix}{name}" for prefix in REDUCTIONS for name in family.pose_names}
-    first = {f"max_abs_{name}" for name in (*family.derivative_of.values(), "dev")}
-    first |= {f"max_{name}" for name in family.pose_names if name.startswith("pressure_angle")}
+    general = {f"{prefix}{name}" for prefix in prefixes(family.domain) for name in family.pose_names}
+    first = {f"max_abs_{name}" for name in family.derivative_of.values()}
+    first |= {f"max_abs_{o.name}" for o in family.pose_outputs if o.windowed}
+    first |= {f"max_{loop.pressure_angle}" for loop in family.every(Assembly)}
     return [name for name in output_names(family) if name not in general or name in first]
 
 

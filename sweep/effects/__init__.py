@@ -17,6 +17,8 @@ from sweep.effects.evaluation import effect_poses, on_own_columns, run_design
 from sweep.effects.placing import Placed, stages_of
 from sweep.families.base import Family, Output, Parameter, Step
 from sweep.families.chain import Chain
+from sweep.quantities.names import stem
+from sweep.quantities.reduction import reduced
 
 # Name of each effect's entry: module and constant.  A new effect is a kernel file, an entry file and its line here.
 _ENTRIES = {
@@ -41,8 +43,6 @@ _ENTRIES = {
 }
 NAMES = tuple(_ENTRIES)
 
-# Prefixes of the general reductions over the turn (sweep/reductions/catalogue.py): max_abs_force_d asks for force_d.
-_REDUCTIONS = ("phi_max_abs_", "max_abs_", "max_", "min_", "range_", "rms_", "")
 # In the stages behind the first, speed and acceleration are those of the first stage's crank.
 _FIRST_ONLY = ("speed", "speed_change")
 
@@ -67,14 +67,14 @@ def applicable(family: Family) -> tuple[Placed, ...]:
         Placed(entry, k, number, k == len(stages) - 1)
         for k, (stage, number) in enumerate(stages)
         for entry in map(effect, NAMES)
-        if stage.name in entry.families and not (k > 0 and entry.even_crank)
+        if entry.serves(stage) and not (k > 0 and entry.even_crank)
     ]
     return tuple(p for p in found if not p.entry.takes_load or len(_carriers(family, p)) == len(stages) - 1 - p.stage)
 
 
 def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
     """The effects that some wanted pose output, design output or reduction belongs to, in the order of the register."""
-    names = {name[len(prefix) :] for name in wanted for prefix in _REDUCTIONS if name.startswith(prefix)}
+    names = {about for name in wanted for about in reduced(name, family.domain)}  # max_abs_force_d asks for force_d
     return tuple(p for p in applicable(family) if not names.isdisjoint(o.name for o in p.outputs))
 
 
@@ -85,7 +85,7 @@ def _carriers(family: Family, placed: Placed) -> list[Placed]:
         Placed(entry, k, number, False)
         for k, (stage, number) in enumerate(stages)
         for entry in map(effect, NAMES)
-        if key and k > placed.stage and entry.key == key and stage.name in entry.families
+        if key and k > placed.stage and entry.key == key and entry.serves(stage)
     ]
 
 
@@ -105,9 +105,9 @@ def offered(family: Family) -> tuple[Output, ...]:
 
 def elsewhere(family: Family, name: str) -> str:
     """Words for an error: which effects have an output that this family, or this stage of a chain, cannot be asked."""
-    plain = {name[len(prefix) :] for prefix in _REDUCTIONS if name.startswith(prefix)}
+    plain = reduced(name, family.domain)
     if isinstance(family, Chain):
-        plain |= {n.removesuffix(number) for _, number in stages_of(family) for n in plain}
+        plain |= {stem(about) for about in plain}
     found = [entry for entry in map(effect, NAMES) if not plain.isdisjoint(o.name for o in Placed(entry).outputs)]
     if not found:
         return ""

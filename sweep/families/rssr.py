@@ -20,6 +20,7 @@ from sweep.families.base import (
     filled,
     optional_outputs,
 )
+from sweep.families.capabilities import Assembly, CrankRockerLoop, JointRecords, OutputLink, Points, PressureEllipse
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -33,7 +34,7 @@ PARAMETERS = (
 )
 
 POSE_OUTPUTS = (
-    Output("psi", "rad", "rocker angle in (-pi, pi]", "(2*)"),
+    Output("psi", "rad", "rocker angle in (-pi, pi]", "(2*)", wraps=True),
     Output("dpsi", "1", "velocity analogue dpsi/dphi", "(3)"),
     Output("d2psi", "1", "acceleration analogue", "(4)"),
     Output("d3psi", "1", "jerk analogue", "(5)"),
@@ -112,6 +113,19 @@ def ellipse(designs: Array) -> Array:
     out = np.empty((len(designs), 7))
     rssr.pressure_ellipse(designs, out)
     return out
+
+
+def discriminant_scale(designs: Array) -> Array:
+    """(2 b c)^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
+    scale: Array = (2.0 * designs[:, 1] * designs[:, 2]) ** 2
+    return scale
+
+
+def rocker_origin(designs: Array) -> Array:
+    """The foot of the common perpendicular on the rocker axis, (n, 3)."""
+    origin = np.zeros((len(designs), 3))
+    origin[:, 0] = designs[:, 3]
+    return origin
 
 
 def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -274,9 +288,15 @@ FAMILY = Family(
         Step("grid", MAXIMA_OUTPUTS, sampled_maxima, 50.0, _sampled, ns_per_sample=1.7),
     ),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
+    outward="branch",
     uses_phi=False,
-    joints=joint_records,
-    joint_needs=JOINT_NEEDS,
-    ellipse=ellipse,
+    capabilities=(
+        Assembly("discriminant", "pressure_angle", discriminant_scale),
+        JointRecords(joint_records, JOINT_NEEDS, "rocker"),
+        PressureEllipse(ellipse),
+        CrankRockerLoop(np.ascontiguousarray),
+        Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
+        OutputLink(rocker_origin),
+    ),
     precise_poses=precise_poses,
 )

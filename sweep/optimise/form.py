@@ -16,7 +16,7 @@ from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.optimise.points import Curves, Points
 from sweep.optimise.problem import PLACE, Problem
-from sweep.reductions.catalogue import output
+from sweep.reductions.catalogue import output, outward_sign
 from sweep.reductions.measures import Measure, Series, margins, measure
 
 Term = dict[int, float]
@@ -259,12 +259,10 @@ class _Layout:
         return [({first + self.scalars.index(name): math.copysign(1.0, sizes[name])}, 0.0)]
 
     def _outward(self, position: str) -> float:
-        """+1 where the extended position is the largest: the branch of the stage (of the last one) says so."""
-        names = self.curves.family.parameter_names
-        branches = [name for name in names if name.rstrip("0123456789") == "branch"]
-        own = "branch" + position.lstrip("abcdefghijklmnopqrstuvwxyz")
-        chosen = own if own in branches else max(branches, default="")
-        return float(self.design[names.index(chosen)]) if chosen else 1.0
+        """+1 where the extended position of that follower is the largest, -1 where it is the smallest."""
+        family = self.curves.family
+        sign = outward_sign(family, family.positions[position])
+        return float(self.design[family.parameter_names.index(sign)]) if sign else 1.0
 
     def _turns(self, k: int) -> float:
         return -2.0 * math.pi * math.floor(float(self.points.phi[k]) / (2.0 * math.pi))

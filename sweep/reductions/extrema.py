@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
+from sweep.quantities.reduction import Mode
 from sweep.reductions.breaks import jumps, near_jumps, search
 from sweep.reductions.refine import EPS, SHRINK, Peaks, Sampler, confirmed, first_peaks, polish_places, sharpen
 from sweep.reductions.sampling import (
@@ -23,13 +24,10 @@ from sweep.reductions.sampling import (
     Status,
     blocks,
     discriminants,
-    is_angle_of_follower,
     pose_columns,
     sample_turn,
 )
 from sweep.reductions.window import Window, edges
-
-Mode: TypeAlias = Literal[-1, 0, 1]
 
 START = 32  # samples of the first look
 LIMIT = 32768  # samples beyond which a design is given up as NOT_CONVERGED
@@ -305,7 +303,7 @@ class _Search:
             for k, request in enumerate(self.requests):
                 mine = number[active] == k
                 values = poses[request.pose][mine]
-                if is_angle_of_follower(request.pose):
+                if self.family.pose_output[request.pose].wraps:
                     values = values + TWO_PI * np.rint((middle[active][mine, None] - values) / TWO_PI)
                 out[mine] = sign[active][mine, None] * values
             return out

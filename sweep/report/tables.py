@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.families import family as find_family
+from sweep.quantities.names import is_flag, is_place
 from sweep.report.limits import bound_words, limited
 from sweep.report.quantities import change, number, quantity
 
@@ -66,7 +67,7 @@ def output_rows(data: Dataset) -> list[OutputRow]:
     for name in dict.fromkeys([*objective, *study.want]):
         shown = quantity(name, data.units.get(name, ""))
         value, other = _number(data.result, name), _number(data.reference, name)
-        flag = name.rstrip("0123456789") == "rotatable"
+        flag = is_flag(name)
         rows.append(
             OutputRow(
                 name,
@@ -76,7 +77,7 @@ def output_rows(data: Dataset) -> list[OutputRow]:
                 shown.at_speed(value, study.speed),
                 _yes(other) if flag else shown.show(other),
                 shown.at_speed(other, study.speed),
-                "" if flag or name.startswith("phi_") else change(shown, value, other),
+                "" if flag or is_place(name) else change(shown, value, other),
             )
         )
     return rows
@@ -154,7 +155,7 @@ def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
     rows = []
     for name in data.study.want:
         error = f"err_{name}"
-        if name.startswith("phi_") or name.rstrip("0123456789") == "rotatable":
+        if is_place(name) or is_flag(name):
             continue  # an error relative to an angle's zero, or of a yes, says nothing
         if error not in found.errors and math.isnan(_number(data.result, error)):
             continue

@@ -14,7 +14,8 @@ from sweep.errors import InputError, StudyError, closest, nearest
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
-from sweep.reductions.catalogue import check_certifiable, proofs
+from sweep.reductions.catalogue import check_certifiable
+from sweep.reductions.steps import proofs
 from sweep.study import units
 from sweep.study.design import check_varied, read_reference, read_space
 from sweep.study.faults import Faults, Key, S, read_section
