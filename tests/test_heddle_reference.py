@@ -34,7 +34,7 @@ def moved(designs, theta, dtype=np.float64, plain=False):
     matrix, theta = np.atleast_2d(np.asarray(designs, dtype)), np.atleast_2d(theta)
     shape = (len(matrix), theta.shape[1])
     status = np.empty(shape, np.uint8)
-    outs = [np.empty(shape, dtype) for _ in range(9)] + [np.empty((6, *shape), dtype)]
+    outs = [np.empty(shape, dtype) for _ in range(9)] + [np.empty((7, *shape), dtype)]
     function = heddle.poses.py_func if plain else heddle.poses
     with np.errstate(all="ignore"):
         function(matrix, np.cos(theta), np.sin(theta), status, *outs)

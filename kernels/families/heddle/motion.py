@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.complex_step import arctan2
+from kernels.complex_step import arctan2, magnitude
 from kernels.families.heddle.closure import Array, Reduced, Status, driven, driven_rates, reduce_design
 
 
@@ -86,7 +86,8 @@ def poses(
     chi ... d3chi : (n, m) out [rad], or None: what is None is neither computed nor compiled
     y ... d3y : (n, m) out [length], or None
     discriminant : (n, m) out [length^2], or None; positive where the rod reaches
-    places : (6, n, m) out, or None; sine of the transmission angle, angle of the shaft lever, B and C (x, y each)
+    places : (7, n, m) out, or None; sine of the transmission angle, pressure angle between rod and bell crank, angle of
+        the shaft lever, B and C (x, y each)
 
     Notes
     -----
@@ -134,7 +135,10 @@ def poses(
             if discriminant is not None:
                 discriminant[i, j] = (delta * r.unit) * r.unit if r.valid else math.nan
             if places is not None:
-                places[0, i, j], places[1, i, j] = -t / r.rod, arctan2(lever_sin, lever_cos)
-                places[2, i, j], places[3, i, j] = r.first.a * u * r.unit, r.first.a * v * r.unit
-                places[4, i, j] = (r.first.e + r.first.c * cos) * r.unit
-                places[5, i, j] = r.first.c * sin * r.unit
+                bar = r.first
+                places[0, i, j] = -t / r.rod
+                # atan2, not acos: acos loses half the digits near zero.
+                places[1, i, j] = arctan2(magnitude(bar.c - (bar.k0 - bar.k2 * u)), magnitude(t))
+                places[2, i, j] = arctan2(lever_sin, lever_cos)
+                places[3, i, j], places[4, i, j] = bar.a * u * r.unit, bar.a * v * r.unit
+                places[5, i, j], places[6, i, j] = (bar.e + bar.c * cos) * r.unit, bar.c * sin * r.unit
