@@ -41,7 +41,7 @@ def posed(designs, rho, mode=Mode.LAW, dtype=np.float64, plain=False):
     blocks = [np.empty((len(names), *shape), dtype) for names in (GEOMETRY, LOADS, BAND)]
     function = backrest.poses.py_func if plain else backrest.poses
     with np.errstate(all="ignore"):
-        function(matrix, rho, int(mode), status, *blocks)
+        function(matrix, rho, np.full(len(matrix), int(mode), np.uint8), status, *blocks)
     names = (*GEOMETRY, *LOADS, *BAND)
     return dict(zip(names, np.concatenate(blocks), strict=True)) | {"status": status}
 

@@ -10,7 +10,9 @@ import sweep.sources  # noqa: F401 (read before any source that makes a value is
 from sweep.errors import InputError, nearest
 from sweep.families.base import Family
 
-NAMES = ("rssr", "rssp", "guide", "geared_dwell", "heddle")
+NAMES = (
+    "rssr", "rssp", "guide", "geared_dwell", "heddle", "backrest", "backrest_tension", "backrest_closure",
+)  # fmt: skip
 
 
 def family(name: str | Sequence[str]) -> Family:

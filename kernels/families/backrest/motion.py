@@ -54,7 +54,7 @@ def _code(valid: bool, at: Place, code: int) -> int:
 
 @kernel
 def poses(
-    designs: Array, rho: Array, mode: int, status: Status, geometry: Array | None, loads: Array | None,
+    designs: Array, rho: Array, modes: Status, status: Status, geometry: Array | None, loads: Array | None,
     band: Array | None,
 ) -> None:  # fmt: skip
     """Geometry, tension and reactions of every design at its beam radii; (1)-(13) of docs/backrest.md.
@@ -63,7 +63,7 @@ def poses(
     ----------
     designs : (n, 32) columns of :class:`Design`
     rho : (n, m), or (1, m) shared by all designs; radius of the yarn on the beam [length]
-    mode : one of :class:`Mode`: what fixes the bracket angle
+    modes : (n,) numbers of :class:`Mode`: what fixes the bracket angle
     status : (n, m) out; OK, NO_ROOT (fewer roots than ``root``), NOT_ASSEMBLED (a yarn branch has no length), SINGULAR
         (bracket parallel to the guide) or INVALID_INPUT; where it is not OK all values are nan, but the count of roots
     geometry : (13, n, m) out, or None: phi, R1, h, theta, gamma, L1, L2, Lc, wrap, x and y of the axis, clearance of
@@ -76,7 +76,7 @@ def poses(
     for i in range(designs.shape[0]):
         unit, valid = scaled(designs, i, d)
         scaled(plain, i, flat)
-        row = i if rho.shape[0] > 1 else 0
+        row, mode = i if rho.shape[0] > 1 else 0, modes[i]
         for j in range(rho.shape[1]):
             radius = rho[row, j].real / unit
             good, code, count = valid and 0.0 < radius < 1e140, st.OK, 1
