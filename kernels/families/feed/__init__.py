@@ -1,0 +1,10 @@
+"""Rack of a feed mechanism on two chains: rocker of a four-bar for the length, eccentric for the lift; planar rack.
+
+``closure`` brings a design to its constants and closes both chains, ``motion`` evaluates poses, ``feeding`` finds entry
+and leaving, ``triad`` is the rack on three leads.
+"""
+
+from kernels.families.feed.closure import Design as Design
+from kernels.families.feed.feeding import feeding as feeding
+from kernels.families.feed.motion import differences as differences
+from kernels.families.feed.motion import poses as poses
