@@ -12,6 +12,7 @@ from sweep.families.base import Family
 
 NAMES = (
     "rssr", "rssp", "guide", "geared_dwell", "heddle", "backrest", "backrest_tension", "backrest_closure",
+    "feed", "feed_triad",
 )  # fmt: skip
 
 

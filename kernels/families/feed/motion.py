@@ -29,7 +29,9 @@ OUTPUTS = (
 
 
 @inline
-def rack_at(r: Reduced, u: Any, v: Any) -> tuple[tuple[Any, Any, Any, Any], tuple[Any, Any, Any, Any], Driven, Driven, int]:
+def rack_at(
+    r: Reduced, u: Any, v: Any
+) -> tuple[tuple[Any, Any, Any, Any], tuple[Any, Any, Any, Any], Driven, Driven, int]:
     """Rocker and rack as (cos, sin, first, second derivative), pins H and E, and the status of the pose."""
     cos, sin, one, two, code = rocker_angle(r.rocker, u, v)
     h = rocker_pin(r, cos, sin, one, two)
@@ -111,3 +113,34 @@ def differences(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, stat
             value = (length - r.q) * (length + r.q)
             assembled = status[i, j] == st.OK or status[i, j] == st.DEAD_POINT
             dq[i, j] = (value * r.unit) * r.unit if assembled else math.nan
+
+
+@kernel
+def lift_rows(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status: Status, rows: Array) -> None:
+    """The weighted difference as a linear form of the lift coupler's dimensions; (10) of docs/feed.md.
+
+    |F - E|^2 - q^2 = rows[0] fx + rows[1] fy + rows[2] - p0 with p0 = q^2 - fx^2 - fy^2.
+
+    Parameters
+    ----------
+    designs : (n, 23) columns of :class:`kernels.families.feed.Design`; q sets the scale only, fx, fy are not used
+    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
+    chi : (n, m) prescribed angles of the rack [rad]
+    status : (n, m) out, of the rocker alone;  rows : (5, n, m) out [length, length, length^2] and the pin H (x, y)
+    """
+    for i in range(designs.shape[0]):
+        r = reduce_design(designs, i)
+        row = i if cos_phi.shape[0] > 1 else 0
+        for j in range(cos_phi.shape[1]):
+            u, v = cos_phi[row, j], sin_phi[row, j]
+            cos, sin, one, two, code = rocker_angle(r.rocker, u, v)
+            status[i, j] = code if r.valid else st.INVALID_INPUT
+            h = rocker_pin(r, cos, sin, one, two)
+            e = eccentric(r.x_ecc, r.y_ecc, r.r_ecc, r.cos_ecc, r.sin_ecc, u, v)
+            wx, wy = h.x - e.x, h.y - e.y
+            x, y = math.cos(chi[i, j]), math.sin(chi[i, j])
+            assembled = status[i, j] == st.OK or status[i, j] == st.DEAD_POINT
+            unit = r.unit if assembled else math.nan
+            rows[0, i, j], rows[1, i, j] = 2.0 * (wx * x + wy * y) * unit, 2.0 * (wy * x - wx * y) * unit
+            rows[2, i, j] = ((wx * wx + wy * wy) * unit) * unit
+            rows[3, i, j], rows[4, i, j] = h.x * unit, h.y * unit

@@ -29,7 +29,8 @@ OUTPUTS = (
 def _height(r: Reduced, phi: float, order: int) -> float:
     """Height of the tooth above the plate (order 0), or its first derivative by phi (order 1)."""
     tooth, _ = tooth_at(r, math.cos(phi), math.sin(phi))
-    return tooth.y - r.plate if order == 0 else tooth.y1
+    value: float = tooth.y - r.plate if order == 0 else tooth.y1
+    return value
 
 
 @inline
