@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sweep.effects import elsewhere, extended, input_names, offered
 from sweep.errors import InputError, nearest
 from sweep.evaluation.tables import design_matrix, numbers, wanted_names
+from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Family
+from sweep.families.domain import TWO_PI, March
 from sweep.reductions.catalogue import output_names
 
 if TYPE_CHECKING:
@@ -21,17 +23,17 @@ if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
 
-def evaluate(
-    family: str | Sequence[str], table: Table, want: str | Sequence[str], phi: ArrayLike | None = None
-) -> pd.DataFrame:
+def evaluate(family: Mechanism, table: Table, want: str | Sequence[str], phi: ArrayLike | None = None) -> pd.DataFrame:
     """Pose outputs of mechanisms at given crank angles, one row per pose, in the order of the input.
 
     Parameters
     ----------
-    family : "rssr", "guide", ... or a list of them for a chain
+    family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1
     want : names of pose outputs (see ``sweep families``)
-    phi : crank angles [rad]; without it the table must have a column ``phi``
+    phi : crank angles [rad]; without it the table must have a column ``phi``.  A family over an interval takes values
+        of its own variable here, or in a column of that name; one whose poses depend on those before takes equal steps
+        of one turn from 0, in order
 
     Returns
     -------
@@ -49,12 +51,16 @@ def evaluate(
     bare = find_family(family).precise()
     mechanism = extended(bare, wanted_names(want, f"pose outputs of {bare.name}"))
     wanted = pose_wants(mechanism, want)
-    extra = () if phi is not None else ("phi",)
+    variable = mechanism.domain.name
+    extra = () if phi is not None else (variable,)
     matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))
     if phi is None:
-        if "phi" not in extras:
-            raise InputError("phi", None, "a column phi, or the argument phi=", f"table of {mechanism.name}")
-        columns = mechanism.poses(matrix, Angles.of(np.ascontiguousarray(extras["phi"])[:, None]), frozenset(wanted))
+        _refuse_single_poses(mechanism)
+        if variable not in extras:
+            allowed = f"a column {variable}, or the argument phi="
+            raise InputError(variable, None, allowed, f"table of {mechanism.name}")
+        given = np.ascontiguousarray(extras[variable])[:, None]
+        columns = mechanism.poses(matrix, Angles.of(given), frozenset(wanted))
         index = table.index if isinstance(table, pd.DataFrame) else None
         return pd.DataFrame({name: columns[name].ravel() for name in [*wanted, "status"]}, index=index)
 
@@ -62,9 +68,28 @@ def evaluate(
     if not np.isfinite(grid).all():
         position = int(np.argmin(np.isfinite(grid)))
         raise InputError("phi", float(grid[position]), "a finite number", f"phi, position {position}")
+    _check_march(mechanism, grid)
     columns = mechanism.poses(matrix, Angles.of(grid[None, :]), frozenset(wanted))
-    head = {"design": np.repeat(np.arange(len(matrix)), grid.size), "phi": np.tile(grid, len(matrix))}
+    head = {"design": np.repeat(np.arange(len(matrix)), grid.size), variable: np.tile(grid, len(matrix))}
     return pd.DataFrame(head | {name: columns[name].ravel() for name in [*wanted, "status"]})
+
+
+def _refuse_single_poses(mechanism: Family) -> None:
+    if isinstance(mechanism.domain, March):
+        allowed = "the argument phi=, equal steps of one turn from 0: a pose depends on those before it"
+        raise InputError("phi", "a column", allowed, f"table of {mechanism.name}")
+
+
+def _check_march(mechanism: Family, grid: NDArray[np.float64]) -> None:
+    """Refuse crank angles that are no march over one turn."""
+    if not isinstance(mechanism.domain, March):
+        return
+    steps = np.arange(grid.size) * (TWO_PI / grid.size)
+    off = np.abs(grid - steps) > 1e-12 * TWO_PI
+    if off.any():
+        k = int(np.argmax(off))
+        allowed = f"equal steps of one turn from 0, here {steps[k]:.6g}: a pose depends on those before it"
+        raise InputError("phi", float(grid[k]), allowed, f"phi, position {k}")
 
 
 def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
-from typing import Literal, TypeAlias
 
 import numpy as np
 
 from sweep.errors import InputError
+from sweep.evaluation.members import machine_routes
+from sweep.evaluation.route import General, Part, Route
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.chain import Stage
 from sweep.families.domain import March
+from sweep.families.members import Machine
 from sweep.quantities.names import at_stage, error_of
 from sweep.quantities.reduction import reduction_of
 from sweep.reductions.catalogue import output, quantity
@@ -21,31 +22,6 @@ from sweep.reductions.refine import precise_maxima
 from sweep.reductions.sampling import TWO_PI
 from sweep.reductions.steps import applying_step
 from sweep.reductions.turn import group_ns, limits_and_reductions, margin_group
-
-Part: TypeAlias = tuple[float, float] | None
-"""A window of the stroke as two fractions, or none."""
-General: TypeAlias = Literal["margin", "limits", "reductions", "means"]
-RunFunction: TypeAlias = Callable[[Array, Accuracy, Part], Columns]
-
-
-@dataclass(frozen=True)
-class Route:
-    """Some design outputs that are computed together.
-
-    Parameters
-    ----------
-    name : what computes them
-    outputs : their names
-    ns_per_design : estimate of the cost
-    run : ``run(designs, accuracy, window)`` gives the outputs, perhaps their ``err_``, and ``status``, each (n,)
-    general : which general reduction it is; "" for a family's own step or an effect
-    """
-
-    name: str
-    outputs: tuple[str, ...]
-    ns_per_design: float
-    run: RunFunction | None = None
-    general: General | Literal[""] = ""
 
 
 def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
@@ -57,6 +33,10 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
         for an unknown name, or an accuracy that the family's domain or the output does not serve.
     """
     _check_domain(family, accuracy)
+    found: list[Route] = []
+    if isinstance(family, Machine):
+        found, left = machine_routes(family, wanted, accuracy)
+        wanted = left
     steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
     groups: dict[tuple[General, str], list[str]] = {}
     asked = {name: (applying_step(family, name, accuracy), quantity(family, name)) for name in dict.fromkeys(wanted)}
@@ -80,7 +60,7 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
                 "with accuracy=, not on samples" if accuracy.samples is not None else "on samples, not with accuracy="
             )
             raise InputError("output", name, allowed, f"design outputs of {family.name}")
-    found = [_own(family, step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
+    found += [_own(family, step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
     found += [_general(family, *key, tuple(names), accuracy) for key, names in groups.items()]
     return tuple(sorted(found, key=lambda route: route.ns_per_design))
 

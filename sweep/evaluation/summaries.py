@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from kernels import status as st
 from sweep.effects import extended, input_names
 from sweep.errors import InputError
-from sweep.evaluation.routes import Part, Route, routes
+from sweep.evaluation.route import Part, Route
+from sweep.evaluation.routes import routes
 from sweep.evaluation.tables import design_matrix, wanted_names
+from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.domain import Domain, Interval, March
@@ -45,7 +47,7 @@ PARTIAL = (
 
 
 def summarise(
-    family: str | Sequence[str],
+    family: Mechanism,
     table: Table,
     want: str | Sequence[str],
     *,
@@ -58,7 +60,7 @@ def summarise(
 
     Parameters
     ----------
-    family : "rssr", "guide", ... or a list of them for a chain
+    family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad], and per input of the effects that
         ``want`` calls for; missing ``branch`` means +1
     want : names of design outputs: ``rotatable``, ``margin``, ``stroke``, ``max_abs_d2s`` ... (see ``sweep families``),

@@ -208,6 +208,10 @@ class Family:
         """Pose outputs that are the position of a follower, with the number of its stage in a chain."""
         return {self.position: ""}
 
+    def outward_sign(self, position: str) -> str:
+        """The sign parameter that tells the extended from the folded limit of a position; "" where there is none."""
+        return self.outward
+
 
 def filled(
     kernel: Callable[..., object],

@@ -13,7 +13,7 @@ from kernels.chain import chain_rule, input_angle
 from kernels.status import OK
 from sweep.errors import InputError
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly
+from sweep.families.capabilities import Assembly, OutputLink, Points
 from sweep.families.domain import Turn
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
@@ -44,6 +44,12 @@ class Chain(Family):
     def positions(self) -> Mapping[str, str]:
         """The last stage's position, then those of all stages under their numbers."""
         return {self.position: ""} | {f"{s.family.position}{s.number}": str(s.number) for s in self.stages}
+
+    def outward_sign(self, position: str) -> str:
+        """The sign parameter of the stage whose position it is."""
+        stage = self.positions[position]
+        own = self.stages[int(stage) - 1].family.outward if stage else ""
+        return own and f"{own}{stage}" if stage else self.outward
 
     def precise(self) -> Chain:
         """The chain with the most accurate poses its stages have."""
@@ -112,7 +118,7 @@ def chain(families: tuple[Family, ...]) -> Chain:
         outward=last.outward and f"{last.outward}{len(families)}",
         uses_phi=families[0].uses_phi,
         analytic=all(f.analytic for f in families),
-        capabilities=tuple(found for stage in stages for found in _numbered_capabilities(stage)),
+        capabilities=(*(loop for stage in stages for loop in _loops(stage)), *_of_last(stages[-1])),
         dear={
             f"{name}{s.number}": (f"{what}{s.number}", ns) for s in stages for name, (what, ns) in s.family.dear.items()
         }
@@ -126,17 +132,23 @@ def _precise(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
     return tuple(replace(stage, family=stage.family.precise()) for stage in stages)
 
 
-def _numbered_capabilities(stage: Stage) -> list[object]:
-    """What a stage's capabilities are in the chain: those that concern its loop, under the chain's names."""
+def _loops(stage: Stage) -> list[Assembly]:
+    """The loops of a stage under the chain's names."""
     return [
         Assembly(
-            f"{found.discriminant}{stage.number}",
-            f"{found.pressure_angle}{stage.number}",
-            partial(_on_stage, stage, found.scale),
+            f"{loop.discriminant}{stage.number}",
+            f"{loop.pressure_angle}{stage.number}",
+            partial(_on_stage, stage, loop.scale),
             str(stage.number),
         )
-        for found in stage.family.every(Assembly)
+        for loop in stage.family.every(Assembly)
     ]
+
+
+def _of_last(stage: Stage) -> list[object]:
+    """Points and output link of the last stage: its outputs also stand without a number, in the frame of that stage."""
+    links = [OutputLink(partial(_on_stage, stage, link.origin)) for link in stage.family.every(OutputLink)]
+    return [*stage.family.every(Points), *links]
 
 
 def _on_stage(stage: Stage, of_design: Callable[[Array], Array], designs: Array) -> Array:

@@ -16,7 +16,7 @@ from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.optimise.points import Curves, Points
 from sweep.optimise.problem import PLACE, Problem
-from sweep.reductions.catalogue import output, outward_sign
+from sweep.reductions.catalogue import output
 from sweep.reductions.measures import Measure, Series, margins, measure
 
 Term = dict[int, float]
@@ -224,6 +224,9 @@ class _Layout:
             many = above == (m.kind == "max")
             ends = maxima if m.kind == "max" else minima
             return [({k: m.sign}, 0.0) for k in (ends if many else ends[:1])]
+        if m.kind in ("phi_max", "phi_min"):
+            ends = maxima if m.kind == "phi_max" else minima
+            return [({len(self.points) + k: 1.0}, self._turns(k)) for k in ends[:1]]
         if m.kind in ("max_abs", "phi_max_abs"):
             value = self.points.value
             ends = sorted([*maxima, *minima], key=lambda k: -self.points.sense[k] * value[k])
@@ -261,7 +264,7 @@ class _Layout:
     def _outward(self, position: str) -> float:
         """+1 where the extended position of that follower is the largest, -1 where it is the smallest."""
         family = self.curves.family
-        sign = outward_sign(family, family.positions[position])
+        sign = family.outward_sign(position)
         return float(self.design[family.parameter_names.index(sign)]) if sign else 1.0
 
     def _turns(self, k: int) -> float:

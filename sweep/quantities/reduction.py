@@ -61,6 +61,8 @@ REDUCTIONS = (
               "crank angle of the largest {}", (0,), place=True),
     Reduction("max", "largest value over {over} of", "max {}", "largest {}", (1,)),
     Reduction("min", "smallest value over {over} of", "min {}", "smallest {}", (-1,)),
+    Reduction("max", "{variable} of the largest value of", "φ at max {}", "crank angle of the largest {}", (1,), True),
+    Reduction("min", "{variable} of the least value of", "φ at min {}", "crank angle of the smallest {}", (-1,), True),
     Reduction("range", "largest minus smallest value over {over} of", "range of {}", "range of {}", (1, -1)),
     Reduction("rms", "root mean square over {over} of", "rms {}", "root mean square of {}", (),
               domains=("turn", "march")),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from sweep.effects import elsewhere, offered
@@ -12,8 +12,9 @@ from sweep.families.base import Accuracy, Family, Output
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
 from sweep.families.domain import Turn
+from sweep.families.members import Machine, Member
 from sweep.quantities.names import parts
-from sweep.quantities.reduction import Mode, prefixes, reduction_of
+from sweep.quantities.reduction import Mode, prefixes, reduction_of, split
 from sweep.reductions.extrema import Request
 from sweep.reductions.size import SIZE, lengths
 from sweep.reductions.steps import applying_step, certified_names, own_steps, place_names
@@ -92,9 +93,38 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy)
 
 def quantity(family: Family, name: str) -> Quantity | None:
     """What a name stands for where it is computed from poses alone; None where it stands for nothing."""
+    if isinstance(family, Machine):
+        member = family.split(name)
+        if member is not None:
+            return _of_member(member[0], quantity(member[0].family, member[1])) or _of_point(family, *member)
+        return _margin(family, name) or _reduction(family, name)
     if name == STAY.name and isinstance(family.domain, Turn):
         return Quantity(STAY, "limits", STAY.name, family.position)
     return _margin(family, name) or _limit(family, name) or _reduction(family, name)
+
+
+def _of_member(member: Member, found: Quantity | None) -> Quantity | None:
+    """A member's quantity as one of the machine."""
+    if found is None:
+        return None
+    of = found.of and f"{member.name}.{found.of}"
+    return replace(found, output=_dotted(member, found.output), of=of, stage=f"{member.name}.{found.stage}")
+
+
+def _of_point(machine: Machine, member: Member, own: str) -> Quantity | None:
+    """A reduction of a coordinate in the machine's frame, which the member's family does not know."""
+    for reduction, rest in split(own, machine.domain):
+        pose = machine.pose_output.get(f"{member.name}.{rest}")
+        if pose is not None:
+            found = reduction.output(pose, machine.domain)
+            route: Literal["reduction", "mean"] = "reduction" if reduction.modes else "mean"
+            named = replace(found, name=f"{member.name}.{own}")
+            return Quantity(named, route, reduction.kind, pose.name, "", reduction.modes, reduction.place)
+    return None
+
+
+def _dotted(member: Member, found: Output) -> Output:
+    return replace(found, name=f"{member.name}.{found.name}", text=f"{member.name}: {found.text}")
 
 
 def output(family: Family, name: str) -> Output:
@@ -105,6 +135,14 @@ def output(family: Family, name: str) -> Output:
     InputError
         if the family has no such output; the message gives the nearest name.
     """
+    if isinstance(family, Machine):
+        member = family.split(name)
+        if member is not None:
+            point = _of_point(family, *member)
+            return point.output if point else _dotted(member[0], output(member[0].family, member[1]))
+        timing = next((t for t in family.timings if t.name == name), None)
+        if timing is not None:
+            return timing.output
     for _, found, stage in own_steps(family, name):
         return found.of_stage(stage.number) if stage else found
     asked = quantity(family, name)
@@ -130,6 +168,11 @@ def _known(family: Family, name: str) -> str:
 
 def output_names(family: Family) -> tuple[str, ...]:
     """All design outputs worth listing: the family's own, margins, limit positions, reductions of every pose output."""
+    if isinstance(family, Machine):
+        dotted = [f"{m.name}.{name}" for m in family.members for name in output_names(m.family)]
+        own = [o.name for relation in family.relations for o in relation.outputs]
+        reductions = [f"{prefix}{name}" for name in own for prefix in prefixes(family.domain)]
+        return (*dotted, *MARGIN_TEXTS, *(t.name for t in family.timings), *reductions)
     names = [o.name for step in family.steps for o in step.provides]
     assemblies = family.every(Assembly)
     if assemblies:
@@ -176,7 +219,7 @@ def _limit(family: Family, name: str) -> Quantity | None:
             continue
         unit = family.pose_output[position].unit
         units = {"phi_ext": "rad", "phi_fold": "rad", "phi0": "rad", "stroke_ratio": "1"}
-        first, second = limit_order(family, stage)
+        first, second = limit_order(family, position)
         texts = {
             "ext": f"{position} in the extended position: the {first}",
             "fold": f"{position} in the folded position: the {second}",
@@ -192,20 +235,12 @@ def _limit(family: Family, name: str) -> Quantity | None:
     return None
 
 
-def limit_order(family: Family, stage: str) -> tuple[str, str]:
+def limit_order(family: Family, position: str) -> tuple[str, str]:
     """How the extended and the folded position are told apart, in words."""
-    sign = outward_sign(family, stage)
+    sign = family.outward_sign(position)
     if sign:
         return f"largest (smallest if {sign} = -1)", f"smallest (largest if {sign} = -1)"
     return "largest", "smallest"
-
-
-def outward_sign(family: Family, stage: str) -> str:
-    """The sign parameter that tells the extended position of a stage from the folded one; "" where there is none."""
-    if stage and isinstance(family, Chain):
-        own = family.stages[int(stage) - 1].family.outward
-        return own and f"{own}{stage}"
-    return family.outward
 
 
 def _reduction(family: Family, name: str) -> Quantity | None:

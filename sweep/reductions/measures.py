@@ -22,7 +22,20 @@ from sweep.reductions.size import SIZE, lengths
 ROTATABLE_MARGIN = 1e-6
 
 Kind: TypeAlias = Literal[
-    "max_abs", "max", "min", "range", "phi_max_abs", "ext", "fold", "phi_ext", "phi_fold", "phi0", "scalar", "lengths"
+    "max_abs",
+    "max",
+    "min",
+    "range",
+    "phi_max_abs",
+    "phi_max",
+    "phi_min",
+    "ext",
+    "fold",
+    "phi_ext",
+    "phi_fold",
+    "phi0",
+    "scalar",
+    "lengths",
 ]
 Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable"]
 

@@ -12,7 +12,7 @@ from kernels import status as st
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.chain import Chain
-from sweep.reductions.catalogue import STAY, Quantity, outward_sign, quantity
+from sweep.reductions.catalogue import STAY, Quantity, quantity
 from sweep.reductions.closing import variable
 from sweep.reductions.dwell import window_angle
 from sweep.reductions.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
@@ -176,20 +176,20 @@ def sampled_extrema(
 def _value(family: Family, designs: Array, one: Quantity, found: Found, windowed: bool) -> tuple[Array, Array]:
     """A design output and its error from the extrema it is made of."""
     first = found[one.requests(family, windowed)[0]]
-    if one.kind == "phi_max_abs":
+    if one.kind in ("phi_max_abs", "phi_max", "phi_min"):
         return variable(family, designs, first.phi, first.err_phi)
     if one.kind in ("max_abs", "max", "min"):
         return first.value, first.err
     most, least = (found[r] for r in one.requests(family, windowed))
     if one.kind in ("range", "stroke"):
         return most.value - least.value, most.err + least.err
-    outward = _extended_is_largest(family, designs, one.stage)
+    outward = _extended_is_largest(family, designs, one.of)
     return _limit(one.kind, family.pose_output[one.of].wraps, most, least, outward)
 
 
-def _extended_is_largest(family: Family, designs: Array, stage: str) -> Mask:
+def _extended_is_largest(family: Family, designs: Array, position: str) -> Mask:
     """Whether crank and coupler are in line outward where the follower is farthest: so in assembly mode +1 (3.2)."""
-    sign = outward_sign(family, stage)
+    sign = family.outward_sign(position)
     if not sign:
         return np.ones(len(designs), np.bool_)
     outward: Mask = designs[:, family.parameter_names.index(sign)] > 0.0
