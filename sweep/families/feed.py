@@ -39,7 +39,7 @@ PARAMETERS = (
     Parameter("pitch", "length", "distance of two teeth", default=0.0),
     Parameter("y_plate", "length", "height of the needle plate", default=0.0),
     SIGMA,
-    Parameter("bar_branch", "sign", "assembly mode of the rack: +1 if the triangle H-E-F is turned positively",
+    Parameter("bar_branch", "sign", "assembly mode of the rack: +1 if F lies to the right of the ray from H to E",
               default=1.0, choices=(-1.0, 1.0)),
 )  # fmt: skip
 

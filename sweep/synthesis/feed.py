@@ -126,7 +126,7 @@ def lift_chain(
 
 
 def _given(table: Table, phi: object, other: object, name: str) -> tuple[Array, Array, Array]:
-    matrix, _ = design_matrix(family("feed"), table)
+    matrix, _ = design_matrix(family("feed"), table, unused=("phi",))
     if len(matrix) != 1:
         raise InputError("table", f"{len(matrix)} rows", "one design", "table of feed")
     grid = np.atleast_1d(numbers(phi, "phi", "phi, position"))

@@ -29,7 +29,7 @@ def points(p: dict[str, Any], phi: Any) -> dict[str, Any]:
     # triangle H E F: at H between HE and HF
     to_e = e - h
     cos = (abs(to_e) ** 2 + abs(f) ** 2 - p["q"] ** 2) / (2 * abs(to_e) * abs(f))
-    chi = mp.arg(to_e / f) + p["bar_branch"] * mp.acos(cos)
+    chi = mp.arg(to_e / f) - p["bar_branch"] * mp.acos(cos)
     tooth = mp.mpc(p["tx"] + p["tooth"] * p["pitch"], p["ty"])
     return {"psi_plus_dh": psi, "chi": chi, "H": h, "E": e, "F": h + mp.expj(chi) * f, "T": h + mp.expj(chi) * tooth}
 
@@ -74,10 +74,19 @@ def triad(p: dict[str, Any], phi: Any, start: tuple[float, float, float]) -> lis
     leads += [mp.mpc(p[f"xE{k}"], p[f"yE{k}"]) + p[f"rE{k}"] * mp.expj(phi + p[f"dE{k}"]) for k in (2, 3)]
     arms = [mp.mpc(p[f"f{k}x"], p[f"f{k}y"]) for k in (1, 2, 3)]
 
-    def closures(x: Any, y: Any, chi: Any) -> list[Any]:
-        return [
+    def closures(place: Any) -> Any:
+        x, y, chi = place
+        return mp.matrix([
             abs(mp.mpc(x, y) + mp.expj(chi) * arm - lead) - p[f"q{k}"]
             for k, (arm, lead) in enumerate(zip(arms, leads, strict=True), 1)
-        ]
+        ])  # fmt: skip
 
-    return list(mp.findroot(closures, [mp.mpf(v) for v in start], tol=mp.mpf(10) ** -50, verify=False))
+    place, step = mp.matrix([mp.mpf(float(v)) for v in start]), mp.mpf(10) ** -25
+    for _ in range(6):
+        slopes = mp.matrix(3, 3)
+        for k in range(3):
+            moved = place.copy()
+            moved[k] += step
+            slopes[:, k] = (closures(moved) - closures(place)) / step
+        place -= mp.lu_solve(slopes, closures(place))
+    return list(place)

@@ -63,8 +63,14 @@ _LENGTHS = (0, 1, 2, 3, 4, 5, 7, 9, 10, 11, 13, 14, 15, 17, 18, 19, 20, 21, 22, 
 
 @inline
 def _scaled(designs: Array, i: int, d: Array) -> tuple[float, bool]:
-    """Columns of one design in units of a power of two near the first link; the unit, and whether valid."""
-    _, exponent = math.frexp(designs[i, 23].real)
+    """Columns of one design in units of a power of two near its greatest length; the unit, and whether valid.
+
+    Newton's steps are measured against 1, so the greatest length sets the scale, not some link that may be tiny.
+    """
+    greatest = 0.0
+    for k in _LENGTHS:
+        greatest = max(greatest, abs(designs[i, k].real))
+    _, exponent = math.frexp(greatest if greatest < math.inf else 1.0)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     good = True
     for k in range(designs.shape[1]):
