@@ -6,7 +6,6 @@ survivors wait before each route until there are enough of them, or until no mor
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -18,7 +17,8 @@ from numpy.typing import NDArray
 from kernels import status as codes
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array
-from sweep.quantities.names import by_magnitude
+from sweep.families.chain import stages_of
+from sweep.quantities.names import by_magnitude, parts
 from sweep.synthesis.fit import NS_FIT, fit_line
 
 if TYPE_CHECKING:
@@ -235,9 +235,9 @@ def _before_fit(study: Study, route: Route) -> bool:
     """Whether the route concerns only stages before the one that [fit] finishes."""
     if study.fit is None:
         return False
-    last = len(study.families)
-    numbers = [re.search(r"(\d+)$", name) for name in route.outputs]
-    return all(number is not None and int(number[1]) < last for number in numbers)
+    last = len(stages_of(study.bare))
+    numbers = [parts(name).stage for name in route.outputs]
+    return all(number and int(number) < last for number in numbers)
 
 
 def compared(name: str, values: Number) -> Number:

@@ -57,8 +57,13 @@ def main_outputs(family: Family) -> list[str]:
     """Design outputs but for the reductions of every pose output, of which only those a designer asks for first."""
     from sweep.evaluation.summaries import output_names
     from sweep.families.capabilities import Assembly
+    from sweep.families.members import Machine
     from sweep.quantities.reduction import prefixes
 
+    if isinstance(family, Machine):
+        members = [f"{m.name}.{name}" for m in family.members for name in main_outputs(m.family)]
+        between = [f"min_{r.outputs[0].name}" for r in family.relations] + [t.name for t in family.timings]
+        return [*members, *between]
     general = {f"{prefix}{name}" for prefix in prefixes(family.domain) for name in family.pose_names}
     first = {f"max_abs_{name}" for name in family.derivative_of.values()}
     first |= {f"max_abs_{o.name}" for o in family.pose_outputs if o.windowed}

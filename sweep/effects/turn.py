@@ -83,6 +83,8 @@ def reductions(name: str, values: Array, status: Status) -> Columns:
         "max_abs": (size, err),
         # The slope's zero is as sharp as the square root of the value's error.
         "phi_max_abs": (np.where(upward, phi_largest, phi_least), np.full(n, np.sqrt(RESOLVED))),
+        "phi_max": (phi_largest, np.full(n, np.sqrt(RESOLVED))),
+        "phi_min": (phi_least, np.full(n, np.sqrt(RESOLVED))),
         "range": (largest - least, 2.0 * err),
         "rms": (rms, err),
     }

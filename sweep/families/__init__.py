@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -10,10 +11,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import sweep.sources  # noqa: F401 (read before any source that makes a value is imported, and all of those begin here)
 from sweep.errors import InputError, nearest
 from sweep.families.base import Family
+from sweep.families.check import check_family
 
 if TYPE_CHECKING:
     from sweep.families.members import Machine
-    from sweep.families.specification import Specification
 
 NAMES = (
     "rssr", "rssp", "guide", "geared_dwell", "heddle", "backrest", "backrest_tension", "backrest_closure",
@@ -21,7 +22,15 @@ NAMES = (
 )  # fmt: skip
 
 
-Mechanism: TypeAlias = str | Sequence[str] | Mapping[str, Any] | Family
+@dataclass(frozen=True)
+class Specification:
+    """A machine as it was written: hashable, so that the machine it makes is made once."""
+
+    members: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
+    relations: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
+
+
+Mechanism: TypeAlias = "str | Sequence[str] | Mapping[str, Any] | Specification | Family"
 """A family's name, a list of them for a chain, a table of members for a machine, or what `sweep.machine` made."""
 
 
@@ -37,6 +46,8 @@ def family(name: Mechanism) -> Family:
         return name
     if isinstance(name, Mapping):
         return machine(name)
+    if isinstance(name, Specification):
+        return _machine(name)
     if isinstance(name, str):
         return _single(name)
     names = tuple(name) if isinstance(name, Sequence) else (name,)
@@ -91,7 +102,7 @@ def _single(name: str) -> Family:
     if name not in NAMES:
         raise InputError("family", name, f"one of {', '.join(NAMES)}{nearest(name, NAMES)}", "family")
     entry: Family = import_module(f"sweep.families.{name}").FAMILY
-    return entry
+    return check_family(entry)
 
 
 @lru_cache

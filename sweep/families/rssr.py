@@ -123,7 +123,7 @@ def discriminant_scale(designs: Array) -> Array:
 
 def rocker_origin(designs: Array) -> Array:
     """The foot of the common perpendicular on the rocker axis, (n, 3)."""
-    origin = np.zeros((len(designs), 3))
+    origin = np.zeros((len(designs), 3), designs.dtype)
     origin[:, 0] = designs[:, 3]
     return origin
 

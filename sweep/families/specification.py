@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from sweep.errors import InputError, nearest
+from sweep.families import Specification
 from sweep.families.base import Family
 from sweep.families.capabilities import OutputLink
 from sweep.families.domain import Turn
@@ -22,14 +22,6 @@ _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
 
 FindFamily = Callable[[str | Sequence[str]], Family]
-
-
-@dataclass(frozen=True)
-class Specification:
-    """A machine as it was written: hashable, so that the machine it makes is made once."""
-
-    members: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
-    relations: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
 
 
 def specification(members: Mapping[str, Any], relations: Mapping[str, Any] | None) -> Specification:

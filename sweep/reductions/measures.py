@@ -14,6 +14,7 @@ from typing import Literal, TypeAlias, cast
 from sweep.errors import InputError
 from sweep.families.base import Family
 from sweep.families.capabilities import Assembly
+from sweep.families.members import Machine
 from sweep.quantities.names import parts, stem
 from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.size import SIZE, lengths
@@ -22,21 +23,9 @@ from sweep.reductions.size import SIZE, lengths
 ROTATABLE_MARGIN = 1e-6
 
 Kind: TypeAlias = Literal[
-    "max_abs",
-    "max",
-    "min",
-    "range",
-    "phi_max_abs",
-    "phi_max",
-    "phi_min",
-    "ext",
-    "fold",
-    "phi_ext",
-    "phi_fold",
-    "phi0",
-    "scalar",
-    "lengths",
-]
+    "max_abs", "max", "min", "range", "phi_max_abs", "phi_max", "phi_min", "ext", "fold", "phi_ext", "phi_fold", "phi0",
+    "difference", "scalar", "lengths",
+]  # fmt: skip
 Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable"]
 
 # What the optimiser follows of the two limit positions: which end, or the difference of both.
@@ -65,8 +54,8 @@ class Series:
 class Measure:
     """A design output as ``sign`` * (reduction ``kind`` of its series), read back through ``inner``.
 
-    ``numbers`` are plain numbers instead of series: the output itself ("scalar"), or parameters of which it is the
-    largest magnitude ("lengths").
+    ``parts`` are the two angles of a "difference", the second minus the first.  ``numbers`` are plain numbers instead
+    of series: the output itself ("scalar"), or parameters of which it is the largest magnitude ("lengths").
     """
 
     name: str
@@ -75,6 +64,12 @@ class Measure:
     inner: Inner = "same"
     sign: float = 1.0
     numbers: tuple[str, ...] = ()
+    parts: tuple[Measure, ...] = ()
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether it is made of crank angles at which something happens."""
+        return self.kind.startswith("phi") or self.kind == "difference"
 
     def to_inner(self, value: float) -> float:
         """Inner value that stands for a value of the output."""
@@ -126,6 +121,10 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     """
     if stem(name) == "rotatable" and not margins(family, parts(name).stage):
         return _margin_measure(name, "rotatable", ())
+    timing = next((t for t in family.timings if t.name == name), None) if isinstance(family, Machine) else None
+    if timing is not None:
+        ends = tuple(measure(family, place, window) for place in timing.places)
+        return Measure(name, "difference", tuple(s for end in ends for s in end.series), parts=ends)
     asked = quantity(family, name)
     if asked is not None and asked.route == "margin":
         return _margin_measure(name, asked.kind, margins(family, asked.stage))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
-from sweep.families import family as find_family
 from sweep.quantities.names import is_flag, is_place
 from sweep.report.limits import bound_words, limited
 from sweep.report.quantities import change, number, quantity
@@ -87,7 +86,7 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
     """All parameters of the mechanism with what was searched."""
     study, rows = data.study, []
     links = () if study.locus is None else study.locus.made
-    own = find_family(study.families).parameter_names
+    own = study.bare.parameter_names
     for p in study.family.parameters:
         if p.name not in own and study.space.fixed.get(p.name) == p.default:
             continue  # an input of an effect that the study left out

@@ -215,6 +215,8 @@ class ReportSection(Section):
 TABLES = (
     "study",
     "mechanism",
+    "machine",
+    "relations",
     "scene",
     "design",
     "locus",
@@ -230,4 +232,4 @@ TABLES = (
     "budget",
     "report",
 )
-REQUIRED_TABLES = ("study", "mechanism", "design")
+REQUIRED_TABLES = ("study", "design")
