@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 NAMES = (
     "rssr", "rssp", "guide", "geared_dwell", "heddle", "backrest", "backrest_tension", "backrest_closure",
-    "feed", "feed_triad",
+    "feed", "feed_triad", "foot", "feed_foot",
 )  # fmt: skip
 
 
