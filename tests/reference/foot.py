@@ -68,13 +68,14 @@ def flights(p: dict[str, float], turns: int, steps: int) -> list[tuple[float, fl
                 continue
         else:
 
-            def gap(x: float) -> float:
-                return flying(y0, v0, x - launched)[0] - max(rack(x)[0], 0.0)
+            def gap(x: float, y: float = y0, v: float = v0, since: float = launched) -> float:
+                return flying(y, v, x - since)[0] - max(rack(x)[0], 0.0)
 
             if gap(after) < 0.0:
-                low = max(t, launched + 1e-9 * dt)
-                start = launched
-                t = crossing(gap, low, after) if gap(low) > 0.0 else low
+                before = max(t, launched)
+                tries = [before + (after - before) * n / 64 for n in range(64)]
+                clear = [x for x in tries if gap(x) > 0.0]
+                start, t = launched, (crossing(gap, clear[-1], after) if clear else after)
                 mode, launched, y0, v0, closing = meet(t, flying(y0, v0, t - start)[1])
                 found.append((omega * start, omega * t, closing))
                 continue
