@@ -148,8 +148,10 @@ def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[St
     push = _force(foot, ground, bend if on_rack else 0.0)
     rebound = foot.restitution * max(closing, 0.0)
     if rebound > foot.still:
-        top = phi + (rebound / push if push > 0.0 else 0.0)
-        return State(FLIGHT, phi, ground, surface + rebound, top), closing
+        # The hop is highest after rebound/push at a constant push; a longer one is seen by the parts of a cell.
+        part = TWO_PI / path.shape[1] / _PARTS
+        clear = phi + (min(rebound / push, part) if push > 0.0 else 0.0)
+        return State(FLIGHT, phi, ground, surface + rebound, clear), closing
     if push < 0.0:
         return State(FLIGHT, phi, ground, surface, phi), closing
     return State(RACK if on_rack else PLATE, phi, ground, surface, phi), closing
@@ -182,9 +184,13 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
             if which >= 0:
                 return first, which
         elif _measure(path, foot, state, j, after, 2) < 0.0:
-            if _measure(path, foot, state, j, before, 2) <= 0.0:
-                return before, 2
-            return _root(path, foot, state, j, before, after, 2), 2
+            # A launch begins with no gap: halve towards it until there is one.  A hop that shows none ends here.
+            clear = before
+            for n in range(1, 30):
+                if _measure(path, foot, state, j, clear, 2) > 0.0:
+                    return _root(path, foot, state, j, clear, after, 2), 2
+                clear = before + (after - before) * 0.5**n
+            return after, 2
         before = after
     return 2.0, -1
 

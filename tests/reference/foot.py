@@ -75,7 +75,11 @@ def flights(p: dict[str, float], turns: int, steps: int) -> list[tuple[float, fl
                 before = max(t, launched)
                 tries = [before + (after - before) * n / 64 for n in range(64)]
                 clear = [x for x in tries if gap(x) > 0.0]
-                start, t = launched, (crossing(gap, clear[-1], after) if clear else after)
+                if not clear:
+                    # a hop shorter than a sixty-fourth of a step: the foot has come to rest
+                    mode, t = ("rack" if rack(before)[0] > 0.0 else "plate"), after
+                    continue
+                start, t = launched, crossing(gap, clear[-1], after)
                 mode, launched, y0, v0, closing = meet(t, flying(y0, v0, t - start)[1])
                 found.append((omega * start, omega * t, closing))
                 continue
