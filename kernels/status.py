@@ -21,6 +21,7 @@ NOT_LINEAR = 11
 NO_DWELL = 12
 NOT_ADMISSIBLE = 13
 NO_ROOT = 14
+NO_EVENT = 15
 
 MEANING: dict[int, str] = {
     OK: "ok",
@@ -38,6 +39,7 @@ MEANING: dict[int, str] = {
     NOT_LINEAR: "the deflection is too large for the linearised equation; the number given solves that equation only",
     JAMMED: "friction blocks the motion, or its iteration does not contract; the crank all but stops within the turn",
     NO_DWELL: "the output does not make one turn per turn of the input: no dwell is defined",
-    NOT_ADMISSIBLE: "the point of the locus gives no mechanism that meets the requirement",
     NO_ROOT: "the equation that fixes the position has no root in its interval, or fewer than asked for",
+    NO_EVENT: "the event does not happen within the turn, or within the interval",
+    NOT_ADMISSIBLE: "the point of the locus gives no mechanism that meets the requirement",
 }

@@ -15,8 +15,8 @@ from sweep.effects.advice import closure, findings
 from sweep.effects.costs import designs
 from sweep.effects.placing import Placed
 from sweep.families import NAMES as FAMILIES
-from sweep.families.capabilities import JointRecords
 from sweep.families import family
+from sweep.families.capabilities import JointRecords
 from sweep.study.units import factor, internal_unit
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -140,7 +140,7 @@ def test_feed_speed_at_entry_and_way_between_agree_with_poses():
 def test_feed_without_entry_says_so():
     for plate in (-10.0, 10.0):
         got = sweep.summarise("feed", RACK | {"y_plate": plate}, ["phi_entry", "rise"], samples=64).iloc[0]
-        assert got.status == st.NO_ROOT and math.isnan(got.phi_entry)
+        assert got.status == st.NO_EVENT and math.isnan(got.phi_entry)
     long = sweep.summarise("feed", RACK | {"h_a": 3.0}, ["phi_entry"], samples=64).iloc[0]
     assert long.status == st.NOT_ASSEMBLED
 

@@ -144,9 +144,9 @@ def test_foot_energy_of_a_flight_is_kept():
 
 def test_foot_says_what_it_cannot_do():
     never = sweep.summarise("foot", HEAVY | {"p": 2e-3}, ["x0", "v_entry"]).iloc[0]
-    assert never.status == st.NO_ROOT and math.isnan(never.x0)
+    assert never.status == st.NO_EVENT and math.isnan(never.x0)
     buried = sweep.summarise("foot", HEAVY | {"p": -2e-3}, ["flights"]).iloc[0]
-    assert buried.status == st.NO_ROOT and math.isnan(buried.flights)
+    assert buried.status == st.NO_EVENT and math.isnan(buried.flights)
     under = sweep.summarise("foot", HEAVY | {"p": 2e-3}, ["flights", "lost_angle"]).iloc[0]
     assert (under.flights, under.lost_angle, under.status) == (0.0, 0.0, st.OK)
     elastic = sweep.summarise("foot", HEAVY | {"restitution": 1.0}, ["flights"]).iloc[0]

@@ -257,7 +257,7 @@ def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, 
         their first and second derivatives by phi in the rows behind each [length]
     feet : (n, 5) mass, spring stiffness, preload (weight included), speed [rad per time], restitution
     turns : how many turns are marched, from rest on the plate where the rack is lowest
-    status : (n,) out; OK, NO_ROOT (the rack never lies below the plate), NOT_CONVERGED (bounces without end) or
+    status : (n,) out; OK, NO_EVENT (the rack never lies below the plate), NOT_CONVERGED (bounces without end) or
         INVALID_INPUT
     outputs : (11, n) out of the last turn in the order of :data:`OUTPUTS`; angles in [0, 2 pi), nan where there is none
     heights, forces : (n, N) out; height of the foot and force between it and rack or plate at every node
@@ -284,7 +284,7 @@ def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, 
                 lowest = j
         status[i] = st.OK if valid and unit > 0.0 and unit < math.inf else st.INVALID_INPUT
         if status[i] == st.OK and rack[0, lowest] > 0.0:
-            status[i] = st.NO_ROOT
+            status[i] = st.NO_EVENT
         if status[i] != st.OK:
             continue
         foot = Foot(math.sqrt(stiffness / mass) / speed, preload / unit, restitution, 1e-9 * quickest)

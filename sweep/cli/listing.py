@@ -25,19 +25,57 @@ def families(name: str | None) -> None:
     from sweep.families import NAMES, family
 
     if name is None:
-        echo_columns([(known, family(known).title) for known in NAMES])
+        found = [family(known) for known in NAMES]
+        rows = [(entry.name, over(entry), entry.title, ", ".join(capability_words(entry))) for entry in found]
+        echo_columns([("family", "over", "", "can be asked for"), *rows])
         click.echo("\nchains: any of them in series, such as rssr+guide; `sweep families NAME` shows what one takes")
         return
     for line in describe(family(family_names(name))):
         click.echo(line)
 
 
+def over(family: Family) -> str:
+    """Over what a family is evaluated, in a word or two."""
+    domain = family.domain
+    return domain.kind if domain.kind != "interval" else f"interval of {domain.name}"
+
+
+def capability_words(family: Family) -> list[str]:
+    """What a family can be asked for besides its motion."""
+    from sweep.families.capabilities import (
+        Assembly,
+        CrankRockerLoop,
+        GuidedPoint,
+        JointRecords,
+        OutputLink,
+        Points,
+        PressureEllipse,
+    )
+
+    words = [
+        (Assembly, "rotatability"),
+        (JointRecords, "loads"),
+        (PressureEllipse, "pressure extrema"),
+        (CrankRockerLoop, "proofs"),
+        (GuidedPoint, "line fit"),
+        (Points, "points"),
+        (OutputLink, "tip"),
+    ]
+    return [word for kind, word in words if family.find(kind) is not None]
+
+
 def describe(family: Family) -> list[str]:
     """Parameters, pose outputs and design outputs of a family with their units, one per line."""
     from sweep.evaluation.summaries import output
+    from sweep.families.capabilities import Points
     from sweep.quantities.reduction import prefixes
 
-    lines = [f"{family.name}: {family.title}", "", "parameters (one length unit throughout, angles in rad)"]
+    lines = [f"{family.name}: {family.title}", "", f"over: {over(family)}"]
+    if words := capability_words(family):
+        lines.append(f"can be asked for: {', '.join(words)}")
+    if points := [name for found in family.every(Points) for name in found.at]:
+        lines.append(f"points: {', '.join(points)}")
+    lines += ["", "parameters (one length unit throughout, angles in rad)"]
     parameters = []
     for p in family.parameters:
         notes = [p.sign] if p.sign else []

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from sweep.families.base import Accuracy, Array, Columns
+from sweep.reductions.turn import Group
 
 Part: TypeAlias = tuple[float, float] | None
 """A window of the stroke as two fractions, or none."""
-General: TypeAlias = Literal["margin", "limits", "reductions", "means"]
 RunFunction: TypeAlias = Callable[[Array, Accuracy, Part], Columns]
 
 
@@ -31,4 +31,4 @@ class Route:
     outputs: tuple[str, ...]
     ns_per_design: float
     run: RunFunction | None = None
-    general: General | Literal[""] = ""
+    general: Group | Literal[""] = ""

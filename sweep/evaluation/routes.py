@@ -9,7 +9,7 @@ import numpy as np
 
 from sweep.errors import InputError
 from sweep.evaluation.members import machine_routes
-from sweep.evaluation.route import General, Part, Route
+from sweep.evaluation.route import Part, Route
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.chain import Stage
 from sweep.families.domain import March
@@ -17,11 +17,12 @@ from sweep.families.members import Machine
 from sweep.quantities.names import at_stage, error_of
 from sweep.quantities.reduction import reduction_of
 from sweep.reductions.catalogue import output, quantity
+from sweep.reductions.events import event_outputs
 from sweep.reductions.means import mean_squares
 from sweep.reductions.refine import precise_maxima
 from sweep.reductions.sampling import TWO_PI
 from sweep.reductions.steps import applying_step
-from sweep.reductions.turn import group_ns, limits_and_reductions, margin_group
+from sweep.reductions.turn import Group, group_ns, limits_and_reductions, margin_group
 
 
 def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
@@ -38,7 +39,7 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
         found, left = machine_routes(family, wanted, accuracy)
         wanted = left
     steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
-    groups: dict[tuple[General, str], list[str]] = {}
+    groups: dict[tuple[Group, str], list[str]] = {}
     asked = {name: (applying_step(family, name, accuracy), quantity(family, name)) for name in dict.fromkeys(wanted)}
     # The margin of a whole chain asks all stages: a first one judged by itself would take its designs from the others.
     together = any(
@@ -49,8 +50,8 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
             step, stage = own
             steps.setdefault((step.name, stage.number if stage else 0), (step, stage, []))[2].append(name)
         elif one is not None:
-            about_position: General = "limits" if one.of in family.positions else "reductions"
-            general: General = {"margin": "margin", "mean": "means"}.get(one.route, about_position)  # type: ignore[assignment]
+            about_position: Group = "limits" if one.of in family.positions else "reductions"
+            general: Group = {"margin": "margin", "mean": "means", "event": "events"}.get(one.route, about_position)  # type: ignore[assignment]
             # Each effect by itself: one that jams or leaves its range takes nothing from the others.
             effect = family.dear.get(one.of, ("", 0.0))[0]
             groups.setdefault((general, effect), []).append(name)
@@ -76,19 +77,21 @@ def _own(family: Family, step: Step, stage: Stage | None, outputs: tuple[str, ..
     return Route(name, outputs, step.cost(accuracy), partial(_run_step, family, step, stage, outputs))
 
 
-def _general(family: Family, general: General, effect: str, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
+def _general(family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
     run = partial(_run_general, family, general, outputs)
     cost = group_ns(family, general, outputs, accuracy)
     return Route(f"{general} {effect}".rstrip(), outputs, cost, run, general)
 
 
 def _run_general(
-    family: Family, general: General, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy, window: Part
+    family: Family, general: Group, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy, window: Part
 ) -> Columns:
     if general == "margin":
         return margin_group(family, designs, outputs, accuracy)
     if general == "means":
         return mean_squares(family, designs, outputs, accuracy)
+    if general == "events":
+        return event_outputs(family, designs, outputs, accuracy)
     return limits_and_reductions(family, designs, outputs, accuracy, window)
 
 

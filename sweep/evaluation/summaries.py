@@ -43,6 +43,7 @@ FEWEST_SAMPLES = 8
 # With these some outputs are missing or rough, the others are worth having.
 PARTIAL = (
     st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
+    st.NO_EVENT,
 )  # fmt: skip
 
 

@@ -93,6 +93,26 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Event:
+    """Something that happens where a pose output passes a level: entry, landing, loss of contact.
+
+    Parameters
+    ----------
+    name : of the event; ``phi_NAME`` is where it first happens, ``count_NAME`` how often
+    of : the pose output that passes the level
+    text : what happens, in words
+    level : in the unit of the output
+    rising : whether it passes upwards
+    """
+
+    name: str
+    of: str
+    text: str
+    level: float = 0.0
+    rising: bool = True
+
+
+@dataclass(frozen=True)
 class Accuracy:
     """How extrema over the turn are found: on a dense grid of ``samples``, or refined to relative error ``target``.
 
@@ -151,11 +171,13 @@ class Family:
     domain : over what it is evaluated
     steps : its own routes to design outputs, exact or faster than the general reductions over poses
     derivative_of : for a pose output its derivative with respect to the domain's variable
+    events : what happens at roots of pose outputs
     outward : the sign parameter whose +1 makes the extended limit position the one with the largest position; without
         one the extended position always is
     uses_phi : False for poses that need no more than cos(phi) and sin(phi); in a chain that saves an arctangent a pose
     analytic : whether poses take complex designs and angles, for exact gradients by the complex step
     capabilities : typed objects that effects, proofs, drawings and fits ask for (:mod:`sweep.families.capabilities`)
+    example : an ordinary design, by parameter, whose poses all exist; hard inputs are made from it
     dear : for pose outputs that cost far more than the motion, what they are computed by and its cost [ns per pose]
     precise_poses : slower poses whose errors are a few roundings of what is given, where the family has them
     """
@@ -169,10 +191,12 @@ class Family:
     domain: Domain = field(default_factory=Turn)
     steps: tuple[Step, ...] = ()
     derivative_of: Mapping[str, str] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()
     outward: str = ""
     uses_phi: bool = True
     analytic: bool = True
     capabilities: tuple[object, ...] = ()
+    example: Mapping[str, float] = field(default_factory=dict)
     dear: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     precise_poses: PoseFunction | None = None
 

@@ -25,7 +25,7 @@ def check_family(family: Family) -> Family:
     FamilyError
         naming the family, what is wrong and how it is mended.
     """
-    faults = [*_names(family), *_outputs(family), *_capabilities(family)]
+    faults = [*_names(family), *_outputs(family), *_capabilities(family), *_example(family)]
     if faults:
         raise FamilyError("\n".join([f"family {family.name}: {len(faults)} faults", *(f"  {x}" for x in faults)]))
     return family
@@ -52,6 +52,14 @@ def _names(family: Family) -> list[str]:
     return faults
 
 
+def _example(family: Family) -> list[str]:
+    needed = [p.name for p in family.parameters if p.default is None]
+    faults = [f"example lacks {name!r}: give an ordinary design" for name in needed if name not in family.example]
+    return faults + [
+        f"example has {x!r}, which is no parameter" for x in family.example if x not in family.parameter_names
+    ]
+
+
 def _outputs(family: Family) -> list[str]:
     names, faults = family.pose_output, []
     if family.position not in names:
@@ -63,6 +71,7 @@ def _outputs(family: Family) -> list[str]:
         sign = next((p for p in family.parameters if p.name == family.outward), None)
         if sign is None or sign.choices != (-1.0, 1.0):
             faults.append(f"outward {family.outward!r} is no parameter with the choices -1 and +1")
+    faults += [f"event {e.name} is about {e.of!r}, which is no pose output" for e in family.events if e.of not in names]
     for o in family.pose_outputs:
         if o.windowed and family.position in names and names[family.position].wraps:
             faults.append(f"{o.name} is windowed, but the position is an angle: a window is a part of a stroke")

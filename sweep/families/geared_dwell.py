@@ -142,4 +142,5 @@ FAMILY = Family(
     ),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     capabilities=(Points({"b": ("x_b", "y_b", None)}),),
+    example={"k": 1.4, "a": 0.3},
 )

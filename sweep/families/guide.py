@@ -113,4 +113,5 @@ FAMILY = Family(
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)}),
     ),
     precise_poses=precise_poses,
+    example={"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "lam": 1.1, "h": -0.6, "branch": 1.0},
 )

@@ -207,7 +207,12 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
     for relation in relations:
         found |= relation.compute(found, {m.name: m.place.rotation for m in machine.members}, wanted)
-    return {name: np.ascontiguousarray(np.broadcast_to(found[name], shape)) for name in wanted} | {"status": status}
+    return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
+
+
+def _whole(values: Any, shape: tuple[int, int]) -> Any:
+    """Values of one design for all where it was computed once; an array of their own, which may be written on."""
+    return values if values.shape == shape else np.array(np.broadcast_to(values, shape))
 
 
 def _driving(member: Member, needed: set[str]) -> set[str]:

@@ -168,4 +168,5 @@ FAMILY = Family(
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
     ),
     precise_poses=precise_poses,
+    example={"a": 1.3, "b": 5.2, "e": 0.7, "f": 0.4, "alpha": 0.3, "branch": -1.0},
 )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from kernels import status as st
 from kernels.families import rssr
@@ -81,22 +83,39 @@ MAXIMA_OUTPUTS = tuple(
 
 ROUNDING = 2.0**-53
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up; 100 suffice within 1e-9 of a change point
-_POSE_NAMES = tuple(o.name for o in POSE_OUTPUTS)
+_JOINTS = rssr.Joints._fields
+_VALUES = tuple(o.name for o in POSE_OUTPUTS if o.name not in _JOINTS)
+_NO_JOINTS = (*_VALUES, "joints")  # a name that nobody wants: its argument is None
+
+
+def _filled(
+    kernel: Callable[..., object], arguments: tuple[Array, ...], wanted: frozenset[str], columns: int, dtype: DTypeLike
+) -> Columns:
+    """Call a kernel of poses whose last output is the record of joints, or None if no joint is wanted."""
+    status = np.empty((len(arguments[0]), columns), np.uint8)
+    if wanted.isdisjoint(_JOINTS):
+        return filled(kernel, arguments, _NO_JOINTS, wanted, status, dtype)
+    room = optional_outputs(_JOINTS, wanted, status.shape, dtype)
+
+    def with_joints(*given: object) -> None:
+        kernel(*given, rssr.Joints(*room))
+
+    found = filled(with_joints, arguments, _VALUES, wanted, status, dtype)
+    return found | {name: x for name, x in zip(_JOINTS, room, strict=True) if x is not None}
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    arguments = designs, angles.cos, angles.sin
-    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-    return filled(rssr.poses, arguments, _POSE_NAMES, wanted, status, np.result_type(designs, angles.cos))
+    dtype = np.result_type(designs, angles.cos)
+    return _filled(rssr.poses, (designs, angles.cos, angles.sin), wanted, angles.cos.shape[1], dtype)
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """As :func:`poses`, with the closure in twice the working precision; for float64 only."""
-    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
     constants = np.empty((len(designs), rssr.PRECISE_COLUMNS))
     rssr.precise_constants(designs, constants)
-    return filled(rssr.precise_poses, (designs, constants, angles.cos, angles.sin), _POSE_NAMES, wanted, status)
+    arguments = designs, constants, angles.cos, angles.sin
+    return _filled(rssr.precise_poses, arguments, wanted, angles.cos.shape[1], np.float64)
 
 
 JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
@@ -299,4 +318,5 @@ FAMILY = Family(
         OutputLink(rocker_origin),
     ),
     precise_poses=precise_poses,
+    example={"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "branch": -1.0},
 )

@@ -15,6 +15,7 @@ from sweep.families.domain import Turn
 from sweep.families.members import Machine, Member
 from sweep.quantities.names import parts
 from sweep.quantities.reduction import Mode, prefixes, reduction_of, split
+from sweep.reductions.events import event_names
 from sweep.reductions.extrema import Request
 from sweep.reductions.size import SIZE, lengths
 from sweep.reductions.steps import applying_step, certified_names, own_steps, place_names
@@ -46,7 +47,7 @@ class Quantity:
     """
 
     output: Output
-    route: Literal["margin", "limits", "reduction", "mean"]
+    route: Literal["margin", "limits", "reduction", "mean", "event"]
     kind: str
     of: str = ""
     stage: str = ""
@@ -100,7 +101,20 @@ def quantity(family: Family, name: str) -> Quantity | None:
         return _margin(family, name) or _reduction(family, name)
     if name == STAY.name and isinstance(family.domain, Turn):
         return Quantity(STAY, "limits", STAY.name, family.position)
-    return _margin(family, name) or _limit(family, name) or _reduction(family, name)
+    return _margin(family, name) or _limit(family, name) or _event(family, name) or _reduction(family, name)
+
+
+def _event(family: Family, name: str) -> Quantity | None:
+    for event in family.events:
+        place, count = event_names(family, event)
+        of = family.pose_output[event.of]
+        if name == place:
+            found = Output(name, family.domain.unit, f"{family.domain.text} at which {event.text}", of.equation)
+            return Quantity(found, "event", "event", event.of, modes=(), locates=True)
+        if name == count:
+            found = Output(name, "1", f"how often {event.text}", of.equation, jumps=True)
+            return Quantity(found, "event", "count", event.of, modes=())
+    return None
 
 
 def _of_member(member: Member, found: Quantity | None) -> Quantity | None:
@@ -181,6 +195,7 @@ def output_names(family: Family) -> tuple[str, ...]:
         names += [f"{o.name}1" for step in family.stages[0].family.steps for o in step.provides]
         names += [f"{base}{loop.stage}" for loop in assemblies for base in MARGIN_TEXTS]
     names += [name for position, stage in family.positions.items() for name in limit_names(family, position, stage)]
+    names += [name for event in family.events for name in event_names(family, event)]
     names += [STAY.name] if isinstance(family.domain, Turn) else []
     names += [SIZE.name] if lengths(family) else []
     names += [f"{prefix}{pose}" for pose in family.pose_names for prefix in prefixes(family.domain)]

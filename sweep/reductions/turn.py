@@ -20,7 +20,7 @@ from sweep.reductions.margins import combined, margin_suffixes, margins, own_ste
 from sweep.reductions.sampling import TWO_PI, Mask, Status, blocks, sample_turn
 from sweep.reductions.window import Window
 
-Group: TypeAlias = Literal["margin", "limits", "reductions", "means"]
+Group: TypeAlias = Literal["margin", "limits", "reductions", "means", "events"]
 Found: TypeAlias = dict[Request, Extremum]
 
 
@@ -99,6 +99,8 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
         followed = enumerate(margin_suffixes(family), start=1)
         return sum(100.0 if own_step(family, s, accuracy) else NS_MARGIN * stage for stage, s in followed)
     asked = _quantities(family, names)
+    if group == "events":
+        return POSES_EVENT * NS_POSE * stages
     requests = {r for one in asked for r in one.requests(family, False)}
     # What effects add is paid once per effect and pose, and far outweighs the motion.
     effects = sum(dict(family.dear[one.of] for one in asked if one.of in family.dear).values())
@@ -122,6 +124,7 @@ NS_PEAK = 2200.0
 NS_MARGIN = 1600.0
 # Poses per design on average: of a mean, of a search without its peaks, per refined extremum.
 POSES_MEAN = 110.0
+POSES_EVENT = 340.0
 POSES_SEARCH = 180.0
 POSES_PEAK = 30.0
 

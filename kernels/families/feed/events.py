@@ -92,7 +92,7 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
     Parameters
     ----------
     designs : (n, 23) columns of :class:`kernels.families.feed.Design`
-    status : (n,) out; OK, NO_ROOT (the tooth never passes the plate), that of the first pose that is not assembled
+    status : (n,) out; OK, NO_EVENT (the tooth never passes the plate), that of the first pose that is not assembled
     outputs : (9, n) out in the order of :data:`OUTPUTS` [rad, length, length per rad]; nan where the status is not OK
 
     Notes
@@ -127,7 +127,7 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
                     longest, first, last = stay, j, j + stay
         outputs[8, i] = crossings
         if crossings == 0:
-            status[i] = st.NO_ROOT
+            status[i] = st.NO_EVENT
             continue
         entry = _passage(r, first * step, (first + 1) * step, heights[first], heights[(first + 1) % SAMPLES], 0)
         leave = _passage(r, last * step, (last + 1) * step, heights[last % SAMPLES], heights[(last + 1) % SAMPLES], 0)

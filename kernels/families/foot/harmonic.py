@@ -91,7 +91,7 @@ def closed_forms(designs: Array, status: Status, outputs: Array) -> None:
     Parameters
     ----------
     designs : (n, 8) columns of :class:`Design`
-    status : (n,) out; OK, NO_ROOT (the rack does not pass the plate) or INVALID_INPUT
+    status : (n,) out; OK, NO_EVENT (the rack does not pass the plate) or INVALID_INPUT
     outputs : (10, n) out in the order of :data:`OUTPUTS`; the time of first contact is nan without a rebound
     """
     for i in range(designs.shape[0]):
@@ -102,7 +102,7 @@ def closed_forms(designs: Array, status: Status, outputs: Array) -> None:
         valid = m > 0.0 and k >= 0.0 and preload > 0.0 and omega > 0.0 and 0.0 <= restitution < 1.0
         status[i] = st.OK if valid and lift > 0.0 and lift < 1e150 and abs(p) < 1e150 else st.INVALID_INPUT
         if status[i] == st.OK and not -lift < p < lift:
-            status[i] = st.NO_ROOT
+            status[i] = st.NO_EVENT
         if status[i] != st.OK:
             continue
         across = math.sqrt((lift - p) * (lift + p))

@@ -110,6 +110,46 @@ def reduce_scaled(a: Any, b: Any, c: Any, e: Any, f: Any, g: Any, alpha: Any, br
     )  # fmt: skip
 
 
+class Place(NamedTuple):
+    """The closure at one crank angle; ``hu``, ``hv`` are cos(phi), sin(phi) times the cosine of the axes' angle."""
+
+    u: Any  # cos phi
+    v: Any  # sin phi
+    hu: Any
+    hv: Any
+    x: Any  # X, Y, W of the closure
+    y: Any
+    w1: Any  # W = k0 - w1
+    w: Any
+    rr: Any  # X^2 + Y^2, squared distance of the crank pin from the rocker axis
+    delta: Any  # the discriminant X^2 + Y^2 - W^2
+
+
+@inline
+def place(e: Any, y0: Any, ca: Any, k0: Any, k1: Any, k2: Any, u: Any, v: Any) -> Place:
+    """Evaluate the closure of a reduced design at (cos phi, sin phi) = (u, v); (2).
+
+    It takes float32, float64 and complex128 alike, so no literal number may stand in it.
+    """
+    hu, hv = ca * u, ca * v
+    x, y, w1 = e - u, y0 + hv, k2 * u - k1 * v
+    w = k0 - w1
+    rr = x * x + y * y
+    return Place(u, v, hu, hv, x, y, w1, w, rr, rr - w * w)
+
+
+@inline
+def closure_terms(
+    e: float, y0: float, ca: float, k0: float, k1: float, k2: float, u: float, v: float
+) -> tuple[float, ...]:
+    """X, Y, W of the closure alone, for margins, limit positions, error estimates and enclosures.
+
+    W is summed in another order than in :func:`place`.  The order decides its last bit and with it that of every
+    margin, so both are kept.
+    """
+    return e - u, y0 + ca * v, k0 + k1 * v - k2 * u
+
+
 @inline
 def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
     """Rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (sheet 1.2)."""
