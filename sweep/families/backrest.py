@@ -82,6 +82,13 @@ BAND = (
 )
 
 DRIFT = Output("drift", "N", "K_couple - K0", "(11)")
+# The worked example of docs/backrest.md
+EXAMPLE = {
+    "a1": 0.75, "b1": 0.5625, "a2": 0.125, "b2": 0.4375, "H": 0.03125, "r": 0.0625, "r0": 0.046875, "psi": 1.5,
+    "xE": 0.0, "yE": 0.25, "f": 0.125, "P1": 300.0, "P2": 200.0, "lM": 0.25, "nu": 1.0, "x3": 0.75, "y3": 0.6875,
+    "cs": 512.0, "l0": 0.5, "F0": 1856.0, "rg": 0.1875, "nug": 0.125, "rho_full": 0.375, "rho_empty": 0.09375,
+}  # fmt: skip
+
 K0 = Parameter("K0", "force", "warp tension wanted", default=0.0)
 
 _COLUMNS = backrest.Design._fields
@@ -143,6 +150,7 @@ FAMILY = Family(
     position="K_couple",
     pose_outputs=GEOMETRY[:-1] + LOADS + BAND + (DRIFT,),
     poses=poses,
+    example=EXAMPLE | {"phi": 0.4, "turn": -0.15, "K0": 1482.0},
     domain=beam_of(_NAMES),
     capabilities=(POINTS,),
 )

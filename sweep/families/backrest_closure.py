@@ -26,6 +26,7 @@ FAMILY = Family(
     position="phi",
     pose_outputs=(PHI, *regulated.GEOMETRY[1:], *regulated.LOADS, *regulated.BAND),
     poses=poses,
+    example=regulated.EXAMPLE | {"phi_lo": -0.5, "phi_hi": 0.6},
     domain=regulated.beam_of(_NAMES),
     capabilities=(regulated.POINTS,),
 )

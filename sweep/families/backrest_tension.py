@@ -41,6 +41,7 @@ FAMILY = Family(
     position="phi",
     pose_outputs=(PHI, *regulated.GEOMETRY[1:], *regulated.LOADS, *regulated.BAND),
     poses=poses,
+    example=regulated.EXAMPLE | {"K0": 1482.0, "phi_lo": -0.1, "phi_hi": 1.2},
     domain=regulated.beam_of(_NAMES),
     capabilities=(regulated.POINTS,),
 )

@@ -110,6 +110,12 @@ def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
 
 
+EXAMPLE = {
+    "h_a": 0.4, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "rh": 1.2, "dh": -0.3, "xE": 5.6, "yE": 0.7, "rE": 0.18, "dE": 0.8,
+    "q": 2.6, "fx": -1.7, "fy": 0.6, "tx": -0.3, "ty": 0.9, "y_plate": 1.5, "h_sigma": -1.0, "bar_branch": -1.0,
+}  # fmt: skip
+
+
 FAMILY = Family(
     name="feed",
     title="feed rack on a horizontal and a lift chain",
@@ -118,6 +124,7 @@ FAMILY = Family(
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
     steps=(Step("feeding", FEEDING_OUTPUTS, events, 150_000.0),),
+    example=EXAMPLE,
     derivative_of={
         "psi_plus_dh": "dpsi", "dpsi": "d2psi", "chi": "dchi", "dchi": "d2chi", "x_t": "dx_t", "dx_t": "d2x_t",
         "y_t": "dy_t", "dy_t": "d2y_t",

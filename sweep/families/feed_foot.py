@@ -61,6 +61,9 @@ def feeding(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
     return feed.events(np.ascontiguousarray(designs[:, :_RACK_COLUMNS]), wanted, accuracy)
 
 
+EXAMPLE = feed.EXAMPLE | {"m": 0.05, "k": 50.0, "F0": 4.0, "omega": 20.0}
+
+
 FAMILY = Family(
     name="feed_foot",
     title="presser foot on the rack of a feed mechanism",
@@ -73,5 +76,6 @@ FAMILY = Family(
         Step("feeding", feed.FEEDING_OUTPUTS, feeding, 150_000.0),
         Step("march", EVENT_OUTPUTS, events, 2_000_000.0),
     ),
+    example=EXAMPLE,
     analytic=False,
 )

@@ -59,6 +59,13 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return {name: x for name, x in zip(triad.OUTPUTS, outputs, strict=True) if name in wanted} | {"status": status}
 
 
+EXAMPLE = {
+    "h_a": 0.5, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "rh": 1.2, "xE2": 2.0, "yE2": -2.5, "rE2": 0.15, "dE2": 0.3,
+    "xE3": 5.5, "yE3": -2.5, "rE3": 0.15, "dE3": 0.5, "f1x": -1.0, "f1y": -0.5, "f2x": -0.8, "f2y": -0.6, "f3x": 1.2,
+    "f3y": -0.6, "q1": 1.5, "q2": 2.5, "q3": 2.5, "x0": 4.0, "y0": 1.0, "chi0": 0.0, "h_sigma": -1.0,
+}  # fmt: skip
+
+
 FAMILY = Family(
     name="feed_triad",
     title="feed rack on three leads",
@@ -66,6 +73,7 @@ FAMILY = Family(
     position="x_t",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
+    example=EXAMPLE,
     derivative_of={
         "x_t": "dx_t", "dx_t": "d2x_t", "y_t": "dy_t", "dy_t": "d2y_t", "chi": "dchi", "dchi": "d2chi",
     },

@@ -122,6 +122,9 @@ def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     return chosen(columns, wanted)
 
 
+EXAMPLE = {"m": 0.05, "k": 3000.0, "F0": 6.0, "omega": 400.0, "Y": 1.5e-3, "p": 0.5e-3, "X": 1e-3}
+
+
 FAMILY = Family(
     name="foot",
     title="presser foot on a harmonic rack",
@@ -134,5 +137,6 @@ FAMILY = Family(
         Step("closed forms", CLOSED_OUTPUTS, closed, 20_000.0),
         Step("march", EVENT_OUTPUTS, events, 1_500_000.0),
     ),
+    example=EXAMPLE,
     analytic=False,
 )

@@ -65,6 +65,9 @@ def rod_square(designs: Array) -> Array:
     return square
 
 
+EXAMPLE = {"O2B": 30.0, "BC": 150.0, "O3C": 70.0, "O2O3": 155.0, "O4E": 138.5, "chi_mid": 1.85}
+
+
 FAMILY = Family(
     name="heddle",
     title="lever drive of a heddle shaft",
@@ -72,6 +75,7 @@ FAMILY = Family(
     position="y",
     pose_outputs=VALUE_OUTPUTS + PLACE_OUTPUTS,
     poses=poses,
+    example=EXAMPLE,
     derivative_of={"chi": "dchi", "dchi": "d2chi", "d2chi": "d3chi", "y": "dy", "dy": "d2y", "d2y": "d3y"},
     uses_phi=False,
     capabilities=(
