@@ -121,7 +121,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     valid = a.real > 0.0 and b.real > 0.0 and c.real > 0.0 and q.real > 0.0
     size = rocker.reach + rocker.z_reach + c.real + b.real
     size += abs(arm.real) + abs(x_ecc.real) + abs(y_ecc.real) + abs(r_ecc.real)
-    size += abs(fx.real) + abs(fy.real) + abs(tx.real) + abs(ty.real) + abs(plate.real)
+    size += abs(fx.real) + abs(fy.real) + abs(tx.real) + abs(ty.real) + abs(plate.real) + q.real
     valid = valid and size < 1e140 and abs(alpha.real) < 1e5 and abs(dh.real) < 1e5 and abs(de.real) < 1e5
     branch = designs[i, 22].real
     valid = valid and rocker.sigma * rocker.sigma == 1.0 and branch * branch == 1.0
