@@ -1,4 +1,4 @@
-"""Heddle drive and back-rest through `sweep.evaluate`: every row of the 25-digit tables has its place in the contract."""
+"""Heddle drive and back-rest through `sweep.evaluate`: every row of the tables has its place in the contract."""
 
 from __future__ import annotations
 
