@@ -33,7 +33,7 @@ MEANING: dict[int, str] = {
     NOT_CONVERGED: "the accuracy asked for was not reached, by an iteration or because rounding is all there is",
     INVALID_INPUT: "a parameter is not finite, a length is not positive, an angle is beyond 1e5 rad, their scale is "
     "beyond float64, or they exclude each other (supports at one place, a collar no larger than its journal, nothing "
-    "that has inertia)",
+    "that has inertia, the life of a bearing that carries nothing)",
     SINGULAR: "the position is not defined (a joint lies on the axis it turns about)",
     NOT_OSCILLATING: "the follower turns fully: it has no limit positions",
     NOT_LINEAR: "the deflection is too large for the linearised equation; the number given solves that equation only",

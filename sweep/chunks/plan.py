@@ -39,7 +39,9 @@ PILOT_RUNS, PILOT_LENGTH = 32, 32
 PARAMETER_UNITS = {word: internal_unit(word) for word in get_args(Unit)}
 
 # The folders of the package whose sources decide values in a chunk.
-VALUES = frozenset(["families", "quantities", "effects", "reductions", "evaluation", "synthesis", "study", "chunks"])
+VALUES = frozenset(
+    ["numerics", "families", "quantities", "effects", "reductions", "evaluation", "synthesis", "study", "chunks"]
+)
 
 # Sections of the study file that decide no value in a chunk.
 NOT_IN_CHUNKS = ("study", "optimise", "pareto", "tolerance", "reference", "budget", "report")

@@ -147,6 +147,16 @@ class Scene:
         given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
         return Scene(self.family, self.designs[rows], angles, given, after)
 
+    def posed(self, rows: Rows, phi: Array) -> Scene:
+        """Some of the designs, each as often as wanted, at crank angles (k, m) of their own."""
+        given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
+        return Scene(self.family, self.designs[rows], Angles.of(phi), given, after)
+
+    def precise(self) -> Scene:
+        """The same scene with the most accurate poses that its families have."""
+        after = tuple(d._replace(family=d.family.precise()) for d in self.after)
+        return Scene(self.family.precise(), self.designs, self.angles, self.inputs, after)
+
     def on_grid(self, size: int) -> Scene:
         """The same designs at ``size`` equidistant crank angles of one turn: what a whole-turn effect samples."""
         angles = Angles.of(2.0 * np.pi * np.arange(size)[None] / size)
@@ -162,11 +172,13 @@ class DesignResult:
     """Outputs an effect gives per design instead of per pose: a whole-turn effect's, or a closed form.
 
     ``run(scene, wanted, accuracy)`` gets a scene of a single crank angle, whose ``on_grid`` makes whole turns; it
-    returns the wanted outputs, perhaps their ``err_``, and ``status``.
+    returns the wanted outputs, perhaps their ``err_``, and ``status``.  ``block`` is how many designs it gets at once:
+    few where it needs hundreds of poses of each, more where it asks for a few poses many times.
     """
 
     outputs: tuple[Output, ...]
     run: DesignFunction
+    block: int = 32
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ from sweep.quantities.reduction import reduction_of
 from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.events import event_outputs
 from sweep.reductions.means import mean_squares
-from sweep.reductions.refine import precise_maxima
-from sweep.reductions.sampling import TWO_PI
+from sweep.reductions.precise import sharpen_maxima
 from sweep.reductions.steps import applying_step
 from sweep.reductions.turn import Group, group_ns, limits_and_reductions, margin_group
 
@@ -123,14 +122,4 @@ def _sharpen(family: Family, step: Step, designs: Array, name: str, columns: Col
     found = reduction_of(family, name)
     if found is None or found[0].modes != (0,) or not located or family.precise_poses is None:
         return
-    value, err = (np.asarray(columns[key], np.float64) for key in (name, error_of(name)))
-    rows = np.flatnonzero(err > target * np.abs(value))
-    if not rows.size:
-        return
-    phi = np.asarray(step.run(designs[rows], frozenset((name, place)), Accuracy(target=target))[place], np.float64)
-    peaks = precise_maxima(family, designs[rows], found[1].name, phi, target, place in columns)
-    better = peaks.err_height < err[rows]
-    rows, peaks = rows[better], peaks.only(better)
-    value[rows], err[rows] = peaks.height, peaks.err_height
-    if place in columns:
-        columns[place][rows], columns[error_of(place)][rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
+    sharpen_maxima(family, step, designs, found[1].name, name, columns, target)

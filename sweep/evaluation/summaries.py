@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from sweep.effects import extended, input_names
 from sweep.errors import InputError
 from sweep.evaluation.route import Part, Route
 from sweep.evaluation.routes import routes
-from sweep.evaluation.tables import design_matrix, wanted_names
+from sweep.evaluation.statuses import explained, meanings
+from sweep.evaluation.tables import design_matrix, kept_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Columns, Family
@@ -56,6 +57,8 @@ def summarise(
     accuracy: float | None = None,
     certify: bool | Sequence[str] = False,
     window: tuple[float, float] | None = None,
+    keep: bool | str | Sequence[str] = False,
+    status_text: bool = False,
 ) -> pd.DataFrame:
     """Design outputs of mechanisms, one row per design, in the order of the input.
 
@@ -73,6 +76,8 @@ def summarise(
         ``err_`` are then bounds instead of estimates
     window : ``max_abs_dev`` and the other reductions of ``dev`` count only poses whose position lies between these
         fractions of the stroke, measured from its smallest position; default the whole turn
+    keep : columns of the table that the result repeats in front: names, or True for all of them
+    status_text : add a column ``status_text``, the meaning of ``status`` in words
 
     Returns
     -------
@@ -100,7 +105,10 @@ def summarise(
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
     errors = [error_of(name) for name in wanted] if chosen.target is not None else []
     index = table.index if isinstance(table, pd.DataFrame) else None
-    return pd.DataFrame({name: columns[name] for name in [*wanted, *errors, "status"]}, index=index)
+    made: dict[str, Any] = {name: columns[name] for name in [*wanted, *errors, "status"]}
+    if status_text:
+        made["status_text"] = np.array(meanings(columns["status"]), dtype=object)
+    return pd.DataFrame(kept_columns(table, keep, made, len(matrix)) | made, index=index)
 
 
 def design_outputs(
@@ -145,7 +153,8 @@ def design_outputs(
         assert route.run is not None
         # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
         alive = np.flatnonzero(np.isin(status, PARTIAL))
-        found = route.run(designs[alive], accuracy, window)
+        with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+            found = route.run(designs[alive], accuracy, window)
         for name in route.outputs:
             for key in (name, error_of(name)) if accuracy.target is not None else (name,):
                 columns[key] = _spread(found[key], alive, n)
@@ -153,7 +162,8 @@ def design_outputs(
         status[alive] = np.where(status[alive] == st.OK, now, status[alive])
     if isinstance(family.domain, Interval):
         status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
-    return {name: columns[name] for name in dict.fromkeys(_with_errors(wanted, accuracy))} | {"status": status}
+    chosen = {name: columns[name] for name in dict.fromkeys(_with_errors(wanted, accuracy))}
+    return explained(chosen | {"status": status}, dict.fromkeys(wanted))
 
 
 def _spread(values: NDArray[np.generic], rows: Index, n: int) -> NDArray[np.generic]:

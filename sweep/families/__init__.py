@@ -17,9 +17,31 @@ if TYPE_CHECKING:
     from sweep.families.members import Machine
 
 NAMES = (
-    "rssr", "rssp", "guide", "geared_dwell", "heddle", "backrest", "backrest_tension", "backrest_closure",
-    "feed", "feed_triad", "foot", "feed_foot",
-)  # fmt: skip
+    "rssr",
+    "rssp",
+    "guide",
+    "geared_dwell",
+    "five_link",
+    "kim_dison",
+    "slotted",
+    "swivel",
+    "spherical_looper",
+    "cylindrical_looper",
+    "slider_crank",
+    "four_bar",
+    "inverted_slider_crank",
+    "epicyclic_dwell",
+    "cam",
+    "cam_lever",
+    "heddle",
+    "backrest",
+    "backrest_tension",
+    "backrest_closure",
+    "feed",
+    "feed_triad",
+    "foot",
+    "feed_foot",
+)
 
 
 @dataclass(frozen=True)

@@ -86,12 +86,16 @@ def chain(families: tuple[Family, ...]) -> Chain:
     Raises
     ------
     InputError
-        if a stage other than the last has no output angle: a slider cannot drive a crank.
+        if a stage other than the last has no output angle: a slider cannot drive a crank; if a stage has several loops
+        of its own.
     """
     place = f"chain {[f.name for f in families]}"
     for number, family in enumerate(families, start=1):
         if not isinstance(family.domain, Turn):
             allowed = f"a family over a closed turn; {family.name} is evaluated over {family.domain.text}"
+            raise InputError(f"stage {number}", family.name, allowed, place)
+        if len(family.every(Assembly)) > 1:  # their margins, and magnitudes of velocities, would carry no clear name
+            allowed = f"a family with one loop; {family.name} has several: make it a driven member of a machine"
             raise InputError(f"stage {number}", family.name, allowed, place)
         if number < len(families) and not family.pose_output[family.position].wraps:
             allowed = f"a family with an output angle psi; {family.name} has {family.position}, which drives no crank"

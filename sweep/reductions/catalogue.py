@@ -57,7 +57,7 @@ class Quantity:
     def requests(self, family: Family, windowed: bool) -> tuple[Request, ...]:
         """The extrema it is made of; a window concerns deviations across a line only."""
         inside = windowed and family.pose_output[self.of].windowed
-        return tuple(Request(self.of, mode, inside) for mode in self.modes)
+        return tuple(Request(self.of, mode, inside, self.locates) for mode in self.modes)
 
 
 def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> None:

@@ -60,17 +60,16 @@ def limits_and_reductions(
     asked = _quantities(family, names)
     windowed = part is not None
     requests = list(dict.fromkeys(r for one in asked for r in one.requests(family, windowed)))
-    locate = any(one.locates for one in asked)
     window, status = None, np.zeros(len(designs), np.uint8)
     found: Found = {}
     if part is not None and any(r.windowed for r in requests):
         ends = [Request(family.position, 1), Request(family.position, -1)]
-        found, status = _extrema(family, designs, ends, accuracy, locate, None)
+        found, status = _extrema(family, designs, ends, accuracy, None)
         most, least = (found[r] for r in ends)
         err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(len(designs))
         window = Window.of_stroke(least.value, most.value, err, part)
         requests = [r for r in requests if r not in ends]
-    more, now = _extrema(family, designs, requests, accuracy, locate, window)
+    more, now = _extrema(family, designs, requests, accuracy, window)
     columns: Columns = {"status": np.where(status == st.OK, now, status).astype(np.uint8)}
     for name, one in zip(names, asked, strict=True):
         if one.kind == STAY.name:
@@ -136,14 +135,14 @@ def _quantities(family: Family, names: Sequence[str]) -> list[Quantity]:
 
 
 def _extrema(
-    family: Family, designs: Array, requests: Sequence[Request], accuracy: Accuracy, locate: bool, window: Window | None
+    family: Family, designs: Array, requests: Sequence[Request], accuracy: Accuracy, window: Window | None
 ) -> tuple[Found, Status]:
     if not requests:
         return {}, np.zeros(len(designs), np.uint8)
     if accuracy.samples is not None:
         return sampled_extrema(family, designs, requests, accuracy.samples, window)
     assert accuracy.target is not None
-    return true_extrema(family, designs, requests, accuracy.target, locate=locate, window=window)
+    return true_extrema(family, designs, requests, accuracy.target, window=window)
 
 
 def sampled_extrema(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sweep.families.domain import Turn
 from sweep.quantities.names import is_error, is_place, parts, without_error
@@ -80,6 +80,9 @@ def quantity(name: str, unit: str) -> Quantity:
     if is_error(name):
         shown = quantity(without_error(name), unit)
         return Quantity(name, f"error of {shown.symbol}", f"error of the {shown.words}", shown.unit, shown.factor)
+    if member := parts(name).member:
+        shown = quantity(name.removeprefix(f"{member}."), unit)
+        return replace(shown, name=name, symbol=f"{shown.symbol} {member}", words=f"{shown.words} of the {member}")
     reduction, base = next(split(name, Turn()), (None, name))
     symbol_form, words_form = (reduction.symbol, reduction.words) if reduction else ("{}", "{}")
     order, root, stage = _derivative(base)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
+from sweep.evaluation.statuses import meaning
 from sweep.quantities.names import is_flag, is_place
 from sweep.report.limits import bound_words, limited
 from sweep.report.quantities import change, number, quantity
@@ -132,9 +133,7 @@ def fates(data: Dataset, found: Scan) -> list[Fate]:
         if code == codes.LIMIT_EXCEEDED and sum(data.missed.values()) == counts[code]:
             rows += [Fate(code, words, count, 100.0 * count / total) for words, count in _by_limit(data)]
         else:
-            rows.append(
-                Fate(code, codes.MEANING.get(code, f"status {code}"), counts[code], 100.0 * counts[code] / total)
-            )
+            rows.append(Fate(code, meaning(code), counts[code], 100.0 * counts[code] / total))
     kept = counts.get(codes.OK, 0)
     return [*rows, Fate(codes.OK, "within all limits", kept, 100.0 * kept / total)]
 
