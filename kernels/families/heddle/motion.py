@@ -89,10 +89,7 @@ def poses(
     places : (7, n, m) out, or None; sine of the transmission angle, pressure angle between rod and bell crank, angle of
         the shaft lever, B and C (x, y each)
 
-    Notes
-    -----
     Where the status is not OK the values are nan, except that a dead point of the rod keeps its position.
-    Measured: errors below 3 x 2^-53 max(cond, |y|) over the oracle table.
     """
     rates_wanted = dy is not None or d2y is not None or d3y is not None
     for i in range(designs.shape[0]):
