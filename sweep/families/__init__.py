@@ -37,6 +37,14 @@ NAMES = (
     "guided_cam",
     "free_cam",
     "free_cam_friction",
+    "heddle",
+    "backrest",
+    "backrest_tension",
+    "backrest_closure",
+    "feed",
+    "feed_triad",
+    "foot",
+    "feed_foot",
 )
 
 
