@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.families import backrest
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, guarded
 from sweep.families.capabilities import Points
 from sweep.families.domain import Interval
 
@@ -149,7 +149,7 @@ FAMILY = Family(
     parameters=PARAMETERS,
     position="K_couple",
     pose_outputs=GEOMETRY[:-1] + LOADS + BAND + (DRIFT,),
-    poses=poses,
+    poses=guarded(poses),
     example=EXAMPLE | {"phi": 0.4, "turn": -0.15, "K0": 1482.0},
     domain=beam_of(_NAMES),
     capabilities=(POINTS,),

@@ -7,7 +7,7 @@ import numpy as np
 from kernels.families import backrest
 from sweep.families import backrest as regulated
 from sweep.families.backrest_tension import PHI, SOUGHT
-from sweep.families.base import Angles, Array, Columns, Family
+from sweep.families.base import Angles, Array, Columns, Family, guarded
 
 PARAMETERS = (*regulated.FRAME, *SOUGHT, *regulated.BEAM)
 _NAMES = tuple(p.name for p in PARAMETERS)
@@ -25,7 +25,7 @@ FAMILY = Family(
     parameters=PARAMETERS,
     position="phi",
     pose_outputs=(PHI, *regulated.GEOMETRY[1:], *regulated.LOADS, *regulated.BAND),
-    poses=poses,
+    poses=guarded(poses),
     example=regulated.EXAMPLE | {"phi_lo": -0.5, "phi_hi": 0.6},
     domain=regulated.beam_of(_NAMES),
     capabilities=(regulated.POINTS,),

@@ -6,7 +6,7 @@ import numpy as np
 
 from kernels.families import backrest
 from sweep.families import backrest as regulated
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, guarded
 
 SOUGHT = (
     Parameter("phi_lo", "angle", "bracket angles are sought from here"),
@@ -40,7 +40,7 @@ FAMILY = Family(
     parameters=PARAMETERS,
     position="phi",
     pose_outputs=(PHI, *regulated.GEOMETRY[1:], *regulated.LOADS, *regulated.BAND),
-    poses=poses,
+    poses=guarded(poses),
     example=regulated.EXAMPLE | {"K0": 1482.0, "phi_lo": -0.1, "phi_hi": 1.2},
     domain=regulated.beam_of(_NAMES),
     capabilities=(regulated.POINTS,),

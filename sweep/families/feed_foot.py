@@ -7,7 +7,7 @@ import numpy as np
 from kernels.families import feed as kernels
 from kernels.families.feed.motion import OUTPUTS as _RACK
 from sweep.families import feed
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Step
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Step, guarded
 from sweep.families.domain import March
 from sweep.families.foot import EVENT_OUTPUTS, FOOT, NODES, POSE_OUTPUTS, RESTITUTION, TURNS, chosen, marched, nodes_for
 
@@ -70,7 +70,7 @@ FAMILY = Family(
     parameters=PARAMETERS,
     position="y_foot",
     pose_outputs=(*POSE_OUTPUTS, Output("x_rack", "length", "tooth, along the feed", "(11)")),
-    poses=poses,
+    poses=guarded(poses),
     domain=March(turns=TURNS),
     steps=(
         Step("feeding", feed.FEEDING_OUTPUTS, feeding, 150_000.0),

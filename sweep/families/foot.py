@@ -8,7 +8,7 @@ from kernels.effects.foot import OUTPUTS as _EVENTS
 from kernels.effects.foot import march
 from kernels.families import foot
 from kernels.families.foot.harmonic import OUTPUTS as _CLOSED
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, guarded
 from sweep.families.domain import March
 
 FOOT = (
@@ -131,7 +131,7 @@ FAMILY = Family(
     parameters=PARAMETERS,
     position="y_foot",
     pose_outputs=POSE_OUTPUTS,
-    poses=poses,
+    poses=guarded(poses),
     domain=March(turns=TURNS),
     steps=(
         Step("closed forms", CLOSED_OUTPUTS, closed, 20_000.0),
