@@ -343,7 +343,7 @@ def _mechanism(data: Mapping[str, Any], faults: Faults) -> tuple[tuple[str, ...]
     """What [mechanism] or [machine] says, and the family, chain or machine; None with its faults."""
     if "machine" not in data:
         if "mechanism" not in data:
-            faults.missing(("mechanism",), "a table [mechanism], or [machine.NAME] for several mechanisms")
+            faults.missing(("mechanism",), "a table [mechanism]")
         if "relations" in data:
             faults.value(("relations",), data["relations"], "nothing here: relations are those of a [machine]")
         names = _families(_section(MechanismSection, "mechanism", data, faults), data, faults)
