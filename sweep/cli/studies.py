@@ -38,15 +38,35 @@ def run(
     """Run or resume a study.
 
     An interrupted run is resumed by the same command.  Finished chunks are never computed twice, and the result is the
-    same, bit for bit, with any number of workers.
+    same, bit for bit, with any number of workers.  The answer comes last; where no design keeps all limits, it says
+    which of them have to give way, and the exit code is 4.
     """
+    from sweep.dataset.store import is_complete
+    from sweep.engine.run import default_folder
     from sweep.engine.run import run as run_study
+    from sweep.errors import TimeUsedUp
+    from sweep.report.terminal import ending
+    from sweep.study import load_study
 
     proof = True if certify else None
-    folder = run_study(
-        study, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
-    )
+    model = load_study(study, smoke=smoke)
+    folder = default_folder(model, smoke) if out is None else out
+    late: TimeUsedUp | None = None
+    try:
+        run_study(
+            model, folder, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
+        )
+    except TimeUsedUp as error:
+        if not is_complete(folder):
+            raise
+        late = error
+    found = ending(folder)
+    for line in found.lines:
+        click.echo(line)
     click.echo(f"dataset: {folder}")
+    if late is not None:
+        raise late
+    click.get_current_context().exit(found.exit_code)
 
 
 @click.command()

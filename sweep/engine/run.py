@@ -70,8 +70,8 @@ def run(
     BudgetError
         if the estimate exceeds the study's budget (3)
     WorkerDied, StoreError, LockedError, TimeUsedUp, Interrupted
-        worker killed (70), disk full or forbidden (74), folder in use (75), the budget's time over (124), signal (130,
-        143); finished chunks stay.
+        worker killed (70), disk full or forbidden (74), folder in use (75), the budget's time or that of the optimiser
+        over (124), signal (130, 143); finished chunks and what was found of the optimum stay.
     """
     if backend not in BACKENDS:
         raise InputError("backend", backend, f"{' or '.join(BACKENDS)}{nearest(str(backend), BACKENDS)}", "run")
@@ -79,7 +79,7 @@ def run(
         raise InputError("jobs", jobs, "a whole number from 1", "run")
     model = _model(study, smoke, accuracy, certify)
     _check_budget(model, jobs, force)
-    folder = Path(out) if out is not None else Path("results", *(["smoke"] if smoke else []), model.name, "designs")
+    folder = Path(out) if out is not None else default_folder(model, smoke)
     with store.locked(folder):
         head = {"run": uuid.uuid4().hex[:12]}
         begin = time.monotonic()
@@ -88,14 +88,20 @@ def run(
         try:
             computed = _sweep(model, folder, jobs, backend, force, progress)
             if model.optimise is not None:
-                _optimise(replace(model, pareto=None), folder, jobs)
+                _optimise(replace(model, pareto=None), folder, jobs, progress)
             _front(model, folder, jobs)
+            _raise_if_cut_short(folder)
         except Exception as error:
             if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
                 store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
             raise
         store.append_run(folder, head | _end(begin, "complete", f"{computed} chunks computed"))
     return folder
+
+
+def default_folder(study: Study, smoke: bool = False) -> Path:
+    """Where a study's dataset goes unless somebody says otherwise."""
+    return Path("results", *(["smoke"] if smoke else []), study.name, "designs")
 
 
 def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certify: bool | None) -> Study:
@@ -238,24 +244,37 @@ def _raise_if_signalled(stop: Stop, folder: Path) -> None:
         raise Interrupted(stop.signal_number, text)
 
 
-def _optimise(study: Study, folder: Path, jobs: int) -> None:
-    """Run the optimiser unless its result for these very sources is there already."""
+def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
+    """Run the optimiser unless its result for these very sources is there already, whole."""
     from sweep.chunks.plan import optimiser_hash
-    from sweep.optimise import optimise_study
+    from sweep.jobs.progress import Progress
+    from sweep.optimise import optimise_study, read_survey
 
     note = store.read_plan(folder) or {}
     key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
-    if note.get("optimised") == key and (folder / store.OPTIMUM).is_file():
+    found = read_survey(folder / store.OPTIMUM)
+    if note.get("optimised") == key and (folder / store.OPTIMUM).is_file() and (found is None or found.ended != "time"):
         return
+    assert study.optimise is not None
     store.write_plan(folder, note | {"optimised": None})
-    with stop_on_signal() as stop:
+    with stop_on_signal() as stop, Progress("optimum", study.optimise.starts, 0, progress, unit="starts") as shown:
         try:
-            optimise_study(study, folder, lambda: bool(stop), jobs)
+            optimise_study(study, folder, lambda: bool(stop), jobs, lambda done, _: shown.advance(done - shown.done))
         except KeyboardInterrupt:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
             raise Interrupted(number, text) from None
     store.write_plan(folder, note | {"optimised": key})
+
+
+def _raise_if_cut_short(folder: Path) -> None:
+    """The optimum stands there, but the emergency brake has kept some starts from being searched."""
+    from sweep.optimise import read_survey
+
+    found = read_survey(folder / store.OPTIMUM)
+    if found is not None and found.ended == "time":
+        text = f"{folder}: {found.warnings[0]} searched; run again with a greater optimise.time_budget for all of them"
+        raise TimeUsedUp(text)
 
 
 def _front(study: Study, folder: Path, jobs: int) -> None:

@@ -88,7 +88,8 @@ class Result:
     ``multipliers`` are relative changes of the objective (of cos^2 of a pressure angle) per relative change of each
     active limit (of sin^2 of a pressure angle, of a margin itself; per width between the bounds of a variable), not
     negative but for equations.  ``status`` is OK, LIMIT_EXCEEDED (infeasible) or NOT_CONVERGED, and ``ended`` says how
-    the search ended: "converged", "stalled", "infeasible", "time" or "interrupted".
+    the search ended: "converged", "stalled", "infeasible", "looks", "time" or "interrupted".  ``basin`` numbers the
+    values that starts ended at, 1 for the best, 0 where infeasible; ``looks`` counts the evaluations.
     """
 
     start: int
@@ -104,6 +105,8 @@ class Result:
     status: int
     ended: str
     agree: int = 1
+    basin: int = 0
+    looks: int = 0
     caveat: str = CAVEAT
 
 

@@ -34,12 +34,12 @@ def optimum(
     ----------
     problem : in the parameters themselves
     signs : combinations of the parameters that are not varied, as ``[{"branch": 1.0}, {"branch": -1.0}]``
-    settings : number of starts, seed of the sample, time for each search
+    settings : the most starts of each search, seed of the sample, what ends a search earlier
     stop, jobs : as for ``minimise``
 
     Returns
     -------
-    Results as of ``minimise``, best first.  Same arguments, same results, unless time ran out.
+    Results as of ``minimise``, best first.  Same arguments, same results, unless it was stopped.
 
     Raises
     ------

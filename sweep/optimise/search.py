@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from kernels import status as st
 from sweep.families.base import Array
 from sweep.optimise.certificate import Result, in_words
 from sweep.optimise.descent import KKT, Descent
 from sweep.optimise.form import Program
-from sweep.optimise.model import State, Stopped
+from sweep.optimise.model import LooksUsedUp, State, Stopped
 from sweep.optimise.problem import Problem
 
+FIRST = 2  # looks that give a start its scale and its first design
 
-def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool]) -> Result:
+
+def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool], allowed: float = math.inf) -> Result:
     """Search from one start, on one BLAS thread: the systems are small, and the bits stay those of any other process.
 
     Parameters
@@ -23,26 +26,30 @@ def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool
     problem : what to minimise
     start : (P,) design
     asked : true ends the search with the best checked design so far; the first one is reached in any case
+    allowed : looks at designs after which it ends in the same way, wherever and however fast it runs
     """
     import scipy.optimize  # noqa: F401  (brings its own BLAS, which has to be there to be limited)
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, user_api="blas"):
         program = Program(problem)
-        descent = Descent(problem, program, start, _after_first(asked))
+        descent = Descent(problem, program, start, _after_first(asked), max(allowed, FIRST))
         ended = ""
         try:
             descent.run()
+        except LooksUsedUp:
+            ended = "looks"
         except Stopped:
             ended = "time"
         except KeyboardInterrupt:
             ended = "interrupted"
-        descent.model.stop = lambda: False
-        return _result(number, problem, program, descent, ended)
+        looks = descent.model.looks
+        descent.model.stop, descent.model.allowed = (lambda: False), math.inf
+        return replace(_result(number, problem, program, descent, ended), looks=looks)
 
 
 def _after_first(asked: Callable[[], bool]) -> Callable[[], bool]:
-    calls = iter(range(3))
+    calls = iter(range(FIRST + 1))
     return lambda: next(calls, None) is None and asked()
 
 

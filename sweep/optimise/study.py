@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +19,14 @@ from sweep.families.base import Angles, Array, Parameter
 from sweep.optimise.candidates import ranking
 from sweep.optimise.certificate import Result
 from sweep.optimise.coordinates import LocusCoordinates
+from sweep.optimise.filling import filled
 from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
 from sweep.optimise.sensitivity import sensitivities
-from sweep.optimise.solve import minimise
-from sweep.optimise.starts import best_rows, diverse, drawn
+from sweep.optimise.solve import Tell, explore
+from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn
+from sweep.optimise.survey import Survey
 from sweep.optimise.tolerance import tolerance_rows
 from sweep.optimise.written import certificates, outputs, write
 
@@ -113,28 +117,35 @@ def _prescribed(study: Study) -> tuple[Parameter, ...]:
 
 
 def problem_and_starts(study: Study, folder: Path) -> tuple[OptimiseSettings, Problem, Array]:
-    """Settings, problem and starts: the diverse best of the dataset, or of random designs where no row is feasible."""
+    """Settings, problem and starts: the diverse best of the dataset, filled up from samples where they are too few.
+
+    Where no row of the dataset is feasible, the first starts are the best of random designs.
+    """
     if study.optimise is None or study.objective is None:
         raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
-    count = study.optimise.starts
+    settings = study.optimise
+    count, seed = settings.starts, settings.seed
     designs, merit = best_rows(study.family, study.objective.output, folder)
     if len(designs):
         problem = problem_of(study, designs)
-    else:
-        designs = drawn(study, count, study.optimise.seed)
-        if not len(designs):
-            raise InputError(
-                "design space",
-                study.space.count,
-                "at least one design that [locus] and [fit] can make",
-                str(study.path),
-            )
-        problem = problem_of(study, designs)
-        merit = ranking(problem, designs)
-    return study.optimise, problem, diverse(problem, designs, merit, count)
+        return settings, problem, filled(study, problem, diverse(problem, designs, merit, count, ALIKE), count, seed)
+    designs = drawn(study, count, seed)
+    if not len(designs):
+        allowed = "at least one design that [locus] and [fit] can make"
+        raise InputError("design space", study.space.count, allowed, str(study.path))
+    problem = problem_of(study, designs)
+    # Half of them from the space itself: a sample of the problem's variables may miss what [locus] or [fit] makes.
+    own = diverse(problem, designs, ranking(problem, designs), -(-count // 2), ALIKE)
+    return settings, problem, filled(study, problem, own, count, seed)
 
 
-def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | None = None, jobs: int = 1) -> Path:
+def optimise_study(
+    study: Study,
+    folder: str | Path,
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+    tell: Tell | None = None,
+) -> Path:
     """Search from diverse best designs of the dataset and write the result beside it.
 
     Parameters
@@ -143,11 +154,13 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     folder : its dataset; where it has no feasible row, the starts come from a sample of the same bounds
     stop : asked often; true ends the search as Ctrl-C does
     jobs : processes the starts are spread over; the result does not depend on it
+    tell : called with the number of starts that are done and the most there will be
 
     Returns
     -------
-    Path of ``_optimum.parquet``; ``_curves.parquet``, ``_sensitivity.parquet`` and, where the study has tolerances,
-    ``_tolerance.parquet`` stand beside it.  Each is written as a whole or not at all.
+    Path of ``_optimum.parquet``, whose metadata hold what the starts tell of the search (:func:`read_survey`);
+    ``_curves.parquet``, ``_sensitivity.parquet`` and, where the study has tolerances, ``_tolerance.parquet`` stand
+    beside it.  Each is written as a whole or not at all.
 
     Raises
     ------
@@ -160,18 +173,32 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     """
     place = Path(folder)
     settings, problem, starts = problem_and_starts(study, place)
-    results = minimise(problem, starts, settings, stop, jobs)
+    results, found = explore(problem, starts, settings, stop, jobs, tell)
     frame = _table(study, problem, results)
-    write(place / store.OPTIMUM, frame, study)
+    about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}
+    write(place / store.OPTIMUM, frame, study, about=about)
     write(place / store.CURVES, _curves(study, frame), study)
     write(place / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
     if study.tolerance is None:
         (place / store.TOLERANCE).unlink(missing_ok=True)
     else:
         write(place / store.TOLERANCE, _by_role(study, frame, _tolerance), study)
-    if any(result.ended == "interrupted" for result in results) or (stop is not None and stop()):
+    if found.ended == "interrupted" or (stop is not None and stop()):
         raise KeyboardInterrupt
     return place / store.OPTIMUM
+
+
+def read_survey(path: Path) -> Survey | None:
+    """What the starts told of the search that a ``_optimum.parquet`` comes from; None where there is no such file."""
+    import pyarrow.parquet as pq
+
+    if not path.is_file():
+        return None
+    noted = (pq.read_schema(path).metadata or {}).get(b"search")
+    if noted is None:
+        return None
+    content = json.loads(noted)
+    return Survey(**content | {"kinds": tuple(tuple(kind) for kind in content["kinds"])})
 
 
 def _table(study: Study, problem: Problem, results: list[Result]) -> dict[str, Any]:
@@ -183,7 +210,7 @@ def _table(study: Study, problem: Problem, results: list[Result]) -> dict[str, A
         reference, violation = _reference(study, problem)
         designs = np.concatenate([designs, reference])
         status = st.OK if violation <= 1e-9 else st.LIMIT_EXCEEDED
-        last: tuple[Any, ...] = ("reference", -1, violation, np.nan, np.nan, "", "", 1, "", status)
+        last: tuple[Any, ...] = ("reference", -1, violation, np.nan, np.nan, "", "", 1, 0, "", 0, status)
         for name, value in zip(rows, last, strict=True):
             rows[name].append(value)
     columns: dict[str, Any] = {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}

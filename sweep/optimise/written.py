@@ -25,7 +25,9 @@ TEXTS = {
     "active": ("", "limits and bounds that hold the result back"),
     "relaxation": ("", "where infeasible: by how much each limit would have to give way, in its internal unit"),
     "agree": ("", "number of starts whose objective is within 1e-4 of the best; 1 for those that are not"),
-    "ended": ("", "converged, stalled, infeasible, time or interrupted"),
+    "basin": ("", "number of the value it ended at, 1 for the best, values within 1e-4 are one; 0 where infeasible"),
+    "ended": ("", "converged, stalled, infeasible, looks, time or interrupted"),
+    "looks": ("", "evaluations of designs by the search from this start"),
     "status": ("", "see kernels.status"),
     "parameter": ("", "dimension that changes"),
     "output": ("", "design output; its unit is that of _optimum.parquet"),
@@ -50,7 +52,9 @@ def certificates(results: list[Result]) -> dict[str, list[Any]]:
         "active": ["; ".join(r.active) for r in results],
         "relaxation": ["; ".join(f"{k} by {v:.6g}" for k, v in r.relaxation.items()) for r in results],
         "agree": [r.agree for r in results],
+        "basin": [r.basin for r in results],
         "ended": [r.ended for r in results],
+        "looks": [r.looks for r in results],
         "status": [r.status for r in results],
     }
 

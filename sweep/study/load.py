@@ -159,6 +159,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     speed = _quantity(scene.speed, "rad/s", ("scene", "speed"), faults)
     window = _window(scene, faults)
     time_budget = _quantity(search.time_budget, "s", ("optimise", "time_budget"), faults)
+    unseen = _share(search.unseen, ("optimise", "unseen"), faults)
     tolerance = _tolerance(_section(ToleranceSection, "tolerance", data, faults), data, faults)
     disk_bytes = _quantity(budget.disk, "B", ("budget", "disk"), faults)
     seconds = _quantity(budget.time, "s", ("budget", "time"), faults)
@@ -232,7 +233,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         objective=Objective(goal) if goal else None,
         accuracy=accuracy,
         window=window,
-        optimise=OptimiseSettings(search.starts, search.seed, time_budget, search.variables)
+        optimise=OptimiseSettings(search.starts, search.seed, time_budget, search.variables, unseen, search.looks)
         if "optimise" in data
         else None,
         pareto=pareto,
@@ -275,6 +276,14 @@ def _quantity(text: str | None, internal: str, key: Key, faults: Faults) -> floa
     if not value > 0.0:
         faults.value(key, text, f"a positive number; {units.example(internal)}")
     return value
+
+
+def _share(text: str, key: Key, faults: Faults) -> float:
+    """A text such as "2 %" as a share between 0 and 1, neither of them."""
+    share = _quantity(text, "1", key, faults)
+    if share is not None and not share < 1.0:
+        faults.value(key, text, 'a share below 100 %, as "2 %"')
+    return 0.5 if share is None else share
 
 
 def _tolerance(section: ToleranceSection, data: Mapping[str, Any], faults: Faults) -> Tolerance | None:

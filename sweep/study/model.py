@@ -136,6 +136,8 @@ class OptimiseSection(Section):
 
     starts: Annotated[int, Field(ge=1, le=100_000)] = Field(20, description="a whole number, 1 to 100000")
     seed: Seed = Field(0, description="a whole number, 0 or greater")
+    unseen: str = Field("2 %", description='a share as a text, as "2 %"')
+    looks: Annotated[int, Field(ge=100, le=10_000_000)] = Field(20_000, description="a whole number, 100 to 10000000")
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
     variables: Literal["parameters", "locus"] | None = Field(None, description='"parameters" or "locus"')
 
@@ -177,7 +179,7 @@ class BudgetSection(Section):
     """[budget]"""
 
     disk: str = Field("20 GB", description='a size as a text, as "20 GB"')
-    time: str = Field("1 h", description='a time as a text, as "1 h"')
+    time: str = Field("1 h", description='a time as a text, as "60 s"')
 
 
 class CurveTable(Section):
