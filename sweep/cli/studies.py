@@ -41,25 +41,18 @@ def run(
     same, bit for bit, with any number of workers.  The answer comes last; where no design keeps all limits, it says
     which of them have to give way, and the exit code is 4.
     """
-    from sweep.dataset.store import is_complete
-    from sweep.engine.run import default_folder
     from sweep.engine.run import run as run_study
-    from sweep.errors import TimeUsedUp
+    from sweep.errors import SearchCutShort
     from sweep.report.terminal import ending
-    from sweep.study import load_study
 
     proof = True if certify else None
-    model = load_study(study, smoke=smoke)
-    folder = default_folder(model, smoke) if out is None else out
-    late: TimeUsedUp | None = None
+    late: SearchCutShort | None = None
     try:
-        run_study(
-            model, folder, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
+        folder = run_study(
+            study, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
         )
-    except TimeUsedUp as error:
-        if not is_complete(folder):
-            raise
-        late = error
+    except SearchCutShort as error:
+        late, folder = error, error.folder
     found = ending(folder)
     for line in found.lines:
         click.echo(line)

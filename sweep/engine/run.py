@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from sweep.dataset import store
-from sweep.errors import InputError, Interrupted, StoreError, TimeUsedUp, WorkerDied, nearest
+from sweep.errors import InputError, Interrupted, SearchCutShort, StoreError, TimeUsedUp, WorkerDied, nearest
 from sweep.jobs.signals import Stop, stop_on_signal
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def run(
         raise InputError("jobs", jobs, "a whole number from 1", "run")
     model = _model(study, smoke, accuracy, certify)
     _check_budget(model, jobs, force)
-    folder = Path(out) if out is not None else default_folder(model, smoke)
+    folder = Path(out) if out is not None else Path("results", *(["smoke"] if smoke else []), model.name, "designs")
     with store.locked(folder):
         head = {"run": uuid.uuid4().hex[:12]}
         begin = time.monotonic()
@@ -97,11 +97,6 @@ def run(
             raise
         store.append_run(folder, head | _end(begin, "complete", f"{computed} chunks computed"))
     return folder
-
-
-def default_folder(study: Study, smoke: bool = False) -> Path:
-    """Where a study's dataset goes unless somebody says otherwise."""
-    return Path("results", *(["smoke"] if smoke else []), study.name, "designs")
 
 
 def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certify: bool | None) -> Study:
@@ -274,7 +269,7 @@ def _raise_if_cut_short(folder: Path) -> None:
     found = read_survey(folder / store.OPTIMUM)
     if found is not None and found.ended == "time":
         text = f"{folder}: {found.warnings[0]} searched; run again with a greater optimise.time_budget for all of them"
-        raise TimeUsedUp(text)
+        raise SearchCutShort(folder, text)
 
 
 def _front(study: Study, folder: Path, jobs: int) -> None:

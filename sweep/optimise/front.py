@@ -14,7 +14,7 @@ import numpy as np
 from kernels import status as st
 from sweep.chunks.cascade import MAGNITUDES
 from sweep.dataset import store
-from sweep.errors import InputError, TimeUsedUp
+from sweep.errors import InputError, SearchCutShort
 from sweep.families.base import Array
 from sweep.optimise.certificate import Result
 from sweep.optimise.pareto import Front, advance, steps
@@ -58,7 +58,7 @@ def front_study(
         if the folder cannot be written
     KeyboardInterrupt
         if the search was stopped, after the best so far was written
-    TimeUsedUp
+    SearchCutShort
         if ``pareto.time_budget`` stopped it, likewise.
     """
     if study.pareto is None:
@@ -80,7 +80,7 @@ def front_study(
     if not kept.complete:
         _write(path, study, settings, best, key, kept, "time")
         done = f"{kept.taken} of {len(steps(len(kept.bounds)))} steps of the front"
-        raise TimeUsedUp(f"{path}: time ran out: {done}; run again to continue the front")
+        raise SearchCutShort(place, f"{path}: time ran out: {done}; run again to continue the front")
     return path
 
 

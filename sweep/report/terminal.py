@@ -64,6 +64,8 @@ def ending(folder: Path) -> Ending:
     if data.front_steps is not None:
         lines.append(f"warning: time ran out: {data.front_steps} steps of the front")
     lines.append(f"next: sweep report {shlex.quote(str(folder))}")
+    # No-break spaces keep values with their units on a page; a shell's tools look for plain ones.
+    lines = [line.replace("\u00a0", " ") for line in lines]
     return Ending(tuple(lines), INFEASIBLE if missed else OK)
 
 
