@@ -19,10 +19,12 @@ from sweep.families.base import Angles, Array, Parameter
 from sweep.optimise.candidates import ranking
 from sweep.optimise.certificate import Result
 from sweep.optimise.coordinates import LocusCoordinates
-from sweep.optimise.filling import filled
+from sweep.optimise.filling import filled, kinds
 from sweep.optimise.form import Program
+from sweep.optimise.linear import NEEDED, elimination
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
+from sweep.optimise.proportions import from_proportions, widened
 from sweep.optimise.sensitivity import sensitivities
 from sweep.optimise.solve import Tell, explore
 from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study
 
 POSES = 720
+SWEPT = 6  # of so many starts one comes from the sweep where there is a global search
 WHOLE_TURN = 2.0 * np.pi - 1e-9
 TAILS = (2.0, 98.0)  # percent; beyond are needles that hardly moved and were scaled up to the stroke
 _DRAWN = re.compile(r"(pressure_angle|[xyz]_[a-z])\d*")
@@ -116,16 +119,23 @@ def _prescribed(study: Study) -> tuple[Parameter, ...]:
     return () if study.locus is None else study.locus.prescribed
 
 
-def problem_and_starts(study: Study, folder: Path) -> tuple[OptimiseSettings, Problem, Array]:
+def problem_and_starts(
+    study: Study, folder: Path, stop: Callable[[], bool] = lambda: False
+) -> tuple[OptimiseSettings, Problem, Array]:
     """Settings, problem and starts: the diverse best of the dataset, filled up from samples where they are too few.
 
-    Where no row of the dataset is feasible, the first starts are the best of random designs.
+    Where no row of the dataset is feasible, the first starts are the best of random designs.  With
+    ``optimise.global = "proportions"`` five of six starts come from the search over proportions instead; ``stop`` ends
+    it early.
     """
     if study.optimise is None or study.objective is None:
         raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
     settings = study.optimise
     count, seed = settings.starts, settings.seed
     designs, merit = best_rows(study.family, study.objective.output, folder)
+    if settings.globally == "proportions":
+        known = designs if len(designs) else drawn(study, count, seed)
+        return settings, *_from_proportions(study, settings, known, merit, stop)
     if len(designs):
         problem = problem_of(study, designs)
         return settings, problem, filled(study, problem, diverse(problem, designs, merit, count, ALIKE), count, seed)
@@ -137,6 +147,26 @@ def problem_and_starts(study: Study, folder: Path) -> tuple[OptimiseSettings, Pr
     # Half of them from the space itself: a sample of the problem's variables may miss what [locus] or [fit] makes.
     own = diverse(problem, designs, ranking(problem, designs), -(-count // 2), ALIKE)
     return settings, problem, filled(study, problem, own, count, seed)
+
+
+def _from_proportions(
+    study: Study, settings: OptimiseSettings, known: Array, merit: Array, stop: Callable[[], bool]
+) -> tuple[Problem, Array]:
+    """Problem and starts: those of the global search, before them a few of the sweep."""
+    count = settings.starts
+    problem = problem_of(study, known)
+    linear = elimination(problem)
+    if linear is None:
+        raise InputError("optimise.global", "proportions", NEEDED, str(study.path))
+    own = diverse(problem, known, merit, count // SWEPT, ALIKE) if len(merit) else known[:0]
+    found = from_proportions(linear, kinds(study, problem, own), count - len(own), settings.seed, stop)
+    starts = np.concatenate([own, found])
+    problem = widened(problem, found, [n for n in problem.variables if n in study.made])
+    if not len(starts):
+        raise InputError(
+            "design space", study.space.count, "proportions with which the mechanism turns", str(study.path)
+        )
+    return problem, starts
 
 
 def optimise_study(
@@ -172,7 +202,7 @@ def optimise_study(
         if the search was stopped, after the best so far was written.
     """
     place = Path(folder)
-    settings, problem, starts = problem_and_starts(study, place)
+    settings, problem, starts = problem_and_starts(study, place, stop or (lambda: False))
     results, found = explore(problem, starts, settings, stop, jobs, tell)
     frame = _table(study, problem, results)
     about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}

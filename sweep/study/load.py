@@ -190,6 +190,8 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     for name in [name for name in bounds or () if name in prescribed]:
         faults.value(("limits", name), (bounds or {})[name], "nothing here: [locus] prescribes it")
     limits = (*prescribed_limits(prescribed), *read_limits(family, bounds or {}, faults))
+    if search.globally == "proportions" and families != ("rssr", "guide"):
+        faults.value(("optimise", "global"), "proportions", '"none", or the chain ["rssr", "guide"]')
     if goal is not None:
         read_output_name(family, goal, ("objective", "minimise"), faults)
     pareto = None
@@ -233,7 +235,9 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         objective=Objective(goal) if goal else None,
         accuracy=accuracy,
         window=window,
-        optimise=OptimiseSettings(search.starts, search.seed, time_budget, search.variables, unseen, search.looks)
+        optimise=OptimiseSettings(
+            search.starts, search.seed, time_budget, search.variables, unseen, search.looks, search.globally
+        )
         if "optimise" in data
         else None,
         pareto=pareto,
@@ -276,6 +280,18 @@ def _quantity(text: str | None, internal: str, key: Key, faults: Faults) -> floa
     if not value > 0.0:
         faults.value(key, text, f"a positive number; {units.example(internal)}")
     return value
+
+
+def _search_settings(search: OptimiseSection, time_budget: float | None, unseen: float) -> OptimiseSettings:
+    return OptimiseSettings(
+        starts=search.starts,
+        seed=search.seed,
+        time_budget=time_budget,
+        variables=search.variables,
+        unseen=unseen,
+        looks=search.looks,
+        globally=search.globally,
+    )
 
 
 def _share(text: str, key: Key, faults: Faults) -> float:

@@ -140,6 +140,7 @@ class OptimiseSection(Section):
     looks: Annotated[int, Field(ge=100, le=10_000_000)] = Field(20_000, description="a whole number, 100 to 10000000")
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
     variables: Literal["parameters", "locus"] | None = Field(None, description='"parameters" or "locus"')
+    globally: Literal["none", "proportions"] = Field("none", alias="global", description='"none" or "proportions"')
 
 
 class ParetoSection(Section):

@@ -45,8 +45,9 @@ class OptimiseSettings:
 
     ``variables`` is "locus" for what [locus] prescribes, "parameters" for the links, None for what suits the study.
     ``unseen`` is the estimated share of unseen basins below which no more starts are made once the best basin was met
-    often enough; ``looks`` are the designs each start may look at.  ``time_budget`` [s] is an emergency brake: what it
-    stops says so, and no result that was not stopped depends on it.
+    often enough; ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from
+    evolution strategies over what is not linear.  ``time_budget`` [s] is an emergency brake: what it stops says so,
+    and no result that was not stopped depends on it.
     """
 
     starts: int = 20
@@ -55,6 +56,7 @@ class OptimiseSettings:
     variables: Literal["parameters", "locus"] | None = None
     unseen: float = 0.02
     looks: int = 20_000
+    globally: Literal["none", "proportions"] = "none"
 
 
 @dataclass(frozen=True)
