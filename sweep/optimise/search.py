@@ -8,9 +8,9 @@ from dataclasses import replace
 
 from kernels import status as st
 from sweep.families.base import Array
-from sweep.optimise.certificate import Result, in_words
+from sweep.optimise.certificate import Multipliers, Result, in_words, multipliers
 from sweep.optimise.descent import KKT, Descent
-from sweep.optimise.form import Program
+from sweep.optimise.form import Form, Program
 from sweep.optimise.model import LooksUsedUp, State, Stopped
 from sweep.optimise.problem import Problem
 
@@ -58,7 +58,10 @@ def _result(number: int, problem: Problem, program: Program, descent: Descent, e
     exists = math.isfinite(state.objective) and math.isfinite(state.violation)
     value = program.value(program.objective, state.form, descent.model.curves, state.design, state.atoms)
     residual, words = math.nan, {}
-    if exists:
+    if exists and not state.feasible and state.form.complete:
+        form, least = _of_relaxation(descent, state)
+        residual, words = least.residual, in_words(form.labels, least, problem.variables)
+    elif exists:
         found = descent.model.certificate(state)
         residual = found.residual
         size = abs(state.objective) or 1.0  # of the objective here, in units of the start's
@@ -78,6 +81,13 @@ def _result(number: int, problem: Problem, program: Program, descent: Descent, e
         kkt_residual=residual, active=tuple(words), multipliers=words, relaxation=_relaxation(program, values, state),
         values=values, status=status, ended=ended or how,
     )  # fmt: skip
+
+
+def _of_relaxation(descent: Descent, state: State) -> tuple[Form, Multipliers]:
+    """The elastic program at a design that misses its limits, and its multipliers."""
+    form = state.form.relaxed({"rotatable"})
+    jacobian = descent.model.jacobian(state.fractions, form, form.points)
+    return form, multipliers(form, form.rows(state.atoms, state.violation), jacobian, state.fractions)
 
 
 def _relaxation(program: Program, values: dict[str, float], state: State) -> dict[str, float]:

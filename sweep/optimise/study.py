@@ -19,16 +19,18 @@ from sweep.families.base import Angles, Array, Parameter
 from sweep.optimise.candidates import ranking
 from sweep.optimise.certificate import Result
 from sweep.optimise.coordinates import LocusCoordinates
+from sweep.optimise.discrete import listed, with_neighbours
 from sweep.optimise.filling import filled, kinds
 from sweep.optimise.form import Program
 from sweep.optimise.linear import NEEDED, elimination
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
 from sweep.optimise.proportions import from_proportions, widened
+from sweep.optimise.robust import robust, yields
 from sweep.optimise.sensitivity import sensitivities
 from sweep.optimise.solve import Tell, explore
 from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn
-from sweep.optimise.survey import Survey
+from sweep.optimise.survey import CUT, Survey
 from sweep.optimise.tolerance import tolerance_rows
 from sweep.optimise.written import certificates, outputs, write
 
@@ -47,7 +49,7 @@ def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Pr
 
     Swept steady parameters vary between the ends of their axes, those that [locus] or [fit] sets or scales as far as
     ``designs`` (k, P) reach and half their size beyond; limits on parameters narrow both.  An angle swept over a whole
-    turn may go on for half a turn.
+    turn may go on for half a turn.  Parameters given as lists of values are not varied: each start keeps its own.
 
     On the locus, what it prescribes is varied instead of the links: fixed values hold by construction, axes are bounds,
     limits on links stay limits.  Otherwise what is prescribed becomes limits: equations where it is fixed.
@@ -69,14 +71,21 @@ def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Pr
         LocusCoordinates(study.locus) if study.locus and (_wanted(study) if on_locus is None else on_locus) else None
     )
     follows, given = ((), ()) if coordinates is None else (coordinates.made, coordinates.given)
-    bounds = {name: _bounds(study, name, designs) for name in (*study.family.parameter_names, *given)}
+    chosen = listed(study)
+    bounds = {
+        name: None if name in chosen else _bounds(study, name, designs)
+        for name in (*study.family.parameter_names, *given)
+    }
     varied = {name: ends for name, ends in bounds.items() if ends is not None and name not in follows}
     held = {name: ends[0] for name, ends in varied.items() if ends[0] == ends[1]}
     names = tuple(name for name in varied if name not in held)
     own = [name for name in (*study.family.parameter_names, *given) if name not in follows]
     fixed = {name: abs(x) if name in given else x for name, x in study.space.fixed.items() if name in own}
     limits = [limit for limit in study.output_limits if limit.output not in given]
-    limits += [limit for limit in study.parameter_limits if limit.output in follows]
+    limits += [limit for limit in study.parameter_limits if limit.output in (*follows, *chosen)]
+    if not names:
+        allowed = "a parameter that changes steadily beside the listed ones; the sweep has tried them all"
+        raise InputError("optimise", ", ".join(chosen), allowed, str(study.path))
     return Problem(
         study.family, names, np.array([varied[n][0] for n in names]), np.array([varied[n][1] for n in names]),
         fixed | held, study.objective.output, tuple(limits), study.window, study.accuracy, coordinates,
@@ -204,7 +213,14 @@ def optimise_study(
     place = Path(folder)
     settings, problem, starts = problem_and_starts(study, place, stop or (lambda: False))
     results, found = explore(problem, starts, settings, stop, jobs, tell)
-    frame = _table(study, problem, results)
+    catalogue = listed(study)
+    if catalogue and found.ended not in CUT:
+        results = with_neighbours(problem, results, catalogue, settings, stop, jobs)
+    nominal = results[0]
+    if study.tolerance is not None and study.tolerance.robust is not None and found.ended not in CUT:
+        made = robust(problem, results, study.tolerance, settings, stop, jobs)
+        results = results if made is None else [made.result, *results]
+    frame = _table(study, problem, results, nominal)
     about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}
     write(place / store.OPTIMUM, frame, study, about=about)
     write(place / store.CURVES, _curves(study, frame), study)
@@ -231,10 +247,11 @@ def read_survey(path: Path) -> Survey | None:
     return Survey(**content | {"kinds": tuple(tuple(kind) for kind in content["kinds"])})
 
 
-def _table(study: Study, problem: Problem, results: list[Result]) -> dict[str, Any]:
-    """One row per start, best first, then the reference."""
+def _table(study: Study, problem: Problem, results: list[Result], nominal: Result) -> dict[str, Any]:
+    """One row per start, best first, then the reference; a robust design stands before the ``nominal`` best."""
     designs = np.array([r.design for r in results])
-    rows: dict[str, list[Any]] = {"role": ["optimum", *("start" for _ in results[1:])]}
+    roles = ["nominal" if r is nominal else "start" for r in results[1:]]
+    rows: dict[str, list[Any]] = {"role": ["optimum", *roles]}
     rows |= {"start": [r.start for r in results]} | certificates(results)
     if study.reference is not None:
         reference, violation = _reference(study, problem)
@@ -243,8 +260,17 @@ def _table(study: Study, problem: Problem, results: list[Result]) -> dict[str, A
         last: tuple[Any, ...] = ("reference", -1, violation, np.nan, np.nan, "", "", 1, 0, "", 0, status)
         for name, value in zip(rows, last, strict=True):
             rows[name].append(value)
+    if study.tolerance is not None:
+        shown = [k for k, role in enumerate(rows["role"]) if role != "start"]
+        share = np.full(len(designs), np.nan)
+        share[shown] = yields(problem, designs[shown], study.tolerance, _seed(study))
+        rows["yield"] = share.tolist()
     columns: dict[str, Any] = {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}
     return {"role": rows.pop("role"), "start": rows.pop("start")} | columns | outputs(study, designs) | rows
+
+
+def _seed(study: Study) -> int:
+    return 0 if study.optimise is None else study.optimise.seed
 
 
 def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
@@ -277,7 +303,7 @@ def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Arra
     """Rows about the optimum and about the reference, one below the other."""
     rows: dict[str, list[Any]] = {"role": []}
     for k, role in enumerate(table["role"]):
-        if role in ("optimum", "reference"):
+        if role != "start":
             own = rows_of(study, np.array([table[name][k] for name in study.family.parameter_names], np.float64))
             rows["role"] += [role] * len(own["output"])
             for name, values in own.items():

@@ -105,7 +105,8 @@ def survey(
     are drawn at random; ours are the best of samples, so the estimate says how much to expect from more of their kind.
     """
     whole = [r for r in results if r.ended not in CUT]
-    numbered = with_basins(whole)
+    # What was left after the first heat has not reached the bottom of any basin.
+    numbered = with_basins([r for r in whole if r.ended != "left"])
     met = Counter(r.basin for r in numbered if r.basin)
     n, w = sum(met.values()), len(met)
     best = _distinct(problem, starts, [r.start for r in numbered if r.basin == 1])

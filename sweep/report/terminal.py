@@ -57,6 +57,8 @@ def ending(folder: Path) -> Ending:
         found = read_survey(folder / store.OPTIMUM)
         if found is not None:
             lines.append(f"search: {started(found.starts)}, {found.words}")
+            kinds = [f"{words}: {started(n)}, {b} basin{'' if b == 1 else 's'}" for words, n, b in found.kinds]
+            lines += [f"signs: {'; '.join(kinds)}"] if kinds else []
             lines += [f"warning: {text}" for text in found.warnings]
     else:
         missed = feasible == 0
@@ -102,9 +104,13 @@ def _optimum(data: Dataset) -> list[str]:
     held = [f"{s.shown.words} ({s.bound})" for s in active]
     words = [w.strip() for w in str(data.optimum.get("active") or "").split(";")]
     held += [w for w in words if w.endswith(" bound") and w.split()[0] not in {s.shown.name for s in active}]
+    made = float(data.optimum.get("yield", math.nan))
+    asked = None if data.study.tolerance is None else data.study.tolerance.robust
+    wanted = f", {100.0 * asked:g} % asked" if asked is not None else ""
     return [
         f"optimum: {shown.words} {shown.show(value)}{f' ({fast})' if fast else ''}",
         f"held back by: {'; '.join(held) or 'nothing: an optimum in the open'}",
+        *([f"as it is made: {100.0 * made:.1f} % within all limits{wanted}"] if math.isfinite(made) else []),
     ]
 
 

@@ -38,7 +38,7 @@ from sweep.study.model import (
 )
 from sweep.study.pareto import read_pareto
 from sweep.study.prescribed import prescribed_limits, read_locus, read_prescribed
-from sweep.study.study import Budget, Objective, OptimiseSettings, OutputSettings, Study, Tolerance
+from sweep.study.study import Budget, Limit, Objective, OptimiseSettings, OutputSettings, Study, Tolerance
 
 if TYPE_CHECKING:
     from sweep.synthesis.fit import LineFit
@@ -204,10 +204,12 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     made = () if locus is None else locus.made
     space = None if design is None else read_space(family, design, faults, fitted, given, made, prescribed)
     if "optimise" in data and space is not None and fit is None and (locus is None or search.variables != "parameters"):
-        check_varied(family, space, faults)
+        check_varied(family, space, design or {}, faults)
     # The inputs of effects describe the scene: the reference design has the same unless it says otherwise.
     if space is not None:
         given |= {name: x for name, x in space.fixed.items() if name not in (*bare.parameter_names, *prescribed)}
+    if tolerance is not None:
+        _check_touched(family, tolerance, limits, faults)
     reference = None if reference_design is None else read_reference(family, reference_design, faults, given)
     _check_figures(report, faults)
     _check_curves(report, [*prescribed, *(name for name in design or () if name in family.parameter_names)], faults)
@@ -291,6 +293,7 @@ def _search_settings(search: OptimiseSection, time_budget: float | None, unseen:
         unseen=unseen,
         looks=search.looks,
         globally=search.globally,
+        finalists=search.finalists,
     )
 
 
@@ -311,7 +314,19 @@ def _tolerance(section: ToleranceSection, data: Mapping[str, Any], faults: Fault
         faults.missing(("tolerance", "lengths"), 'a length as "0.02 mm"; or angles, as "0.05 deg"', instead="angles")
     lengths = _quantity(section.lengths, "mm", ("tolerance", "lengths"), faults)
     angles = _quantity(section.angles, "rad", ("tolerance", "angles"), faults)
-    return Tolerance(lengths or 0.0, angles or 0.0)
+    share = None if section.robust is None else _share(section.robust, ("tolerance", "robust"), faults)
+    return Tolerance(lengths or 0.0, angles or 0.0, share)
+
+
+def _check_touched(family: Family, tolerance: Tolerance, limits: Sequence[Limit], faults: Faults) -> None:
+    """Report tolerances that change nothing, and a robust search for what no made mechanism can keep."""
+    for key, unit, size in (("lengths", "length", tolerance.lengths), ("angles", "angle", tolerance.angles)):
+        if size > 0.0 and not any(p.unit == unit and p.choices is None for p in family.parameters):
+            faults.value(("tolerance", key), size, f"nothing: {family.name} has no {key} that could deviate")
+    equal = [x.output for x in limits if x.minimum is not None and x.minimum == x.maximum]
+    if tolerance.robust is not None and equal:
+        words = 'limits with room, as swing = "40 +- 0.2 deg": no mechanism that is made keeps an equation'
+        faults.value(("tolerance", "robust"), ", ".join(equal), words)
 
 
 def _window(scene: SceneSection, faults: Faults) -> tuple[float, float] | None:

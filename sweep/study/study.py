@@ -46,8 +46,9 @@ class OptimiseSettings:
     ``variables`` is "locus" for what [locus] prescribes, "parameters" for the links, None for what suits the study.
     ``unseen`` is the estimated share of unseen basins below which no more starts are made once the best basin was met
     often enough; ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from
-    evolution strategies over what is not linear.  ``time_budget`` [s] is an emergency brake: what it stops says so,
-    and no result that was not stopped depends on it.
+    evolution strategies over what is not linear; ``finalists`` is the number of starts that go on after a first heat,
+    None for all.  ``time_budget`` [s] is an emergency brake: what it stops says so, and no result that was not stopped
+    depends on it.
     """
 
     starts: int = 20
@@ -57,6 +58,7 @@ class OptimiseSettings:
     unseen: float = 0.02
     looks: int = 20_000
     globally: Literal["none", "proportions"] = "none"
+    finalists: int | None = None
 
 
 @dataclass(frozen=True)
@@ -77,10 +79,14 @@ class ParetoSettings:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Manufacturing tolerances: +- of every length [mm] and of every angle [rad]; zero is exact."""
+    """Manufacturing tolerances: +- of every length [mm] and of every angle [rad]; zero is exact.
+
+    ``robust`` is the share of mechanisms within them that have to keep the limits; None asks it of the drawing alone.
+    """
 
     lengths: float = 0.0
     angles: float = 0.0
+    robust: float | None = None
 
 
 @dataclass(frozen=True)
@@ -193,7 +199,7 @@ class Study:
         if self.accuracy.certify:
             content["certify"] = self.accuracy.proven or True
         if self.tolerance is not None:
-            content["tolerance"] = asdict(self.tolerance)
+            content["tolerance"] = _without_none(asdict(self.tolerance), "robust")
         return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
 
