@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: bench-estimates bench-extrema bench-optimise help setup test lint types imports check smoke bench bench-effects bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-effects bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -24,6 +24,9 @@ setup: $(VENV)/ready  ## create the environment in .venv
 
 test: $(VENV)/ready  ## run the tests
 	$(BIN)/python -m pytest
+
+test-long: $(VENV)/ready  ## the tests that take minutes: thousands of hostile tables
+	$(BIN)/python -m pytest -m long
 
 lint: $(VENV)/ready  ## ruff
 	$(BIN)/ruff check .

@@ -15,6 +15,7 @@ Every kernel of the house is made by :func:`kernel`.  The options and why they a
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numba
@@ -24,8 +25,10 @@ from kernels._cache import kept
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _compiled(function: F, **options: Any) -> F:
-    return cast(F, kept(numba.njit(nogil=True, error_model="numpy", **options)(function)))
+def _compiled(function: F, fastmath: bool | set[str] = False, **options: Any) -> F:
+    # Flags must be said: a helper without them takes those of the kernel that happens to be compiled first, and keeps
+    # them in every other kernel, so the last bits of a result would depend on what was computed before it.
+    return cast(F, kept(numba.njit(nogil=True, error_model="numpy", fastmath=fastmath, **options)(function)))
 
 
 def kernel(function: F) -> F:
@@ -45,3 +48,17 @@ def inline(function: F) -> F:
     was measured to take a quarter of the time.
     """
     return _compiled(function, forceinline=True, no_cfunc_wrapper=True)
+
+
+def inline_fused(helper: F) -> F:
+    """The same helper again, for :func:`kernel_fused` loops: products and sums may be contracted in it too.
+
+    The flag belongs to the instructions of the function that was compiled, so a helper made by :func:`inline` keeps
+    its products and sums apart wherever it is folded in.
+    """
+    source = getattr(helper, "py_func", helper)
+    # The cache on disk tells functions by name and line: under one name the two would get each other's machine code.
+    name = f"{source.__name__}_fused"
+    copy = FunctionType(source.__code__, source.__globals__, name, source.__defaults__, source.__closure__)
+    copy.__qualname__, copy.__module__ = name, source.__module__
+    return cast(F, _compiled(copy, forceinline=True, no_cfunc_wrapper=True, fastmath={"contract"}))

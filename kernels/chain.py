@@ -25,6 +25,7 @@ def input_angle(kappa: Array, offset: Array, cos_psi: Array, sin_psi: Array, cos
     cos_phi, sin_phi : (n, m) out, input angle of the driven stage
     """
     for i in range(cos_psi.shape[0]):
+        # Once per design: the angle addition leaves no trigonometric call in the loop over poses.
         c0, s0 = np.cos(offset[i]), np.sin(offset[i])
         k = kappa[i]
         for j in range(cos_psi.shape[1]):
@@ -55,6 +56,7 @@ def chain_rule(
     for i in range(outer1.shape[0]):
         k = kappa[i]
         for j in range(outer1.shape[1]):
+            # outer1 is overwritten before outer2 and outer3 are formed from it, so its old value is kept in y.
             x, y = k * inner1[i, j], outer1[i, j]
             outer1[i, j] = x * y
             if inner2 is not None and outer2 is not None:

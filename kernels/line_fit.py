@@ -195,6 +195,18 @@ def _exchange(
     return False
 
 
+@inline
+def _couplers(b_x: Array, b_y: Array, c_x: Array, c_y: Array, bx: Array, by: Array, dx: Array, dy: Array) -> bool:
+    """Pin B and direction d of the coupler at every position; false if one of them is not assembled."""
+    good = True
+    for j in range(b_x.size):
+        bx[j], by[j] = b_x[j], b_y[j]
+        length = math.hypot(c_x[j] - bx[j], c_y[j] - by[j])
+        dx[j], dy[j] = (c_x[j] - bx[j]) / length, (c_y[j] - by[j]) / length
+        good = good and math.isfinite(dx[j]) and math.isfinite(dy[j])
+    return good
+
+
 @kernel
 def line_fit(
     b_x: Array,
@@ -236,14 +248,8 @@ def line_fit(
     x, a, y = np.empty(3), np.empty((3, 3)), np.empty(3)
     points = np.empty(4, np.int64)
     for i in range(b_x.shape[0]):
-        bad = False
-        for j in range(m):
-            bx[j], by[j] = b_x[i, j], b_y[i, j]
-            length = math.hypot(c_x[i, j] - bx[j], c_y[i, j] - by[j])
-            dx[j], dy[j] = (c_x[i, j] - bx[j]) / length, (c_y[i, j] - by[j]) / length
-            inside[j] = True
-            bad = bad or not (math.isfinite(dx[j]) and math.isfinite(dy[j]))
-        if bad:
+        inside[:] = True
+        if not _couplers(b_x[i], b_y[i], c_x[i], c_y[i], bx, by, dx, dy):
             xi[i], eta[i], h[i], deviation[i], travel[i] = math.nan, math.nan, math.nan, math.nan, math.nan
             status[i] = st.NOT_ASSEMBLED
             continue

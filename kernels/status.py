@@ -20,6 +20,8 @@ JAMMED = 10
 NOT_LINEAR = 11
 NO_DWELL = 12
 NOT_ADMISSIBLE = 13
+NO_ROOT = 14
+NO_EVENT = 15
 
 MEANING: dict[int, str] = {
     OK: "ok",
@@ -31,11 +33,13 @@ MEANING: dict[int, str] = {
     NOT_CONVERGED: "the accuracy asked for was not reached, by an iteration or because rounding is all there is",
     INVALID_INPUT: "a parameter is not finite, a length is not positive, an angle is beyond 1e5 rad, their scale is "
     "beyond float64, or they exclude each other (supports at one place, a collar no larger than its journal, nothing "
-    "that has inertia)",
+    "that has inertia, the life of a bearing that carries nothing)",
     SINGULAR: "the position is not defined (a joint lies on the axis it turns about)",
     NOT_OSCILLATING: "the follower turns fully: it has no limit positions",
     NOT_LINEAR: "the deflection is too large for the linearised equation; the number given solves that equation only",
     JAMMED: "friction blocks the motion, or its iteration does not contract; the crank all but stops within the turn",
     NO_DWELL: "the output does not make one turn per turn of the input: no dwell is defined",
+    NO_ROOT: "the equation that fixes the position has no root in its interval, or fewer than asked for",
+    NO_EVENT: "the event does not happen within the turn, or within the interval",
     NOT_ADMISSIBLE: "the point of the locus gives no mechanism that meets the requirement",
 }

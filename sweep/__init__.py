@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from sweep.engine.run import run
     from sweep.evaluation.poses import evaluate
     from sweep.evaluation.summaries import summarise
+    from sweep.families import machine
     from sweep.synthesis.mechanisms import synthesise
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "evaluate",
     "is_complete",
     "load",
+    "machine",
     "run",
     "summarise",
     "synthesise",
@@ -34,6 +36,7 @@ _HOMES = {
     "evaluate": "sweep.evaluation.poses",
     "is_complete": "sweep.dataset.store",
     "load": "sweep.dataset.store",
+    "machine": "sweep.families",
     "run": "sweep.engine.run",
     "summarise": "sweep.evaluation.summaries",
     "synthesise": "sweep.synthesis.mechanisms",

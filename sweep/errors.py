@@ -6,6 +6,8 @@ import difflib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+LONGEST = 200  # letters of a value in a message
+
 
 class LinksweepError(Exception):
     """Base of all errors raised on purpose; ``exit_code`` is what the command line ends with."""
@@ -26,10 +28,19 @@ class InputError(LinksweepError, ValueError):
 
     def __init__(self, name: str, value: object, allowed: str, place: str) -> None:
         self.name, self.value, self.allowed, self.place = name, value, allowed, place
-        super().__init__(f"{place}: {name} = {value!r}; allowed: {allowed}")
+        super().__init__(f"{place}: {name} = {shown(value)}; allowed: {allowed}")
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, object, str, str]]:
         return type(self), (self.name, self.value, self.allowed, self.place)
+
+
+def shown(value: object) -> str:
+    """A value as it stands in a message: its repr, cut short where it is long."""
+    try:
+        text = repr(value)
+    except ValueError:  # an int of thousands of digits, an object that cannot show itself
+        return f"something of type {type(value).__name__} that cannot be printed"
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
 
 
 class StudyError(LinksweepError, ValueError):

@@ -12,7 +12,7 @@ OUTPUTS = (
     Output("s", "length", "cos phi: the position"),
     Output("wave", "1", "cos 3phi + p cos 2phi + q cos phi + r"),
     Output("bowl", "1", "((p - 1)^2 + (q + 2)^2 + 1) cos phi"),
-    Output("dev", "length", "s^2 + p s + q"),
+    Output("dev", "length", "s^2 + p s + q", windowed=True),
     Output("swell", "length", "p sin phi"),
 )
 
@@ -47,6 +47,7 @@ FAMILY = Family(
         Parameter("branch", "sign", "without effect", default=1.0, choices=(-1.0, 1.0)),
     ),
     position="s",
+    outward="branch",
     pose_outputs=OUTPUTS,
     poses=poses,
     steps=(Step("bill", (Output("bill", "1", "exp p + q^2"),), bill, 1.0),),

@@ -40,7 +40,8 @@ def poses(designs, phi, *, function=rssr.poses):
     dtype = np.result_type(designs, phi)
     out = {name: np.empty(shape, dtype) for name in (*POSE_NAMES, *JOINT_NAMES)}
     status = np.empty(shape, np.uint8)
-    function(designs, np.cos(phi), np.sin(phi), status, *out.values())
+    values, joints = [out[name] for name in POSE_NAMES], rssr.Joints(*(out[name] for name in JOINT_NAMES))
+    function(designs, np.cos(phi), np.sin(phi), status, *values, joints)
     return out | {"status": status}
 
 

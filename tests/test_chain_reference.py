@@ -205,7 +205,7 @@ def gear(*, uses_phi=True, asked=None):
         title="gear pair",
         parameters=(Parameter("ratio", "ratio", "ratio"),),
         position="psi",
-        pose_outputs=tuple(Output(name, "1", name) for name in names),
+        pose_outputs=tuple(Output(name, "1", name, wraps=name == "psi") for name in names),
         poses=poses,
         derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
         uses_phi=uses_phi,

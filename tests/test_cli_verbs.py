@@ -79,7 +79,9 @@ def test_eval_gives_what_evaluate_gives(table: Path, tmp_path: Path, suffix: str
     np.testing.assert_array_equal(found.to_numpy(float), expected.to_numpy(float))  # every bit, through CSV too
 
 
-def test_eval_over_a_turn(table: Path) -> None:
+def test_eval_over_a_turn(tmp_path: Path) -> None:
+    table = tmp_path / "designs.csv"
+    DESIGNS[["k", "a"]].to_csv(table, index=False)
     result = call("eval", "geared_dwell", table, "--want", "psi", "--poses", 4)
     lines = result.output.splitlines()
     assert lines[0] == "design,phi,psi,status"
@@ -145,7 +147,7 @@ def test_bad_input_is_one_message_and_exit_code_2(tmp_path: Path, arguments: tup
 
 
 def test_unexpected_error_keeps_its_traceback(table: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("a bug")
 
     monkeypatch.setattr("sweep.evaluation.poses.evaluate", broken)

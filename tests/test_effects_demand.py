@@ -214,3 +214,17 @@ def test_a_scene_with_everything_on_keeps_its_memory():
     assert found.peak < 1500.0
     assert found.peak - found.before < 0.1 * found.before
     assert set(found.parts) == {placed.name for placed in applicable(family("rssr"))}
+
+
+def test_no_bit_of_a_design_output_depends_on_what_is_wanted_beside_it():
+    names = ["max_force_b", "max_abs_drive_torque", "max_abs_finger_couple", "range_psi", "phi_max_abs_drive_torque",
+             "rms_force_c", "rms_d2psi", "max_abs_drive_torque_friction", "mean_load_d1", "swing"]  # fmt: skip
+    full = extended(family("rssr"), names)
+    table = dict(zip(full.parameter_names, bench_designs(full, 40).T, strict=True))
+    together = sweep.summarise("rssr", table, names)
+    assert (together["status"] == st.OK).sum() > 20
+    for name in names:
+        alone = sweep.summarise("rssr", table, name)
+        known = (alone["status"] == st.OK) & (together["status"] == st.OK)
+        for column in (name, f"err_{name}"):
+            np.testing.assert_array_equal(alone[column][known], together[column][known], err_msg=column)

@@ -49,14 +49,14 @@ def test_extremes_beside_jumps_are_found(name, output):
         assert (err < 1e-7 * size).all()
 
 
-def test_the_mean_of_a_curve_with_jumps_says_how_well_it_is_known():
-    """It is given up early, with an error that holds; a smooth curve goes on to its target."""
+def test_the_mean_of_a_curve_with_jumps_is_found_to_its_target():
+    """Where the follower reverses, friction jumps: panels close in on that."""
     got, values = found_and_dense("rssp", "drive_torque_friction")
     exact = np.sqrt((values**2).mean(axis=1))
-    assert (got["status"] == st.NOT_CONVERGED).all()
-    miss = np.abs(got["rms_drive_torque_friction"] - exact)
-    assert (miss <= got["err_rms_drive_torque_friction"] + 1e-4 * exact).all()
-    assert (got["err_rms_drive_torque_friction"] < 1e-2 * exact).all()
+    assert (got["status"] == st.OK).all()
+    # The dense sum errs by a sample at each jump.
+    assert (np.abs(got["rms_drive_torque_friction"] - exact) <= 1e-4 * exact).all()
+    assert (got["err_rms_drive_torque_friction"] < 1.1e-8 * exact).all()
     smooth, values = found_and_dense("rssp", "drive_torque")
     assert (smooth["status"] == st.OK).all()
     np.testing.assert_allclose(smooth["rms_drive_torque"], np.sqrt((values**2).mean(axis=1)), rtol=1e-8)
@@ -64,7 +64,7 @@ def test_the_mean_of_a_curve_with_jumps_says_how_well_it_is_known():
 
 def test_without_brackets_a_jump_is_never_resolved(monkeypatch):
     """Negative control: it is the bracketing that ends the search."""
-    monkeypatch.setattr("sweep.reductions.extrema.BREAKING", 10**9)
+    monkeypatch.setattr("sweep.reductions.search.BREAKING", 10**9)
     got, _ = found_and_dense("rssp", "drive_torque_friction", count=1)
     assert got["status"][0] == st.NOT_CONVERGED
 
@@ -73,7 +73,7 @@ def test_a_smooth_curve_is_not_taken_for_one_that_jumps(monkeypatch):
     """A made-up family without jumps: the search gives the same whether it may look for them or not."""
     matrix = np.column_stack([np.linspace(-2.0, 2.0, 40), np.linspace(3.0, -3.0, 40), np.zeros(40), np.ones(40)])
     with_brackets = design_outputs(WAVES, matrix, ["max_wave", "max_abs_dev"], Accuracy(target=1e-10))
-    monkeypatch.setattr("sweep.reductions.extrema.BREAKING", 10**9)
+    monkeypatch.setattr("sweep.reductions.search.BREAKING", 10**9)
     without = design_outputs(WAVES, matrix, ["max_wave", "max_abs_dev"], Accuracy(target=1e-10))
     for name, values in without.items():
         assert np.array_equal(values, with_brackets[name]), name

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from kernels.families.rssr.margin import turning_status
+from kernels.verdict import turning_status
 from studies.accuracy import oracle, reference
 from sweep.families import family
 from sweep.families.base import Angles

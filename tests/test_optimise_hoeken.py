@@ -43,7 +43,7 @@ def hoeken(beta: float) -> Family:
             Parameter("h", "length", "height of the line"),
         ),
         position="s",
-        pose_outputs=(Output("s", "length", "along the line"), Output("dev", "length", "across it")),
+        pose_outputs=(Output("s", "length", "along the line"), Output("dev", "length", "across it", windowed=True)),
         poses=poses,
     )
 

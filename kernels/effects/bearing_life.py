@@ -57,20 +57,3 @@ def bearing_loads(
             if equivalent2 is not None:
                 on_second = thrust if bearings[i, 10] == 2.0 else 0.0
                 equivalent2[i, j] = good * equivalent_load(bearings, i, second, on_second)
-
-
-@kernel
-def mean_load(load: Array, dpsi: Array, exponent: Array, mean: Array, travel: Array) -> None:
-    """Load of equal effect over the cycle, P_m = (sum P^p |dpsi| / sum |dpsi|)^(1/p), and the travel of the rocker.
-
-    ``load``, ``dpsi`` (n, N) on a uniform grid of one turn; ``mean`` (n,) out; ``travel`` (n,) out, the integral of
-    |dpsi| over the turn [rad].
-    """
-    for i in range(load.shape[0]):
-        total, weight = 0.0, 0.0
-        for j in range(load.shape[1]):
-            way = abs(dpsi[i, j])
-            total += load[i, j] ** exponent[i] * way
-            weight += way
-        mean[i] = (total / weight) ** (1.0 / exponent[i])
-        travel[i] = 2.0 * math.pi * weight / load.shape[1]

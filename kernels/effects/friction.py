@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.effects.coupler import orientation
-from kernels.effects.kinetostatics import SPEED, inertia_loads, pose_status, solve, store_forces
-from kernels.joints import read
+from kernels.effects.coupler import Coupler, orientation
+from kernels.effects.kinetostatics import SPEED, Loads, inertia_loads, pose_status, solve, store_forces
+from kernels.joints import Joints, read
 from kernels.vectors import Vector, cross, dot, mix, norm, scale, sub
 
 Array = NDArray[np.float64]
@@ -121,79 +121,108 @@ def friction_loads(
             coupler = orientation(j, finger[i])
             code = pose_status(status[i, k], j, coupler)
             load = inertia_loads(j, coupler, bodies[i], drive[i, k if drive.shape[1] > 1 else 0])
-            turn_b = _unit(sub(load.omega2, load.omega1))
-            turn_c = _unit(sub(load.omega2, load.omega3))
             speed_a = drive[i, k if drive.shape[1] > 1 else 0, SPEED]
             speed_d = speed_a * j.dpsi
             # A rocker turns about k on two supports, a slider moves along tau on two shoes.
             axis = mix(j.turns, j.k, 1.0 - j.turns, j.tau)
-            unit_b, unit_c, unit_d = 0.0, 0.0, 0.0
-            for which in range(4):
-                e_b = scale(-unit_b if which == 1 else 0.0, turn_b)
-                e_c = scale(-unit_c if which == 2 else 0.0, turn_c)
-                r = solve(j, coupler, load, finger[i], e_b, e_c, unit_d if which == 3 else 0.0, 0.0)
-                store_forces(answers[which], 1.0, r)
-                answers[which, 18], answers[which, 19] = r.finger, r.drive
-                if which == 0:
-                    # Couples of the size that the largest force makes: a joint at rest at first may be loaded later.
-                    size = max(norm(r.r_b), max(norm(r.r_c), norm(r.r_d)))
-                    unit_b, unit_c = f.mu_b * f.r_b * size, f.mu_c * f.r_c * size
-                    unit_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, (size, size, size), speed_d)
-                else:
-                    for at in range(ANSWER):
-                        answers[which, at] -= answers[0, at]
-            x, y, z, size_b, size_c, t_d = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            dx0, dy0, dz0, last, least = 0.0, 0.0, 0.0, math.inf, math.inf
-            stalled, count, converged = 0, 0, False
-            while code == st.OK and not converged and count < PASSES and stalled < STALLED:
-                count += 1
-                _total(answers, x, y, z, total)
-                size_b = f.mu_b * f.r_b * norm((total[3], total[4], total[5]))
-                size_c = f.mu_c * f.r_c * norm((total[6], total[7], total[8]))
-                t_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, _guidance(total, axis, f), speed_d)
-                dx, dy, dz = _share(size_b, unit_b) - x, _share(size_c, unit_c) - y, _share(t_d, unit_d) - z
-                change = _largest_change(x, dx, y, dy, z, dz)
-                # The last digits wander: a change at rounding level is convergence, not a stall.
-                converged = change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last)
-                converged = converged and math.isfinite(dx + dy + dz)
-                last = change
-                # In proportion to themselves couples change less and less even while they grow without end.
-                step = max(abs(dx), max(abs(dy), abs(dz)))
-                stalled = 0 if step < least else stalled + 1
-                least = step
-                further = 1.0
-                if count % LEAP == 0 and not converged:
-                    further, least = _leap(dx * dx0 + dy * dy0 + dz * dz0, dx0 * dx0 + dy0 * dy0 + dz0 * dz0), math.inf
-                x, y, z = max(x + further * dx, 0.0), max(y + further * dy, 0.0), max(z + further * dz, 0.0)
-                dx0, dy0, dz0 = dx, dy, dz
-            if code == st.OK and not converged:
+            unit = _answers(j, coupler, load, finger[i], f, speed_d, answers)
+            at = _settled(code == st.OK, answers, f, axis, speed_d, unit, total)
+            if code == st.OK and not at.converged:
                 code = st.JAMMED
             status[i, k] = code
             good = 1.0 if code == st.OK else math.nan
             # The crank's bearing feeds nothing back: its torque follows from the reactions with the other three.
-            _total(answers, x, y, z, total)
+            _total(answers, at.x, at.y, at.z, total)
             moment_a = (total[12], total[13], total[14])
             on_a = supports((total[0], total[1], total[2]), moment_a, j.u, f.z_a1, f.z_a2)
             t_a = _shaft_torque(f.mu_a, f.r_a, f.rt_a, on_a, speed_a)
             if forces is not None:
-                for at in range(18):
-                    forces[i, k, at] = good * total[at]
-                for at in range(3):
-                    forces[i, k, 12 + at] -= t_a * j.u[at]
+                for n in range(18):
+                    forces[i, k, n] = good * total[n]
+                for n in range(3):
+                    forces[i, k, 12 + n] -= t_a * j.u[n]
             if couples is not None:
                 couples[i, k, 0] = good * total[18]
                 couples[i, k, 1] = good * (total[19] - t_a)
             if losses is not None:
                 on = _guidance(total, axis, f)
-                losses[i, k, 0], losses[i, k, 1] = good * t_a, good * t_d
-                losses[i, k, 2], losses[i, k, 3] = good * size_b, good * size_c
+                losses[i, k, 0], losses[i, k, 1] = good * t_a, good * at.t_d
+                losses[i, k, 2], losses[i, k, 3] = good * at.size_b, good * at.size_c
                 losses[i, k, 4], losses[i, k, 5] = good * on_a[0], good * on_a[1]
-                losses[i, k, 6], losses[i, k, 7], losses[i, k, 8] = good * on[0], good * on[1], good * count
+                losses[i, k, 6], losses[i, k, 7], losses[i, k, 8] = good * on[0], good * on[1], good * at.passes
             if contraction is not None:
                 known = code == st.OK or code == st.JAMMED
-                contraction[i, k] = (
-                    _contraction(answers, matrix, f, axis, unit_b, unit_c, unit_d) if known else math.nan
-                )
+                contraction[i, k] = _contraction(answers, matrix, f, axis, unit) if known else math.nan
+
+
+@inline
+def _answers(
+    j: Joints, coupler: Coupler, load: Loads, finger: float, f: Friction, speed_d: float, answers: Array
+) -> Vector:
+    """The reactions without friction and those to each of the three couples alone, whose sizes are returned."""
+    turn_b = _unit(sub(load.omega2, load.omega1))
+    turn_c = _unit(sub(load.omega2, load.omega3))
+    unit_b, unit_c, unit_d = 0.0, 0.0, 0.0
+    for which in range(4):
+        e_b = scale(-unit_b if which == 1 else 0.0, turn_b)
+        e_c = scale(-unit_c if which == 2 else 0.0, turn_c)
+        r = solve(j, coupler, load, finger, e_b, e_c, unit_d if which == 3 else 0.0, 0.0)
+        store_forces(answers[which], 1.0, r)
+        answers[which, 18], answers[which, 19] = r.finger, r.drive
+        if which == 0:
+            # Couples of the size that the largest force makes: a joint at rest at first may be loaded later.
+            size = max(norm(r.r_b), max(norm(r.r_c), norm(r.r_d)))
+            unit_b, unit_c = f.mu_b * f.r_b * size, f.mu_c * f.r_c * size
+            unit_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, (size, size, size), speed_d)
+        else:
+            for at in range(ANSWER):
+                answers[which, at] -= answers[0, at]
+    return unit_b, unit_c, unit_d
+
+
+class Couples(NamedTuple):
+    """Where the iteration ended: the couples of B, C and the guidance, first in units of their first guesses."""
+
+    x: float
+    y: float
+    z: float
+    size_b: float
+    size_c: float
+    t_d: float
+    passes: int
+    converged: bool
+
+
+@inline
+def _settled(
+    assembled: bool, answers: Array, f: Friction, axis: Vector, speed_d: float, unit: Vector, total: Array
+) -> Couples:
+    """Find the couples that make the reactions they follow from, by successive approximations."""
+    x, y, z, size_b, size_c, t_d = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    dx0, dy0, dz0, last, least = 0.0, 0.0, 0.0, math.inf, math.inf
+    stalled, count, converged = 0, 0, False
+    while assembled and not converged and count < PASSES and stalled < STALLED:
+        count += 1
+        _total(answers, x, y, z, total)
+        size_b = f.mu_b * f.r_b * norm((total[3], total[4], total[5]))
+        size_c = f.mu_c * f.r_c * norm((total[6], total[7], total[8]))
+        t_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, _guidance(total, axis, f), speed_d)
+        dx, dy, dz = _share(size_b, unit[0]) - x, _share(size_c, unit[1]) - y, _share(t_d, unit[2]) - z
+        change = _largest_change(x, dx, y, dy, z, dz)
+        # The last digits wander: a change at rounding level is convergence, not a stall.
+        converged = change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last)
+        converged = converged and math.isfinite(dx + dy + dz)
+        last = change
+        # In proportion to themselves couples change less and less even while they grow without end.
+        step = max(abs(dx), max(abs(dy), abs(dz)))
+        stalled = 0 if step < least else stalled + 1
+        least = step
+        further = 1.0
+        if count % LEAP == 0 and not converged:
+            further, least = _leap(dx * dx0 + dy * dy0 + dz * dz0, dx0 * dx0 + dy0 * dy0 + dz0 * dz0), math.inf
+        x, y, z = max(x + further * dx, 0.0), max(y + further * dy, 0.0), max(z + further * dz, 0.0)
+        dx0, dy0, dz0 = dx, dy, dz
+    return Couples(x, y, z, size_b, size_c, t_d, count, converged)
 
 
 @inline
@@ -215,10 +244,10 @@ def _guidance(total: Array, axis: Vector, f: Friction) -> tuple[float, float, fl
 
 
 @inline
-def _contraction(answers: Array, m: Array, f: Friction, axis: Vector, b: float, c: float, d: float) -> float:
+def _contraction(answers: Array, m: Array, f: Friction, axis: Vector, units: Vector) -> float:
     """Spectral radius of m = L, L_ij = mu_i r_i |d reaction_i / d couple_j|."""
     for which in range(3):
-        unit = abs(b) if which == 0 else (abs(c) if which == 1 else abs(d))
+        unit = abs(units[which])
         per = 1.0 / unit if unit > 0.0 else 0.0
         r = answers[which + 1]
         m[0, which] = per * f.mu_b * f.r_b * norm((r[3], r[4], r[5]))

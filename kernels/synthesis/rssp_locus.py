@@ -7,6 +7,7 @@ a circle; with the crank angle phi1 as its parameter e, s1, s2 and the two dista
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,13 +16,36 @@ from kernels.synthesis.acceptance import EPS, Array, Status, design_status, firs
 from kernels.synthesis.angles import PI, sine_cosine
 
 
+class Given(NamedTuple):
+    """What is prescribed of a slider-crank, or chosen beforehand."""
+
+    stroke: Any  # [length] signed from extended to folded
+    e: Any
+    f: Any
+    alpha: Any
+    sa: Any  # sin alpha
+    ca: Any
+    valid: bool
+
+
+class Limits(NamedTuple):
+    """The two limit positions found; v = sin phi."""
+
+    s1: Any
+    s2: Any
+    middle: Any  # (s1 + s2)/2
+    ahead: Any  # distance of the slider ball from the crank axis, extended
+    back: Any  # and folded, negative where the crank points away
+    v1: Any
+    v2: Any
+    point: bool  # whether they are defined
+
+
 @inline
-def _finish(
-    stroke: float, s1: float, s2: float, middle: float, e: float, f: float, alpha: float, sa: float, ca: float,
-    ahead: float, back: float, v1: float, v2: float, point: bool, valid: bool,
-    i: int, status: Status, failed: Status, designs: Array,
-) -> None:  # fmt: skip
-    """Crank and coupler of (11), (12), the tests (i)-(iii), and the row; ``middle`` = (s1 + s2)/2, v = sin phi."""
+def _finish(g: Given, at: Limits, i: int, status: Status, failed: Status, designs: Array) -> None:
+    """Crank and coupler of (11), (12), the tests (i)-(iii), and the row of the design."""
+    stroke, e, f, alpha, sa, ca, valid = g
+    s1, s2, middle, ahead, back, v1, v2, point = at
     branch = -1.0 if stroke.real > 0.0 else 1.0
     a = stroke * (f * sa - middle) / (ahead - back)
     radial, axial = ahead - a, s1 * sa - f
@@ -74,28 +98,24 @@ def rssp_on_locus(requirements: Array, status: Status, failed: Status, designs: 
         middle = 0.5 * per * (v1 * u2 + v2 * u1)
         valid = _valid(stroke, phi1, f, alpha) and abs(phi1.real) < 1e5 and 0.0 < phi0.real < 2.0 * PI
         point = abs(s0.real) > 4.0 * EPS
-        _finish(
-            stroke, start, end, middle, e, f, alpha, sa, ca, per * ca * u2, per * ca * u1, v1, v2, point, valid,
-            i, status, failed, designs,
-        )  # fmt: skip
+        at = Limits(start, end, middle, per * ca * u2, per * ca * u1, v1, v2, point)
+        _finish(Given(stroke, e, f, alpha, sa, ca, valid), at, i, status, failed, designs)
         if s1 is not None:
             s1[i] = start if status[i] == 0 else math.nan
 
 
 @inline
 def _between(
-    stroke: float, s1: float, s2: float, middle: float, e: float, f: float, alpha: float, sa: float, ca: float,
-    side: float, point: bool, valid: bool, i: int, status: Status, failed: Status, designs: Array,
+    g: Given, s1: float, s2: float, middle: float, side: float, point: bool,
+    i: int, status: Status, failed: Status, designs: Array,
 ) -> float:  # fmt: skip
     """Finish a slider-crank from its two limits; returns the crank angle phi1.  ``side`` is negative if phi0 is met."""
+    e, ca = g.e, g.ca
     y1, y2 = s1 * ca, s2 * ca
     rho1, rho2 = math.sqrt(e * e + y1 * y1), math.sqrt(e * e + y2 * y2)
     back = -rho2 if side < 0.0 else rho2
     point = point and rho1 > 0.0 and rho2 > 0.0
-    _finish(
-        stroke, s1, s2, middle, e, f, alpha, sa, ca, rho1, back, y1 / rho1, -y2 / rho2, point, valid,
-        i, status, failed, designs,
-    )  # fmt: skip
+    _finish(g, Limits(s1, s2, middle, rho1, back, y1 / rho1, -y2 / rho2, point), i, status, failed, designs)
     return math.atan2(y1, e) if status[i] == 0 else math.nan
 
 
@@ -135,9 +155,8 @@ def rssp_at_offset(
         valid = _valid(stroke, e, f, alpha) and 0.0 < phi0 < 2.0 * PI and root[i] * root[i] == 1.0
         point = inner >= 0.0 and abs(s0) > 4.0 * EPS
         side = (e * e + (ca * start) * (ca * end)) * c0 + e * ca * stroke * s0
-        place = _between(
-            stroke, start, end, middle, e, f, alpha, sa, ca, side, point, valid, i, status, failed, designs
-        )
+        g = Given(stroke, e, f, alpha, sa, ca, valid)
+        place = _between(g, start, end, middle, side, point, i, status, failed, designs)
         if s1 is not None:
             s1[i] = start if status[i] == 0 else math.nan
         if phi1 is not None:
@@ -164,9 +183,8 @@ def rssp_at_place(
         sa, ca = sine_cosine(alpha)
         s2 = s1 + stroke
         valid = _valid(stroke, e, f, alpha) and abs(s1) < 1e150
-        place = _between(
-            stroke, s1, s2, s1 + 0.5 * stroke, e, f, alpha, sa, ca, -1.0, True, valid, i, status, failed, designs
-        )
+        g = Given(stroke, e, f, alpha, sa, ca, valid)
+        place = _between(g, s1, s2, s1 + 0.5 * stroke, -1.0, True, i, status, failed, designs)
         if phi0 is not None:
             turn = math.atan2(e * ca * stroke, e * e + (s1 * ca) * (s2 * ca))
             phi0[i] = PI + turn if status[i] == 0 else math.nan

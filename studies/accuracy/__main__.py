@@ -80,7 +80,7 @@ def main() -> None:
     (out / "accuracy.md").write_text(page, encoding="utf-8")
     (out / "report.html").write_text(html(page, figures), encoding="utf-8")
     if not smoke:
-        publish(found, page, figures, ROOT)
+        publish(page, figures, ROOT)
     done(f"{out.relative_to(ROOT) if out.is_relative_to(ROOT) else out}/report.html")
 
 

@@ -86,7 +86,7 @@ def _picture(name: str, text: str) -> list[str]:
 
 
 def marks_table(marks: pd.DataFrame) -> list[str]:
-    """The marks: what was asked, what was measured, whether it was met; also for the README."""
+    """The marks: what was asked, what was measured, whether it was met."""
     rows = [[mark, asked, measured, "yes" if met else "**no**"] for mark, asked, measured, met in marks.to_numpy()]
     return pipe_table(["mark", "asked", "measured", "met"], rows)
 

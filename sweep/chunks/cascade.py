@@ -6,7 +6,6 @@ survivors wait before each route until there are enough of them, or until no mor
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -18,6 +17,8 @@ from numpy.typing import NDArray
 from kernels import status as codes
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array
+from sweep.families.chain import stages_of
+from sweep.quantities.names import by_magnitude, parts
 from sweep.synthesis.fit import NS_FIT, fit_line
 
 if TYPE_CHECKING:
@@ -34,7 +35,6 @@ CALL_SECONDS = 1e-3
 Number = TypeVar("Number", float, Array)
 
 # A clockwise and an anticlockwise follower of the same amplitude meet the same requirement.
-MAGNITUDES = ("swing", "stroke")
 
 # With these one output is missing or rough, the others are worth having where all rows are kept.
 PARTIAL = (
@@ -235,14 +235,14 @@ def _before_fit(study: Study, route: Route) -> bool:
     """Whether the route concerns only stages before the one that [fit] finishes."""
     if study.fit is None:
         return False
-    last = len(study.families)
-    numbers = [re.search(r"(\d+)$", name) for name in route.outputs]
-    return all(number is not None and int(number[1]) < last for number in numbers)
+    last = len(stages_of(study.bare))
+    numbers = [parts(name).stage for name in route.outputs]
+    return all(number and int(number) < last for number in numbers)
 
 
 def compared(name: str, values: Number) -> Number:
     """What limits and objectives compare: of a swing and a stroke the magnitude, of anything else the value itself."""
-    return abs(values) if name.rstrip("0123456789") in MAGNITUDES else values
+    return abs(values) if by_magnitude(name) else values
 
 
 def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:

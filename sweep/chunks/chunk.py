@@ -14,7 +14,8 @@ from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Array, Columns
-from sweep.reductions.catalogue import is_proven
+from sweep.quantities.names import error_of, is_flag
+from sweep.reductions.steps import is_proven
 from sweep.synthesis.fit import fit_line
 
 if TYPE_CHECKING:
@@ -47,8 +48,8 @@ def output_columns(study: Study) -> dict[str, str]:
     columns: dict[str, str] = {}
     for name in study.want:
         columns[name] = study.output.dtype
-        if study.accuracy.target is not None and not name.startswith("rotatable"):
-            columns[f"err_{name}"] = "float64" if is_proven(study.family, name, study.accuracy) else "float32"
+        if study.accuracy.target is not None and not is_flag(name):
+            columns[error_of(name)] = "float64" if is_proven(study.family, name, study.accuracy) else "float32"
     return columns
 
 

@@ -16,7 +16,8 @@ from sweep.chunks.cascade import BLOCK, CALL_SECONDS, Cascade, levels
 from sweep.chunks.chunk import output_columns, parameter_matrix, parameter_ns
 from sweep.evaluation.summaries import output
 from sweep.families.base import Array, Unit
-from sweep.reductions.catalogue import is_proven
+from sweep.quantities.names import is_error, without_error
+from sweep.reductions.steps import is_proven
 from sweep.sources import DIGESTS
 from sweep.study.units import internal_unit
 
@@ -38,7 +39,9 @@ PILOT_RUNS, PILOT_LENGTH = 32, 32
 PARAMETER_UNITS = {word: internal_unit(word) for word in get_args(Unit)}
 
 # The folders of the package whose sources decide values in a chunk.
-VALUES = frozenset(["families", "effects", "reductions", "evaluation", "synthesis", "study", "chunks"])
+VALUES = frozenset(
+    ["numerics", "families", "quantities", "effects", "reductions", "evaluation", "synthesis", "study", "chunks"]
+)
 
 # Sections of the study file that decide no value in a chunk.
 NOT_IN_CHUNKS = ("study", "optimise", "pareto", "tolerance", "reference", "budget", "report")
@@ -200,9 +203,9 @@ def error_words(study: Study, name: str) -> str:
 
 
 def _output_column(study: Study, name: str, dtype: str) -> Column:
-    plain = name.removeprefix("err_")
+    plain = without_error(name)
     definition = output(study.family, plain)
-    text = f"{error_words(study, plain)} of {definition.name}" if name.startswith("err_") else definition.text
+    text = f"{error_words(study, plain)} of {definition.name}" if is_error(name) else definition.text
     return Column(name, dtype, internal_unit(definition.unit), text, "output")
 
 

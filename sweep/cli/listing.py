@@ -11,8 +11,6 @@ import click
 if TYPE_CHECKING:
     from sweep.families.base import Family
 
-REDUCTIONS = ("max_abs_", "phi_max_abs_", "max_", "min_", "range_", "rms_")
-
 
 def family_names(text: str) -> str | list[str]:
     """``rssr`` is a family, ``rssr+guide`` or ``rssr,guide`` a chain of two."""
@@ -27,18 +25,57 @@ def families(name: str | None) -> None:
     from sweep.families import NAMES, family
 
     if name is None:
-        echo_columns([(known, family(known).title) for known in NAMES])
+        found = [family(known) for known in NAMES]
+        rows = [(entry.name, over(entry), entry.title, ", ".join(capability_words(entry))) for entry in found]
+        echo_columns([("family", "over", "", "can be asked for"), *rows])
         click.echo("\nchains: any of them in series, such as rssr+guide; `sweep families NAME` shows what one takes")
         return
     for line in describe(family(family_names(name))):
         click.echo(line)
 
 
+def over(family: Family) -> str:
+    """Over what a family is evaluated, in a word or two."""
+    domain = family.domain
+    return domain.kind if domain.kind != "interval" else f"interval of {domain.name}"
+
+
+def capability_words(family: Family) -> list[str]:
+    """What a family can be asked for besides its motion."""
+    from sweep.families.capabilities import (
+        Assembly,
+        CrankRockerLoop,
+        GuidedPoint,
+        JointRecords,
+        OutputLink,
+        Points,
+        PressureEllipse,
+    )
+
+    words = [
+        (Assembly, "rotatability"),
+        (JointRecords, "loads"),
+        (PressureEllipse, "pressure extrema"),
+        (CrankRockerLoop, "proofs"),
+        (GuidedPoint, "line fit"),
+        (Points, "points"),
+        (OutputLink, "tip"),
+    ]
+    return [word for kind, word in words if family.find(kind) is not None]
+
+
 def describe(family: Family) -> list[str]:
     """Parameters, pose outputs and design outputs of a family with their units, one per line."""
     from sweep.evaluation.summaries import output
+    from sweep.families.capabilities import Points
+    from sweep.quantities.reduction import prefixes
 
-    lines = [f"{family.name}: {family.title}", "", "parameters (one length unit throughout, angles in rad)"]
+    lines = [f"{family.name}: {family.title}", "", f"over: {over(family)}"]
+    if words := capability_words(family):
+        lines.append(f"can be asked for: {', '.join(words)}")
+    if points := [name for found in family.every(Points) for name in found.at]:
+        lines.append(f"points: {', '.join(points)}")
+    lines += ["", "parameters (one length unit throughout, angles in rad)"]
     parameters = []
     for p in family.parameters:
         notes = [p.sign] if p.sign else []
@@ -50,17 +87,25 @@ def describe(family: Family) -> list[str]:
     lines += aligned([(o.name, o.unit, o.text) for o in family.pose_outputs])
     lines += ["", "design outputs (sweep summarise, and [scene] want of a study)"]
     lines += aligned([(o.name, o.unit, o.text) for o in (output(family, n) for n in main_outputs(family))])
-    lines += [f"  and of any pose output x: {', '.join(f'{prefix}x' for prefix in REDUCTIONS)}"]
+    lines += [f"  and of any pose output x: {', '.join(f'{prefix}x' for prefix in prefixes(family.domain))}"]
     return lines
 
 
 def main_outputs(family: Family) -> list[str]:
     """Design outputs but for the reductions of every pose output, of which only those a designer asks for first."""
     from sweep.evaluation.summaries import output_names
+    from sweep.families.capabilities import Assembly
+    from sweep.families.members import Machine
+    from sweep.quantities.reduction import prefixes
 
-    general = {f"{prefix}{name}" for prefix in REDUCTIONS for name in family.pose_names}
-    first = {f"max_abs_{name}" for name in (*family.derivative_of.values(), "dev")}
-    first |= {f"max_{name}" for name in family.pose_names if name.startswith("pressure_angle")}
+    if isinstance(family, Machine):
+        members = [f"{m.name}.{name}" for m in family.members for name in main_outputs(m.family)]
+        between = [f"min_{r.outputs[0].name}" for r in family.relations] + [t.name for t in family.timings]
+        return [*members, *between]
+    general = {f"{prefix}{name}" for prefix in prefixes(family.domain) for name in family.pose_names}
+    first = {f"max_abs_{name}" for name in family.derivative_of.values()}
+    first |= {f"max_abs_{o.name}" for o in family.pose_outputs if o.windowed}
+    first |= {f"max_{loop.pressure_angle}" for loop in family.every(Assembly)}
     return [name for name in output_names(family) if name not in general or name in first]
 
 

@@ -129,9 +129,8 @@ def _effects(study: Study) -> list[str]:
     """The effects of the scene: what is computed, what is not, and which rules of negligibility hold."""
     from sweep.chunks.plan import spread_designs
     from sweep.effects.advice import findings, left_out, tree
-    from sweep.families import family as find_family
 
-    bare = find_family(study.families)
+    bare = study.bare
     out = left_out(bare, study.want)
     if not out and bare is study.family:
         return []

@@ -23,6 +23,10 @@ WANT = click.option(
 OUT = click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), help="A .parquet or .csv file; default: CSV to stdout."
 )
+KEEP = click.option(
+    "--keep", multiple=True, help="Columns of TABLE to repeat in the result, separated by commas; `all` for every one."
+)
+TEXT = click.option("--status-text", is_flag=True, help="Add a column that says in words what the status means.")
 
 
 @click.command("eval")
@@ -32,8 +36,18 @@ OUT = click.option(
 @click.option(
     "--poses", type=click.IntRange(min=1), help="Equally spaced crank angles over one turn, for every design."
 )
+@KEEP
+@TEXT
 @OUT
-def evaluate_table(family: str, table: Path, want: tuple[str, ...], poses: int | None, out: Path | None) -> None:
+def evaluate_table(
+    family: str,
+    table: Path,
+    want: tuple[str, ...],
+    poses: int | None,
+    keep: tuple[str, ...],
+    status_text: bool,
+    out: Path | None,
+) -> None:
     """Pose outputs of the designs in TABLE (.parquet or .csv), one row per pose.
 
     TABLE has a column for each parameter of FAMILY, in one length unit, ANGLES IN RAD, and a column phi (then each row
@@ -51,7 +65,10 @@ def evaluate_table(family: str, table: Path, want: tuple[str, ...], poses: int |
         raise InputError(
             "column", "phi", "a column phi [rad], or --poses N for N crank angles over the turn", str(table)
         )
-    write_table(evaluate(family_names(family), designs, wanted(want), phi), out)
+    if poses is not None and "phi" in designs.columns:
+        raise InputError("--poses", poses, f"either --poses or a column phi in {table}, not both", "command line")
+    names, chosen = family_names(family), kept(keep)
+    write_table(evaluate(names, designs, wanted(want), phi, keep=chosen, status_text=status_text), out)
 
 
 @click.command("summarise")
@@ -66,6 +83,8 @@ def evaluate_table(family: str, table: Path, want: tuple[str, ...], poses: int |
 @click.option(
     "--window", type=(float, float), help="Part of the stroke that max_abs_dev covers, two fractions such as 0 0.6."
 )
+@KEEP
+@TEXT
 @OUT
 def summarise_table(
     family: str,
@@ -75,6 +94,8 @@ def summarise_table(
     accuracy: float | None,
     certify: bool,
     window: tuple[float, float] | None,
+    keep: tuple[str, ...],
+    status_text: bool,
     out: Path | None,
 ) -> None:
     """Design outputs of the designs in TABLE (.parquet or .csv), one row per design.
@@ -87,7 +108,15 @@ def summarise_table(
 
     designs = read_table(table)
     found = summarise(
-        family_names(family), designs, wanted(want), samples=samples, accuracy=accuracy, certify=certify, window=window
+        family_names(family),
+        designs,
+        wanted(want),
+        samples=samples,
+        accuracy=accuracy,
+        certify=certify,
+        window=window,
+        keep=kept(keep),
+        status_text=status_text,
     )
     write_table(found, out)
 
@@ -96,6 +125,12 @@ def wanted(texts: tuple[str, ...]) -> list[str]:
     """Names out of ``--want x,y --want z``, without repetition."""
     names = [name.strip() for text in texts for name in text.split(",")]
     return list(dict.fromkeys(name for name in names if name))
+
+
+def kept(texts: tuple[str, ...]) -> bool | list[str]:
+    """What ``--keep`` asks for, as the argument ``keep`` of the API."""
+    names = wanted(texts)
+    return True if names == ["all"] else names
 
 
 def checked_format(out: Path | None) -> Path | None:
@@ -130,7 +165,7 @@ def read_table(path: Path) -> pd.DataFrame:
         return frame
     except InputError:
         raise
-    except (ValueError, OSError) as error:  # pyarrow derives all its complaints about content from these
+    except Exception as error:  # damaged metadata end in whatever pandas meets first
         raise InputError("table", path.name, f"readable {suffix[1:]} ({error})", str(path)) from error
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sweep.dataset import store
 from sweep.errors import InputError, StoreError
+from sweep.quantities.names import is_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -174,7 +175,7 @@ class _Rows:
             about = [json.loads(pq.read_metadata(part.path).metadata[store.METADATA]) for part in chunks]
             schema = pq.read_schema(chunks[0].path)
         self.stops = [chunk["stop"] for chunk in about]
-        self.columns = [name for name in schema.names if not name.startswith("err_")]
+        self.columns = [name for name in schema.names if not is_error(name)]
         self._chunks: Iterator[tuple[int, store.Part]] = iter(zip(self.stops, chunks, strict=True))
         self._rows: pd.DataFrame | None = None
         self._reached = 0

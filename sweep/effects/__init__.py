@@ -17,6 +17,9 @@ from sweep.effects.evaluation import effect_poses, on_own_columns, run_design
 from sweep.effects.placing import Placed, stages_of
 from sweep.families.base import Family, Output, Parameter, Step
 from sweep.families.chain import Chain
+from sweep.families.members import Machine
+from sweep.quantities.names import stem
+from sweep.quantities.reduction import reduced
 
 # Name of each effect's entry: module and constant.  A new effect is a kernel file, an entry file and its line here.
 _ENTRIES = {
@@ -41,8 +44,6 @@ _ENTRIES = {
 }
 NAMES = tuple(_ENTRIES)
 
-# Prefixes of the general reductions over the turn (sweep/reductions/catalogue.py): max_abs_force_d asks for force_d.
-_REDUCTIONS = ("phi_max_abs_", "max_abs_", "max_", "min_", "range_", "rms_", "")
 # In the stages behind the first, speed and acceleration are those of the first stage's crank.
 _FIRST_ONLY = ("speed", "speed_change")
 
@@ -67,14 +68,14 @@ def applicable(family: Family) -> tuple[Placed, ...]:
         Placed(entry, k, number, k == len(stages) - 1)
         for k, (stage, number) in enumerate(stages)
         for entry in map(effect, NAMES)
-        if stage.name in entry.families and not (k > 0 and entry.even_crank)
+        if entry.serves(stage) and not (k > 0 and entry.even_crank)
     ]
     return tuple(p for p in found if not p.entry.takes_load or len(_carriers(family, p)) == len(stages) - 1 - p.stage)
 
 
 def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
     """The effects that some wanted pose output, design output or reduction belongs to, in the order of the register."""
-    names = {name[len(prefix) :] for name in wanted for prefix in _REDUCTIONS if name.startswith(prefix)}
+    names = {about for name in wanted for about in reduced(name, family.domain)}  # max_abs_force_d asks for force_d
     return tuple(p for p in applicable(family) if not names.isdisjoint(o.name for o in p.outputs))
 
 
@@ -85,12 +86,14 @@ def _carriers(family: Family, placed: Placed) -> list[Placed]:
         Placed(entry, k, number, False)
         for k, (stage, number) in enumerate(stages)
         for entry in map(effect, NAMES)
-        if key and k > placed.stage and entry.key == key and stage.name in entry.families
+        if key and k > placed.stage and entry.key == key and entry.serves(stage)
     ]
 
 
 def input_names(family: Family) -> frozenset[str]:
     """Inputs of all effects that can be asked of a family, or of the stages of a chain."""
+    if isinstance(family, Machine):
+        return frozenset(f"{m.name}.{name}" for m in family.members for name in input_names(m.family))
     # Asked at every call of the reductions; it depends on nothing but the names of the stages.
     stages = tuple((stage.name, number) for stage, number in stages_of(family))
     if stages not in _INPUT_NAMES:
@@ -100,19 +103,24 @@ def input_names(family: Family) -> frozenset[str]:
 
 def offered(family: Family) -> tuple[Output, ...]:
     """Pose and design outputs of all effects that can be asked of a family, or of the stages of a chain."""
+    if isinstance(family, Machine):
+        return tuple(replace(o, name=f"{m.name}.{o.name}") for m in family.members for o in offered(m.family))
     return tuple(o for placed in applicable(family) for o in placed.outputs)
 
 
 def elsewhere(family: Family, name: str) -> str:
     """Words for an error: which effects have an output that this family, or this stage of a chain, cannot be asked."""
-    plain = {name[len(prefix) :] for prefix in _REDUCTIONS if name.startswith(prefix)}
+    if isinstance(family, Machine):
+        found = family.split(name)
+        return elsewhere(found[0].family, found[1]) if found else ""
+    plain = reduced(name, family.domain)
     if isinstance(family, Chain):
-        plain |= {n.removesuffix(number) for _, number in stages_of(family) for n in plain}
-    found = [entry for entry in map(effect, NAMES) if not plain.isdisjoint(o.name for o in Placed(entry).outputs)]
-    if not found:
+        plain |= {stem(about) for about in plain}
+    others = [entry for entry in map(effect, NAMES) if not plain.isdisjoint(o.name for o in Placed(entry).outputs)]
+    if not others:
         return ""
-    words = ", ".join(f"{entry.name} ({', '.join(entry.families)})" for entry in found)
-    first = isinstance(family, Chain) and all(entry.even_crank for entry in found)
+    words = ", ".join(f"{entry.name} ({', '.join(entry.families)})" for entry in others)
+    first = isinstance(family, Chain) and all(entry.even_crank for entry in others)
     even = " at the first stage of a chain only" if first else ""
     return f"; {name} is an output of the effects{even}, families in brackets: {words}"
 
@@ -123,7 +131,23 @@ def extended(family: Family, wanted: Iterable[str]) -> Family:
     The inputs of the effects become further parameters, after the family's own.  In a chain an effect belongs to a
     stage, and its inputs and outputs carry the stage's number.
     """
+    if isinstance(family, Machine):
+        asked = _asked(family, wanted)
+        found = {m.name: extended(m.family, [own for own in map(m.own, asked) if own]) for m in family.members}
+        same = all(found[m.name] is m.family for m in family.members)
+        return family if same else family.with_families(found)
     return with_effects(family, called_for(family, wanted))
+
+
+def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
+    """Dotted names that wanted names are about, those behind relations included."""
+    names = {about for name in wanted for about in reduced(name, machine.domain)}
+    places = [place for timing in machine.timings if timing.name in names for place in timing.places]
+    names |= {about for name in places for about in reduced(name, machine.domain)}
+    for relation in machine.relations:
+        if not names.isdisjoint(o.name for o in relation.outputs):
+            names |= relation.needs
+    return names
 
 
 def with_effects(family: Family, effects: tuple[Placed, ...]) -> Family:

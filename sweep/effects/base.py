@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.joints import PER_DESIGN, PER_POSE
 from sweep.effects.measured import COSTS
+from sweep.families import NAMES as FAMILY_NAMES
+from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.chain import drive
+from sweep.families.capabilities import JointRecords
+from sweep.families.chain import drive, driving_names
 
 UNMEASURED = (0.0, 0.0)
 
@@ -60,16 +63,21 @@ class Scene:
     @cached_property
     def motion(self) -> Columns:
         """Pose outputs of the family that the joint records are made of."""
-        return self.family.poses(self.designs, self.angles, frozenset(self.family.joint_needs))
+        return self.family.poses(self.designs, self.angles, frozenset(self._joints.needs))
 
     @cached_property
     def records(self) -> tuple[Array, Array]:
         """Joint records per pose (n, m, PER_POSE) and per design (n, PER_DESIGN); see :mod:`kernels.joints`."""
-        if self.family.joints is None:
-            raise TypeError(f"{self.family.name} has no joint records")
         per_pose, per_design = np.empty((*self.shape, PER_POSE)), np.empty((len(self.designs), PER_DESIGN))
-        self.family.joints(self.designs, self.angles, self.motion, per_pose, per_design)
+        self._joints.fill(self.designs, self.angles, self.motion, per_pose, per_design)
         return per_pose, per_design
+
+    @cached_property
+    def _joints(self) -> JointRecords:
+        joints = self.family.find(JointRecords)
+        if joints is None:
+            raise TypeError(f"{self.family.name} has no joint records")
+        return joints
 
     @cached_property
     def driven(self) -> Scene | None:
@@ -77,10 +85,9 @@ class Scene:
         if not self.after:
             return None
         following, *rest = self.after
-        names = {"psi"} if following.family.uses_phi else {"cos_psi", "sin_psi"}
-        names &= set(self.family.pose_names)
-        turn = self.family.poses(self.designs, self.angles, frozenset(names or {"psi"}))
-        angles = drive(turn, following.kappa, following.offset)
+        names = frozenset(driving_names(self.family, following.family))
+        turn = self.family.poses(self.designs, self.angles, names)
+        angles = drive(turn, self.family.position, following.kappa, following.offset)
         return Scene(following.family, following.designs, angles, following.inputs, tuple(rest), self)
 
     def stage(self, index: int) -> Scene:
@@ -94,9 +101,11 @@ class Scene:
     @cached_property
     def gear(self) -> tuple[Array, Array]:
         """First and second derivative of the next stage's crank angle with respect to this stage's, (n, m)."""
-        turn = self.family.poses(self.designs, self.angles, frozenset({"dpsi", "d2psi"}))
+        rate = self.family.derivative_of[self.family.position]
+        names = rate, self.family.derivative_of[rate]
+        turn = self.family.poses(self.designs, self.angles, frozenset(names))
         kappa = self.after[0].kappa[:, None]
-        first, second = (kappa * np.asarray(turn[name], np.float64) for name in ("dpsi", "d2psi"))
+        first, second = (kappa * np.asarray(turn[name], np.float64) for name in names)
         return first, second
 
     @cached_property
@@ -138,6 +147,16 @@ class Scene:
         given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
         return Scene(self.family, self.designs[rows], angles, given, after)
 
+    def posed(self, rows: Rows, phi: Array) -> Scene:
+        """Some of the designs, each as often as wanted, at crank angles (k, m) of their own."""
+        given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
+        return Scene(self.family, self.designs[rows], Angles.of(phi), given, after)
+
+    def precise(self) -> Scene:
+        """The same scene with the most accurate poses that its families have."""
+        after = tuple(d._replace(family=d.family.precise()) for d in self.after)
+        return Scene(self.family.precise(), self.designs, self.angles, self.inputs, after)
+
     def on_grid(self, size: int) -> Scene:
         """The same designs at ``size`` equidistant crank angles of one turn: what a whole-turn effect samples."""
         angles = Angles.of(2.0 * np.pi * np.arange(size)[None] / size)
@@ -153,11 +172,13 @@ class DesignResult:
     """Outputs an effect gives per design instead of per pose: a whole-turn effect's, or a closed form.
 
     ``run(scene, wanted, accuracy)`` gets a scene of a single crank angle, whose ``on_grid`` makes whole turns; it
-    returns the wanted outputs, perhaps their ``err_``, and ``status``.
+    returns the wanted outputs, perhaps their ``err_``, and ``status``.  ``block`` is how many designs it gets at once:
+    few where it needs hundreds of poses of each, more where it asks for a few poses many times.
     """
 
     outputs: tuple[Output, ...]
     run: DesignFunction
+    block: int = 32
 
 
 @dataclass(frozen=True)
@@ -189,8 +210,9 @@ class Effect:
     ``whole_turn`` effects couple different crank angles: they sample the turn themselves, whatever is asked for.
     ``even_crank`` effects presume a crank that turns evenly, so they are no effects of a chain's later stages.
     ``takes_load`` is the key of the effect that hands back the load of a chain's later stages; without it their load
-    does not enter.  ``advise(scene)`` applies the effect's rule of negligibility to some designs over a turn; None
-    where none turns.
+    does not enter.  ``requires`` is the capability that a family must have, ``followers`` are the kinds of
+    follower that the effect is made for.  ``advise(scene)`` applies the effect's rule of negligibility to some designs
+    over a turn; None where none turns.
     """
 
     key: str
@@ -198,7 +220,6 @@ class Effect:
     title: str
     equation: str
     formulas: tuple[str, ...]
-    families: tuple[str, ...]
     needs: tuple[str, ...]
     inputs: tuple[Parameter, ...]
     outputs: tuple[Output, ...]
@@ -210,6 +231,19 @@ class Effect:
     takes_load: str = ""
     design_result: DesignResult | None = None
     advise: AdviceFunction | None = None
+    requires: type = JointRecords
+    followers: tuple[str, ...] = ("rocker", "slider")
+
+    def serves(self, family: Family) -> bool:
+        """Whether the family has what the effect requires, with a kind of follower that it is made for."""
+        joints = family.find(JointRecords)
+        follows = joints is None or joints.follower in self.followers
+        return family.find(self.requires) is not None and follows
+
+    @cached_property
+    def families(self) -> tuple[str, ...]:
+        """Names of the register's families that it serves."""
+        return tuple(name for name in FAMILY_NAMES if self.serves(find_family(name)))
 
     @property
     def ns_per_pose(self) -> float:

@@ -140,7 +140,7 @@ def _effect(
         title=title,
         equation=EQUATION,
         formulas=FORMULAS,
-        families=("rssr", "guide"),
+        followers=("rocker",),
         needs=("pressure",),
         inputs=inputs,
         outputs=results,

@@ -82,7 +82,6 @@ EFFECT = Effect(
     title="motion of a coupler point, orientation and rates of the coupler",
     equation=EQUATION,
     formulas=FORMULAS,
-    families=("rssr", "rssp", "guide"),
     needs=(),
     inputs=INPUTS,
     outputs=OUTPUTS,

@@ -105,16 +105,17 @@ def run_design(
     accuracy: Accuracy,
 ) -> Columns:
     """Design outputs of an effect, block by block."""
-    assert placed.entry.design_result is not None
+    whole_turn = placed.entry.design_result
+    assert whole_turn is not None
     bare = np.ascontiguousarray(designs[:, :own])
     given = input_columns(inputs, designs, own)
     names = frozenset(placed.own[name] for name in wanted)
     at_rest = Angles.of(np.zeros((1, 1)))
     parts = []
-    for start in range(0, max(len(bare), 1), TURNS):
-        rows = slice(start, start + TURNS)
+    for start in range(0, max(len(bare), 1), whole_turn.block):
+        rows = slice(start, start + whole_turn.block)
         scene = first_scene(family, bare[rows], at_rest, {n: x[rows] for n, x in given.items()})
-        parts.append(placed.entry.design_result.run(scene, names, accuracy))
+        parts.append(whole_turn.run(scene, names, accuracy))
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     columns: Columns = {"status": whole["status"]}
     for name in wanted:

@@ -138,7 +138,7 @@ def _effect(kind: loads.Follower) -> Effect:
         title=f"friction of ball joints, crank shaft and {kind.name} by successive approximations",
         equation=EQUATION,
         formulas=FORMULAS,
-        families=kind.families,
+        followers=(kind.name,),
         needs=(f"{kind.prefix}kinetostatics",),
         inputs=(*kind.parameters, *_data(kind)),
         outputs=_outputs(kind),

@@ -179,7 +179,7 @@ def _effect(kind: loads.Follower) -> Effect:
         title=f"joint reactions of crank, coupler and {kind.name}, finger couple, driving torque, reduced inertia",
         equation=EQUATION,
         formulas=FORMULAS,
-        families=kind.families,
+        followers=(kind.name,),
         needs=("coupler",),
         inputs=kind.parameters,
         outputs=_outputs(kind.name),

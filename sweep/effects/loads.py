@@ -7,6 +7,7 @@ from typing import NamedTuple
 from sweep.effects.base import Scene
 from sweep.effects.coupler import CONSTRUCTION
 from sweep.families.base import Parameter
+from sweep.families.capabilities import JointRecords
 
 _FRAMES = {
     "crank": "along the crank, tangential, along its axis, from A",
@@ -53,22 +54,22 @@ class Follower(NamedTuple):
 
     name: str
     prefix: str  # of the names of its effects
-    families: tuple[str, ...]
     load: Parameter
     bodies: tuple[str, ...]  # columns of kernels.effects.kinetostatics in order
     parameters: tuple[Parameter, ...]
 
 
-def _follower(name: str, prefix: str, families: tuple[str, ...], load: Parameter) -> Follower:
+def _follower(name: str, prefix: str, load: Parameter) -> Follower:
     bodies = (*_body("crank"), *_body("coupler"), *_body(name), *GRAVITY)
     parameters = (*bodies, load, SPEED, CHANGE, CONSTRUCTION)
-    return Follower(name, prefix, families, load, tuple(p.name for p in bodies), parameters)
+    return Follower(name, prefix, load, tuple(p.name for p in bodies), parameters)
 
 
-ROCKER = _follower("rocker", "", ("rssr", "guide"), _TORQUE)
-SLIDER = _follower("slider", "slider_", ("rssp",), _FORCE)
+ROCKER = _follower("rocker", "", _TORQUE)
+SLIDER = _follower("slider", "slider_", _FORCE)
 
 
 def follower(scene: Scene) -> Follower:
     """The kind of follower of a scene's family."""
-    return SLIDER if scene.family.name in SLIDER.families else ROCKER
+    joints = scene.family.find(JointRecords)
+    return SLIDER if joints is not None and joints.follower == SLIDER.name else ROCKER

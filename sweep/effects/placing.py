@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 from sweep.effects.base import Driven, Effect, Scene
 from sweep.families.base import Angles, Array, Family, Output
 from sweep.families.chain import Chain
+from sweep.quantities.names import at_stage
 
 
 @dataclass(frozen=True)
@@ -49,9 +50,7 @@ class Placed:
     def _numbered(self, outputs: tuple[Output, ...]) -> tuple[Output, ...]:
         if not self.number:
             return outputs
-        numbered = tuple(
-            replace(o, name=f"{o.name}{self.number}", text=f"stage {self.number}: {o.text}") for o in outputs
-        )
+        numbered = tuple(o.of_stage(int(self.number)) for o in outputs)
         return (*numbered, *outputs) if self.last else numbered
 
 
@@ -75,7 +74,7 @@ def first_scene(family: Family, designs: Array, angles: Angles, given: dict[str,
     parts = []
     for stage in family.stages:
         number = str(stage.number)
-        own = {name.removesuffix(number): x for name, x in given.items() if name.endswith(number)}
+        own = {plain: x for name, x in given.items() if (plain := at_stage(name, number))}
         parts.append((stage.family, stage.designs(designs), own | crank))
     after = tuple(
         Driven(bare, matrix, designs[:, stage.kappa], designs[:, stage.offset], own)

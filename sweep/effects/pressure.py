@@ -49,7 +49,6 @@ EFFECT = Effect(
     title="direction of the coupler force: radial, axial and crank-side pressure angles",
     equation=EQUATION,
     formulas=FORMULAS,
-    families=("rssr", "rssp", "guide"),
     needs=(),
     inputs=(),
     outputs=OUTPUTS,

@@ -8,6 +8,7 @@ from kernels.effects.pressure_extrema import pressure_extrema
 from sweep.effects.base import DesignResult, Effect, Scene, no_poses
 from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Columns, Output
+from sweep.families.capabilities import PressureEllipse
 
 EQUATION = "P1 (1)-(3)"
 FORMULAS = (
@@ -39,12 +40,13 @@ ERROR = 1e-14
 
 def extrema(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Wanted extrema and status, each (n,)."""
-    if scene.family.ellipse is None:
+    ellipse = scene.family.find(PressureEllipse)
+    if ellipse is None:
         raise TypeError(f"{scene.family.name} has no ellipse of the coupler direction")
     n = len(scene.designs)
     status, count = np.empty(n, np.uint8), np.empty(n)
     phi, theta, highest, lowest = (np.empty((n, 4)) for _ in range(4))
-    pressure_extrema(scene.family.ellipse(scene.designs), status, count, phi, theta, highest, lowest)
+    pressure_extrema(ellipse.curve(scene.designs), status, count, phi, theta, highest, lowest)
     columns: Columns = {"pressure_extrema": count, "err_pressure_extrema": 0.0 * count}
     for name, values in zip(_ANGLES, np.hstack([highest, lowest]).T, strict=True):
         columns |= {name: values, f"err_{name}": ERROR / np.cos(highest[:, 0])}
@@ -57,7 +59,6 @@ EFFECT = Effect(
     title="all extrema of the pressure angle over the turn, in closed form",
     equation=EQUATION,
     formulas=FORMULAS,
-    families=("rssr", "rssp", "guide"),
     needs=(),
     inputs=(),
     outputs=(),
@@ -65,5 +66,6 @@ EFFECT = Effect(
     called_for="transmission constraints that need more than the largest pressure angle (margin, max_pressure_angle)",
     negligible="never as a guard near dead points; the largest angle alone is cheaper from the margin",
     even_crank=True,
+    requires=PressureEllipse,
     design_result=DesignResult(OUTPUTS, extrema),
 )

@@ -99,7 +99,7 @@ def _effect(kind: loads.Follower) -> Effect:
         title="fluctuation of the crank speed at constant mean speed",
         equation=EQUATION,
         formulas=FORMULAS,
-        families=kind.families,
+        followers=(kind.name,),
         needs=(f"{kind.prefix}kinetostatics",),
         inputs=(*kind.parameters, FLYWHEEL),
         outputs=OUTPUTS,

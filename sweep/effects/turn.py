@@ -11,6 +11,8 @@ from kernels import status as st
 from kernels.turn_series import turn_extremes
 from sweep.effects.base import Scene, Status, take_over
 from sweep.families.base import Array, Columns, Output
+from sweep.families.domain import Turn
+from sweep.quantities.reduction import REDUCTIONS
 
 RESOLVED = 1e-9
 
@@ -57,23 +59,9 @@ def per_turn(
     return chosen(columns, wanted, status)
 
 
-_TEXTS = {
-    "max": "largest value over one turn of",
-    "min": "smallest value over one turn of",
-    "max_abs": "largest magnitude over one turn of",
-    "phi_max_abs": "crank angle of the largest magnitude of",
-    "range": "largest minus smallest value over one turn of",
-    "rms": "root mean square over one turn of",
-}
-
-
 def reduction_outputs(outputs: Sequence[Output]) -> tuple[Output, ...]:
     """The reductions over the turn of these pose outputs, as design outputs of the effect itself."""
-    return tuple(
-        Output(f"{base}_{o.name}", "rad" if base == "phi_max_abs" else o.unit, f"{text} {o.name}: {o.text}", o.equation)
-        for o in outputs
-        for base, text in _TEXTS.items()
-    )
+    return tuple(reduction.output(o, Turn()) for o in outputs for reduction in REDUCTIONS)
 
 
 def reductions(name: str, values: Array, status: Status) -> Columns:
@@ -95,6 +83,8 @@ def reductions(name: str, values: Array, status: Status) -> Columns:
         "max_abs": (size, err),
         # The slope's zero is as sharp as the square root of the value's error.
         "phi_max_abs": (np.where(upward, phi_largest, phi_least), np.full(n, np.sqrt(RESOLVED))),
+        "phi_max": (phi_largest, np.full(n, np.sqrt(RESOLVED))),
+        "phi_min": (phi_least, np.full(n, np.sqrt(RESOLVED))),
         "range": (largest - least, 2.0 * err),
         "rms": (rms, err),
     }

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sweep.errors import BudgetError
+from sweep.quantities.names import is_error, is_flag
 from sweep.study.study import Study
 
 # With no survivor in the pilot, this share is assumed.
@@ -68,9 +69,9 @@ def estimate(study: Study, jobs: int) -> Estimate:
     designs = study.space.count
     kept = 1.0 if study.output.keep == "all" else max(found.feasible, LEAST_KEPT)
     results = sum(
-        np.dtype(column.dtype).itemsize * (PACKED_ERROR if column.name.startswith("err_") else PACKED_RESULT)
+        np.dtype(column.dtype).itemsize * (PACKED_ERROR if is_error(column.name) else PACKED_RESULT)
         for column in describe_columns(study)
-        if column.role == "output" and not column.name.startswith("rotatable")
+        if column.role == "output" and not is_flag(column.name)
     )
     sampled = len(study.space.axes) * SAMPLED_VALUE_BYTES if study.space.kind == "sobol" else 0.0
     chunks = -(-designs // chunk_size)
@@ -102,7 +103,7 @@ def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
     of `sweep.summarise` is left out.
     """
     from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
-    from sweep.reductions.catalogue import certified_names
+    from sweep.reductions.steps import certified_names
     from sweep.study.load import study_from_data, with_accuracy
 
     target, samples = study.accuracy.target, study.accuracy.samples

@@ -6,13 +6,16 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sweep.effects import elsewhere, extended, input_names, offered
 from sweep.errors import InputError, nearest
-from sweep.evaluation.tables import design_matrix, numbers, wanted_names
+from sweep.evaluation.statuses import explained, meanings
+from sweep.evaluation.tables import design_matrix, kept_columns, numbers, wanted_names
+from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Family
+from sweep.families.domain import TWO_PI, March
 from sweep.reductions.catalogue import output_names
 
 if TYPE_CHECKING:
@@ -22,22 +25,33 @@ if TYPE_CHECKING:
 
 
 def evaluate(
-    family: str | Sequence[str], table: Table, want: str | Sequence[str], phi: ArrayLike | None = None
+    family: Mechanism,
+    table: Table,
+    want: str | Sequence[str],
+    phi: ArrayLike | None = None,
+    *,
+    keep: bool | str | Sequence[str] = False,
+    status_text: bool = False,
 ) -> pd.DataFrame:
     """Pose outputs of mechanisms at given crank angles, one row per pose, in the order of the input.
 
     Parameters
     ----------
-    family : "rssr", "guide", ... or a list of them for a chain
+    family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1
     want : names of pose outputs (see ``sweep families``)
-    phi : crank angles [rad]; without it the table must have a column ``phi``
+    phi : crank angles [rad], one or a plain list of them, for every design; without it the table must have a column
+        ``phi``, and with it none.  A family over an interval takes values of its own variable here, or in a column of
+        that name; one whose poses depend on those before takes equal steps of one turn from 0, in order
+    keep : columns of the table that the result repeats in front: names, or True for all of them
+    status_text : add a column ``status_text``, the meaning of ``status`` in words
 
     Returns
     -------
     DataFrame
-        the wanted columns and ``status``; with ``phi=`` preceded by ``design`` (row of the table) and ``phi``,
-        otherwise indexed like the table.  Where a value is nan, ``status`` says why (see :mod:`kernels.status`).
+        the wanted columns and ``status``; with ``phi=`` preceded by ``design`` (row of the table, from 0) and ``phi``.
+        Each row has the index label of its design.  Where a value is nan, ``status`` says why (see
+        :mod:`kernels.status`).
 
     Raises
     ------
@@ -49,22 +63,66 @@ def evaluate(
     bare = find_family(family).precise()
     mechanism = extended(bare, wanted_names(want, f"pose outputs of {bare.name}"))
     wanted = pose_wants(mechanism, want)
-    extra = () if phi is not None else ("phi",)
+    variable = mechanism.domain.name
+    extra = () if phi is not None else (variable,)
     matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))
+    index = table.index if isinstance(table, pd.DataFrame) else None
     if phi is None:
-        if "phi" not in extras:
-            raise InputError("phi", None, "a column phi, or the argument phi=", f"table of {mechanism.name}")
-        columns = mechanism.poses(matrix, Angles.of(np.ascontiguousarray(extras["phi"])[:, None]), frozenset(wanted))
-        index = table.index if isinstance(table, pd.DataFrame) else None
-        return pd.DataFrame({name: columns[name].ravel() for name in [*wanted, "status"]}, index=index)
+        _refuse_single_poses(mechanism)
+        if variable not in extras:
+            allowed = f"a column {variable}, or the argument phi="
+            raise InputError(variable, None, allowed, f"table of {mechanism.name}")
+        angles, head, repeats = np.ascontiguousarray(extras[variable])[:, None], {}, 1
+    else:
+        if variable in map(str, table):
+            allowed = f"either phi= for every design, or a column {variable}, not both"
+            raise InputError(variable, "a column", allowed, f"table of {mechanism.name}")
+        grid = _values_of_the_variable(phi)
+        _check_march(mechanism, grid)
+        angles, repeats = grid[None, :], grid.size
+        head = {"design": np.repeat(np.arange(len(matrix)), repeats), variable: np.tile(grid, len(matrix))}
+        index = None if index is None else index.repeat(repeats)
+    with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+        columns = explained(mechanism.poses(matrix, Angles.of(angles), frozenset(wanted)), wanted)
+    made = head | {name: columns[name].ravel() for name in [*wanted, "status"]}
+    if status_text:
+        made["status_text"] = np.array(meanings(made["status"]), dtype=object)
+    result = pd.DataFrame(made, index=index)
+    kept = kept_columns(table, keep, made, len(matrix))
+    if not kept:
+        return result
+    input_columns = pd.DataFrame(kept).loc[np.repeat(np.arange(len(matrix)), repeats)].set_axis(result.index)
+    return pd.concat([input_columns, result], axis=1)
 
-    grid = np.atleast_1d(numbers(phi, "phi", "phi, position")).ravel()
+
+def _values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
+    """The argument phi= as a plain array."""
+    grid = numbers(phi, "phi", "phi, position")
+    if grid.ndim > 1:
+        raise InputError("phi", f"shape {grid.shape}", "one angle, or a plain list of angles for every design", "phi")
+    grid = np.atleast_1d(grid)
     if not np.isfinite(grid).all():
         position = int(np.argmin(np.isfinite(grid)))
         raise InputError("phi", float(grid[position]), "a finite number", f"phi, position {position}")
-    columns = mechanism.poses(matrix, Angles.of(grid[None, :]), frozenset(wanted))
-    head = {"design": np.repeat(np.arange(len(matrix)), grid.size), "phi": np.tile(grid, len(matrix))}
-    return pd.DataFrame(head | {name: columns[name].ravel() for name in [*wanted, "status"]})
+    return grid
+
+
+def _refuse_single_poses(mechanism: Family) -> None:
+    if isinstance(mechanism.domain, March):
+        allowed = "the argument phi=, equal steps of one turn from 0: a pose depends on those before it"
+        raise InputError("phi", "a column", allowed, f"table of {mechanism.name}")
+
+
+def _check_march(mechanism: Family, grid: NDArray[np.float64]) -> None:
+    """Refuse crank angles that are no march over one turn."""
+    if not isinstance(mechanism.domain, March):
+        return
+    steps = np.arange(grid.size) * (TWO_PI / grid.size)
+    off = np.abs(grid - steps) > 1e-12 * TWO_PI
+    if off.any():
+        k = int(np.argmax(off))
+        allowed = f"equal steps of one turn from 0, here {steps[k]:.6g}: a pose depends on those before it"
+        raise InputError("phi", float(grid[k]), allowed, f"phi, position {k}")
 
 
 def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:

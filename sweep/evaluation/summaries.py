@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,24 +12,21 @@ from numpy.typing import NDArray
 from kernels import status as st
 from sweep.effects import extended, input_names
 from sweep.errors import InputError
-from sweep.evaluation.tables import design_matrix, wanted_names
+from sweep.evaluation.route import Part, Route
+from sweep.evaluation.routes import routes
+from sweep.evaluation.statuses import explained, meanings
+from sweep.evaluation.tables import design_matrix, kept_columns, wanted_names
+from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Accuracy, Array, Columns, Family, Step
-from sweep.families.chain import Stage
-from sweep.reductions.catalogue import (
-    applying_step,
-    check_certifiable,
-    general_way,
-    is_position,
-    output,
-    output_names,
-    proofs,
-)
+from sweep.families.base import Accuracy, Array, Columns, Family
+from sweep.families.domain import Domain, Interval, March
+from sweep.quantities.names import error_of
+from sweep.reductions.catalogue import check_certifiable, output, output_names
+from sweep.reductions.closing import on_closed_turn
 from sweep.reductions.margins import margin_suffixes
-from sweep.reductions.means import mean_squares
-from sweep.reductions.refine import precise_maxima
-from sweep.reductions.sampling import TWO_PI, Index
-from sweep.reductions.turn import Group, group_ns, limits_and_reductions, margin_group
+from sweep.reductions.sampling import Index
+from sweep.reductions.steps import proofs
+from sweep.reductions.turn import margin_group
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["Route", "design_outputs", "output", "output_names", "routes", "summarise"]
 
 DEFAULT_TARGET = 1e-8
+DEFAULT_SAMPLES = 720  # of a march, which no accuracy can be asked of
 FINEST_TARGET = 1e-14
 MOST_SAMPLES = 2**20
 FEWEST_SAMPLES = 8
@@ -47,30 +44,12 @@ FEWEST_SAMPLES = 8
 # With these some outputs are missing or rough, the others are worth having.
 PARTIAL = (
     st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
+    st.NO_EVENT,
 )  # fmt: skip
 
 
-class Route(NamedTuple):
-    """Some design outputs that are computed together, by what, and an estimate of the cost [ns per design]."""
-
-    name: str
-    outputs: tuple[str, ...]
-    ns_per_design: float
-
-
-@dataclass(frozen=True)
-class _Job:
-    """A route and how to run it: a step (of a chain's first stage, perhaps), or the general reductions."""
-
-    name: str
-    group: Group | Step
-    stage: Stage | None
-    outputs: tuple[str, ...]
-    ns_per_design: float
-
-
 def summarise(
-    family: str | Sequence[str],
+    family: Mechanism,
     table: Table,
     want: str | Sequence[str],
     *,
@@ -78,22 +57,27 @@ def summarise(
     accuracy: float | None = None,
     certify: bool | Sequence[str] = False,
     window: tuple[float, float] | None = None,
+    keep: bool | str | Sequence[str] = False,
+    status_text: bool = False,
 ) -> pd.DataFrame:
     """Design outputs of mechanisms, one row per design, in the order of the input.
 
     Parameters
     ----------
-    family : "rssr", "guide", ... or a list of them for a chain
+    family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad], and per input of the effects that
         ``want`` calls for; missing ``branch`` means +1
     want : names of design outputs: ``rotatable``, ``margin``, ``stroke``, ``max_abs_d2s`` ... (see ``sweep families``),
         ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``)
     samples : extrema on a dense grid of so many crank angles
-    accuracy : true extrema, refined to this relative error; 1e-8 if neither is given
+    accuracy : true extrema, refined to this relative error; 1e-8 if neither is given.  A family whose poses depend on
+        those before (a march) has no true extrema: 720 samples if neither is given
     certify : prove that no peak of the wanted maxima was missed, or of those named (docs/extrema.md, section 5); their
         ``err_`` are then bounds instead of estimates
     window : ``max_abs_dev`` and the other reductions of ``dev`` count only poses whose position lies between these
         fractions of the stroke, measured from its smallest position; default the whole turn
+    keep : columns of the table that the result repeats in front: names, or True for all of them
+    status_text : add a column ``status_text``, the meaning of ``status`` in words
 
     Returns
     -------
@@ -114,14 +98,17 @@ def summarise(
     wanted = wanted_names(want, f"design outputs of {bare.name}")
     mechanism = extended(bare, wanted)
     wanted = [name for name in wanted if name != "status"]
-    chosen = _accuracy(samples, accuracy, certify)
+    chosen = _accuracy(mechanism.domain, samples, accuracy, certify)
     if certify:
         check_certifiable(mechanism, wanted, chosen)
     matrix, _ = design_matrix(mechanism, table, unused=input_names(bare))
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
-    errors = [f"err_{name}" for name in wanted] if chosen.target is not None else []
+    errors = [error_of(name) for name in wanted] if chosen.target is not None else []
     index = table.index if isinstance(table, pd.DataFrame) else None
-    return pd.DataFrame({name: columns[name] for name in [*wanted, *errors, "status"]}, index=index)
+    made: dict[str, Any] = {name: columns[name] for name in [*wanted, *errors, "status"]}
+    if status_text:
+        made["status_text"] = np.array(meanings(columns["status"]), dtype=object)
+    return pd.DataFrame(kept_columns(table, keep, made, len(matrix)) | made, index=index)
 
 
 def design_outputs(
@@ -129,7 +116,7 @@ def design_outputs(
     designs: Array,
     wanted: Sequence[str],
     accuracy: Accuracy,
-    window: tuple[float, float] | None = None,
+    window: Part = None,
 ) -> Columns:
     """Design outputs of a design matrix, cheapest first; what does not turn is left out of the dear ones.
 
@@ -153,111 +140,30 @@ def design_outputs(
         for an unknown name, or a window that is no part of the stroke.
     """
     _check_window(window)
+    family = on_closed_turn(family)
     n = len(designs)
     status = np.zeros(n, np.uint8)
     columns: Columns = {}
-    jobs = _jobs(family, wanted, accuracy)
-    kinds = {job.group for job in jobs if not isinstance(job.group, Step)}
+    ways = routes(family, wanted, accuracy)
+    kinds = {route.general for route in ways if route.general}
     if accuracy.samples is not None and kinds and "margin" not in kinds and margin_suffixes(family):
         # Refinement meets a dead point between samples, a plain grid does not.
         status = margin_group(family, designs, (), accuracy)["status"].astype(np.uint8)
-    for job in jobs:
+    for route in ways:
+        assert route.run is not None
         # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
         alive = np.flatnonzero(np.isin(status, PARTIAL))
-        found = _run(family, job, designs[alive], accuracy, window)
-        for name in job.outputs:
-            for key in (name, f"err_{name}") if accuracy.target is not None else (name,):
+        with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+            found = route.run(designs[alive], accuracy, window)
+        for name in route.outputs:
+            for key in (name, error_of(name)) if accuracy.target is not None else (name,):
                 columns[key] = _spread(found[key], alive, n)
         now = found["status"].astype(np.uint8)
         status[alive] = np.where(status[alive] == st.OK, now, status[alive])
-    return {name: columns[name] for name in dict.fromkeys(_with_errors(wanted, accuracy))} | {"status": status}
-
-
-def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
-    """What will be computed and how, cheapest first; each route's outputs can be asked of `design_outputs` alone.
-
-    Raises
-    ------
-    InputError
-        for an unknown name.
-    """
-    return tuple(Route(job.name, job.outputs, job.ns_per_design) for job in _jobs(family, wanted, accuracy))
-
-
-def _jobs(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> list[_Job]:
-    steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
-    groups: dict[tuple[Group, str], list[str]] = {}
-    ways = {name: (applying_step(family, name, accuracy), general_way(family, name)) for name in dict.fromkeys(wanted)}
-    # The margin of a whole chain asks all stages: a first one judged by itself would take its designs from the others.
-    together = any(
-        own is None and way is not None and way.kind == "margin" and not way.suffix for own, way in ways.values()
-    )
-    for name, (own, way) in ways.items():
-        if own is not None and not (together and way is not None and way.kind == "margin"):
-            step, stage = own
-            steps.setdefault((step.name, stage.number if stage else 0), (step, stage, []))[2].append(name)
-        elif way is not None:
-            position: Group = "limits" if is_position(family, way.of) else "reductions"
-            group: Group = "margin" if way.kind == "margin" else "means" if way.kind == "mean" else position
-            # Each effect by itself: one that jams or leaves its range takes nothing from the others.
-            effect = family.dear.get(way.of, ("", 0.0))[0]
-            groups.setdefault((group, effect), []).append(name)
-        else:
-            output(family, name)  # unknown names end here, with the nearest known one
-            allowed = "another accuracy: this output is only computed " + (
-                "with accuracy=, not on samples" if accuracy.samples is not None else "on samples, not with accuracy="
-            )
-            raise InputError("output", name, allowed, f"design outputs of {family.name}")
-    jobs = [
-        _Job(f"stage 1: {step.name}" if stage else step.name, step, stage, tuple(names), step.cost(accuracy))
-        for step, stage, names in steps.values()
-    ]
-    jobs += [
-        _Job(f"{group} {effect}".rstrip(), group, None, tuple(names), group_ns(family, group, tuple(names), accuracy))
-        for (group, effect), names in groups.items()
-    ]
-    return sorted(jobs, key=lambda job: job.ns_per_design)
-
-
-def _run(family: Family, job: _Job, designs: Array, accuracy: Accuracy, window: tuple[float, float] | None) -> Columns:
-    if job.group == "margin":
-        return margin_group(family, designs, job.outputs, accuracy)
-    if job.group == "means":
-        return mean_squares(family, designs, job.outputs, accuracy)
-    if not isinstance(job.group, Step):
-        return limits_and_reductions(family, designs, job.outputs, accuracy, window)
-    own = {name: name.removesuffix("1") if job.stage else name for name in job.outputs}
-    part, mechanism = (job.stage.designs(designs), job.stage.family) if job.stage else (designs, family)
-    found = job.group.run(part, frozenset(own.values()), accuracy)
-    if accuracy.target is not None:
-        for plain in own.values():
-            # A step that serves a target promises it; one that estimates its error says so itself.
-            found.setdefault(f"err_{plain}", accuracy.target * np.abs(np.asarray(found[plain], np.float64)))
-            located = any(o.name == f"phi_{plain}" for o in job.group.provides)
-            if plain.startswith("max_abs_") and located and mechanism.precise_poses and not accuracy.certify:
-                _sharpen(mechanism, job.group, part, plain, found, accuracy.target)
-    return {"status": found["status"]} | {
-        key: found[own_key]
-        for name, plain in own.items()
-        for key, own_key in ((name, plain), (f"err_{name}", f"err_{plain}"))
-        if own_key in found
-    }
-
-
-def _sharpen(family: Family, step: Step, designs: Array, name: str, columns: Columns, target: float) -> None:
-    """Take a step's maxima that rounding left less accurate than was asked from the family's precise poses."""
-    place = f"phi_{name}"
-    value, err = (np.asarray(columns[key], np.float64) for key in (name, f"err_{name}"))
-    rows = np.flatnonzero(err > target * np.abs(value))
-    if not rows.size:
-        return
-    phi = np.asarray(step.run(designs[rows], frozenset((name, place)), Accuracy(target=target))[place], np.float64)
-    peaks = precise_maxima(family, designs[rows], name.removeprefix("max_abs_"), phi, target, place in columns)
-    better = peaks.err_height < err[rows]
-    rows, peaks = rows[better], peaks.only(better)
-    value[rows], err[rows] = peaks.height, peaks.err_height
-    if place in columns:
-        columns[place][rows], columns[f"err_{place}"][rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
+    if isinstance(family.domain, Interval):
+        status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
+    chosen = {name: columns[name] for name in dict.fromkeys(_with_errors(wanted, accuracy))}
+    return explained(chosen | {"status": status}, dict.fromkeys(wanted))
 
 
 def _spread(values: NDArray[np.generic], rows: Index, n: int) -> NDArray[np.generic]:
@@ -270,10 +176,14 @@ def _spread(values: NDArray[np.generic], rows: Index, n: int) -> NDArray[np.gene
 
 
 def _with_errors(wanted: Sequence[str], accuracy: Accuracy) -> list[str]:
-    return [*wanted, *(f"err_{name}" for name in wanted if accuracy.target is not None)]
+    return [*wanted, *(error_of(name) for name in wanted if accuracy.target is not None)]
 
 
-def _accuracy(samples: int | None, accuracy: float | None, certify: bool | Sequence[str] = False) -> Accuracy:
+def _accuracy(
+    domain: Domain, samples: int | None, accuracy: float | None, certify: bool | Sequence[str] = False
+) -> Accuracy:
+    if isinstance(domain, March) and samples is None and accuracy is None:
+        samples = DEFAULT_SAMPLES
     if samples is not None and accuracy is not None:
         raise InputError("samples", samples, "either samples= or accuracy=, not both", "summarise")
     if not isinstance(certify, (bool, str)) and not (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
@@ -45,16 +45,17 @@ def design_matrix(
         for a missing or misspelt column, a value that is no number, a nan or infinity, a length that is not positive.
     """
     known = [*family.parameter_names, *extra]
-    names = _column_names(table)
+    keys = _column_names(table)
+    names = list(keys)
     for name in names:
         missing = [k for k in known if k not in names]
         if name not in known and name not in unused and nearest(name, missing):
             raise InputError("column", name, f"the columns {', '.join(known)}{nearest(name, missing)}", "table")
-    rows = _row_count(table, [n for n in names if n in known])
+    rows = _row_count(table, {n: keys[n] for n in names if n in known})
     matrix = np.empty((rows, len(family.parameters)))
     for k, parameter in enumerate(family.parameters):
-        matrix[:, k] = _parameter_column(family, parameter, table, names, rows)
-    extras = {name: np.broadcast_to(_column(table, name), rows) for name in extra if name in names}
+        matrix[:, k] = _parameter_column(family, parameter, table, keys, rows)
+    extras = {name: np.broadcast_to(_column(table, keys, name), rows) for name in extra if name in names}
     for name, values in extras.items():
         _refuse(~np.isfinite(values), values, name, "a finite number")
     return matrix, extras
@@ -75,27 +76,63 @@ def wanted_names(want: str | Sequence[str], place: str) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _column_names(table: Table) -> list[str]:
-    """Names of the columns, each once."""
+def kept_columns(table: Table, keep: bool | str | Sequence[str], made: Collection[str], rows: int) -> dict[str, Any]:
+    """Columns of the input that a result shall repeat in front of its own, as they are.
+
+    Parameters
+    ----------
+    table : as for `design_matrix`
+    keep : True for all columns but those that have the name of a result; or the names of some;  False for none
+    made : names of the results
+    rows : number of designs; single numbers are repeated
+
+    Raises
+    ------
+    InputError
+        for a name that the table does not have or that the result needs itself, or a column of another length.
+    """
+    keys = _column_names(table)
+    if isinstance(keep, bool):
+        chosen = [name for name in keys if name not in made] if keep else []
+    else:
+        chosen = wanted_names(keep, "keep")
+    columns: dict[str, Any] = {}
+    for name in chosen:
+        if name not in keys:
+            raise InputError("keep", name, f"columns of the table: {', '.join(keys)}{nearest(name, keys)}", "table")
+        if name in made:
+            raise InputError("keep", name, "another name: the result has a column of this one itself", "table")
+        values = table[keys[name]]
+        if isinstance(values, str) or not hasattr(values, "__len__"):
+            columns[name] = [values] * rows
+        elif len(values) == rows:
+            columns[name] = getattr(values, "array", values)  # of a Series what it holds, not its index
+        else:
+            raise InputError(name, f"{len(values)} rows", f"as many rows as there are designs, {rows}", "keep")
+    return columns
+
+
+def _column_names(table: Table) -> dict[str, Any]:
+    """Names of the columns, each once, and the keys under which the table has them."""
     if not isinstance(table, Mapping) and not (hasattr(table, "columns") and hasattr(table, "iloc")):
         raise InputError("table", type(table).__name__, "a DataFrame, or a dict of columns", "table")
-    names = [str(name) for name in table]
+    names = [str(key) for key in table]
     for name in names:
         if names.count(name) > 1:
             raise InputError("column", name, f"each name once; it stands {names.count(name)} times", "table")
-    return names
+    return dict(zip(names, table, strict=True))
 
 
-def _parameter_column(family: Parametrised, p: Parameter, table: Table, names: list[str], rows: int) -> Array:
-    if p.name not in names:
+def _parameter_column(family: Parametrised, p: Parameter, table: Table, keys: dict[str, Any], rows: int) -> Array:
+    if p.name not in keys:
         if p.default is not None:
             return np.full(rows, p.default)
-        guess = nearest(p.name, [n for n in names if n not in family.parameter_names])
-        present = ", ".join(names) or "none"
+        guess = nearest(p.name, [n for n in keys if n not in family.parameter_names])
+        present = ", ".join(keys) or "none"
         raise InputError(
             p.name, "missing", f"a column with the {p.text}; found {present}{guess}", f"table of {family.name}"
         )
-    values = np.broadcast_to(_column(table, p.name), rows)
+    values = np.broadcast_to(_column(table, keys, p.name), rows)
     _refuse(~np.isfinite(values), values, p.name, "a finite number")
     if p.sign:
         _refuse(values <= 0.0 if p.positive else values < 0.0, values, p.name, f"a {p.sign} {p.unit}")
@@ -104,10 +141,10 @@ def _parameter_column(family: Parametrised, p: Parameter, table: Table, names: l
     return values
 
 
-def _row_count(table: Table, names: list[str]) -> int:
+def _row_count(table: Table, keys: dict[str, Any]) -> int:
     lengths: dict[str, int] = {}
-    for name in names:
-        shape = np.shape(np.asarray(table[name]))
+    for name, key in keys.items():
+        shape = numbers(table[key], name, f"column {name}, row").shape
         if len(shape) > 1:
             raise InputError(name, f"shape {shape}", "a plain column or one number", f"column {name}")
         if shape:
@@ -121,8 +158,8 @@ def _row_count(table: Table, names: list[str]) -> int:
     return rows
 
 
-def _column(table: Table, name: str) -> Array:
-    return numbers(table[name], name, f"column {name}, row")
+def _column(table: Table, keys: dict[str, Any], name: str) -> Array:
+    return numbers(table[keys[name]], name, f"column {name}, row")
 
 
 def numbers(values: object, name: str, place: str) -> Array:
@@ -133,22 +170,43 @@ def numbers(values: object, name: str, place: str) -> Array:
     InputError
         for the first that is no number, with its place
     """
-    kind = np.asarray(values).dtype.kind
-    try:
-        if kind not in "mMc":  # a date, a time span or a complex number is none, though numpy would take it for one
-            return np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        pass
-    rows = list(np.atleast_1d(np.asarray(values, dtype=object)).ravel())
-    row = next((k for k, value in enumerate(rows) if kind in "mMc" or not _is_number(value)), 0)
+    found = _converted(values)
+    if found is not None:
+        return found
+    rows = _entries(values)
+    kind = getattr(getattr(values, "dtype", None), "kind", "")
+    row = next((k for k, value in enumerate(rows) if kind in ("m", "M", "c") or not _is_number(value)), 0)
     raise InputError(name, rows[row] if rows else values, "a number", f"{place} {row}")
 
 
+def _converted(values: object) -> Array | None:
+    """Values as float64, None where one of them is no number."""
+    try:
+        array = np.asarray(values)
+        # A date, a time span or a complex number is none, though numpy would take it for one.
+        if array.dtype.kind in "mMc" or (array.dtype.kind == "O" and not all(map(_is_number, array.flat))):
+            return None
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):  # ragged lists among them
+        return None
+
+
+def _entries(values: object) -> list[Any]:
+    """What stands in the rows, whatever it is; one row where it is no column."""
+    if isinstance(values, np.ndarray):
+        return list(values.flat)
+    if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
+        return [values]
+    return list(values)
+
+
 def _is_number(value: Any) -> bool:
+    if isinstance(value, (np.complexfloating, np.datetime64, np.timedelta64, np.ndarray)):
+        return False
     try:
         float(value)
     except (TypeError, ValueError, OverflowError):
-        return False
+        return value is None or type(value).__name__ == "NAType"  # a gap: nan, which has a message of its own
     return True
 
 

@@ -2,25 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import sweep.sources  # noqa: F401 (read before any source that makes a value is imported, and all of those begin here)
 from sweep.errors import InputError, nearest
 from sweep.families.base import Family
+from sweep.families.check import check_family
 
-NAMES = ("rssr", "rssp", "guide", "geared_dwell")
+if TYPE_CHECKING:
+    from sweep.families.members import Machine
+
+NAMES = (
+    "rssr",
+    "rssp",
+    "guide",
+    "geared_dwell",
+    "five_link",
+    "kim_dison",
+    "slotted",
+    "swivel",
+    "spherical_looper",
+    "cylindrical_looper",
+    "slider_crank",
+    "four_bar",
+    "inverted_slider_crank",
+    "epicyclic_dwell",
+    "cam",
+    "cam_lever",
+)
 
 
-def family(name: str | Sequence[str]) -> Family:
-    """The family of that name, or the chain of the families named in a list.
+@dataclass(frozen=True)
+class Specification:
+    """A machine as it was written: hashable, so that the machine it makes is made once."""
+
+    members: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
+    relations: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
+
+
+Mechanism: TypeAlias = "str | Sequence[str] | Mapping[str, Any] | Specification | Family"
+"""A family's name, a list of them for a chain, a table of members for a machine, or what `sweep.machine` made."""
+
+
+def family(name: Mechanism) -> Family:
+    """The family of that name, the chain of the families named in a list, or the machine of a table of members.
 
     Raises
     ------
     InputError
         if a name is unknown; the message gives the nearest known one.
     """
+    if isinstance(name, Family):
+        return name
+    if isinstance(name, Mapping):
+        return machine(name)
+    if isinstance(name, Specification):
+        return _machine(name)
     if isinstance(name, str):
         return _single(name)
     names = tuple(name) if isinstance(name, Sequence) else (name,)
@@ -31,12 +72,51 @@ def family(name: str | Sequence[str]) -> Family:
     return _chain(names)
 
 
+def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = None) -> Machine:
+    """Several mechanisms on one main shaft, accepted wherever a family's name is.
+
+    Parameters
+    ----------
+    members : by name, each a family, a list of families, or a table with ``family`` or ``chain`` and, as wanted,
+        ``ratio`` (whole turns of its crank for one of what drives it, default 1), ``offset`` (its crank angle where the
+        driving angle is 0 [rad]), ``driver`` ("shaft", or an angle of an earlier member such as "needle.psi1"),
+        ``place`` (``at``, ``axis``, ``zero``: origin, z and x of the member's frame, for a chain the last stage's, in
+        the machine's frame) and ``tip`` (a point fixed to the output link: along it, across it, along its axis)
+    relations : by name, each one of ``{"distance": [point, point]}``, ``{"timing": [crank angle, crank angle]}``,
+        ``{"torque": [member, ...]}``, ``{"shaking": [member, ...]}``
+
+    Returns
+    -------
+    Machine
+        parameters and outputs carry the member's name: ``needle.a1``, ``looper.swing``.  ``offset``, ``x_at`` ... and
+        ``x_tip`` ... are parameters with what is given here as default.  Relations are outputs: of a distance
+        ``clearance`` there are ``min_clearance``, ``phi_min_clearance`` ...
+
+    Raises
+    ------
+    InputError
+        for anything that makes no machine; the message says what may stand there.
+
+    Examples
+    --------
+    >>> drives = machine({"needle": ["rssr", "guide"], "looper": {"family": "rssr", "tip": [30.0, 0.0, 0.0]}},
+    ...                  {"clearance": {"distance": ["needle.point", "looper.tip"]}})
+    >>> drives.parameter_names[:2], "clearance" in drives.pose_names
+    (('needle.a1', 'needle.b1'), True)
+    """
+    if not isinstance(members, Mapping):
+        raise InputError("members", members, "a table of members by name", "machine")
+    from sweep.families.specification import specification
+
+    return _machine(specification(members, relations))
+
+
 @lru_cache
 def _single(name: str) -> Family:
     if name not in NAMES:
         raise InputError("family", name, f"one of {', '.join(NAMES)}{nearest(name, NAMES)}", "family")
     entry: Family = import_module(f"sweep.families.{name}").FAMILY
-    return entry
+    return check_family(entry)
 
 
 @lru_cache
@@ -44,3 +124,10 @@ def _chain(names: tuple[str, ...]) -> Family:
     from sweep.families.chain import chain
 
     return chain(tuple(_single(name) for name in names))
+
+
+@lru_cache
+def _machine(given: Specification) -> Machine:
+    from sweep.families.specification import built
+
+    return built(given, family)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
+
+from sweep.families.domain import Domain, Turn
 
 Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = dict[str, NDArray[np.generic]]
@@ -60,7 +62,13 @@ class Parameter:
 class Output:
     """One quantity that can be wanted: unit in SI words ("rad", "length", "1"), definition, equation of its page.
 
-    ``jumps`` says that it is a whole number or otherwise constant in pieces: no slope leads an optimiser to it.
+    Parameters
+    ----------
+    name, unit, text, equation : as they are printed
+    jumps : it is a whole number or otherwise constant in pieces, so no slope leads an optimiser to it
+    wraps : an angle that is known only up to full turns; curves of it are made continuous
+    windowed : a deviation, of which only the part inside the window of the stroke counts where a window is given
+    stage, own : in a chain the number of the stage that gives it, and its name there
     """
 
     name: str
@@ -68,6 +76,40 @@ class Output:
     text: str
     equation: str = ""
     jumps: bool = False
+    wraps: bool = False
+    windowed: bool = False
+    stage: str = ""
+    own: str = ""
+
+    @property
+    def base(self) -> str:
+        """The name without the number of a stage."""
+        return self.own or self.name
+
+    def of_stage(self, number: int) -> Output:
+        """The same output of the stage of that number in a chain, under its name there."""
+        words = f"stage {number}: {self.text}"
+        return replace(self, name=f"{self.name}{number}", text=words, stage=str(number), own=self.name)
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happens where a pose output passes a level: entry, landing, loss of contact.
+
+    Parameters
+    ----------
+    name : of the event; ``phi_NAME`` is where it first happens, ``count_NAME`` how often
+    of : the pose output that passes the level
+    text : what happens, in words
+    level : in the unit of the output
+    rising : whether it passes upwards
+    """
+
+    name: str
+    of: str
+    text: str
+    level: float = 0.0
+    rising: bool = True
 
 
 @dataclass(frozen=True)
@@ -90,8 +132,7 @@ class Accuracy:
 
 PoseFunction: TypeAlias = Callable[[Array, Angles, frozenset[str]], Columns]
 StepFunction: TypeAlias = Callable[[Array, frozenset[str], Accuracy], Columns]
-JointFunction: TypeAlias = Callable[[Array, Angles, Columns, Array, Array], None]
-EllipseFunction: TypeAlias = Callable[[Array], Array]
+Capability = TypeVar("Capability")
 
 
 @dataclass(frozen=True)
@@ -116,31 +157,29 @@ class Step:
         return self.ns_per_design + self.ns_per_sample * (accuracy.samples or 0)
 
 
-class Travel(NamedTuple):
-    """Where the parts of a guided point's drive stand in the design matrix, for the proof of its maxima.
-
-    ``starts`` are the columns in which the parameters of each stage begin, crank-rockers first, the guide's last;
-    ``couplings`` those of kappa of each stage but the first, the offset stands behind it.
-    """
-
-    starts: tuple[int, ...]
-    couplings: tuple[int, ...]
-
-
 @dataclass(frozen=True)
 class Family:
     """A mechanism family, or a chain of them, which looks the same from outside.
 
-    ``poses(designs, angles, wanted)`` takes the (n, P) matrix with the columns of ``parameters`` and returns the wanted
-    pose outputs and ``status``, each of shape (n, m).  ``position`` names the follower's coordinate, "psi" or "s"; its
-    derivatives with respect to phi are ``d<position>``, ``d2<position>``, ``d3<position>``.  A family whose poses need
-    no more than cos(phi) and sin(phi) says ``uses_phi=False``; in a chain that saves an arctangent per pose.
-    ``joints(designs, angles, motion, per_pose, per_design)`` fills the records of :mod:`kernels.joints` that effects
-    work from, out of the pose outputs ``joint_needs``; ``ellipse(designs)`` gives the curve that
-    :mod:`kernels.effects.pressure_extrema` takes.  A family without them has no effects.  ``dear`` names, for pose
-    outputs that cost far more than the motion, what they are computed by and its cost [ns per pose].  ``precise_poses``
-    is a slower ``poses`` for real numbers whose errors are a few roundings of what is given, where the family has one.
-    ``travel`` is given by a guide, alone or behind crank-rockers (:mod:`sweep.reductions.travel`).
+    Parameters
+    ----------
+    name, title : for the register and for people
+    parameters : the columns of the (n, P) design matrix
+    position : the pose output that is the follower's coordinate; limit positions, swing or stroke are about it
+    pose_outputs : everything a single pose gives
+    poses : ``poses(designs, angles, wanted)`` returns the wanted pose outputs and ``status``, each (n, m)
+    domain : over what it is evaluated
+    steps : its own routes to design outputs, exact or faster than the general reductions over poses
+    derivative_of : for a pose output its derivative with respect to the domain's variable
+    events : what happens at roots of pose outputs
+    outward : the sign parameter whose +1 makes the extended limit position the one with the largest position; without
+        one the extended position always is
+    uses_phi : False for poses that need no more than cos(phi) and sin(phi); in a chain that saves an arctangent a pose
+    analytic : whether poses take complex designs and angles, for exact gradients by the complex step
+    capabilities : typed objects that effects, proofs, drawings and fits ask for (:mod:`sweep.families.capabilities`)
+    example : an ordinary design, by parameter, whose poses all exist; hard inputs are made from it
+    dear : for pose outputs that cost far more than the motion, what they are computed by and its cost [ns per pose]
+    precise_poses : slower poses whose errors are a few roundings of what is given, where the family has them
     """
 
     name: str
@@ -149,19 +188,29 @@ class Family:
     position: str
     pose_outputs: tuple[Output, ...]
     poses: PoseFunction
+    domain: Domain = field(default_factory=Turn)
     steps: tuple[Step, ...] = ()
     derivative_of: Mapping[str, str] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()
+    outward: str = ""
     uses_phi: bool = True
-    joints: JointFunction | None = None
-    joint_needs: tuple[str, ...] = ()
-    ellipse: EllipseFunction | None = None
+    analytic: bool = True
+    capabilities: tuple[object, ...] = ()
+    example: Mapping[str, float] = field(default_factory=dict)
     dear: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     precise_poses: PoseFunction | None = None
-    travel: Travel | None = None
 
     def precise(self) -> Family:
         """Give the same family with the most accurate poses it has: for single poses, not for sweeps."""
         return self if self.precise_poses is None else replace(self, poses=self.precise_poses)
+
+    def find(self, kind: type[Capability]) -> Capability | None:
+        """The first capability of a type, None where the family has none."""
+        return next(iter(self.every(kind)), None)
+
+    def every(self, kind: type[Capability]) -> tuple[Capability, ...]:
+        """All capabilities of a type: a chain has one of each stage."""
+        return tuple(found for found in self.capabilities if isinstance(found, kind))
 
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:
@@ -172,6 +221,20 @@ class Family:
     def pose_names(self) -> tuple[str, ...]:
         """Names of the pose outputs."""
         return tuple(o.name for o in self.pose_outputs)
+
+    @cached_property
+    def pose_output(self) -> Mapping[str, Output]:
+        """The pose outputs by name."""
+        return {o.name: o for o in self.pose_outputs}
+
+    @cached_property
+    def positions(self) -> Mapping[str, str]:
+        """Pose outputs that are the position of a follower, with the number of its stage in a chain."""
+        return {self.position: ""}
+
+    def outward_sign(self, position: str) -> str:
+        """The sign parameter that tells the extended from the folded limit of a position; "" where there is none."""
+        return self.outward
 
 
 def filled(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,9 @@ import numpy as np
 from kernels.chain import chain_rule, input_angle
 from kernels.status import OK
 from sweep.errors import InputError
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, Travel
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from sweep.families.capabilities import Assembly, OutputLink, Points
+from sweep.families.domain import Turn
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
 
@@ -38,6 +40,17 @@ class Chain(Family):
 
     stages: tuple[Stage, ...] = ()
 
+    @cached_property
+    def positions(self) -> Mapping[str, str]:
+        """The last stage's position, then those of all stages under their numbers."""
+        return {self.position: ""} | {f"{s.family.position}{s.number}": str(s.number) for s in self.stages}
+
+    def outward_sign(self, position: str) -> str:
+        """The sign parameter of the stage whose position it is."""
+        stage = self.positions[position]
+        own = self.stages[int(stage) - 1].family.outward if stage else ""
+        return own and f"{own}{stage}" if stage else self.outward
+
     def precise(self) -> Chain:
         """The chain with the most accurate poses its stages have."""
         return (
@@ -57,6 +70,13 @@ class _Plan:
     source: dict[str, tuple[int, str]] = field(default_factory=dict)  # wanted name -> stage index, its own name
 
 
+def stages_of(family: Family) -> tuple[Stage, ...]:
+    """The stages of a chain; a family alone is its own only stage."""
+    if isinstance(family, Chain):
+        return family.stages
+    return (Stage(1, family, slice(0, len(family.parameters))),)
+
+
 def chain(families: tuple[Family, ...]) -> Chain:
     """The chain of these families, each driven by the one before it.
 
@@ -66,11 +86,18 @@ def chain(families: tuple[Family, ...]) -> Chain:
     Raises
     ------
     InputError
-        if a stage other than the last has no output angle: a slider cannot drive a crank.
+        if a stage other than the last has no output angle: a slider cannot drive a crank; if a stage has several loops
+        of its own.
     """
     place = f"chain {[f.name for f in families]}"
-    for number, family in enumerate(families[:-1], start=1):
-        if family.position != "psi":
+    for number, family in enumerate(families, start=1):
+        if not isinstance(family.domain, Turn):
+            allowed = f"a family over a closed turn; {family.name} is evaluated over {family.domain.text}"
+            raise InputError(f"stage {number}", family.name, allowed, place)
+        if len(family.every(Assembly)) > 1:  # their margins, and magnitudes of velocities, would carry no clear name
+            allowed = f"a family with one loop; {family.name} has several: make it a driven member of a machine"
+            raise InputError(f"stage {number}", family.name, allowed, place)
+        if number < len(families) and not family.pose_output[family.position].wraps:
             allowed = f"a family with an output angle psi; {family.name} has {family.position}, which drives no crank"
             raise InputError(f"stage {number}", family.name, allowed, place)
     stages, parameters = _numbered(families)
@@ -78,10 +105,11 @@ def chain(families: tuple[Family, ...]) -> Chain:
     outputs = [_with_respect_to_chain(o, last) for o in last.pose_outputs]
     for stage in stages:
         outputs += [
-            replace(o, name=f"{o.name}{stage.number}", text=f"stage {stage.number}: {o.text}")
+            o.of_stage(stage.number)
             for o in stage.family.pose_outputs
             if stage.number == 1 or o.name not in stage.family.derivative_of.values()
         ]
+    named = {o.name: o for o in outputs}
     own = {f"{name}1": f"{derivative}1" for name, derivative in families[0].derivative_of.items()}
     return Chain(
         name="+".join(f.name for f in families),
@@ -89,16 +117,18 @@ def chain(families: tuple[Family, ...]) -> Chain:
         parameters=parameters,
         position=last.position,
         pose_outputs=tuple(outputs),
-        poses=partial(_poses, stages, {}),
+        poses=partial(_poses, stages, named, {}),
         derivative_of=dict(last.derivative_of) | own,
+        outward=last.outward and f"{last.outward}{len(families)}",
         uses_phi=families[0].uses_phi,
+        analytic=all(f.analytic for f in families),
+        capabilities=(*(loop for stage in stages for loop in _loops(stage)), *_of_last(stages[-1])),
         dear={
             f"{name}{s.number}": (f"{what}{s.number}", ns) for s in stages for name, (what, ns) in s.family.dear.items()
         }
         | dict(last.dear),
-        precise_poses=partial(_poses, _precise(stages), {}) if any(f.precise_poses for f in families) else None,
+        precise_poses=partial(_poses, _precise(stages), named, {}) if any(f.precise_poses for f in families) else None,
         stages=stages,
-        travel=_travel(stages),
     )
 
 
@@ -106,12 +136,27 @@ def _precise(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
     return tuple(replace(stage, family=stage.family.precise()) for stage in stages)
 
 
-def _travel(stages: tuple[Stage, ...]) -> Travel | None:
-    """Crank-rockers that drive a guide, and nothing else, have a guided point whose maxima can be proven."""
-    if [stage.family.name for stage in stages] != ["rssr"] * (len(stages) - 1) + ["guide"]:
-        return None
-    couplings = tuple(stage.kappa for stage in stages if stage.kappa is not None)
-    return Travel(tuple(stage.columns.start for stage in stages), couplings)
+def _loops(stage: Stage) -> list[Assembly]:
+    """The loops of a stage under the chain's names."""
+    return [
+        Assembly(
+            f"{loop.discriminant}{stage.number}",
+            f"{loop.pressure_angle}{stage.number}",
+            partial(_on_stage, stage, loop.scale),
+            str(stage.number),
+        )
+        for loop in stage.family.every(Assembly)
+    ]
+
+
+def _of_last(stage: Stage) -> list[object]:
+    """Points and output link of the last stage: its outputs also stand without a number, in the frame of that stage."""
+    links = [OutputLink(partial(_on_stage, stage, link.origin)) for link in stage.family.every(OutputLink)]
+    return [*stage.family.every(Points), *links]
+
+
+def _on_stage(stage: Stage, of_design: Callable[[Array], Array], designs: Array) -> Array:
+    return of_design(stage.designs(designs))
 
 
 def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Parameter, ...]]:
@@ -151,7 +196,7 @@ def _derivatives(family: Family, name: str) -> list[str]:
     return names
 
 
-def _plan(stages: tuple[Stage, ...], wanted: frozenset[str]) -> _Plan:
+def _plan(stages: tuple[Stage, ...], outputs: Mapping[str, Output], wanted: frozenset[str]) -> _Plan:
     last = stages[-1].family
     plan = _Plan(needed=[set() for _ in stages])
     chains: dict[str, list[str]] = {}
@@ -162,8 +207,8 @@ def _plan(stages: tuple[Stage, ...], wanted: frozenset[str]) -> _Plan:
             if derivatives:
                 chains[derivatives[0]] = max(chains.get(derivatives[0], []), derivatives, key=len)
         else:
-            stage = next(s for s in stages if name.endswith(str(s.number)) and _own(name, s) in s.family.pose_names)
-            plan.source[name] = stage.number - 1, _own(name, stage)
+            output = outputs[name]
+            plan.source[name] = int(output.stage) - 1, output.own
     plan.composed = list(chains.values())
     plan.order = max((len(names) for names in plan.composed), default=0)
     for index, own in plan.source.values():
@@ -173,19 +218,21 @@ def _plan(stages: tuple[Stage, ...], wanted: frozenset[str]) -> _Plan:
     deepest = max((index for index, _ in plan.source.values()), default=len(stages) - 1)
     del plan.needed[deepest + 1 :]
     for k, stage in enumerate(stages[:deepest]):
-        outputs = stage.family.pose_names
-        angle = {"sin_psi", "cos_psi"} if {"sin_psi", "cos_psi"} <= set(outputs) else {"psi"}
-        if stages[k + 1].family.uses_phi:
-            angle.add("psi")
-        plan.needed[k] |= angle | set(_psi_derivatives(stage.family, plan.order))
+        plan.needed[k] |= driving_names(stage.family, stages[k + 1].family)
+        plan.needed[k] |= set(_position_derivatives(stage.family, plan.order))
     return plan
 
 
-def _own(name: str, stage: Stage) -> str:
-    return name.removesuffix(str(stage.number))
+def driving_names(family: Family, driven: Family) -> set[str]:
+    """Pose outputs of a stage from which the next one gets its input angle: cosine and sine where it has them."""
+    angle = family.position
+    turned = {f"cos_{angle}", f"sin_{angle}"}
+    if not turned <= set(family.pose_names):
+        return {angle}
+    return turned | {angle} if driven.uses_phi else turned
 
 
-def _psi_derivatives(family: Family, order: int) -> list[str]:
+def _position_derivatives(family: Family, order: int) -> list[str]:
     names = [family.position]
     while len(names) <= order:
         names.append(family.derivative_of[names[-1]])
@@ -194,6 +241,7 @@ def _psi_derivatives(family: Family, order: int) -> list[str]:
 
 def _poses(
     stages: tuple[Stage, ...],
+    outputs: Mapping[str, Output],
     plans: dict[frozenset[str], _Plan],
     designs: Array,
     angles: Angles,
@@ -205,7 +253,7 @@ def _poses(
     """
     plan = plans.get(wanted)
     if plan is None:
-        plan = plans[wanted] = _plan(stages, wanted)
+        plan = plans[wanted] = _plan(stages, outputs, wanted)
     shape = (designs.shape[0], angles.cos.shape[1])
     if shape[0] * shape[1] <= BLOCK:
         return _block(stages, plan, designs, angles)
@@ -237,13 +285,14 @@ def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angle
         is_last = k == len(stages) - 1
         if k > 0:
             kappa = np.ascontiguousarray(designs[:, stage.kappa])
-            angles = drive(results[-1], kappa, np.ascontiguousarray(designs[:, stage.offset]))
+            driving = stages[k - 1].family.position
+            angles = drive(results[-1], driving, kappa, np.ascontiguousarray(designs[:, stage.offset]))
         result: dict[str, Any] = stage.family.poses(stage.designs(designs), angles, frozenset(needed))
         np.copyto(status, result["status"], where=status == OK)
         results.append(result)
         if plan.order == 0:
             continue
-        composed = plan.composed if is_last else [_psi_derivatives(stage.family, plan.order)]
+        composed = plan.composed if is_last else [_position_derivatives(stage.family, plan.order)]
         if k > 0:
             for names in composed:
                 outer: list[Any] = [result[name] for name in names]
@@ -255,16 +304,16 @@ def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angle
     return columns | {"status": status}
 
 
-def drive(result: dict[str, Any], kappa: Array, offset: Array) -> Angles:
-    """The input angles of the stage driven by ``result``: status, and psi or cos_psi and sin_psi."""
+def drive(result: dict[str, Any], angle: str, kappa: Array, offset: Array) -> Angles:
+    """The input angles of the stage driven by ``result``: status, and the output ``angle`` or its cosine and sine."""
     shape = result["status"].shape
     # a family that says it works from cos and sin alone gets no angle at all
     phi: Array = np.broadcast_to(np.float64(np.nan), shape)
-    if "psi" in result:
-        phi = kappa[:, None] * result["psi"] + offset[:, None]
-    if "cos_psi" not in result:
+    if angle in result:
+        phi = kappa[:, None] * result[angle] + offset[:, None]
+    if f"cos_{angle}" not in result:
         return Angles.of(phi)
-    cos = np.empty(shape, np.result_type(result["cos_psi"], offset))
+    cos = np.empty(shape, np.result_type(result[f"cos_{angle}"], offset))
     sin = np.empty_like(cos)
-    input_angle(kappa, offset, result["cos_psi"], result["sin_psi"], cos, sin)
+    input_angle(kappa, offset, result[f"cos_{angle}"], result[f"sin_{angle}"], cos, sin)
     return Angles(phi, cos, sin)

@@ -8,6 +8,7 @@ import numpy as np
 
 from kernels.families import geared_dwell
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, optional_outputs
+from sweep.families.capabilities import Points
 
 PARAMETERS = (
     Parameter("k", "ratio", "distance of the pin from the planet centre, in planet radii", positive=True),
@@ -15,7 +16,7 @@ PARAMETERS = (
 )
 
 POSE_OUTPUTS = (
-    Output("psi", "rad", "output angle, continuous over all turns; 0 or pi at phi = 0", "(3)"),
+    Output("psi", "rad", "output angle, continuous over all turns; 0 or pi at phi = 0", "(3)", wraps=True),
     Output("dpsi", "1", "velocity analogue dpsi/dphi", "(4)"),
     Output("d2psi", "1", "acceleration analogue", "(5)"),
     Output("d3psi", "1", "jerk analogue", "(6)"),
@@ -140,4 +141,6 @@ FAMILY = Family(
         Step("grid", _SAMPLED_OUTPUTS, sampled_maxima, 50.0, lambda accuracy: accuracy.samples is not None, 0.8),
     ),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
+    capabilities=(Points({"b": ("x_b", "y_b", None)}),),
+    example={"k": 1.4, "a": 0.3},
 )

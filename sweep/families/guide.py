@@ -6,7 +6,15 @@ import numpy as np
 
 from kernels.families import guide
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, Travel, filled_with_places
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
+from sweep.families.capabilities import (
+    Assembly,
+    CrankRockerLoop,
+    GuidedPoint,
+    JointRecords,
+    Points,
+    PressureEllipse,
+)
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -25,7 +33,7 @@ VALUE_OUTPUTS = (
     Output("ds", "length", "velocity analogue ds/dphi", "(5)"),
     Output("d2s", "length", "acceleration analogue", "(5)"),
     Output("d3s", "length", "jerk analogue", "(5)"),
-    Output("dev", "length", "deviation of the coupler point from the line, to its left", "(4)"),
+    Output("dev", "length", "deviation of the coupler point from the line, to its left", "(4)", windowed=True),
     Output("ddev", "length", "first derivative of the deviation with respect to phi", "(5)"),
     Output("d2dev", "length", "second derivative of the deviation", "(5)"),
     Output("discriminant", "length^4", "A1^2 + A2^2 - A3^2; the links reach where it is not negative", "(2)"),
@@ -74,6 +82,13 @@ def ellipse(designs: Array) -> Array:
     return crank_rocker.ellipse(as_crank_rocker(designs))
 
 
+def travel_shares(designs: Array) -> Array:
+    """Factors by which the directions of the links enter the travel along the line, (n, 6)."""
+    shares = np.empty((len(designs), 6))
+    guide.travel_shares(np.ascontiguousarray(designs), shares)
+    return shares
+
+
 FAMILY = Family(
     name="guide",
     title="planar four-bar with a guided coupler point",
@@ -82,9 +97,21 @@ FAMILY = Family(
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
     poses=poses,
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s", "dev": "ddev", "ddev": "d2dev"},
+    outward="branch",
     uses_phi=False,
-    joints=joint_records,
-    ellipse=ellipse,
+    capabilities=(
+        Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
+        JointRecords(joint_records, (), "rocker"),
+        PressureEllipse(ellipse),
+        CrankRockerLoop(as_crank_rocker),
+        GuidedPoint(
+            travel_shares,
+            fitted=("xi", "eta", "lam", "h"),
+            scaled=("a", "b", "c", "e", "xi", "eta", "h"),
+            direction="lam",
+        ),
+        Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)}),
+    ),
     precise_poses=precise_poses,
-    travel=Travel((0,), ()),
+    example={"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "lam": 1.1, "h": -0.6, "branch": 1.0},
 )

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from kernels.families import rssp
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
+from sweep.families.capabilities import Assembly, JointRecords, Points, PressureEllipse
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -140,6 +141,12 @@ def ellipse(designs: Array) -> Array:
     return out
 
 
+def coupler_square(designs: Array) -> Array:
+    """b^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
+    square: Array = designs[:, 1] * designs[:, 1]
+    return square
+
+
 FAMILY = Family(
     name="rssp",
     title="spatial slider-crank",
@@ -152,9 +159,14 @@ FAMILY = Family(
         Step("limit positions", LIMIT_OUTPUTS, limit_positions, 500.0),
     ),
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
+    outward="branch",
     uses_phi=False,
-    joints=joint_records,
-    joint_needs=_JOINT_NEEDS,
-    ellipse=ellipse,
+    capabilities=(
+        Assembly("discriminant", "pressure_angle", coupler_square),
+        JointRecords(joint_records, _JOINT_NEEDS, "slider"),
+        PressureEllipse(ellipse),
+        Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
+    ),
     precise_poses=precise_poses,
+    example={"a": 1.3, "b": 5.2, "e": 0.7, "f": 0.4, "alpha": 0.3, "branch": -1.0},
 )

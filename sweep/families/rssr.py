@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from kernels import status as st
 from kernels.families import rssr
@@ -20,6 +22,7 @@ from sweep.families.base import (
     filled,
     optional_outputs,
 )
+from sweep.families.capabilities import Assembly, CrankRockerLoop, JointRecords, OutputLink, Points, PressureEllipse
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -33,7 +36,7 @@ PARAMETERS = (
 )
 
 POSE_OUTPUTS = (
-    Output("psi", "rad", "rocker angle in (-pi, pi]", "(2*)"),
+    Output("psi", "rad", "rocker angle in (-pi, pi]", "(2*)", wraps=True),
     Output("dpsi", "1", "velocity analogue dpsi/dphi", "(3)"),
     Output("d2psi", "1", "acceleration analogue", "(4)"),
     Output("d3psi", "1", "jerk analogue", "(5)"),
@@ -80,22 +83,39 @@ MAXIMA_OUTPUTS = tuple(
 
 ROUNDING = 2.0**-53
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up; 100 suffice within 1e-9 of a change point
-_POSE_NAMES = tuple(o.name for o in POSE_OUTPUTS)
+_JOINTS = rssr.Joints._fields
+_VALUES = tuple(o.name for o in POSE_OUTPUTS if o.name not in _JOINTS)
+_NO_JOINTS = (*_VALUES, "joints")  # a name that nobody wants: its argument is None
+
+
+def _filled(
+    kernel: Callable[..., object], arguments: tuple[Array, ...], wanted: frozenset[str], columns: int, dtype: DTypeLike
+) -> Columns:
+    """Call a kernel of poses whose last output is the record of joints, or None if no joint is wanted."""
+    status = np.empty((len(arguments[0]), columns), np.uint8)
+    if wanted.isdisjoint(_JOINTS):
+        return filled(kernel, arguments, _NO_JOINTS, wanted, status, dtype)
+    room = optional_outputs(_JOINTS, wanted, status.shape, dtype)
+
+    def with_joints(*given: object) -> None:
+        kernel(*given, rssr.Joints(*room))
+
+    found = filled(with_joints, arguments, _VALUES, wanted, status, dtype)
+    return found | {name: x for name, x in zip(_JOINTS, room, strict=True) if x is not None}
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    arguments = designs, angles.cos, angles.sin
-    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-    return filled(rssr.poses, arguments, _POSE_NAMES, wanted, status, np.result_type(designs, angles.cos))
+    dtype = np.result_type(designs, angles.cos)
+    return _filled(rssr.poses, (designs, angles.cos, angles.sin), wanted, angles.cos.shape[1], dtype)
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """As :func:`poses`, with the closure in twice the working precision; for float64 only."""
-    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
     constants = np.empty((len(designs), rssr.PRECISE_COLUMNS))
     rssr.precise_constants(designs, constants)
-    return filled(rssr.precise_poses, (designs, constants, angles.cos, angles.sin), _POSE_NAMES, wanted, status)
+    arguments = designs, constants, angles.cos, angles.sin
+    return _filled(rssr.precise_poses, arguments, wanted, angles.cos.shape[1], np.float64)
 
 
 JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
@@ -112,6 +132,19 @@ def ellipse(designs: Array) -> Array:
     out = np.empty((len(designs), 7))
     rssr.pressure_ellipse(designs, out)
     return out
+
+
+def discriminant_scale(designs: Array) -> Array:
+    """(2 b c)^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
+    scale: Array = (2.0 * designs[:, 1] * designs[:, 2]) ** 2
+    return scale
+
+
+def rocker_origin(designs: Array) -> Array:
+    """The foot of the common perpendicular on the rocker axis, (n, 3)."""
+    origin = np.zeros((len(designs), 3), designs.dtype)
+    origin[:, 0] = designs[:, 3]
+    return origin
 
 
 def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -274,9 +307,16 @@ FAMILY = Family(
         Step("grid", MAXIMA_OUTPUTS, sampled_maxima, 50.0, _sampled, ns_per_sample=1.7),
     ),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
+    outward="branch",
     uses_phi=False,
-    joints=joint_records,
-    joint_needs=JOINT_NEEDS,
-    ellipse=ellipse,
+    capabilities=(
+        Assembly("discriminant", "pressure_angle", discriminant_scale),
+        JointRecords(joint_records, JOINT_NEEDS, "rocker"),
+        PressureEllipse(ellipse),
+        CrankRockerLoop(np.ascontiguousarray),
+        Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
+        OutputLink(rocker_origin),
+    ),
     precise_poses=precise_poses,
+    example={"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "branch": -1.0},
 )

@@ -12,6 +12,7 @@ from sweep.chunks.cascade import compared
 from sweep.families.base import Accuracy, Array
 from sweep.optimise.problem import Problem
 from sweep.optimise.starts import spread
+from sweep.quantities.names import is_flag, stem
 from sweep.reductions.measures import ROTATABLE_MARGIN, margins
 
 SAMPLED = 1 << 15  # designs per start: on a locus they cost a third of a microsecond each
@@ -124,13 +125,14 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
     designs : (n, P)
     accuracy : of their extrema over the turn
     """
-    limits = [limit for limit in problem.limits if not limit.output.startswith("rotatable")]
+    limits = [limit for limit in problem.limits if not is_flag(limit.output)]
     names = problem.family.parameter_names
     turning = ["margin"] if margins(problem.family) else []
     groups: list[list[Any]] = [[], [], []]
     for limit in limits:
-        stem = limit.output.rstrip("0123456789")
-        groups[0 if limit.output in names else 1 if stem in ("margin", "max_pressure_angle") else 2].append(limit)
+        groups[
+            0 if limit.output in names else 1 if stem(limit.output) in ("margin", "max_pressure_angle") else 2
+        ].append(limit)
     merit = np.full(len(designs), np.inf)
     alive = np.flatnonzero(np.isfinite(designs).all(axis=1))
     violation = np.zeros(len(designs))

@@ -155,7 +155,7 @@ class Program:
         measures = [self.objective, *(r.measure for r in self.requirements)]
         self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
         self.scalars = tuple(dict.fromkeys(name for m in measures for name in m.numbers))
-        self.places = any(m.kind.startswith("phi") for m in measures)
+        self.places = any(m.is_angle for m in measures)
 
     def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
         """Rows for a design; ``points`` are its extrema, ``scale`` divides the objective."""
@@ -253,11 +253,16 @@ class _Layout:
     def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
         if m.numbers:
             return self._numbers(m, above)
+        if m.kind == "difference":
+            return self._difference(m, above)
         maxima, minima = self._ends(m.series)
         if m.kind in ("max", "min"):
             many = above == (m.kind == "max")
             ends = maxima if m.kind == "max" else minima
             return [({k: m.sign}, 0.0) for k in (ends if many else ends[:1])]
+        if m.kind in ("phi_max", "phi_min"):
+            ends = maxima if m.kind == "phi_max" else minima
+            return [({len(self.points) + k: 1.0}, self._turns(k)) for k in ends[:1]]
         if m.kind in ("max_abs", "phi_max_abs"):
             value = self.points.value
             ends = sorted([*maxima, *minima], key=lambda k: -self.points.sense[k] * value[k])
@@ -280,6 +285,18 @@ class _Layout:
         apart = self.points.phi[fold] - self.points.phi[ext]
         return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
 
+    def _difference(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        """The second angle minus the first, in (-pi, pi] at the present points."""
+        ends = [self._bounded(part, above)[:1] for part in m.parts]
+        if not all(ends):
+            return []
+        (first, shift), (second, other) = (end[0] for end in ends)
+        count = len(self.points)
+        apart = sum(w * self.points.phi[k - count] for k, w in second.items()) + other
+        apart -= sum(w * self.points.phi[k - count] for k, w in first.items()) + shift
+        turns = 2.0 * math.pi * math.ceil((apart - math.pi) / (2.0 * math.pi))
+        return [(second | {k: -w for k, w in first.items()}, other - shift - turns)]
+
     def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
         """A plain number, or every length with both signs; only the largest length has to stay above a bound."""
         first = 2 * len(self.points)
@@ -293,12 +310,10 @@ class _Layout:
         return [({first + self.scalars.index(name): math.copysign(1.0, sizes[name])}, 0.0)]
 
     def _outward(self, position: str) -> float:
-        """+1 where the extended position is the largest: the branch of the stage (of the last one) says so."""
-        names = self.curves.family.parameter_names
-        branches = [name for name in names if name.rstrip("0123456789") == "branch"]
-        own = "branch" + position.lstrip("abcdefghijklmnopqrstuvwxyz")
-        chosen = own if own in branches else max(branches, default="")
-        return float(self.design[names.index(chosen)]) if chosen else 1.0
+        """+1 where the extended position of that follower is the largest, -1 where it is the smallest."""
+        family = self.curves.family
+        sign = family.outward_sign(position)
+        return float(self.design[family.parameter_names.index(sign)]) if sign else 1.0
 
     def _turns(self, k: int) -> float:
         return -2.0 * math.pi * math.floor(float(self.points.phi[k]) / (2.0 * math.pi))
@@ -324,9 +339,7 @@ class _Layout:
         if r.measure.numbers:
             return max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)) or 1.0
         ends = [k for side in self._ends(r.measure.series) for k in side]
-        amplitude = (
-            1.0 if r.measure.kind.startswith("phi") else max((abs(self.points.value[k]) for k in ends), default=0.0)
-        )
+        amplitude = 1.0 if r.measure.is_angle else max((abs(self.points.value[k]) for k in ends), default=0.0)
         return max(abs(bound), 1e-3 * amplitude) or 1.0
 
     def form(self, complete: bool, reaches: bool) -> Form:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as st
-from sweep.chunks.cascade import MAGNITUDES
 from sweep.dataset import store
 from sweep.errors import InputError, SearchCutShort
 from sweep.families.base import Array
@@ -21,6 +20,7 @@ from sweep.optimise.pareto import Front, advance, steps
 from sweep.optimise.starts import diverse
 from sweep.optimise.study import problem_and_starts
 from sweep.optimise.written import certificates, outputs, write
+from sweep.quantities.names import by_magnitude
 
 if TYPE_CHECKING:
     from sweep.optimise.problem import Problem
@@ -159,7 +159,7 @@ def within(
         designs = np.column_stack([columns[name] for name in names]).astype(np.float64)
         merit = columns[study.objective.output].astype(np.float64)
         second = columns[settings.output].astype(np.float64)
-        size = np.abs(second) if settings.output.rstrip("0123456789") in MAGNITUDES else second
+        size = np.abs(second) if by_magnitude(settings.output) else second
         good = (columns["status"] == st.OK) & np.isfinite(merit)
         for k, bound in enumerate(bounds):
             inside = good & (size >= bound if settings.at_least else size <= bound)

@@ -12,6 +12,7 @@ from sweep.families.base import Accuracy, Array, Family
 from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
+from sweep.quantities.names import is_flag
 from sweep.reductions.measures import Measure
 
 TIE = 1e-6  # extrema this near to the largest one (relative) share it
@@ -49,7 +50,7 @@ def sensitivities(
     fixed = {n: float(x) for n, x in zip(family.parameter_names, design, strict=True) if n not in names}
     rows: dict[str, list[Any]] = {name: [] for name in ("parameter", "output", "value", "growing", "shrinking")}
     for output in outputs:
-        if output.rstrip("0123456789") == "rotatable":
+        if is_flag(output):
             continue
         place = design[varied]
         problem = Problem(

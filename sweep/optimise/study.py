@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from kernels import status as st
 from sweep.dataset import store
 from sweep.errors import InputError
+from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Angles, Array, Parameter
 from sweep.optimise.candidates import ranking
@@ -41,7 +41,6 @@ POSES = 720
 SWEPT = 6  # of so many starts one comes from the sweep where there is a global search
 WHOLE_TURN = 2.0 * np.pi - 1e-9
 TAILS = (2.0, 98.0)  # percent; beyond are needles that hardly moved and were scaled up to the stroke
-_DRAWN = re.compile(r"(pressure_angle|[xyz]_[a-z])\d*")
 
 
 def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Problem:
@@ -285,8 +284,7 @@ def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
 def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
     """Pose curves of optimum and reference over one turn; no rows where the study wants none."""
     family = study.family
-    motion = [family.position, *(f"d{n}{family.position}" for n in ("", "2", "3")), "dev"]
-    wanted = [name for name in family.pose_names if name in motion or _DRAWN.fullmatch(name)]
+    wanted = [*motion_curves(family), *joint_curves(family)]
     shown = [k for k, role in enumerate(table["role"]) if role in ("optimum", "reference")]
     if study.output.curves == "none":
         shown = []

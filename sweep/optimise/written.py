@@ -12,6 +12,7 @@ import numpy as np
 from sweep.dataset import store
 from sweep.families.base import Array
 from sweep.optimise.certificate import CAVEAT, Result
+from sweep.quantities.names import is_error, without_error
 
 if TYPE_CHECKING:
     from sweep.study import Study
@@ -96,9 +97,9 @@ def write(
     texts |= own_texts
     for name in columns:
         if name not in texts:
-            plain = name.removeprefix("err_")
+            plain = without_error(name)
             wanted = output(family, plain)
-            text = f"{error_words(study, plain)} of {wanted.text}" if name.startswith("err_") else wanted.text
+            text = f"{error_words(study, plain)} of {wanted.text}" if is_error(name) else wanted.text
             texts[name] = (wanted.unit.replace("length", "mm"), text)
     arrays = {name: pa.array(_plain(values)) for name, values in columns.items()}
     fields = [

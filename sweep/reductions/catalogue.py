@@ -2,125 +2,62 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from sweep.effects import elsewhere, offered
 from sweep.errors import InputError, nearest
-from sweep.families.base import Accuracy, Family, Output, Step
-from sweep.families.chain import Chain, Stage
-from sweep.reductions.extrema import Mode, Request
-from sweep.reductions.margins import margin_suffixes
-from sweep.reductions.sampling import is_angle_of_follower
-from sweep.reductions.size import SIZE, lengths, size_step
-from sweep.reductions.travel import certified_travel
+from sweep.families.base import Accuracy, Family, Output
+from sweep.families.capabilities import Assembly
+from sweep.families.chain import Chain
+from sweep.families.domain import Turn
+from sweep.families.members import Machine, Member
+from sweep.quantities.names import parts
+from sweep.quantities.reduction import Mode, prefixes, reduction_of, split
+from sweep.reductions.events import event_names
+from sweep.reductions.extrema import Request
+from sweep.reductions.size import SIZE, lengths
+from sweep.reductions.steps import applying_step, certified_names, own_steps, place_names
 
-REDUCTIONS = {
-    "max_abs": "largest magnitude over one turn of",
-    "phi_max_abs": "crank angle of the largest magnitude of",
-    "max": "largest value over one turn of",
-    "min": "smallest value over one turn of",
-    "range": "largest minus smallest value over one turn of",
-    "rms": "root mean square over one turn of",
-}
-_MODES: dict[str, tuple[Mode, ...]] = {
-    "max_abs": (0,),
-    "phi_max_abs": (0,),
-    "max": (1,),
-    "min": (-1,),
-    "range": (1, -1),
-    "rms": (),
-}
 MARGIN_TEXTS = {
     "rotatable": ("1", "whether the links reach over the whole turn"),
     "margin": ("1", "smallest cos^2(pressure angle) over one turn; negative if the crank does not turn fully"),
     "max_pressure_angle": ("rad", "largest pressure angle over one turn"),
 }
+BOTH_EXTREMA: tuple[Mode, ...] = (1, -1)
+PLACES = ("phi_ext", "phi_fold", "phi0", "stroke_ratio")
 
 STAY = Output("window_angle", "rad", "crank angle over which the position lies in the window of the stroke: its dwell")
 
 
 @dataclass(frozen=True)
-class Way:
-    """One design output and the general route to it."""
+class Quantity:
+    """A design output and what it is made of where no own route of the family gives it.
+
+    Parameters
+    ----------
+    output : name, unit, definition
+    route : the general route that computes it
+    kind : what is taken: "margin", "swing", "max_abs" ...
+    of : the pose output that it is taken of: of a reduction, or the position of the limits
+    stage : the number of the stage, for margins and limit positions of a chain
+    modes : the extrema of ``of`` that it is made of
+    locates : whether it is, or needs, a value of the domain's variable
+    """
 
     output: Output
-    kind: Literal["margin", "limits", "reduction", "mean"]
-    base: str  # the name without what it is taken of: "margin", "swing", "max_abs" ...
-    of: str = ""  # pose output of a reduction, or position of the limits
-    suffix: str = ""  # stage number, for margins and limits
+    route: Literal["margin", "limits", "reduction", "mean", "event"]
+    kind: str
+    of: str = ""
+    stage: str = ""
+    modes: tuple[Mode, ...] = BOTH_EXTREMA
+    locates: bool = False
 
-    @property
-    def modes(self) -> tuple[Mode, ...]:
-        """Which extrema of the pose output it is made of."""
-        return _MODES.get(self.base, (1, -1))
-
-    @property
-    def locates(self) -> bool:
-        """Whether a crank angle is wanted."""
-        return self.base in ("phi_max_abs", "phi_ext", "phi_fold", "phi0", "stroke_ratio")
-
-    def requests(self, windowed: bool) -> tuple[Request, ...]:
-        """The extrema it is made of; a window concerns the deviation across a line only."""
-        return tuple(Request(self.of, mode, windowed and is_deviation(self.of)) for mode in self.modes)
-
-
-def is_deviation(pose: str) -> bool:
-    """Whether a window of the stroke limits what counts of this pose output."""
-    return re.fullmatch(r"dev\d*", pose) is not None
-
-
-def is_position(family: Family, pose: str) -> bool:
-    """Whether the pose output is the position of a follower."""
-    return pose == family.position or is_angle_of_follower(pose) or re.fullmatch(r"s\d+", pose) is not None
-
-
-def steps_of(family: Family) -> tuple[Step, ...]:
-    """The family's own routes, and those that are made for it here."""
-    made = (size_step(family), certified_travel(family))
-    return (*family.steps, *(step for step in made if step is not None))
-
-
-def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | None]]:
-    """The family's own routes to an output, and those of a chain's first stage, which turns as if it were alone."""
-    found: list[tuple[Step, Output, Stage | None]] = [
-        (step, o, None) for step in steps_of(family) for o in step.provides if o.name == name
-    ]
-    if isinstance(family, Chain) and name.endswith("1"):
-        stage = family.stages[0]
-        found += [
-            (step, o, stage) for step in stage.family.steps for o in step.provides if o.name == name.removesuffix("1")
-        ]
-    return found
-
-
-def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
-    """The cheapest own route to an output that serves this accuracy."""
-    able = [(step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy.of(name))]
-    return min(able, key=lambda pair: pair[0].cost(accuracy), default=None)
-
-
-def certified_names(family: Family) -> tuple[str, ...]:
-    """Outputs whose maxima can be proven, those of a chain's first stage included."""
-    names = [o.name for step in steps_of(family) if step.certifies for o in step.provides]
-    if isinstance(family, Chain):
-        names += [f"{o.name}1" for step in family.stages[0].family.steps if step.certifies for o in step.provides]
-    return tuple(names)
-
-
-def proofs(certify: bool | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """What ``certify=`` asks for, as ``certify`` and ``proven`` of `Accuracy`."""
-    if isinstance(certify, bool):
-        return certify, ()
-    names = (certify,) if isinstance(certify, str) else tuple(dict.fromkeys(certify))
-    return bool(names), names
-
-
-def is_proven(family: Family, name: str, accuracy: Accuracy) -> bool:
-    """Whether the error of an output is a proven bound."""
-    return accuracy.of(name).certify and name in certified_names(family) and not name.startswith("phi_")
+    def requests(self, family: Family, windowed: bool) -> tuple[Request, ...]:
+        """The extrema it is made of; a window concerns deviations across a line only."""
+        inside = windowed and family.pose_output[self.of].windowed
+        return tuple(Request(self.of, mode, inside, self.locates) for mode in self.modes)
 
 
 def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> None:
@@ -136,7 +73,8 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy)
         proven; the message names those that can.
     """
     names = certified_names(family)
-    known = ", ".join(name for name in names if not name.startswith("phi_")) or "none"
+    places = place_names(family)
+    known = ", ".join(name for name in names if name not in places) or "none"
     allowed = f"a proof of the maxima that have one; of {family.name}: {known}"
     for name in accuracy.proven:
         if name not in names or name not in wanted:
@@ -145,8 +83,8 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy)
             )
     for name in accuracy.proven or wanted:
         output(family, name)  # unknown names end here
-        way = general_way(family, name)
-        if applying_step(family, name, accuracy) is None and way is not None and way.kind == "reduction":
+        found = quantity(family, name)
+        if applying_step(family, name, accuracy) is None and found is not None and found.route == "reduction":
             raise InputError(
                 "certify", True, f"{allowed}; not of {name}: name those to prove", f"design outputs of {family.name}"
             )
@@ -154,11 +92,53 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy)
         raise InputError("certify", True, f"{allowed}; none of them is wanted", f"design outputs of {family.name}")
 
 
-def general_way(family: Family, name: str) -> Way | None:
-    """How the name is computed from poses alone, or None if it names nothing."""
-    if name == STAY.name:
-        return Way(STAY, "limits", STAY.name, family.position)
-    return _margin_way(family, name) or _limit_way(family, name) or _reduction_way(family, name)
+def quantity(family: Family, name: str) -> Quantity | None:
+    """What a name stands for where it is computed from poses alone; None where it stands for nothing."""
+    if isinstance(family, Machine):
+        member = family.split(name)
+        if member is not None:
+            return _of_member(member[0], quantity(member[0].family, member[1])) or _of_point(family, *member)
+        return _margin(family, name) or _reduction(family, name)
+    if name == STAY.name and isinstance(family.domain, Turn):
+        return Quantity(STAY, "limits", STAY.name, family.position)
+    return _margin(family, name) or _limit(family, name) or _event(family, name) or _reduction(family, name)
+
+
+def _event(family: Family, name: str) -> Quantity | None:
+    for event in family.events:
+        place, count = event_names(family, event)
+        of = family.pose_output[event.of]
+        if name == place:
+            found = Output(name, family.domain.unit, f"{family.domain.text} at which {event.text}", of.equation)
+            return Quantity(found, "event", "event", event.of, modes=(), locates=True)
+        if name == count:
+            found = Output(name, "1", f"how often {event.text}", of.equation, jumps=True)
+            return Quantity(found, "event", "count", event.of, modes=())
+    return None
+
+
+def _of_member(member: Member, found: Quantity | None) -> Quantity | None:
+    """A member's quantity as one of the machine."""
+    if found is None:
+        return None
+    of = found.of and f"{member.name}.{found.of}"
+    return replace(found, output=_dotted(member, found.output), of=of, stage=f"{member.name}.{found.stage}")
+
+
+def _of_point(machine: Machine, member: Member, own: str) -> Quantity | None:
+    """A reduction of a coordinate in the machine's frame, which the member's family does not know."""
+    for reduction, rest in split(own, machine.domain):
+        pose = machine.pose_output.get(f"{member.name}.{rest}")
+        if pose is not None:
+            found = reduction.output(pose, machine.domain)
+            route: Literal["reduction", "mean"] = "reduction" if reduction.modes else "mean"
+            named = replace(found, name=f"{member.name}.{own}")
+            return Quantity(named, route, reduction.kind, pose.name, "", reduction.modes, reduction.place)
+    return None
+
+
+def _dotted(member: Member, found: Output) -> Output:
+    return replace(found, name=f"{member.name}.{found.name}", text=f"{member.name}: {found.text}")
 
 
 def output(family: Family, name: str) -> Output:
@@ -169,79 +149,95 @@ def output(family: Family, name: str) -> Output:
     InputError
         if the family has no such output; the message gives the nearest name.
     """
+    if isinstance(family, Machine):
+        member = family.split(name)
+        if member is not None:
+            point = _of_point(family, *member)
+            return point.output if point else _dotted(member[0], output(member[0].family, member[1]))
+        timing = next((t for t in family.timings if t.name == name), None)
+        if timing is not None:
+            return timing.output
     for _, found, stage in own_steps(family, name):
-        return replace(found, name=name, text=f"stage 1: {found.text}") if stage else found
-    way = general_way(family, name)
-    if way is None:
-        names = output_names(family)
-        known = "max_abs_x, phi_max_abs_x, max_x, min_x, range_x, rms_x of a pose output x, or one of "
-        special = ", ".join(n for n in names if not n.startswith(tuple(f"{r}_" for r in REDUCTIONS)))
-        of_effects = [o.name for o in offered(family)]
-        near = nearest(name, [*names, *of_effects, *(f"{base}_{x}" for x in of_effects for base in REDUCTIONS)])
-        if name in family.pose_names:
-            near = f"; {name} is one of a single pose, ask `evaluate`"
-        known = f"{known}{special}, and those of effects (sweep effects)" if of_effects else f"{known}{special}"
-        near = elsewhere(family, name) or near
-        raise InputError("output", name, f"{known}{near}", f"design outputs of {family.name}")
-    return way.output
+        return found.of_stage(stage.number) if stage else found
+    asked = quantity(family, name)
+    if asked is None:
+        raise InputError("output", name, _known(family, name), f"design outputs of {family.name}")
+    return asked.output
+
+
+def _known(family: Family, name: str) -> str:
+    """Words for an unknown name: what there is, and the nearest."""
+    names = output_names(family)
+    grammar = prefixes(family.domain)
+    special = ", ".join(n for n in names if not n.startswith(grammar))
+    words = f"{', '.join(f'{prefix}x' for prefix in grammar)} of a pose output x, or one of {special}"
+    of_effects = [o.name for o in offered(family)]
+    near = nearest(name, [*names, *of_effects, *(f"{prefix}{x}" for x in of_effects for prefix in grammar)])
+    if name in family.pose_names:
+        near = f"; {name} is one of a single pose, ask `evaluate`"
+    if of_effects:
+        words += ", and those of effects (sweep effects)"
+    return words + (elsewhere(family, name) or near)
 
 
 def output_names(family: Family) -> tuple[str, ...]:
     """All design outputs worth listing: the family's own, margins, limit positions, reductions of every pose output."""
+    if isinstance(family, Machine):
+        dotted = [f"{m.name}.{name}" for m in family.members for name in output_names(m.family)]
+        own = [o.name for relation in family.relations for o in relation.outputs]
+        reductions = [f"{prefix}{name}" for name in own for prefix in prefixes(family.domain)]
+        return (*dotted, *MARGIN_TEXTS, *(t.name for t in family.timings), *reductions)
     names = [o.name for step in family.steps for o in step.provides]
-    suffixes = margin_suffixes(family)
-    if suffixes:
+    assemblies = family.every(Assembly)
+    if assemblies:
         names += MARGIN_TEXTS
     if isinstance(family, Chain):
         names += [f"{o.name}1" for step in family.stages[0].family.steps for o in step.provides]
-        names += [f"{base}{suffix}" for suffix in suffixes for base in MARGIN_TEXTS]
-    names += [*limit_names(family, family.position, ""), STAY.name]
+        names += [f"{base}{loop.stage}" for loop in assemblies for base in MARGIN_TEXTS]
+    names += [name for position, stage in family.positions.items() for name in limit_names(family, position, stage)]
+    names += [name for event in family.events for name in event_names(family, event)]
+    names += [STAY.name] if isinstance(family.domain, Turn) else []
     names += [SIZE.name] if lengths(family) else []
-    if isinstance(family, Chain):
-        for stage in family.stages:
-            names += limit_names(family, f"{stage.family.position}{stage.number}", str(stage.number))
-    names += [f"{base}_{pose}" for pose in family.pose_names for base in REDUCTIONS]
+    names += [f"{prefix}{pose}" for pose in family.pose_names for prefix in prefixes(family.domain)]
     return tuple(dict.fromkeys(names))
 
 
-def limit_names(family: Family, position: str, suffix: str) -> list[str]:
-    """Names made of the two limit positions of a follower."""
-    if position not in family.pose_names:
-        return []
-    letter = position.removesuffix(suffix) if suffix else position
-    amplitude = "swing" if letter == "psi" else "stroke"
-    bases = (f"{letter}_ext", f"{letter}_fold", amplitude, "phi_ext", "phi_fold", "phi0", "stroke_ratio")
-    return [f"{base}{suffix}" for base in bases]
+def limit_names(family: Family, position: str, stage: str) -> dict[str, str]:
+    """Names made of the two limit positions of a follower, and what each is."""
+    pose = family.pose_output.get(position)
+    if pose is None:
+        return {}
+    amplitude = "swing" if pose.wraps else "stroke"
+    kinds: tuple[str, ...] = ("ext", "fold", amplitude, *PLACES)
+    if not isinstance(family.domain, Turn):
+        kinds = (amplitude,)  # an interval has no extended position, and no angle between the limits
+    return {f"{pose.base}_{kind}{stage}" if kind in ("ext", "fold") else f"{kind}{stage}": kind for kind in kinds}
 
 
-def _margin_way(family: Family, name: str) -> Way | None:
-    match = re.fullmatch(r"(rotatable|margin|max_pressure_angle)(\d*)", name)
-    if match is None:
-        return None
-    base, suffix = match.groups()
-    suffixes = margin_suffixes(family)
-    if not suffixes or (suffix and suffix not in suffixes):
+def _margin(family: Family, name: str) -> Quantity | None:
+    _, base, stage = parts(name)
+    loops = family.every(Assembly)
+    if base not in MARGIN_TEXTS or not loops or (stage and stage not in [loop.stage for loop in loops]):
         return None
     unit, text = MARGIN_TEXTS[base]
-    if suffix:
-        text = f"stage {suffix}: {text}"
-    elif len(suffixes) > 1:
+    if stage:
+        text = f"stage {stage}: {text}"
+    elif len(loops) > 1:
         text = f"{text}; of all stages the weakest"
-    return Way(Output(name, unit, text), "margin", base, suffix=suffix)
+    return Quantity(Output(name, unit, text), "margin", base, stage=stage)
 
 
-def _limit_way(family: Family, name: str) -> Way | None:
-    stages = [(family.position, "")]
-    if isinstance(family, Chain):
-        stages += [(f"{s.family.position}{s.number}", str(s.number)) for s in family.stages]
-    for position, suffix in stages:
-        if name not in limit_names(family, position, suffix):
+def _limit(family: Family, name: str) -> Quantity | None:
+    for position, stage in family.positions.items():
+        kind = limit_names(family, position, stage).get(name)
+        if kind is None:
             continue
-        base = name.removesuffix(suffix) if suffix else name
-        unit = next(o.unit for o in family.pose_outputs if o.name == position)
+        unit = family.pose_output[position].unit
         units = {"phi_ext": "rad", "phi_fold": "rad", "phi0": "rad", "stroke_ratio": "1"}
-        first, second = limit_order(family, suffix)
+        first, second = limit_order(family, position)
         texts = {
+            "ext": f"{position} in the extended position: the {first}",
+            "fold": f"{position} in the folded position: the {second}",
             "phi_ext": f"crank angle of the extended position, where {position} is {first}",
             "phi_fold": f"crank angle of the folded position, where {position} is {second}",
             "phi0": "crank angle from the extended to the folded position, in [0, 2 pi)",
@@ -249,33 +245,29 @@ def _limit_way(family: Family, name: str) -> Way | None:
             "swing": f"{position} at the folded minus the extended position, where it is {first}",
             "stroke": f"largest minus smallest {position} over one turn",
         }
-        where = f"extended position: the {first}" if base.endswith("_ext") else f"folded position: the {second}"
-        text = texts.get(base, f"{position} in the {where}")
-        return Way(Output(name, units.get(base, unit), text), "limits", base, position, suffix)
+        found = Output(name, units.get(kind, unit), texts[kind])
+        return Quantity(found, "limits", kind, position, stage, locates=kind in PLACES)
     return None
 
 
-def limit_order(family: Family, suffix: str) -> tuple[str, str]:
+def limit_order(family: Family, position: str) -> tuple[str, str]:
     """How the extended and the folded position are told apart, in words."""
-    names = family.parameter_names
-    branch = f"branch{suffix}" if f"branch{suffix}" in names else f"branch{_last(family)}"
-    if branch in names:
-        return f"largest (smallest if {branch} = -1)", f"smallest (largest if {branch} = -1)"
+    sign = family.outward_sign(position)
+    if sign:
+        return f"largest (smallest if {sign} = -1)", f"smallest (largest if {sign} = -1)"
     return "largest", "smallest"
 
 
-def _last(family: Family) -> str:
-    return str(len(family.stages)) if isinstance(family, Chain) else ""
-
-
-def _reduction_way(family: Family, name: str) -> Way | None:
-    for base, text in REDUCTIONS.items():
-        if not name.startswith(f"{base}_"):
-            continue
-        of = name.removeprefix(f"{base}_")
-        pose = next((o for o in family.pose_outputs if o.name == of), None)
-        if pose is not None:
-            unit = "rad" if base == "phi_max_abs" else pose.unit
-            of_turn = Output(name, unit, f"{text} {pose.name}: {pose.text}", pose.equation, pose.jumps)
-            return Way(of_turn, "mean" if base == "rms" else "reduction", base, pose.name)
-    return None
+def _reduction(family: Family, name: str) -> Quantity | None:
+    found = reduction_of(family, name)
+    if found is None:
+        return None
+    reduction, pose = found
+    if family.domain.kind not in reduction.domains:
+        raise InputError(
+            "output", name, f"no {reduction.name} over an {family.domain.kind} of the {family.domain.text}",
+            f"design outputs of {family.name}",
+        )  # fmt: skip
+    route: Literal["reduction", "mean"] = "reduction" if reduction.modes else "mean"
+    of_turn = reduction.output(pose, family.domain)
+    return Quantity(of_turn, route, reduction.kind, pose.name, pose.stage, reduction.modes, reduction.place)

@@ -6,7 +6,9 @@ import numpy as np
 
 from kernels import status as st
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
+from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain, Stage
+from sweep.quantities.names import is_flag
 from sweep.reductions.extrema import DESIGN_STATUS, Request, true_extrema
 from sweep.reductions.sampling import pose_columns
 
@@ -20,9 +22,7 @@ def margin_suffixes(family: Family) -> tuple[str, ...]:
 
     Stages without a discriminant (a geared drive turns always) are left out.
     """
-    if isinstance(family, Chain):
-        return tuple(str(s.number) for s in family.stages if "discriminant" in s.family.pose_names)
-    return ("",) if "discriminant" in family.pose_names else ()
+    return tuple(loop.stage for loop in family.every(Assembly))
 
 
 def margins(family: Family, designs: Array, suffixes: tuple[str, ...], accuracy: Accuracy) -> Columns:
@@ -55,7 +55,7 @@ def margins(family: Family, designs: Array, suffixes: tuple[str, ...], accuracy:
         status[alive] = part["status"]
         for name in NAMES:
             for key in (f"{name}{suffix}", f"err_{name}{suffix}"):
-                whole = np.zeros(n, np.bool_) if key.startswith("rotatable") else np.full(n, np.nan)
+                whole = np.zeros(n, np.bool_) if is_flag(key) else np.full(n, np.nan)
                 whole[alive] = part[key]
                 columns[key] = whole
     return columns | {"status": status}
@@ -107,7 +107,8 @@ def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accurac
 def _from_poses(family: Family, designs: Array, suffix: str) -> Columns:
     """The margin from the family's discriminant, refined to its least value."""
     designs = _unit_lengths(family, designs)
-    discriminant, angle = f"discriminant{suffix}", f"pressure_angle{suffix}"
+    loop = next(found for found in family.every(Assembly) if found.stage == suffix)
+    discriminant, angle = loop.discriminant, loop.pressure_angle
     request = Request(discriminant, -1)
     found, unknown = true_extrema(family, designs, [request], TARGET, anywhere=True)
     least = found[request]
@@ -118,7 +119,7 @@ def _from_poses(family: Family, designs: Array, suffix: str) -> Columns:
     # A discriminant with nan in it: the status of the poses that have none says why.
     status = np.where(known, at_least, np.where(unknown == st.OK, st.NOT_CONVERGED, unknown)).astype(np.uint8)
     turns = status == st.OK
-    scale = _scale(family, designs, suffix)
+    scale = loop.scale(designs)
     pressure = np.where(turns, poses[angle][:, 0], np.nan)
     err_margin = least.err / scale
     margin = np.where(turns, np.cos(pressure) ** 2, least.value / scale)
@@ -143,13 +144,3 @@ def _unit_lengths(family: Family, designs: Array) -> Array:
         _, exponent = np.frexp(np.abs(designs[:, lengths]).max(axis=1))
         scaled[:, lengths] = np.ldexp(designs[:, lengths], -exponent[:, None])
     return scaled
-
-
-def _scale(family: Family, designs: Array, suffix: str) -> Array:
-    unit = next(o.unit for o in family.pose_outputs if o.name == f"discriminant{suffix}")
-    names = family.parameter_names
-    b: Array = designs[:, names.index(f"b{suffix}")]
-    if unit == "length^2":
-        return b * b
-    c: Array = designs[:, names.index(f"c{suffix}")]
-    return (2.0 * b * c) ** 2

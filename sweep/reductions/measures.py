@@ -8,23 +8,31 @@ with what they replace, so minima, maxima and limits carry over.
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, cast
 
 from sweep.errors import InputError
 from sweep.families.base import Family
-from sweep.reductions.catalogue import STAY
-from sweep.reductions.means import PREFIX
+from sweep.families.capabilities import Assembly
+from sweep.families.members import Machine
+from sweep.quantities.names import parts, stem
+from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.size import SIZE, lengths
 
 # A crank that turns must keep this much of Delta/b^2 at its worst pose: cos^2 of 89.94 degrees.
 ROTATABLE_MARGIN = 1e-6
 
 Kind: TypeAlias = Literal[
-    "max_abs", "max", "min", "range", "phi_max_abs", "ext", "fold", "phi_ext", "phi_fold", "phi0", "scalar", "lengths"
-]
+    "max_abs", "max", "min", "range", "phi_max_abs", "phi_max", "phi_min", "ext", "fold", "phi_ext", "phi_fold", "phi0",
+    "difference", "scalar", "lengths",
+]  # fmt: skip
 Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable"]
+
+# What the optimiser follows of the two limit positions: which end, or the difference of both.
+LIMIT_KINDS: dict[str, Kind] = {
+    "swing": "range", "stroke": "range", "phi0": "phi0", "stroke_ratio": "phi0", "phi_ext": "phi_ext",
+    "phi_fold": "phi_fold", "ext": "ext", "fold": "fold",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -46,8 +54,8 @@ class Series:
 class Measure:
     """A design output as ``sign`` * (reduction ``kind`` of its series), read back through ``inner``.
 
-    ``numbers`` are plain numbers instead of series: the output itself ("scalar"), or parameters of which it is the
-    largest magnitude ("lengths").
+    ``parts`` are the two angles of a "difference", the second minus the first.  ``numbers`` are plain numbers instead
+    of series: the output itself ("scalar"), or parameters of which it is the largest magnitude ("lengths").
     """
 
     name: str
@@ -56,6 +64,12 @@ class Measure:
     inner: Inner = "same"
     sign: float = 1.0
     numbers: tuple[str, ...] = ()
+    parts: tuple[Measure, ...] = ()
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether it is made of crank angles at which something happens."""
+        return self.kind.startswith("phi") or self.kind == "difference"
 
     def to_inner(self, value: float) -> float:
         """Inner value that stands for a value of the output."""
@@ -79,22 +93,15 @@ class Measure:
         return value
 
 
-def curve(output: str, window: tuple[float, float] | None = None) -> Series:
+def curve(family: Family, output: str, window: tuple[float, float] | None = None) -> Series:
     """The series of a plain pose output."""
-    return Series(output, window=window, wrapped=output.rstrip("0123456789") == "psi")
+    return Series(output, window=window, wrapped=family.pose_output[output].wraps)
 
 
 def margins(family: Family, stage: str = "") -> tuple[Series, ...]:
     """Delta/b^2 of the stage of that number; without a number of every stage.  Empty where nothing can lock."""
-    pairs = {}
-    for name in family.pose_names:
-        found = re.fullmatch(r"discriminant(\d*)", name)
-        if found and f"pressure_angle{found[1]}" in family.pose_names:
-            pairs[found[1]] = Series(name, pressure=f"pressure_angle{found[1]}")
-    numbered = {number: series for number, series in pairs.items() if number} or pairs
-    if not stage:
-        return tuple(numbered.values())
-    return (numbered[stage],) if stage in numbered else ()
+    loops = family.every(Assembly)
+    return tuple(Series(o.discriminant, pressure=o.pressure_angle) for o in loops if not stage or o.stage == stage)
 
 
 def measure(family: Family, name: str, window: tuple[float, float] | None = None) -> Measure:
@@ -103,75 +110,40 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     Parameters
     ----------
     family : whose output it is
-    name : ``margin``, ``rotatable``, ``max_pressure_angle``, ``swing``, ``stroke``, ``phi0``, ``stroke_ratio``,
-        positions and angles of the limit positions, ``max_abs_x``, ``phi_max_abs_x``, ``max_x``, ``min_x``, ``range_x``
-        of any pose output x, ``size``; chains: with a stage number.  ``rms_x``, parameters, and what only a step of the
-        family computes, are taken as numbers without inner structure.
+    name : any design output.  Means, parameters, and what only a step of the family computes, are taken as numbers
+        without inner structure
     window : see :class:`sweep.optimise.problem.Problem`
 
     Raises
     ------
     InputError
-        for a name that is none of these.
+        for a name that is no design output and no parameter.
     """
-    stem, stage = _split(name)
-    if stem in ("margin", "rotatable", "max_pressure_angle"):
-        found = margins(family, stage)
-        if found or name == "rotatable":
-            return _margin_measure(name, stem, found)
-    limits: dict[str, Kind] = {
-        "swing": "range", "stroke": "range", "phi0": "phi0", "stroke_ratio": "phi0", "phi_ext": "phi_ext",
-        "phi_fold": "phi_fold", "psi_ext": "ext", "s_ext": "ext", "psi_fold": "fold", "s_fold": "fold",
-    }  # fmt: skip
-    if stem in limits:
-        position = _position(family, stage)
-        fits = {"swing": "psi", "stroke": "s"}.get(stem, stem.split("_")[0] if limits[stem] in ("ext", "fold") else "")
-        if position and (not fits or position.rstrip("0123456789") == fits):
-            inner: Inner = "ratio" if stem == "stroke_ratio" else "same"
-            return Measure(name, limits[stem], (curve(position),), inner)
-    reductions: dict[str, Kind] = {
-        "phi_max_abs_": "phi_max_abs", "max_abs_": "max_abs", "max_": "max", "min_": "min", "range_": "range",
-    }  # fmt: skip
-    for prefix, kind in reductions.items():
-        x = name.removeprefix(prefix)
-        if x != name and x in family.pose_names:
-            inside = window if x == "dev" and kind in ("max_abs", "phi_max_abs") else None
-            return Measure(name, kind, (curve(x, inside),))
-    mean = name.startswith(PREFIX) and name.removeprefix(PREFIX) in family.pose_names
+    if stem(name) == "rotatable" and not margins(family, parts(name).stage):
+        return _margin_measure(name, "rotatable", ())
+    timing = next((t for t in family.timings if t.name == name), None) if isinstance(family, Machine) else None
+    if timing is not None:
+        ends = tuple(measure(family, place, window) for place in timing.places)
+        return Measure(name, "difference", tuple(s for end in ends for s in end.series), parts=ends)
+    asked = quantity(family, name)
+    if asked is not None and asked.route == "margin":
+        return _margin_measure(name, asked.kind, margins(family, asked.stage))
+    if asked is not None and asked.route == "limits" and asked.kind in LIMIT_KINDS:
+        inner: Inner = "ratio" if asked.kind == "stroke_ratio" else "same"
+        return Measure(name, LIMIT_KINDS[asked.kind], (curve(family, asked.of),), inner)
+    if asked is not None and asked.route == "reduction":
+        inside = window if family.pose_output[asked.of].windowed and asked.modes == (0,) else None
+        return Measure(name, cast(Kind, asked.kind), (curve(family, asked.of, inside),))
     steps = {output.name for step in family.steps for output in step.provides}
-    if mean or name == STAY.name or name in steps or name in family.parameter_names:
+    if asked is not None or name in steps or name in family.parameter_names:
         return Measure(name, "scalar", (), numbers=(name,))
     if name == SIZE.name and lengths(family):
         return Measure(name, "lengths", (), numbers=lengths(family))
-    known = (
-        "margin, rotatable, max_pressure_angle, swing or stroke, phi0, stroke_ratio, max_abs_x, max_x, min_x, range_x, "
-        "rms_x, size"
-    )
-    raise InputError(
-        "output", name, f"{known} for x = {', '.join(family.pose_names)}", f"design outputs of {family.name}"
-    )
+    output(family, name)  # an unknown name ends here, with the nearest known one
+    raise InputError("output", name, "an output that changes steadily", f"design outputs of {family.name}")
 
 
-def _margin_measure(name: str, stem: str, series: tuple[Series, ...]) -> Measure:
-    if stem == "max_pressure_angle":
+def _margin_measure(name: str, kind: str, series: tuple[Series, ...]) -> Measure:
+    if kind == "max_pressure_angle":
         return Measure(name, "min", series, "pressure", sign=-1.0)
-    return Measure(name, "min", series, "rotatable" if stem == "rotatable" else "same")
-
-
-def _position(family: Family, stage: str) -> str:
-    name = family.position + stage
-    if name in family.pose_names:
-        return name
-    for letter in ("psi", "s"):
-        if stage and letter + stage in family.pose_names:
-            return letter + stage
-    return ""
-
-
-def _split(name: str) -> tuple[str, str]:
-    if name == "phi0":
-        return name, ""
-    found = re.fullmatch(r"(.*?)(\d*)", name)
-    stem, number = (found[1], found[2]) if found else (name, "")
-    # phi01 is phi0 of stage 1.
-    return ("phi0", number[1:]) if stem == "phi" and number.startswith("0") else (stem, number)
+    return Measure(name, "min", series, "rotatable" if kind == "rotatable" else "same")

@@ -8,8 +8,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kernels import scan
-from sweep.families.base import Array, Family
-from sweep.reductions.sampling import Index, Mask, pose_columns
+from sweep.families.base import Array
+from sweep.reductions.sampling import Index, Mask
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""
@@ -18,12 +18,12 @@ OFFSETS = np.arange(-2.0, 3.0)
 SHRINK = 0.125
 PASSES = 12
 POLISHES = 3
-LOBES = 49  # poses about a maximum among which it is looked for again
 NARROW, WIDE = 1e-8, 1e-4  # secants [rad]: shorter ones would see the rounding of the crank angle
 # The quartic over a five-point window errs in proportion to at least the fourth power of its width, so one pass to the
 # next divides the error by at least 8^4; a sixty-fourth of the last change is claimed, which leaves a factor of 64.
 CLAIM = 1.0 / 64.0
 RIPPLE = 0.25  # of the fourth difference: eight times the noise of one sample on average, and what a quartic leaves out
+VARIES = 8.0  # times the rounding at one pose: what that of its neighbours may be
 EPS = 2.0**-53
 
 
@@ -121,14 +121,29 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) ->
     sample : evaluates the measured quantity with less rounding than what the peaks come from
     peaks, tolerance, locate : as in `sharpen`
     """
+    before = peaks.height
     peaks = _attained(sample, peaks, np.arange(peaks.phi.size))
+    rounded = np.abs(peaks.height - before)
     again = np.flatnonzero((peaks.err_height > tolerance) | (peaks.err_phi > locate))
+    # The same rounding has moved the places; it varies along the curve, and one pose sees one value of it.
+    peaks.err_height[:] += VARIES * rounded
     if again.size:
-        # Rounding may have spoilt the place too: begin as wide as it is uncertain.
-        step = np.maximum(peaks.step, np.minimum(peaks.err_phi, SHRINK * peaks.spacing))
-        rough = peaks._replace(step=step).only(again)
+        # Rounding may have spoilt the place too, and rounding that is alike at neighbouring poses hides that: where it
+        # has changed the height begin anew, else as wide as the place is uncertain.
+        fresh = SHRINK * peaks.spacing
+        err_phi = np.where(rounded > tolerance, np.maximum(peaks.err_phi, fresh), peaks.err_phi)
+        step = np.maximum(peaks.step, np.minimum(err_phi, fresh))
+        rough = peaks._replace(step=step, err_phi=err_phi).only(again)
         sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, tolerance[again], locate[again])
         sharper = _attained(sample, sharper, again)
+        # Both heights are attained, so the higher one is nearer; a narrow window may see noise, or another peak.
+        rougher = peaks.only(again)
+        lower = np.maximum(rougher.height - sharper.height, 0.0)
+        moved = np.abs(sharper.phi - rougher.phi)
+        kept = lower > 0.0
+        sharper.phi[kept], sharper.height[kept] = rougher.phi[kept], rougher.height[kept]
+        sharper.err_height[:] += lower
+        sharper.err_phi[kept] += moved[kept]
         for column, found in zip(peaks, sharper, strict=True):
             column[again] = found
     return peaks
@@ -138,51 +153,6 @@ def _attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
     """Heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
     height = sample(which, peaks.phi[:, None])[:, 0]
     return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
-
-
-def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target: float, locate: bool) -> Peaks:
-    """Largest magnitudes (n,) next to where they were found, from the family's precise poses alone; error inf if lost.
-
-    Parameters
-    ----------
-    family, designs : with precise poses; the (n, P) design matrix
-    pose : which output is largest
-    phi : (n,) places of the maxima as known so far [rad]
-    target : relative accuracy
-    locate : whether the places are wanted too
-
-    Notes
-    -----
-    Near a change point the jerk has tops of nearly equal height a few widths apart, told apart by precise poses only.
-    So each maximum is looked for again among `LOBES` poses about its place, three per width sqrt(y/|y''|) of the curve.
-    """
-    precise = family.precise()
-
-    def measured(which: Index, angles: Array, name: str = pose) -> Array:
-        found = pose_columns(precise, designs[which], angles, [name])[0][name]
-        return np.abs(found) if name == pose else found
-
-    every = np.arange(phi.size)
-    three = measured(every, phi[:, None] + NARROW * np.arange(-1.0, 2.0))
-    bend = np.abs(three[:, 0] - 2.0 * three[:, 1] + three[:, 2]) / NARROW**2
-    spacing = np.minimum(np.sqrt(three[:, 1] / np.maximum(bend, three[:, 1])), 1.0) / 3.0
-    angles = phi[:, None] + spacing[:, None] * np.arange(-(LOBES // 2), LOBES // 2 + 1)
-    values = measured(every, angles)
-    inner = values[:, 3:-3]
-    top = (inner >= values[:, 2:-4]) & (inner >= values[:, 4:-2]) & (inner >= 0.9 * values.max(axis=1)[:, None])
-    row, column = np.nonzero(top)
-    first = first_peaks(angles[row, column + 3], spacing[row], values[row[:, None], column[:, None] + np.arange(7)])
-    peaks = confirmed(
-        lambda active, at: measured(row[active], at), first, target * first.height, np.full(row.size, np.inf)
-    )
-    best, which = np.full(phi.size, -np.inf), np.full(phi.size, -1)
-    scan.best_candidate(row, peaks.height, best, which)
-    highest, slope = peaks.only(which), family.derivative_of.get(pose)
-    highest.err_height[which < 0] = np.inf
-    if not locate or slope is None:
-        return highest
-    places = polish_places(lambda active, at: measured(active, at, slope), highest.phi, highest.err_phi)
-    return highest._replace(phi=places[0], err_phi=places[1])
 
 
 def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Array]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import TypeAlias, cast
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from kernels import scan
 from sweep.families.base import Angles, Array, Family
+from sweep.families.capabilities import Assembly
 
 Index: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.bool_]
@@ -39,15 +39,9 @@ def blocks(rows: Index, samples: int, columns: int = 1) -> Iterator[Index]:
         yield rows[start : start + size]
 
 
-def is_angle_of_follower(pose: str) -> bool:
-    """Whether the pose output is a follower's angle, known only up to full turns."""
-    return re.fullmatch(r"psi\d*", pose) is not None
-
-
 def discriminants(family: Family) -> tuple[str, ...]:
     """Pose outputs that tell how near a stage is to a dead point: one per stage of a chain."""
-    numbered = tuple(name for name in family.pose_names if re.fullmatch(r"discriminant\d+", name))
-    return numbered or tuple(name for name in family.pose_names if name == "discriminant")
+    return tuple(loop.discriminant for loop in family.every(Assembly))
 
 
 def sample_turn(
@@ -65,7 +59,7 @@ def sample_turn(
     worst = np.empty(len(designs), np.uint8)
     scan.worst_status(status, worst)
     winds = np.zeros(len(designs), np.bool_)
-    for name in filter(is_angle_of_follower, names):
+    for name in (name for name in names if family.pose_output[name].wraps):
         winding = np.empty(len(designs), np.int64)
         scan.unwrap(columns[name], winding)
         winds |= winding != 0

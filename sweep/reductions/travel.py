@@ -7,54 +7,67 @@ from functools import partial
 import numpy as np
 
 from kernels import status as st
-from kernels.families import guide, rssr
-from sweep.families import guide as guided
-from sweep.families import rssr as crank_rocker
-from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Travel
+from kernels.families import rssr
+from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step
+from sweep.families.capabilities import CrankRockerLoop, GuidedPoint
+from sweep.families.chain import Stage, stages_of
 from sweep.reductions.extrema import Request, true_extrema
 
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up
-DERIVATIVES = ("ds", "d2s", "d3s")
-GUIDE_COLUMNS, ROCKER_COLUMNS = len(guided.PARAMETERS), len(crank_rocker.PARAMETERS)
+ORDERS = 3  # derivatives of the travel that the proof knows
 
 
 def certified_travel(family: Family) -> Step | None:
-    """The step that proves maxima of a guided point's travel; None for a family without one."""
-    if family.travel is None:
+    """The step that proves maxima of a guided point's travel; None for a family or chain that has none to prove."""
+    stages = stages_of(family)
+    if stages[-1].family.find(GuidedPoint) is None or any(s.family.find(CrankRockerLoop) is None for s in stages):
         return None
-    run = partial(_proven, family, family.travel)
+    names = derivatives(family)
     outputs: list[Output] = []
-    for pose in (o for o in family.pose_outputs if o.name in DERIVATIVES):
+    for pose in (family.pose_output[name] for name in names):
         words = f"largest magnitude over one turn of {pose.name}: {pose.text}"
         outputs.append(Output(f"max_abs_{pose.name}", pose.unit, words, pose.equation))
         place = f"crank angle of the largest magnitude of {pose.name}: {pose.text}"
         outputs.append(Output(f"phi_max_abs_{pose.name}", "rad", place, pose.equation))
-    return Step(
-        "certified maxima", tuple(outputs), run, 8000.0 + 7000.0 * len(family.travel.starts), _certified, certifies=True
-    )
+    run, cost = partial(_proven, family, stages, names), 8000.0 + 7000.0 * len(stages)
+    return Step("certified maxima", tuple(outputs), run, cost, _certified, certifies=True)
+
+
+def derivatives(family: Family) -> tuple[str, ...]:
+    """The first three derivatives of the travel, from the first."""
+    names = [family.position]
+    while len(names) <= ORDERS:
+        names.append(family.derivative_of[names[-1]])
+    return tuple(names[1:])
 
 
 def _certified(accuracy: Accuracy) -> bool:
     return accuracy.certify
 
 
-def _proven(family: Family, travel: Travel, designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+def _proven(
+    family: Family,
+    stages: tuple[Stage, ...],
+    orders: tuple[str, ...],
+    designs: Array,
+    wanted: frozenset[str],
+    accuracy: Accuracy,
+) -> Columns:
     assert accuracy.target is not None
-    starts, couplings = travel
     n = len(designs)
-    driven = np.ascontiguousarray(designs[:, starts[-1] : starts[-1] + GUIDE_COLUMNS])
-    stages = [designs[:, start : start + ROCKER_COLUMNS] for start in starts[:-1]] + [guided.as_crank_rocker(driven)]
-    joined = np.reshape([designs[:, k : k + 2] for k in couplings], (len(couplings), n, 2))
-    shares = np.empty((n, 6))
-    guide.travel_shares(driven, shares)
-    names = [name for name in DERIVATIVES if wanted & {f"max_abs_{name}", f"phi_max_abs_{name}"}]
+    loops = [_loop(stage, designs) for stage in stages]
+    joined = np.reshape([designs[:, s.kappa : s.kappa + 2] for s in stages if s.kappa is not None], (-1, n, 2))
+    guided = stages[-1].family.find(GuidedPoint)
+    assert guided is not None
+    shares = guided.shares(stages[-1].designs(designs))
+    names = [name for name in orders if wanted & {f"max_abs_{name}", f"phi_max_abs_{name}"}]
     found, searched = true_extrema(family, designs, [Request(name, 0) for name in names], accuracy.target, locate=True)
     columns: Columns = {"status": searched.copy()}
     for name in names:
         peak, status, error = found[Request(name, 0)], searched.copy(), np.full(n, np.nan)
         value, phi = peak.value.copy(), peak.phi.copy()
         rssr.certify_travel(
-            np.stack(stages), joined, shares, DERIVATIVES.index(name) + 1, accuracy.target, MOST_CELLS,
+            np.stack(loops), joined, shares, orders.index(name) + 1, accuracy.target, MOST_CELLS,
             status, value, phi, error, np.empty(n),
         )  # fmt: skip
         # Where the proof found a higher peak it climbed it to a thousandth of the target.
@@ -65,3 +78,10 @@ def _proven(family: Family, travel: Travel, designs: Array, wanted: frozenset[st
                 columns |= {key: values, f"err_{key}": err}
         columns["status"] = np.where(columns["status"] == st.OK, status, columns["status"])
     return columns
+
+
+def _loop(stage: Stage, designs: Array) -> Array:
+    """A stage as a crank-rocker, (n, 8)."""
+    found = stage.family.find(CrankRockerLoop)
+    assert found is not None
+    return found.matrix(stage.designs(designs))

@@ -12,22 +12,23 @@ from kernels import status as st
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.chain import Chain
-from sweep.reductions.catalogue import STAY, Way, general_way
+from sweep.reductions.catalogue import STAY, Quantity, quantity
+from sweep.reductions.closing import variable
 from sweep.reductions.dwell import window_angle
 from sweep.reductions.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
 from sweep.reductions.margins import combined, margin_suffixes, margins, own_step
 from sweep.reductions.sampling import TWO_PI, Mask, Status, blocks, sample_turn
 from sweep.reductions.window import Window
 
-Group: TypeAlias = Literal["margin", "limits", "reductions", "means"]
+Group: TypeAlias = Literal["margin", "limits", "reductions", "means", "events"]
 Found: TypeAlias = dict[Request, Extremum]
 
 
 def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
     """Rotatability, margins and largest pressure angles; only the stages that the names need, all if there are none."""
-    ways = _ways(family, names)
+    asked = _quantities(family, names)
     known = margin_suffixes(family)
-    last = max((known.index(way.suffix) if way.suffix else len(known) - 1 for way in ways), default=len(known) - 1)
+    last = max((known.index(one.stage) if one.stage else len(known) - 1 for one in asked), default=len(known) - 1)
     suffixes = known[: last + 1]
     columns = margins(family, designs, suffixes, accuracy)
     if suffixes != ("",) and suffixes == known:
@@ -56,36 +57,35 @@ def limits_and_reductions(
     Columns
         the names and ``err_<name>`` (nan on samples), each (n,), and ``status``
     """
-    ways = _ways(family, names)
+    asked = _quantities(family, names)
     windowed = part is not None
-    requests = list(dict.fromkeys(r for way in ways for r in way.requests(windowed)))
-    locate = any(way.locates for way in ways)
+    requests = list(dict.fromkeys(r for one in asked for r in one.requests(family, windowed)))
     window, status = None, np.zeros(len(designs), np.uint8)
     found: Found = {}
     if part is not None and any(r.windowed for r in requests):
         ends = [Request(family.position, 1), Request(family.position, -1)]
-        found, status = _extrema(family, designs, ends, accuracy, locate, None)
+        found, status = _extrema(family, designs, ends, accuracy, None)
         most, least = (found[r] for r in ends)
         err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(len(designs))
         window = Window.of_stroke(least.value, most.value, err, part)
         requests = [r for r in requests if r not in ends]
-    more, now = _extrema(family, designs, requests, accuracy, locate, window)
+    more, now = _extrema(family, designs, requests, accuracy, window)
     columns: Columns = {"status": np.where(status == st.OK, now, status).astype(np.uint8)}
-    for name, way in zip(names, ways, strict=True):
-        if way.base == STAY.name:
-            columns[name], columns[f"err_{name}"] = _stay(family, designs, way, found | more, accuracy, part)
+    for name, one in zip(names, asked, strict=True):
+        if one.kind == STAY.name:
+            columns[name], columns[f"err_{name}"] = _stay(family, designs, one, found | more, accuracy, part)
             continue
-        value, err_value = _value(family, designs, way, found | more, windowed)
+        value, err_value = _value(family, designs, one, found | more, windowed)
         columns[name], columns[f"err_{name}"] = value, err_value
     return columns
 
 
 def _stay(
-    family: Family, designs: Array, way: Way, found: Found, accuracy: Accuracy, part: tuple[float, float] | None
+    family: Family, designs: Array, one: Quantity, found: Found, accuracy: Accuracy, part: tuple[float, float] | None
 ) -> tuple[Array, Array]:
     if part is None:
         raise InputError("window", None, f"two fractions of the stroke, as {STAY.name} is wanted", "design outputs")
-    most, least = (found[r] for r in way.requests(False))
+    most, least = (found[r] for r in one.requests(family, False))
     err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(len(designs))
     err = np.where(np.isfinite(most.value), err, np.nan)
     return window_angle(family, designs, Window.of_stroke(least.value, most.value, err, part))
@@ -97,15 +97,17 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
     if group == "margin":
         followed = enumerate(margin_suffixes(family), start=1)
         return sum(100.0 if own_step(family, s, accuracy) else NS_MARGIN * stage for stage, s in followed)
-    ways = _ways(family, names)
-    requests = {r for way in ways for r in way.requests(False)}
+    asked = _quantities(family, names)
+    if group == "events":
+        return POSES_EVENT * NS_POSE * stages
+    requests = {r for one in asked for r in one.requests(family, False)}
     # What effects add is paid once per effect and pose, and far outweighs the motion.
-    effects = sum(dict(family.dear[way.of] for way in ways if way.of in family.dear).values())
+    effects = sum(dict(family.dear[one.of] for one in asked if one.of in family.dear).values())
     if accuracy.samples is not None:
-        scans = len(ways) if group == "means" else len(requests)
+        scans = len(asked) if group == "means" else len(requests)
         return accuracy.samples * (NS_POSE * stages + NS_SCAN * scans + effects)
     if group == "means":
-        return POSES_MEAN * (NS_POSE * stages + NS_SCAN * len(ways) + effects)
+        return POSES_MEAN * (NS_POSE * stages + NS_SCAN * len(asked) + effects)
     assert accuracy.target is not None
     dearer = 0.5 - np.log10(accuracy.target) / 16.0
     poses = POSES_SEARCH + POSES_PEAK * dearer * len(requests)
@@ -121,25 +123,26 @@ NS_PEAK = 2200.0
 NS_MARGIN = 1600.0
 # Poses per design on average: of a mean, of a search without its peaks, per refined extremum.
 POSES_MEAN = 110.0
+POSES_EVENT = 340.0
 POSES_SEARCH = 180.0
 POSES_PEAK = 30.0
 
 
-def _ways(family: Family, names: Sequence[str]) -> list[Way]:
-    ways = [general_way(family, name) for name in names]
-    assert all(way is not None for way in ways)
-    return [way for way in ways if way is not None]
+def _quantities(family: Family, names: Sequence[str]) -> list[Quantity]:
+    asked = [quantity(family, name) for name in names]
+    assert all(one is not None for one in asked)
+    return [one for one in asked if one is not None]
 
 
 def _extrema(
-    family: Family, designs: Array, requests: Sequence[Request], accuracy: Accuracy, locate: bool, window: Window | None
+    family: Family, designs: Array, requests: Sequence[Request], accuracy: Accuracy, window: Window | None
 ) -> tuple[Found, Status]:
     if not requests:
         return {}, np.zeros(len(designs), np.uint8)
     if accuracy.samples is not None:
         return sampled_extrema(family, designs, requests, accuracy.samples, window)
     assert accuracy.target is not None
-    return true_extrema(family, designs, requests, accuracy.target, locate=locate, window=window)
+    return true_extrema(family, designs, requests, accuracy.target, window=window)
 
 
 def sampled_extrema(
@@ -172,53 +175,46 @@ def sampled_extrema(
     return found, status
 
 
-def _value(family: Family, designs: Array, way: Way, found: Found, windowed: bool) -> tuple[Array, Array]:
+def _value(family: Family, designs: Array, one: Quantity, found: Found, windowed: bool) -> tuple[Array, Array]:
     """A design output and its error from the extrema it is made of."""
-    first = found[way.requests(windowed)[0]]
-    if way.base == "phi_max_abs":
-        return first.phi, first.err_phi
-    if way.base in ("max_abs", "max", "min"):
+    first = found[one.requests(family, windowed)[0]]
+    if one.kind in ("phi_max_abs", "phi_max", "phi_min"):
+        return variable(family, designs, first.phi, first.err_phi)
+    if one.kind in ("max_abs", "max", "min"):
         return first.value, first.err
-    most, least = (found[r] for r in way.requests(windowed))
-    if way.base in ("range", "stroke"):
+    most, least = (found[r] for r in one.requests(family, windowed))
+    if one.kind in ("range", "stroke"):
         return most.value - least.value, most.err + least.err
-    return _limit(way, most, least, _extended_is_largest(family, designs, way.suffix))
+    outward = _extended_is_largest(family, designs, one.of)
+    return _limit(one.kind, family.pose_output[one.of].wraps, most, least, outward)
 
 
-def _extended_is_largest(family: Family, designs: Array, suffix: str) -> Mask:
-    """In assembly mode +1 crank and coupler are in line outward where the follower is farthest (sheet 3.2)."""
-    stage = suffix or (str(len(family.stages)) if isinstance(family, Chain) else "")
-    if f"branch{stage}" not in family.parameter_names:
+def _extended_is_largest(family: Family, designs: Array, position: str) -> Mask:
+    """Whether crank and coupler are in line outward where the follower is farthest: so in assembly mode +1 (3.2)."""
+    sign = family.outward_sign(position)
+    if not sign:
         return np.ones(len(designs), np.bool_)
-    outward: Mask = designs[:, family.parameter_names.index(f"branch{stage}")] > 0.0
+    outward: Mask = designs[:, family.parameter_names.index(sign)] > 0.0
     return outward
 
 
-def _limit(way: Way, most: Extremum, least: Extremum, outward: Mask) -> tuple[Array, Array]:
+def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mask) -> tuple[Array, Array]:
+    """What the two limit positions say; ``wraps`` is about the position, ``outward`` (n,): the largest is extended."""
     ext = Extremum(*(np.where(outward, a, b) for a, b in zip(most, least, strict=True)))
     fold = Extremum(*(np.where(outward, b, a) for a, b in zip(most, least, strict=True)))
-    swing, phi0 = fold.value - ext.value, np.mod(fold.phi - ext.phi, TWO_PI)
-    err_phi0 = ext.err_phi + fold.err_phi
-    match way.base:
-        case "phi_ext":
-            return ext.phi, ext.err_phi
-        case "phi_fold":
-            return fold.phi, fold.err_phi
-        case "phi0":
-            return phi0, err_phi0
-        case "stroke_ratio":
-            return phi0 / (TWO_PI - phi0), err_phi0 * TWO_PI / (TWO_PI - phi0) ** 2
-        case "swing":
-            return swing, ext.err + fold.err
-        case "psi_ext":
-            return _principal(ext.value), ext.err
-        case "psi_fold":
-            return _principal(fold.value), fold.err
-        case "s_ext":
-            return ext.value, ext.err
-        case "s_fold":
-            return fold.value, fold.err
-    raise AssertionError(way.base)
+    if kind in ("ext", "fold"):
+        end = ext if kind == "ext" else fold
+        return _principal(end.value) if wraps else end.value, end.err
+    if kind in ("phi_ext", "phi_fold"):
+        end = ext if kind == "phi_ext" else fold
+        return end.phi, end.err_phi
+    if kind == "swing":
+        return fold.value - ext.value, ext.err + fold.err
+    phi0, err_phi0 = np.mod(fold.phi - ext.phi, TWO_PI), ext.err_phi + fold.err_phi
+    if kind == "phi0":
+        return phi0, err_phi0
+    assert kind == "stroke_ratio"
+    return phi0 / (TWO_PI - phi0), err_phi0 * TWO_PI / (TWO_PI - phi0) ** 2
 
 
 def _principal(angle: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from kernels import scan
 from sweep.families.base import Array, Family
 from sweep.reductions.refine import EPS
-from sweep.reductions.sampling import TWO_PI, Index, Mask, is_angle_of_follower, pose_columns
+from sweep.reductions.sampling import TWO_PI, Index, Mask, pose_columns
 
 PASSES = 60
 
@@ -86,7 +86,7 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
         phi[a] = right[a] - f_right[a] * (right[a] - left[a]) / (f_right[a] - f_left[a])
         poses, _ = pose_columns(family, designs[rows[row[a]]], phi[a, None], names)
         here, now = poses[pose][:, 0], poses[family.position][:, 0] - level[a]
-        if is_angle_of_follower(family.position):
+        if family.pose_output[family.position].wraps:
             now -= TWO_PI * np.round(now / TWO_PI)
         moved = np.abs(now - f[a])
         tells = (moved > 1e-7 * size[a]) & np.isfinite(values[a])
@@ -101,7 +101,7 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
         a = a[(np.abs(now) > 8.0 * EPS * size[a]) & (right[a] - left[a] > 8.0 * EPS)]
     poses, _ = pose_columns(family.precise(), designs[rows[row]], phi[:, None], names)
     exact, f = poses[pose][:, 0], poses[family.position][:, 0] - level
-    if is_angle_of_follower(family.position):
+    if family.pose_output[family.position].wraps:
         f -= TWO_PI * np.round(f / TWO_PI)
     err = (
         slope * (np.abs(f) + window.err[rows[row]] + 4.0 * EPS * size)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sweep.evaluation.curves import coordinate
+from sweep.quantities.names import stem
 from sweep.report.figures import LIMIT, OPTIMUM, REFERENCE, WIDTH, crank_axis, new_figure
 from sweep.report.quantities import Quantity, quantity
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from sweep.study import Limit
 
 FAR_LIMIT = 2.5  # limits farther out than so many times the curves are not drawn: the curves would be flat
-SHOWN = re.compile(r"(d[23]?)?(s|psi)|dev|pressure_angle\d*")
+NOT_CURVES = ("role", "phi", "status")
 
 
 def style_of(role: str) -> dict[str, Any]:
@@ -29,12 +30,8 @@ def style_of(role: str) -> dict[str, Any]:
 
 
 def shown_curves(columns: list[str]) -> list[str]:
-    """Columns that get a panel; a chain's unnumbered pressure angle repeats that of its last stage."""
-    names = [name for name in columns if SHOWN.fullmatch(name)]
-    if any(re.fullmatch(r"pressure_angle\d+", name) for name in names):
-        names = [name for name in names if name != "pressure_angle"]
-    order = ["s", "psi", "ds", "dpsi", "d2s", "d2psi", "d3s", "d3psi", "dev"]
-    return sorted(names, key=lambda name: (order.index(name) if name in order else len(order), name))
+    """Columns that get a panel, in the order in which they were written."""
+    return [name for name in columns if name not in NOT_CURVES and coordinate(name) is None]
 
 
 def motion_figure(
@@ -105,9 +102,14 @@ def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
     return (fraction >= window[0]) & (fraction <= window[1])
 
 
+def is_angle(position: str) -> bool:
+    """Whether a position is a follower's angle, known up to full turns."""
+    return stem(position) == "psi"
+
+
 def rotates(turn: pd.DataFrame, position: str) -> bool:
     """Whether the follower itself turns fully, so that it has no lowest position."""
-    if position != "psi":
+    if not is_angle(position):
         return False
     path = np.unwrap(turn[position].to_numpy(float))
     return bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
@@ -134,7 +136,7 @@ def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, A
     """One closed turn that starts where the position is smallest; the position itself counts from there."""
     phi, values = turn["phi"].to_numpy(float), turn[name].to_numpy(float)
     path = turn[position].to_numpy(float)
-    if position == "psi":
+    if is_angle(position):
         path = np.unwrap(path)
     if name == position:
         values = path
@@ -158,6 +160,6 @@ def _limit_lines(axes: Axes, name: str, shown: Quantity, limits: tuple[Limit, ..
                 continue
             if abs(value) * shown.factor > FAR_LIMIT * np.abs(axes.dataLim.intervaly).max():
                 continue
-            both = limit.output.startswith("max_abs_") and not name.startswith("pressure_angle")
+            both = limit.output.startswith("max_abs_") and stem(name) != "pressure_angle"
             for sign in (1.0, -1.0) if both else (1.0,):
                 axes.axhline(sign * value * shown.factor, color=LIMIT, linewidth=0.9, linestyle=":", zorder=2)

@@ -8,9 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kernels.status import MEANING
 from sweep.dataset import store
 from sweep.errors import InputError
+from sweep.evaluation.statuses import meaning
 from sweep.optimise import Survey, read_survey
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ class Dataset:
     def reference_status(self) -> str:
         """Why the reference has no values."""
         code = 0 if self.reference is None else int(self.reference.get("status", 0))
-        return MEANING.get(code, f"status {code}")
+        return meaning(code)
 
     @cached_property
     def second(self) -> str | None:

@@ -7,12 +7,12 @@ moves with the coupler.  Held joints in the order of their letters are the ends 
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweep.evaluation.curves import coordinate
 from sweep.report.figures import OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from sweep.families.base import Array
 
-COORDINATE = re.compile(r"[xyz]_([a-z])(\d*)")
 POSITIONS = 8
 PATH = "#2f8f5b"
 ON_PATH = 1e-6  # a path is taken for a circle or a line if it departs from it by less than this part of its size
@@ -57,19 +56,22 @@ def stages(curve: pd.DataFrame) -> list[Stage]:
     """The stages whose joints stand in the columns, ordered by number."""
     found: dict[str, Stage] = {}
     for name in sorted(map(str, curve.columns)):
-        match = COORDINATE.fullmatch(name)
-        if match is None or not name.startswith("x"):
+        at = coordinate(name)
+        if at is None or at.axis != "x":
             continue
-        letter, number = match.groups()
-        joint = _joint(letter, _path(curve, letter, number))
-        stage = found.setdefault(number, Stage(number))
+        joint = _joint(at.joint, _path(curve, name))
+        stage = found.setdefault(at.part, Stage(at.part))
         (stage.held if joint.pivot is not None or joint.straight else stage.free).append(joint)
     # A chain offers its last stage's joints twice, numbered and not.
     return [found[number] for number in sorted(found) if number or len(found) == 1]
 
 
-def _path(curve: pd.DataFrame, letter: str, number: str) -> Array:
-    columns = [f"{axis}_{letter}{number}" for axis in "xyz"]
+def _path(curve: pd.DataFrame, name: str) -> Array:
+    """Path of the joint whose x stands in the column ``name``; a coordinate that is not there is 0."""
+    beside = {at: str(column) for column in curve.columns if (at := coordinate(str(column)))}
+    own = coordinate(name)
+    assert own is not None
+    columns = [beside.get(own._replace(axis=axis), "") for axis in "xyz"]
     return np.column_stack([curve[c].to_numpy(float) if c in curve else np.zeros(len(curve)) for c in columns])
 
 

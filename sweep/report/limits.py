@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from sweep.chunks.cascade import compared, meets
+from sweep.quantities.names import is_flag
 from sweep.report.quantities import Quantity, number, quantity
 
 if TYPE_CHECKING:
@@ -106,4 +107,4 @@ def value_of(row: Row | None, name: str) -> float:
 
 
 def _is_flag(name: str) -> bool:
-    return name.rstrip("0123456789") == "rotatable"
+    return is_flag(name)

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 from kernels import status as codes
 from sweep.chunks.cascade import compared
 from sweep.errors import StoreError
+from sweep.evaluation.curves import coordinate
 from sweep.report import answer, front, limits, robust, tables
 from sweep.report.curves import motion_caption, motion_figure
 from sweep.report.dataset import Dataset, read_dataset
-from sweep.report.drawing import COORDINATE, mechanism_caption, mechanism_figure
+from sweep.report.drawing import mechanism_caption, mechanism_figure
 from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
 from sweep.report.files import copy_tables, write_survivors
 from sweep.report.maps import Overlay, line_figure, map_figure, trade_off_figure
@@ -123,7 +124,7 @@ def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[s
     if data.curves is not None and len(data.curves):
         motion = motion_figure(data.curves, data.units, study.family.position, study.speed, study.limits, study.window)
         figures["motion"] = save(motion, folder / "motion.svg")
-        joint = next((name for name in data.curves.columns if COORDINATE.fullmatch(str(name))), "")
+        joint = next((name for name in data.curves.columns if coordinate(str(name))), "")
         mechanism = mechanism_figure(data.curves, quantity("joint", data.units.get(joint, "mm")).unit)
         if mechanism is not None:
             figures["mechanism"] = save(mechanism, folder / "mechanism.svg")

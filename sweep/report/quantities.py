@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from sweep.families.domain import Turn
+from sweep.quantities.names import is_error, is_place, parts, without_error
+from sweep.quantities.reduction import split
 from sweep.study.units import internal_unit
 
 POSITIONS = {
@@ -20,14 +23,6 @@ DERIVATIVES = ("", "velocity", "acceleration", "jerk")
 SYMBOLS = {"psi": "ψ", "phi": "φ", "phi0": "φ₀", "phi_ext": "φ extended", "phi_fold": "φ folded"}
 PRIMES = ("", "′", "″", "‴")
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
-REDUCTIONS = {
-    "phi_max_abs_": ("φ at max |{}|", "crank angle of the largest {}"),
-    "max_abs_": ("max |{}|", "largest {}"),
-    "range_": ("range of {}", "range of {}"),
-    "max_": ("max {}", "largest {}"),
-    "min_": ("min {}", "smallest {}"),
-    "rms_": ("rms {}", "root mean square of {}"),
-}
 _POINT = re.compile("([xyz])_([a-z])")
 
 
@@ -82,14 +77,14 @@ def with_unit(text: str, unit: str) -> str:
 def quantity(name: str, unit: str) -> Quantity:
     """How the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
     unit = internal_unit(unit)
-    if name.startswith("err_"):
-        shown = quantity(name[4:], unit)
+    if is_error(name):
+        shown = quantity(without_error(name), unit)
         return Quantity(name, f"error of {shown.symbol}", f"error of the {shown.words}", shown.unit, shown.factor)
-    symbol_form, words_form, base = "{}", "{}", name
-    for prefix, (symbols, words) in REDUCTIONS.items():
-        if name.startswith(prefix):
-            symbol_form, words_form, base = symbols, words, name[len(prefix) :]
-            break
+    if member := parts(name).member:
+        shown = quantity(name.removeprefix(f"{member}."), unit)
+        return replace(shown, name=name, symbol=f"{shown.symbol} {member}", words=f"{shown.words} of the {member}")
+    reduction, base = next(split(name, Turn()), (None, name))
+    symbol_form, words_form = (reduction.symbol, reduction.words) if reduction else ("{}", "{}")
     order, root, stage = _derivative(base)
     symbolic = order > 0 or root in ("s", "psi")
     root = _POINT.sub(lambda m: f"{m[1]} of {m[2].upper()}", root)
@@ -98,7 +93,7 @@ def quantity(name: str, unit: str) -> Quantity:
     words += " across the line" if order and root == "dev" else ""
     words += f" of stage {stage}" if stage else ""
     symbol, words = symbol_form.format(symbol), words_form.format(words)
-    if name.startswith("phi_") or (order == 0 and unit in ("rad", "angle")):
+    if is_place(name) or (order == 0 and unit in ("rad", "angle")):
         return Quantity(name, symbol, words, "°", math.degrees(1.0), symbolic)
     if order == 0:
         return Quantity(name, symbol, words, _pretty_unit(unit), 1.0, symbolic)
@@ -121,12 +116,11 @@ SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 def _derivative(base: str) -> tuple[int, str, str]:
     """Order, quantity and stage number of ``d2psi1``."""
-    match = re.fullmatch(r"(d[23]?)?(s|psi|dev)(\d*)", base)
+    _, root, stage = parts(base)
+    match = re.fullmatch(r"(d[23]?)?(s|psi|dev)", root)
     if match:
-        mark, root, stage = match.groups()
+        mark, root = match.groups()
         return (0 if mark is None else int(mark[1:] or 1)), root, stage
-    # phi0 is no phi of a stage 0.
-    root, stage = re.fullmatch(r"(phi0|.*?)(\d*)", base, re.DOTALL).groups()  # type: ignore[union-attr]
     return 0, root, stage
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from sweep.dataset import store
+from sweep.quantities.names import is_flag
 from sweep.report.quantities import number, quantity
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
         within = "" if math.isnan(row["within"]) else f"{number(100.0 * row['within'], 3)}\u00a0%"
         if name == "all limits":
             rows.append(ToleranceRow("", "all limits", "", "", "", within))
-        elif name.rstrip("0123456789") != "rotatable":
+        elif not is_flag(name):
             shown = quantity(name, data.units.get(name, ""))
             band = f"{number(row['low'] * shown.factor)} to {shown.show(row['high'])}"
             rows.append(

@@ -11,6 +11,7 @@ import numpy as np
 
 from sweep.chunks.cascade import compared
 from sweep.families.base import Array
+from sweep.quantities.names import is_error
 
 ROWS_PER_BATCH = 262_144
 SCATTER_POINTS = 40_000
@@ -109,7 +110,7 @@ def scan(parts: Sequence[Path], cells: Sequence[Cells], objective: str | None, s
             ok &= np.isfinite(batch[objective])
         found.feasible += int(ok.sum())
         for name in names:
-            if name.startswith("err_") and ok.any():
+            if is_error(name) and ok.any():
                 _note_errors(found, name, np.abs(batch[name][ok]), np.abs(batch[name[4:]][ok]))
         if not ok.any():
             continue

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
-from sweep.families import family as find_family
+from sweep.evaluation.statuses import meaning
+from sweep.quantities.names import is_flag, is_place
 from sweep.report.limits import bound_words, limited
 from sweep.report.quantities import change, number, quantity
 
@@ -66,7 +67,7 @@ def output_rows(data: Dataset) -> list[OutputRow]:
     for name in dict.fromkeys([*objective, *study.want]):
         shown = quantity(name, data.units.get(name, ""))
         value, other = _number(data.result, name), _number(data.reference, name)
-        flag = name.rstrip("0123456789") == "rotatable"
+        flag = is_flag(name)
         rows.append(
             OutputRow(
                 name,
@@ -76,7 +77,7 @@ def output_rows(data: Dataset) -> list[OutputRow]:
                 shown.at_speed(value, study.speed),
                 _yes(other) if flag else shown.show(other),
                 shown.at_speed(other, study.speed),
-                "" if flag or name.startswith("phi_") else change(shown, value, other),
+                "" if flag or is_place(name) else change(shown, value, other),
             )
         )
     return rows
@@ -86,7 +87,7 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
     """All parameters of the mechanism with what was searched."""
     study, rows = data.study, []
     links = () if study.locus is None else study.locus.made
-    own = find_family(study.families).parameter_names
+    own = study.bare.parameter_names
     for p in study.family.parameters:
         if p.name not in own and study.space.fixed.get(p.name) == p.default:
             continue  # an input of an effect that the study left out
@@ -132,9 +133,7 @@ def fates(data: Dataset, found: Scan) -> list[Fate]:
         if code == codes.LIMIT_EXCEEDED and sum(data.missed.values()) == counts[code]:
             rows += [Fate(code, words, count, 100.0 * count / total) for words, count in _by_limit(data)]
         else:
-            rows.append(
-                Fate(code, codes.MEANING.get(code, f"status {code}"), counts[code], 100.0 * counts[code] / total)
-            )
+            rows.append(Fate(code, meaning(code), counts[code], 100.0 * counts[code] / total))
     kept = counts.get(codes.OK, 0)
     return [*rows, Fate(codes.OK, "within all limits", kept, 100.0 * kept / total)]
 
@@ -154,7 +153,7 @@ def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
     rows = []
     for name in data.study.want:
         error = f"err_{name}"
-        if name.startswith("phi_") or name.rstrip("0123456789") == "rotatable":
+        if is_place(name) or is_flag(name):
             continue  # an error relative to an angle's zero, or of a yes, says nothing
         if error not in found.errors and math.isnan(_number(data.result, error)):
             continue

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.families.base import Angles
-from sweep.report.curves import SHOWN
-from sweep.report.drawing import COORDINATE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,7 +37,7 @@ def curves(study: Study, rows: Mapping[str, Mapping[str, Any] | None]) -> pd.Dat
 
     family = study.family
     known = {role: row for role, row in rows.items() if row is not None}
-    names = [name for name in family.pose_names if SHOWN.fullmatch(name) or COORDINATE.fullmatch(name)]
+    names = [*motion_curves(family), *joint_curves(family)]
     matrix = np.array([[float(row[p]) for p in family.parameter_names] for row in known.values()])
     phi = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
     columns = family.poses(

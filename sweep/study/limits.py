@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Output
 from sweep.families.chain import Chain
+from sweep.quantities.names import is_flag
 from sweep.study import units
 from sweep.study.faults import Faults, Key, read_section
 from sweep.study.model import LimitEntry
@@ -17,8 +17,6 @@ from sweep.study.study import Limit
 
 if TYPE_CHECKING:
     from sweep.synthesis.fit import LineFit
-
-_YES_OR_NO = re.compile(r"rotatable\d*")
 
 
 def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Output | None:
@@ -43,7 +41,7 @@ def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple
         output = _parameter(family, name) or read_output_name(family, name, key, faults)
         if output is None:
             continue
-        if _YES_OR_NO.fullmatch(name):
+        if is_flag(name):
             if entry is not True:
                 faults.value(key, entry, "true")
             found.append(Limit(name, minimum=1.0))

@@ -11,14 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 from sweep.effects import extended
 from sweep.errors import InputError, StudyError, closest, nearest
-from sweep.families import NAMES
+from sweep.families import NAMES, Specification
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
-from sweep.reductions.catalogue import check_certifiable, proofs
+from sweep.families.chain import Chain
+from sweep.families.members import Machine
+from sweep.quantities.names import parts
+from sweep.reductions.catalogue import check_certifiable
+from sweep.reductions.steps import proofs
 from sweep.study import units
 from sweep.study.design import check_varied, read_reference, read_space
 from sweep.study.faults import Faults, Key, S, read_section
 from sweep.study.limits import check_fitted_stroke, read_limits, read_output_name
+from sweep.study.machine import flattened, read_machine
 from sweep.study.model import (
     REQUIRED_TABLES,
     TABLES,
@@ -44,9 +49,6 @@ if TYPE_CHECKING:
     from sweep.synthesis.fit import LineFit
 
 DEFAULT_TARGET = 1e-8
-
-# What scene.speed gives where an effect of a family, or of the first stage of a chain, asks for it.
-SPEED = re.compile("speed1?")
 
 
 def load_study(path: str | Path, smoke: bool = False) -> Study:
@@ -134,7 +136,9 @@ def _read_toml(file: Path) -> dict[str, Any]:
 
 
 def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str, Any]]) -> Study:
-    faults = Faults(files)
+    members = data.get("machine")
+    data = flattened(data, members)
+    faults = Faults({name: flattened(content, members) for name, content in files.items()})
     for name in data:
         if name not in TABLES:
             faults.unknown((name,), [t for t in TABLES if t not in data], "table")
@@ -154,7 +158,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     prescribed_table = _free_table("locus", data, faults)
     bounds = _free_table("limits", data, faults)
     reference_design = _section(ReferenceSection, "reference", data, faults).design
-    families = _families(_section(MechanismSection, "mechanism", data, faults), data, faults)
+    mechanism, bare = _mechanism(data, faults)
 
     speed = _quantity(scene.speed, "rad/s", ("scene", "speed"), faults)
     window = _window(scene, faults)
@@ -172,14 +176,13 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     if not scene.want and not bounds and goal is None:
         faults.missing(("scene", "want"), "design outputs to compute, here or in [limits] or [objective]")
 
-    bare = _family(families, data, faults)
     if bare is None:
         raise StudyError(str(path), faults.lines)
     names = [name for _, name in _texts(data, "scene", "want")]
     family = extended(
         bare, [*names, *(bounds or {}), *([goal] if goal else []), *([front.output] if front.output else [])]
     )
-    given = {} if speed is None else {p: speed for p in family.parameter_names if SPEED.fullmatch(p)}
+    given = {} if speed is None else speeds(family, speed)
     for k, name in _texts(data, "scene", "want"):
         read_output_name(family, name, ("scene", "want", k), faults)
     locus = read_locus(bare, faults) if prescribed_table is not None else None
@@ -190,7 +193,8 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     for name in [name for name in bounds or () if name in prescribed]:
         faults.value(("limits", name), (bounds or {})[name], "nothing here: [locus] prescribes it")
     limits = (*prescribed_limits(prescribed), *read_limits(family, bounds or {}, faults))
-    if search.globally == "proportions" and families != ("rssr", "guide"):
+    chained = [stage.family.name for stage in bare.stages] if isinstance(bare, Chain) else []
+    if search.globally == "proportions" and chained != ["rssr", "guide"]:
         faults.value(("optimise", "global"), "proportions", '"none", or the chain ["rssr", "guide"]')
     if goal is not None:
         read_output_name(family, goal, ("objective", "minimise"), faults)
@@ -227,7 +231,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         title=about.title,
         question=about.question,
         path=path,
-        families=families,
+        mechanism=mechanism,
         speed=speed,
         want=want,
         space=space,
@@ -391,6 +395,32 @@ def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults
     if section.family is not None:
         return (section.family,)
     return tuple(section.chain or ())
+
+
+def _mechanism(data: Mapping[str, Any], faults: Faults) -> tuple[tuple[str, ...] | Specification, Family | None]:
+    """What [mechanism] or [machine] says, and the family, chain or machine; None with its faults."""
+    if "machine" not in data:
+        if "mechanism" not in data:
+            faults.missing(("mechanism",), "a table [mechanism], or [machine.NAME] for several mechanisms")
+        if "relations" in data:
+            faults.value(("relations",), data["relations"], "nothing here: relations are those of a [machine]")
+        names = _families(_section(MechanismSection, "mechanism", data, faults), data, faults)
+        return names, _family(names, data, faults)
+    if "mechanism" in data:
+        faults.value(("mechanism",), data["mechanism"], "either [mechanism] or [machine.NAME], not both")
+    for table in ("locus", "fit"):
+        if table in data:
+            faults.value((table,), data[table], "nothing here: it finishes the links of a [mechanism] alone")
+    found = read_machine(data, faults)
+    return ((), None) if found is None else found
+
+
+def speeds(family: Family, speed: float) -> dict[str, float]:
+    """What scene.speed gives where an effect asks for the speed of a crank: a member turns ratio times as fast."""
+    if isinstance(family, Machine):
+        ratios = {m.name: abs(m.ratio) for m in family.members}
+        return {p: speed * ratios[parts(p).member] for p in family.parameter_names if parts(p).stem == "speed"}
+    return {p: speed for p in family.parameter_names if parts(p).stem == "speed"}
 
 
 def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> Family | None:

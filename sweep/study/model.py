@@ -220,6 +220,8 @@ class ReportSection(Section):
 TABLES = (
     "study",
     "mechanism",
+    "machine",
+    "relations",
     "scene",
     "design",
     "locus",
@@ -235,4 +237,4 @@ TABLES = (
     "budget",
     "report",
 )
-REQUIRED_TABLES = ("study", "mechanism", "design")
+REQUIRED_TABLES = ("study", "design")

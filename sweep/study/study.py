@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from sweep.effects import extended
+from sweep.families import Specification
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
 from sweep.study.space import DesignSpace
@@ -119,7 +120,7 @@ class Study:
     title: str
     question: str
     path: Path
-    families: tuple[str, ...]
+    mechanism: tuple[str, ...] | Specification
     speed: float | None
     want: tuple[str, ...]
     space: DesignSpace
@@ -170,8 +171,13 @@ class Study:
 
     @cached_property
     def family(self) -> Family:
-        """The mechanism, a family or the chain of several, with the effects that what is wanted calls for."""
-        return extended(find_family(self.families), self.want)
+        """The mechanism: a family, a chain or a machine, with the effects that what is wanted calls for."""
+        return extended(self.bare, self.want)
+
+    @property
+    def bare(self) -> Family:
+        """The mechanism without effects."""
+        return find_family(self.mechanism)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -180,7 +186,7 @@ class Study:
         The same values written in other units or in another order give the same fingerprint.
         """
         content = {
-            "families": self.families,
+            "families": asdict(self.mechanism) if isinstance(self.mechanism, Specification) else self.mechanism,
             "speed": self.speed,
             "want": self.want,
             "space": _space_content(self.space),

@@ -18,7 +18,8 @@ from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Family
-from sweep.families.chain import Chain
+from sweep.families.capabilities import GuidedPoint
+from sweep.families.chain import Chain, stages_of
 
 FITTED = ("xi", "eta", "lam", "h")
 SCALED = ("a", "b", "c", "e", "xi", "eta", "h")
@@ -105,10 +106,10 @@ def fit_line(
 
 
 def _suffix(family: Family) -> str:
-    if isinstance(family, Chain) and family.stages[-1].family.name == "guide":
-        return str(family.stages[-1].number)
-    if family.name == "guide":
-        return ""
+    """What follows the names of the guided stage's parameters: its number in a chain."""
+    last = stages_of(family)[-1]
+    if last.family.find(GuidedPoint) is not None:
+        return str(last.number) if isinstance(family, Chain) else ""
     raise InputError("fit", family.name, "a guide, or a chain that ends in one", "mechanism")
 
 

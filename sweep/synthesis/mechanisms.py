@@ -13,6 +13,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array
 from sweep.synthesis.locus import TWO_PI, Found, locus
+from sweep.synthesis.slotted import CentralSlot, central_slots
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,11 +28,12 @@ def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = 
 
     Parameters
     ----------
-    family : "rssr" or "rssp"
+    family : "rssr", "rssp" or "slotted"
     table : DataFrame or mapping, one length unit, rad.  ``rssr``: swing, phi0, e, f, g, alpha and either phi1 (the
         place on the locus: crank angle of the extended position) or psi1 (rocker angle there); or phi1, c and
         direction = atan2(g, e) instead of e and g.  ``rssp``: stroke, f, alpha and phi0 with either phi1 or e; or,
-        without phi0, e and the place s1 where the stroke begins.
+        without phi0, e and the place s1 where the stroke begins.  ``slotted``: phi0, e, f and alpha of a fork slot with
+        s = 0 (:func:`sweep.synthesis.slotted.central_slots` says what it returns).
         Swing and stroke are signed, folded minus extended.  Where psi1 or e is given there are two solutions, told
         apart by ``root``; without such a column both are returned, one row each.
     max_pressure_angle : limit for test (v) [rad]; none if not given
@@ -55,6 +57,8 @@ def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = 
 
     if max_pressure_angle is not None and not 0.0 < max_pressure_angle <= 0.5 * np.pi:
         raise InputError("max_pressure_angle", max_pressure_angle, "an angle between 0 and pi/2", "synthesise")
+    if family == CentralSlot.name:
+        return central_slots(table)
     way = locus(family, tuple(str(name) for name in table))
     matrix = way.read(table)
     index = table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(len(matrix))

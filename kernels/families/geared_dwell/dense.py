@@ -43,10 +43,12 @@ def dense_maxima(
             grid = front if side == 0 else back
             for j in range(grid.shape[1]):
                 t, s = grid[0, j], grid[1, j]
+                # The pin as in closure.pin near phi = 0, written out without that one's branch, so that it vectorises.
                 ss = s * s
                 x, y = h.e - 2.0 * t + 2.0 * h.k * ss, 2.0 * s * (h.below + h.k * t)
                 square = x * x + y * y
                 least = smallest(least, square)
+                # A clamp instead of a branch; ``least`` tells that it was used.
                 per = 1.0 / largest(square, 1e-100)
                 if max_abs_dpsi is not None:
                     m1 = largest(m1, abs(1.0 - h.total * (h.e - 2.0 * t) * per))

@@ -24,6 +24,7 @@ def rising_angle(r: Reduced, psi: float, extreme: float) -> float:
             low = phi
         else:
             high = phi
+        # Newton's step, or bisection where it leaves the bracket or does not halve what is left.
         following = phi - excess / velocity(h, r.ak4, t, x * x + y * y)
         if not (low < following < high) or abs(excess) > 0.5 * before:
             following = 0.5 * (low + high)
@@ -73,6 +74,7 @@ def dwell_measures(
             dwell_angle[i] = 2.0 * math.atan(math.sqrt((k - 1.0) * (k + 1.0))) if returns else none
         if dwell_deviation is not None or dwell_band is not None:
             deviation, band = none, none
+            # The stable root of the quadratic: both terms of the denominator have the same sign.
             if returns:
                 t = -2.0 * h.v0 / (h.v1 + math.sqrt(h.v1 * h.v1 + 4.0 * r.ak4 * h.v0))
                 x, y, _ = pin(h, t, math.sqrt(t * (2.0 - t)))

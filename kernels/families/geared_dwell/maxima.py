@@ -56,6 +56,29 @@ def quadratic(p: Array, x: float) -> float:
     return value
 
 
+@inline
+def _bend(s2: Array, q: Array, d: Array, bend: Array) -> None:
+    """Polynomial s2'/2 q d + s2 (q' d - 2 q d'): psi'' is stationary where it vanishes, psi''' is it over d^3."""
+    # The derivative of a product of powers is their product times a sum of exponents.
+    bend[:] = 0.0
+    for x in range(3):
+        for y in range(3):
+            for z in range(3):
+                if x + y + z > 0:
+                    factor = 0.5 * x + y - 2.0 * z
+                    bend[x + y + z - 1] += factor * (s2[x] * q[y] * d[z])
+
+
+@inline
+def _slope(bend: Array, d: Array, slope: Array) -> None:
+    """Polynomial bend' d - 3 bend d', which vanishes where psi''' is stationary."""
+    slope[:] = 0.0
+    for x in range(6):
+        for z in range(3):
+            if x + z > 0:
+                slope[x + z - 1] += (x - 3.0 * z) * (bend[x] * d[z])
+
+
 @kernel
 def turn_maxima(
     designs: Array,
@@ -93,6 +116,7 @@ def turn_maxima(
         m1, m2, m3, phi2 = 0.0, -1.0, 0.0, 0.0
         first = 2 if near else 0
         for number in range(first, first + 2 if code == st.OK else first):
+            # In the variable that vanishes at the pin's nearest approach no coefficient cancels there.
             end, steep = stretch(r, k, a, number, s2, q, d, lean)
             if max_abs_dpsi is not None:
                 count = roots_up_to(end, q, 2, scratch, found)
@@ -105,14 +129,7 @@ def turn_maxima(
                         value = abs(1.0 - (lean[0] + lean[1] * tau) / square)
                     m1 = value if not value <= m1 else m1  # nan, a root that did not settle, stays
             if max_abs_d2psi is not None or phi_max_abs_d2psi is not None or max_abs_d3psi is not None:
-                # bend = s2'/2 q d + s2 (q' d - 2 q d'): psi'' is stationary where it vanishes, psi''' ~ bend/d^3.
-                bend[:] = 0.0
-                for x in range(3):
-                    for y in range(3):
-                        for z in range(3):
-                            if x + y + z > 0:
-                                factor = 0.5 * x + y - 2.0 * z
-                                bend[x + y + z - 1] += factor * (s2[x] * q[y] * d[z])
+                _bend(s2, q, d, bend)
                 if max_abs_d2psi is not None or phi_max_abs_d2psi is not None:
                     count = roots_up_to(end, bend, 5, scratch, found)
                     for n in range(-1, count):
@@ -122,11 +139,7 @@ def turn_maxima(
                         if not value <= m2:
                             m2, phi2 = value, angle_at(k, number, tau)
                 if max_abs_d3psi is not None:
-                    slope[:] = 0.0
-                    for x in range(6):
-                        for z in range(3):
-                            if x + z > 0:
-                                slope[x + z - 1] += (x - 3.0 * z) * (bend[x] * d[z])
+                    _slope(bend, d, slope)
                     count = roots_up_to(end, slope, 6, scratch, found)
                     for n in range(-2, count):
                         tau = found[n] if n >= 0 else (0.0 if n == -1 else end)

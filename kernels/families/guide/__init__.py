@@ -1,10 +1,11 @@
 """Planar four-bar with a guided coupler point.
 
-``motion`` evaluates poses and sensitivities in plain arithmetic, ``precise`` poses in twice the working precision.
+``closure`` reduces a design to its constants, ``motion`` evaluates poses, ``precise`` the same in twice the working
+precision, ``sensitivities`` has the derivatives of the deviation by the parameters.
 """
 
-from kernels.families.guide.motion import Design as Design
-from kernels.families.guide.motion import dev_sensitivities as dev_sensitivities
+from kernels.families.guide.closure import Design as Design
 from kernels.families.guide.motion import poses as poses
-from kernels.families.guide.motion import travel_shares as travel_shares
 from kernels.families.guide.precise import precise_poses as precise_poses
+from kernels.families.guide.sensitivities import dev_sensitivities as dev_sensitivities
+from kernels.families.guide.sensitivities import travel_shares as travel_shares

@@ -7,12 +7,14 @@ large numbers, and so are the derivatives of the deviation along a nearly straig
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from kernels import status as st
 from kernels import twofold as two
 from kernels._jit import inline, kernel
-from kernels.families.guide.motion import EPS, Array, Status, reduce_design
+from kernels.families.guide.closure import EPS, Array, Status, reduce_design
 from kernels.twofold import Twofold
+from kernels.verdict import pose_status
 
 BAND = 4.0 * EPS  # what rounding the given numbers does to Delta: a dead point made in float64 is still one
 
@@ -32,13 +34,34 @@ def _dot(a: Twofold, b: Twofold, c: Twofold, d: Twofold) -> Twofold:
     return two.add(two.multiply(a, c), two.multiply(b, d))
 
 
+class Line(NamedTuple):
+    """Frame of the guiding line: direction, (l/b) e^{-i lam} of the coupler point, and the unit of length."""
+
+    cl: Twofold
+    sl: Twofold
+    qx: Twofold
+    qy: Twofold
+    unit: float
+
+
+class Pose(NamedTuple):
+    """Crank pin B, coupler d = C - B and rocker c k as vectors, and the two products of d with the rocker."""
+
+    bx: Twofold
+    by: Twofold
+    dx: Twofold
+    dy: Twofold
+    cx: Twofold
+    cy: Twofold
+    rise: Twofold  # d . c k', half the derivative of d . d by the rocker angle
+    inward: Twofold  # d . c k
+
+
 @inline
-def _carried(
-    bx: Twofold, by: Twofold, dx: Twofold, dy: Twofold, cl: Twofold, sl: Twofold, qx: Twofold, qy: Twofold
-) -> tuple[Twofold, Twofold]:
+def _carried(bx: Twofold, by: Twofold, dx: Twofold, dy: Twofold, line: Line) -> tuple[Twofold, Twofold]:
     """e^{-i lam} b + q d: along and across the line, of a point or a derivative of it."""
-    along, across = _times(bx, by, cl, (-sl[0], -sl[1]))
-    more, above = _times(dx, dy, qx, qy)
+    along, across = _times(bx, by, line.cl, (-line.sl[0], -line.sl[1]))
+    more, above = _times(dx, dy, line.qx, line.qy)
     return two.add(along, more), two.add(across, above)
 
 
@@ -81,6 +104,7 @@ def precise_poses(
         lx, ly = two.scale(per_b, designs[i, 4] * per_unit), two.scale(per_b, designs[i, 5] * per_unit)
         qx, qy = _times(lx, ly, cl, (-sl[0], -sl[1]))
         h = designs[i, 7] * per_unit
+        line = Line(cl, sl, qx, qy, unit)
         for j in range(cos_phi.shape[1]):
             u, v = two.unit_vector(cos_phi[row, j], sin_phi[row, j])
             bx, by = two.scale(u, a), two.scale(v, a)
@@ -90,14 +114,7 @@ def precise_poses(
             delta = two.subtract(rr, two.multiply(w, w))
             tolerance = BAND * (abs(x[0]) * r.x_size + abs(by[0]) * a + abs(w[0]) * r.w_size)
             tolerance += BAND * BAND * (r.x_size * r.x_size + a * a + r.w_size * r.w_size)
-            code = st.OK
-            if not r.valid or delta[0] != delta[0]:
-                code = st.INVALID_INPUT
-            elif delta[0] < -tolerance:
-                code = st.NOT_ASSEMBLED
-            elif delta[0] <= tolerance:
-                # The crank pin on the rocker pivot leaves the rocker free; a dead point has one position.
-                code = st.DEAD_POINT if rr[0] > tolerance else st.SINGULAR
+            code = pose_status(r.valid, delta[0], tolerance, rr[0])
             status[i, j] = code
             if discriminant is not None:
                 discriminant[i, j] = (delta[0] * two_c) * two_c if r.valid else math.nan
@@ -118,45 +135,54 @@ def precise_poses(
                 mx, my = _times(dx, dy, lx, ly)
                 joints[4, i, j], joints[5, i, j] = two.add(bx, mx)[0] * unit, two.add(by, my)[0] * unit
             if s is not None or dev is not None:
-                along, across = _carried(bx, by, dx, dy, cl, sl, qx, qy)
+                along, across = _carried(bx, by, dx, dy, line)
                 if s is not None:
                     s[i, j] = along[0] * unit
                 if dev is not None:
                     dev[i, j] = two.add(across, (-h, 0.0))[0] * unit
             if ds is not None or d2s is not None or d3s is not None or ddev is not None or d2dev is not None:
-                rise = two.scale(t, c)
-                per_rise = 1.0 / rise[0] if code == st.OK else math.nan
-                b1x, b1y = (-by[0], -by[1]), bx  # B'; B'' = -B, B''' = -B'
-                p = two.divide(_dot(dx, dy, b1x, b1y), rise, per_rise)
-                d1x = two.subtract(two.multiply(p, (-cy[0], -cy[1])), b1x)
-                d1y = two.subtract(two.multiply(p, cx), b1y)
-                if ds is not None or ddev is not None:
-                    along, across = _carried(b1x, b1y, d1x, d1y, cl, sl, qx, qy)
-                    if ds is not None:
-                        ds[i, j] = along[0] * unit
-                    if ddev is not None:
-                        ddev[i, j] = across[0] * unit
-                if d2s is not None or d3s is not None or d2dev is not None:
-                    pp = two.multiply(p, p)
-                    inward = two.scale(two.subtract((c, 0.0), w), c)  # d . c k
-                    rest = two.subtract(_dot(dx, dy, bx, by), two.multiply(pp, inward))
-                    q = two.divide(two.add(_dot(d1x, d1y, d1x, d1y), rest), rise, per_rise)
-                    q = (-q[0], -q[1])
-                    d2x = two.subtract(two.subtract(bx, two.multiply(q, cy)), two.multiply(pp, cx))
-                    d2y = two.add(two.subtract(by, two.multiply(pp, cy)), two.multiply(q, cx))
-                    if d2s is not None or d2dev is not None:
-                        along, across = _carried((-bx[0], -bx[1]), (-by[0], -by[1]), d2x, d2y, cl, sl, qx, qy)
-                        if d2s is not None:
-                            d2s[i, j] = along[0] * unit
-                        if d2dev is not None:
-                            d2dev[i, j] = across[0] * unit
-                    if d3s is not None:
-                        pq = two.scale(two.multiply(p, q), 3.0)
-                        both = two.subtract(two.scale(_dot(d1x, d1y, d2x, d2y), 3.0), two.multiply(pq, inward))
-                        both = two.divide(both, rise, per_rise)
-                        # psi''' - psi'^3
-                        turn = two.subtract((-p[0], -p[1]), both)
-                        d3x = two.subtract(two.subtract(b1x, two.multiply(turn, cy)), two.multiply(pq, cx))
-                        d3y = two.add(two.subtract(b1y, two.multiply(pq, cy)), two.multiply(turn, cx))
-                        along, _ = _carried((-b1x[0], -b1x[1]), (-b1y[0], -b1y[1]), d3x, d3y, cl, sl, qx, qy)
-                        d3s[i, j] = along[0] * unit
+                at = Pose(bx, by, dx, dy, cx, cy, two.scale(t, c), two.scale(two.subtract((c, 0.0), w), c))
+                _put_derivatives(ds, d2s, d3s, ddev, d2dev, i, j, at, line, code == st.OK)
+
+
+@inline
+def _put_derivatives(
+    ds: Array | None, d2s: Array | None, d3s: Array | None, ddev: Array | None, d2dev: Array | None, i: int, j: int,
+    at: Pose, line: Line, regular: bool,
+) -> None:  # fmt: skip
+    """Write the wanted derivatives up to the highest of them; p, q are psi', psi''."""
+    bx, by, dx, dy, cx, cy, rise, inward = at
+    per_rise = 1.0 / rise[0] if regular else math.nan
+    b1x, b1y = (-by[0], -by[1]), bx  # B'; B'' = -B, B''' = -B'
+    p = two.divide(_dot(dx, dy, b1x, b1y), rise, per_rise)
+    d1x = two.subtract(two.multiply(p, (-cy[0], -cy[1])), b1x)
+    d1y = two.subtract(two.multiply(p, cx), b1y)
+    if ds is not None or ddev is not None:
+        along, across = _carried(b1x, b1y, d1x, d1y, line)
+        if ds is not None:
+            ds[i, j] = along[0] * line.unit
+        if ddev is not None:
+            ddev[i, j] = across[0] * line.unit
+    if d2s is not None or d3s is not None or d2dev is not None:
+        pp = two.multiply(p, p)
+        rest = two.subtract(_dot(dx, dy, bx, by), two.multiply(pp, inward))
+        q = two.divide(two.add(_dot(d1x, d1y, d1x, d1y), rest), rise, per_rise)
+        q = (-q[0], -q[1])
+        d2x = two.subtract(two.subtract(bx, two.multiply(q, cy)), two.multiply(pp, cx))
+        d2y = two.add(two.subtract(by, two.multiply(pp, cy)), two.multiply(q, cx))
+        if d2s is not None or d2dev is not None:
+            along, across = _carried((-bx[0], -bx[1]), (-by[0], -by[1]), d2x, d2y, line)
+            if d2s is not None:
+                d2s[i, j] = along[0] * line.unit
+            if d2dev is not None:
+                d2dev[i, j] = across[0] * line.unit
+        if d3s is not None:
+            pq = two.scale(two.multiply(p, q), 3.0)
+            both = two.subtract(two.scale(_dot(d1x, d1y, d2x, d2y), 3.0), two.multiply(pq, inward))
+            both = two.divide(both, rise, per_rise)
+            # psi''' - psi'^3
+            turn = two.subtract((-p[0], -p[1]), both)
+            d3x = two.subtract(two.subtract(b1x, two.multiply(turn, cy)), two.multiply(pq, cx))
+            d3y = two.add(two.subtract(b1y, two.multiply(pq, cy)), two.multiply(turn, cx))
+            along, _ = _carried((-b1x[0], -b1x[1]), (-b1y[0], -b1y[1]), d3x, d3y, line)
+            d3s[i, j] = along[0] * line.unit

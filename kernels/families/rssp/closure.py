@@ -8,7 +8,7 @@ bit.  Designs may be complex128 (exact gradients by the complex step); decisions
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,3 +60,19 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     valid = a.real > 0.0 and 0.0 < b.real <= 1.0 and m_size < 1e140 and n_size < 1e140
     valid = valid and abs(alpha.real) < 1e5 and branch.real * branch.real == 1.0
     return Reduced(a, b, e, f * sa, a * ca, f * ca, a * sa, m_size, n_size, branch, unit, valid)
+
+
+class Place(NamedTuple):
+    """The coupler across the slide line at one crank angle: m and n, and the discriminant Q = b^2 - m^2 - n^2."""
+
+    m: Any
+    n: Any
+    q: Any
+
+
+@inline
+def place(r: Reduced, u: Any, v: Any) -> Place:
+    """Evaluate the closure at (cos phi, sin phi) = (u, v); (1), (2)."""
+    m, n = r.e - r.a * u, r.n0 - r.na * v
+    # As a product: b^2 - m^2 would lose the digits of a small difference.
+    return Place(m, n, (r.b - m) * (r.b + m) - n * n)

@@ -39,6 +39,7 @@ def joints(
             r = per_pose[i, j]
             r[0], r[1], r[2] = a * u, f * sa + a * (ca * v), f * ca - a * (sa * v)
             r[3], r[4], r[5] = e, s[i, j], 0.0
+            # The middle component is the root of the discriminant: a difference of points loses it near a dead point.
             r[6], r[7], r[8] = (e - r[0]) / b, root / b, -r[2] / b
             r[9], r[10], r[11] = u, ca * v, -sa * v
             r[12], r[13], r[14] = -v, ca * u, -sa * u

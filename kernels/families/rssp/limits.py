@@ -18,7 +18,8 @@ import math
 from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.families.rssp.closure import EPS, Array, Reduced, Status, reduce_design
-from kernels.families.rssp.margin import least_q, turning_status
+from kernels.families.rssp.margin import least_q
+from kernels.verdict import turning_status
 
 _TWO_PI = 2.0 * math.pi
 _MOST_STEPS = 200
@@ -38,10 +39,12 @@ def _excess(r: Reduced, crank: float, ca: float, sa: float, f: float, s: float) 
 @inline
 def _folded(r: Reduced, ca: float, sa: float, f: float) -> tuple[float, bool]:
     """Outer root of the convex E_fold on the side of the branch, by Newton's method from outside."""
+    # A product instead of b^2 - (f cos alpha)^2, which would cancel where the two are nearly equal.
     far = (r.b - f * ca) * (r.b + f * ca)
     s = f * sa + r.branch * math.sqrt(max(far, 0.0))
     for _ in range(_MOST_STEPS):
         value, slope, _ = _excess(r, -r.a, ca, sa, f, s)
+        # From outside a convex function's Newton steps never pass the root: where one does, rounding is reached.
         if value <= 0.0 or slope * r.branch <= 0.0:
             return s, True
         following = s - value / slope
@@ -70,6 +73,7 @@ def _extended(r: Reduced, ca: float, sa: float, f: float, folded: float) -> tupl
         inside = (following - inner) * r.branch > 0.0 and (outer - following) * r.branch > 0.0
         if abs(following - s) <= 2.0 * EPS * abs(s):
             return following if inside else s, True
+        # Bisect where a step leaves the bracket or does not halve the one before.
         if not inside or abs(following - s) > 0.5 * before:
             following = 0.5 * (inner + outer)
             if following in (inner, outer):
@@ -123,7 +127,7 @@ def limits(
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
         least = least_q(r)
-        code = turning_status(least, r.valid)
+        code = turning_status(least.q, least.tolerance, r.valid)
         far, near = math.nan, math.nan
         rho_ext, rho_fold, slope_ext, slope_fold = math.nan, math.nan, math.nan, math.nan
         sa, ca, f = math.sin(designs[i, 4]), math.cos(designs[i, 4]), designs[i, 3] / r.unit
@@ -145,8 +149,10 @@ def limits(
         # The ball's direction from the crank axis; at the folded position the crank points the other way.
         towards, away = math.atan2(far * ca, r.e), math.atan2(-near * ca, -r.e)
         phi_ext[i], phi_fold[i] = _turn(towards), _turn(away)
+        # The stroke by the half-stroke identity: the difference far - near would lose the digits of a small stroke.
         step = -2.0 * r.a * (rho_ext + rho_fold) / (far + near - 2.0 * f * sa)
         stroke[i] = step * r.unit
+        # phi0 - pi as one arctangent: small for nearly central mechanisms, without a difference of angles.
         beyond = math.atan2(r.e * ca * step, r.e * r.e + (far * ca) * (near * ca))
         phi0[i] = math.pi + beyond
         stroke_ratio[i] = (math.pi + beyond) / (math.pi - beyond)

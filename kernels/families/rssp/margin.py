@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.families.rssp.closure import EPS, Array, Reduced, Status, reduce_design
+from kernels.families.rssp.closure import EPS, Array, Reduced, Status, place, reduce_design
 from kernels.trigpoly import minimum
+from kernels.verdict import turning_status
 
 
 class LeastQ(NamedTuple):
@@ -28,29 +29,18 @@ class LeastQ(NamedTuple):
 @inline
 def least_q(r: Reduced) -> LeastQ:
     """The smallest Q over the turn; ``tolerance`` bounds its rounding error (docs/rssp.md, section on rotatability)."""
-    place = minimum(2.0 * r.a * r.e, 2.0 * r.n0 * r.na, -0.5 * r.ka * r.ka, 0.0)
-    u, v = place.cos, place.sin
+    lowest = minimum(2.0 * r.a * r.e, 2.0 * r.n0 * r.na, -0.5 * r.ka * r.ka, 0.0)
+    u, v = lowest.cos, lowest.sin
     # The coefficients only place the minimum; its value comes from m and n, and its slope there takes off what the
     # rounding of the place displaced it by.
-    m, n = r.e - r.a * u, r.n0 - r.na * v
-    q = (r.b - m) * (r.b + m) - n * n
+    m, n, q = place(r, u, v)
     half_slope = -(m * (r.a * v) - n * (r.na * u))
-    moved = 2.0 * half_slope * half_slope / place.curvature
+    moved = 2.0 * half_slope * half_slope / lowest.curvature
     if 0.0 <= moved < 1e-6 * abs(q):
         q -= moved
     size, size2 = r.m_size, r.n_size
     tolerance = EPS * (12.0 * abs(m) * size + 18.0 * abs(n) * size2) + 64.0 * EPS * EPS * (size * size + size2 * size2)
     return LeastQ(q, u, v, math.sqrt(m * m + n * n), tolerance)
-
-
-@inline
-def turning_status(least: LeastQ, valid: bool) -> int:
-    """Whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT."""
-    if not valid or least.q != least.q:
-        return st.INVALID_INPUT
-    if least.q > least.tolerance:
-        return st.OK
-    return st.NOT_ROTATABLE if least.q < -least.tolerance else st.UNDECIDABLE
 
 
 @kernel
@@ -80,7 +70,7 @@ def margin(
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
         least = least_q(r)
-        code = turning_status(least, r.valid)
+        code = turning_status(least.q, least.tolerance, r.valid)
         status[i] = code
         known = code != st.INVALID_INPUT
         if margin is not None:

@@ -12,6 +12,7 @@ from kernels import status as st
 from kernels import twofold as two
 from kernels._jit import kernel
 from kernels.families.rssp.closure import EPS, Array, Status, reduce_design
+from kernels.verdict import pose_status
 
 BAND = 4.0 * EPS  # what rounding the given numbers does to Q: a dead point made in float64 is still one
 
@@ -52,13 +53,7 @@ def precise_poses(
             q = two.subtract(q, two.multiply(n, n))
             tolerance = BAND * (abs(m[0]) * r.m_size + abs(n[0]) * r.n_size)
             tolerance += BAND * BAND * (r.m_size * r.m_size + r.n_size * r.n_size)
-            code = st.OK
-            if not r.valid or q[0] != q[0]:
-                code = st.INVALID_INPUT
-            elif q[0] < -tolerance:
-                code = st.NOT_ASSEMBLED
-            elif q[0] <= tolerance:
-                code = st.DEAD_POINT
+            code = pose_status(r.valid, q[0], tolerance, None)
             status[i, j] = code
 
             if discriminant is not None:

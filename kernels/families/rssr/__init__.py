@@ -17,6 +17,7 @@ from kernels.families.rssr.limits import limits as limits
 from kernels.families.rssr.margin import margin as margin
 from kernels.families.rssr.maxima import sampling_tables as sampling_tables
 from kernels.families.rssr.maxima import true_maxima as true_maxima
+from kernels.families.rssr.motion import Joints as Joints
 from kernels.families.rssr.motion import poses as poses
 from kernels.families.rssr.precise import PRECISE_COLUMNS as PRECISE_COLUMNS
 from kernels.families.rssr.precise import precise_constants as precise_constants

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from kernels._jit import inline
-from kernels.families.rssr.closure import EPS, Array, reduce_scaled, unit_scale, within_unit_range
+from kernels.families.rssr.closure import EPS, Array, closure_terms, reduce_scaled, unit_scale, within_unit_range
 from kernels.reduce import largest, smallest
 from kernels.trigpoly import approach, far_minimum, lowest_of_16, minimum, point, shortfall
 
@@ -93,7 +93,7 @@ def _evaluate(at: Array, k: int) -> None:
     k0, k1, k2 = at[k + K0], at[k + K1], at[k + K2]
     # The expanded coefficients only place the minimum; its value comes from X, Y, W themselves, and its slope there
     # takes off what is left of the way to it.
-    x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
+    x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
     slope = x * v + y * ca * u - w * (k1 * u + k2 * v)
     curvature = -(at[k + C1] * u + at[k + S1] * v) - 4.0 * (
         at[k + C2] * ((u - v) * (u + v)) + at[k + S2] * (2.0 * u * v)

@@ -1,8 +1,8 @@
 """True maximum of one transfer function by marching and bracketing: for the few designs near a change point.
 
-Steps shrink towards the complex zeros of Delta like the distance to them, so a design whose discriminant nearly
-vanishes costs only the logarithm of how nearly.  Maxima are bracketed by the sign of the next derivative; the march is
-repeated with half the steps until two results agree.
+The motion changes fastest near the complex zeros of Delta.  The steps of the march are proportional to the distance
+from them, so a design whose discriminant comes within d of zero takes about log(1/d) steps.  A maximum is bracketed
+where the next derivative changes sign.  The march is repeated with half the steps until two results agree.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from kernels._jit import inline, kernel
-from kernels.families.rssr.closure import EPS
+from kernels.families.rssr.closure import EPS, closure_terms
 from kernels.families.rssr.derivatives import follower, order_pair
 from kernels.reduce import largest
 
@@ -35,16 +35,19 @@ def rounding(
 ) -> tuple[float, float]:
     """Relative rounding errors of the transfer function of that order where it is ``height``, and of its slope.
 
-    It behaves like Delta^(1/2 - order), so it is off relatively by what Delta is.  And it is a sum of terms of the size
-    1, k1, k2 over T, whose rounding stays however small the sum is, and so does that of the angle in them: what the
-    closure X C - Y S + W is off, over T.  Where W is small and the terms it is made of are not, Delta shows none of it,
-    but its slope does, and with it that of the function [1/rad].
+    There are three sources of error.  First, the function is proportional to Delta^(1/2 - order), so a relative error
+    of Delta becomes one of the function.  Second, the function is a sum of terms of the size 1, k1, k2 over T, and the
+    rounding of these terms remains even where their sum is small.  Third, the rocker angle in them has the error of the
+    closure X C - Y S + W divided by T.  Where W is a small difference of large terms, its error hardly changes Delta
+    but changes the slope of Delta, and with it the slope of the function [1/rad].
     """
-    x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
+    x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
+    # Magnitudes of the terms that X and Y are sums of: rounding is proportional to these, not to the sums.
     mx, my = abs(e) + 1.0, abs(y0) + abs(ca)
     tolerance = 4.0 * EPS * (abs(x) * mx + abs(y) * my + abs(w) * w_size)
     slope = 4.0 * EPS * (abs(v) * mx + abs(ca * u) * my + abs(k1 * u + k2 * v) * w_size)
     delta = x * x + y * y - w * w
+    # The clamp keeps the quotient finite where rounding made a tiny discriminant negative.
     per_t = 1.0 / math.sqrt(largest(delta, 1e-300))
     angle = 4.0 * EPS * (mx + my + w_size) * per_t
     terms = (2.0 * EPS * (2.0 + abs(k1) + abs(k2)) + angle) * per_t
@@ -56,6 +59,7 @@ def rounding(
 
 @inline
 def _gap(phi: float, centre: float) -> float:
+    """Distance of two angles around the circle."""
     d = abs(phi - centre) % _TURN
     return min(d, _TURN - d)
 
@@ -93,11 +97,13 @@ def careful_maximum(
         phi, end = phi1, phi1 + _TURN
         y, dy = _evaluate(order, e, y0, ca, k0, k1, k2, phi)
         while phi < end:
+            # Distance of the nearer complex zero of Delta; its imaginary part keeps the step from vanishing.
             near = min(math.hypot(rho1, _gap(phi, phi1)), math.hypot(rho2, _gap(phi, phi2)))
             following = phi + min(2.0 * fineness * _WIDEST, fineness * near)
             y2, dy2 = _evaluate(order, e, y0, ca, k0, k1, k2, following)
             if y * dy > 0.0 and y2 * dy2 <= 0.0 and max(abs(y), abs(y2)) > 0.5 * best:
                 if y * y2 < 0.0:
+                    # The function changed its sign too, so the step was too long to hold one simple maximum.
                     missed = True
                 else:
                     peak, where, bound, width = _bracketed(
@@ -142,6 +148,7 @@ def _bracketed(
     """Illinois' regula falsi on the derivative, bisecting every third step: |y|, phi, error bounds of both."""
     y, mid, bound = 0.0, lo, math.inf
     for step in range(120):
+        # One bisection in three: regula falsi alone may creep towards one end of the bracket.
         mid = 0.5 * (lo + hi) if step % 3 == 2 else (lo * f_hi - hi * f_lo) / (f_hi - f_lo)
         if not lo <= mid <= hi:
             mid = 0.5 * (lo + hi)
@@ -149,6 +156,7 @@ def _bracketed(
         bound = abs(dy) * (hi - lo)
         if bound <= 0.01 * target * abs(y) or hi - lo <= 4.0 * EPS * abs(mid):
             break
+        # Illinois' rule: the value at the end that stays is halved, so that the next point falls beyond the root.
         if (dy > 0.0) == (f_lo > 0.0):
             lo, f_lo, f_hi = mid, dy, 0.5 * f_hi
         else:

@@ -1,25 +1,20 @@
-"""One design of the spatial crank-rocker brought to its smallest set of numbers, and how well they are known.
-
-Polukhin 1971, chapter II, in the corrected and stable forms of docs/rssr.md; the equation numbers are of that page.
-Everything is computed in units of the crank length, mirrored to the assembly mode +1 (psi, f -> -psi, -f together with
-cos(alpha) -> -cos(alpha) in the axial product turns mode -1 into +1 and changes no bit of any magnitude).
-"""
+"""One design of the spatial crank-rocker brought to the numbers of :mod:`kernels.crank_closure`."""
 
 from __future__ import annotations
 
-import math
-from typing import Any, NamedTuple, TypeAlias
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, NamedTuple
 
 from kernels._jit import inline
-from kernels.sincos import sincos
-
-Array: TypeAlias = NDArray[np.float64]
-Numbers: TypeAlias = NDArray[Any]  # float64, or complex128 for exact gradients by the complex step
-Status: TypeAlias = NDArray[np.uint8]
-EPS = 2.0**-53
+from kernels.crank_closure import EPS as EPS
+from kernels.crank_closure import Array as Array
+from kernels.crank_closure import Numbers as Numbers
+from kernels.crank_closure import Reduced as Reduced
+from kernels.crank_closure import Status as Status
+from kernels.crank_closure import axial_terms as axial_terms
+from kernels.crank_closure import discriminant_tolerance as discriminant_tolerance
+from kernels.crank_closure import reduce_scaled as reduce_scaled
+from kernels.crank_closure import unit_scale as unit_scale
+from kernels.crank_closure import within_unit_range as within_unit_range
 
 
 class Design(NamedTuple):
@@ -35,54 +30,6 @@ class Design(NamedTuple):
     branch: float
 
 
-class Reduced(NamedTuple):
-    """Per-design numbers of the closure ``X C - Y S + W = 0`` in units of the crank, mirrored to branch +1."""
-
-    e: float  # X = e - cos phi
-    y0: float  # Y = y0 + ca sin phi
-    ca: float
-    k0: float  # W = k0 + k1 sin phi - k2 cos phi
-    k1: float
-    k2: float
-    w_size: float  # sum of the magnitudes whose rounding errors make up W
-    coupler: float  # b/a
-    rocker: float  # c/a
-    z0: float  # z_B - z_C = z0 - sa sin phi
-    sa: float
-    branch: float
-    valid: bool
-
-
-@inline
-def axial_terms(f: Any, g: Any, alpha: Any, ca: Any) -> tuple[Any, Any, Any]:
-    """f^2 + g^2 - 2 f g cos(alpha), the magnitude of its terms, and f cos(alpha) - g; (K*).
-
-    Without cancellation where the axes are nearly parallel, alpha near 0 or pi, and both offsets long.
-    """
-    near_zero = ca.real >= 0.0
-    sine, cosine = sincos(0.5 * alpha)
-    h = sine if near_zero else cosine
-    sign = 1.0 if near_zero else -1.0
-    gap, rest = f - sign * g, 2.0 * f * h * h
-    near, far = gap * gap, 2.0 * g * rest
-    return near + sign * far, near.real + abs(far.real), sign * (gap - rest)
-
-
-@inline
-def within_unit_range(c: float) -> bool:
-    """Whether a rocker of length c needs no scaling: no square can leave float64."""
-    return (c > 1e-6) & (c < 1e6)
-
-
-@inline
-def unit_scale(c: float) -> float:
-    """Power of two that brings a rocker of length c to the unit range; 1 where it is near enough."""
-    if within_unit_range(c):
-        return 1.0
-    _, exponent = math.frexp(c)
-    return math.ldexp(1.0, -exponent)
-
-
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
@@ -92,27 +39,41 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     return reduce_scaled(a, b, c, e, f, g, designs[i, 6], designs[i, 7].real)
 
 
-@inline
-def reduce_scaled(a: Any, b: Any, c: Any, e: Any, f: Any, g: Any, alpha: Any, branch: float) -> Reduced:
-    """As :func:`reduce_design`, for lengths whose squares stay in float64; without a branch, so that it vectorises."""
-    sa, ca = sincos(alpha)
-    q, q_size, rise = axial_terms(f, g, alpha, ca)
-    square = (c - b) * (c + b) + (a * a + e * e) + q
-    per_a, per_c = 1.0 / a, 1.0 / c
-    k0, k1, k2 = 0.5 * square * per_c * per_a, g * sa * per_c, e * per_c
-    terms = abs(((c - b) * (c + b)).real) + (a * a).real + (e * e).real + q_size
-    size = 0.5 * terms * per_c.real * per_a.real + abs(k1.real) + abs(k2.real)
-    valid = (a.real > 1e-140) & (per_a.real < 1e140) & (b.real > 0.0) & (c.real > 0.0) & (size < 1e140)
-    valid = valid & (abs(alpha.real) < 1e5) & (branch * branch == 1.0)
-    return Reduced(
-        e * per_a, branch * (f * sa * per_a), branch * ca, k0, k1, k2, size,
-        b * per_a, c * per_a, rise * per_a, sa, branch, valid,
-    )  # fmt: skip
+class Place(NamedTuple):
+    """The closure at one crank angle; ``hu``, ``hv`` are cos(phi), sin(phi) times the cosine of the axes' angle."""
+
+    u: Any  # cos phi
+    v: Any  # sin phi
+    hu: Any
+    hv: Any
+    x: Any  # X, Y, W of the closure
+    y: Any
+    w1: Any  # W = k0 - w1
+    w: Any
+    rr: Any  # X^2 + Y^2, squared distance of the crank pin from the rocker axis
+    delta: Any  # the discriminant X^2 + Y^2 - W^2
 
 
 @inline
-def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
-    """Rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (sheet 1.2)."""
-    mx, my, mw = abs(r.e.real) + 1.0, abs(r.y0.real) + 1.0, r.w_size
-    t = 8.0 * EPS
-    return t * (abs(x.real) * mx + abs(y.real) * my + abs(w.real) * mw) + t * t * (mx * mx + my * my + mw * mw)
+def place(e: Any, y0: Any, ca: Any, k0: Any, k1: Any, k2: Any, u: Any, v: Any) -> Place:
+    """Evaluate the closure of a reduced design at (cos phi, sin phi) = (u, v); (2).
+
+    It takes float32, float64 and complex128 alike, so no literal number may stand in it.
+    """
+    hu, hv = ca * u, ca * v
+    x, y, w1 = e - u, y0 + hv, k2 * u - k1 * v
+    w = k0 - w1
+    rr = x * x + y * y
+    return Place(u, v, hu, hv, x, y, w1, w, rr, rr - w * w)
+
+
+@inline
+def closure_terms(
+    e: float, y0: float, ca: float, k0: float, k1: float, k2: float, u: float, v: float
+) -> tuple[float, ...]:
+    """X, Y, W of the closure alone, for margins, limit positions, error estimates and enclosures.
+
+    W is summed in another order than in :func:`place`.  The order decides its last bit and with it that of every
+    margin, so both are kept.
+    """
+    return e - u, y0 + ca * v, k0 + k1 * v - k2 * u

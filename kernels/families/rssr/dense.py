@@ -10,6 +10,13 @@ from numpy.typing import NDArray
 
 from kernels._jit import kernel_fused
 from kernels.families.rssr.closure import Array, reduce_design
+from kernels.families.rssr.derivatives import (
+    acceleration_fused,
+    jerk_fused,
+    place_fused,
+    rocker_fused,
+    velocity_fused,
+)
 from kernels.reduce import largest, smallest
 
 Indices: TypeAlias = NDArray[np.int64]
@@ -45,39 +52,28 @@ def dense_maxima(
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
+        # The helpers of this loop are contracted like the loop itself: a product and a sum become one instruction.
         least, m1, m2, m3 = 1e300, 0.0, 0.0, 0.0
         for j in range(cos_phi.size):
-            u, v = cos_phi[j], sin_phi[j]
-            hu, hv = r.ca * u, r.ca * v
-            x, y, w1 = r.e - u, r.y0 + hv, r.k2 * u - r.k1 * v
-            w = r.k0 - w1
-            rr = x * x + y * y
-            delta = rr - w * w
-            least = smallest(least, delta)
+            place = place_fused(r.e, r.y0, r.ca, r.k0, r.k1, r.k2, cos_phi[j], sin_phi[j])
+            least = smallest(least, place.delta)
             if max_abs_dpsi is not None or max_abs_d2psi is not None or max_abs_d3psi is not None:
-                t = math.sqrt(largest(delta, 1e-300))
-                shared = 1.0 / (rr * t)  # one division for 1/R and 1/T
-                per_r, per_t = t * shared, rr * shared
-                c, s = (x * w + y * t) * per_r, (x * t - y * w) * per_r
-                w_ph = r.k1 * u + r.k2 * v
-                g_ph = w_ph - (v * c - hu * s)
-                p = g_ph * per_t  # -psi'
+                # A clamp instead of a branch; the minimum of the discriminant itself tells that it was used.
+                t = math.sqrt(largest(place.delta, 1e-300))
+                rocker = rocker_fused(place, t, 1.0 / (place.rr * t))
+                first = velocity_fused(r.k1, r.k2, rocker, place)
                 if max_abs_dpsi is not None:
-                    m1 = largest(m1, abs(p))
+                    m1 = largest(m1, abs(first.p))
                     if values is not None:
-                        values[j] = abs(p)
+                        values[j] = abs(first.p)
                 if max_abs_d2psi is not None or max_abs_d3psi is not None:
-                    g_phps = v * s + hu * c
-                    q = (w1 - (u * c + hv * s) + p * (w * p - (g_phps + g_phps))) * per_t  # -psi''
+                    second = acceleration_fused(rocker, place, first)
                     if max_abs_d2psi is not None:
-                        m2 = largest(m2, abs(q))
+                        m2 = largest(m2, abs(second.q))
                         if values is not None:
-                            values[j] = abs(q)
+                            values[j] = abs(second.q)
                     if max_abs_d3psi is not None:
-                        g_phphps = u * s - hv * c
-                        jerk = (
-                            g_ph + p * (3.0 * g_phphps - p * (3.0 * (w_ph - g_ph) + t * p)) + 3.0 * q * (g_phps - w * p)
-                        ) * per_t
+                        jerk = jerk_fused(rocker, place, first, second)
                         m3 = largest(m3, abs(jerk))
                         if values is not None:
                             values[j] = abs(jerk)
@@ -90,6 +86,7 @@ def dense_maxima(
             max_abs_d3psi[i] = m3
         if at is not None and values is not None:
             most = m3 if max_abs_d3psi is not None else (m2 if max_abs_d2psi is not None else m1)
+            # The maximum is one of the stored values, so it is found again by equality.
             at[i] = 0
             for j in range(cos_phi.size):
                 if values[j] == most:

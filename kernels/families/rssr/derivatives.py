@@ -1,41 +1,109 @@
-"""Transfer functions of one pose up to the fourth, for the search of their true maxima."""
+"""Transfer functions of the spatial crank-rocker at one pose; equations (3)-(5), (5a) of docs/rssr.md.
+
+The one set of formulas behind the motion at given angles, the dense grid and the search for true maxima.  Derivatives
+of the closure are written ``w_ph``, ``g_phps`` and so on: ``ph`` stands for phi, ``ps`` for psi.
+
+Everything is of the mechanism mirrored to branch +1.  The first two transfer functions are returned with the opposite
+sign, because so they need no negation in between; changing a sign changes no other bit.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
-from kernels._jit import inline
+from kernels._jit import inline, inline_fused
+from kernels.families.rssr.closure import Place, place
 from kernels.reduce import largest
+
+
+class Rocker(NamedTuple):
+    """The rocker of the mirrored mechanism: minus cos psi, minus sin psi, T = sqrt(Delta) and 1/T."""
+
+    c: Any
+    s: Any
+    t: Any
+    per_t: Any
+
+
+class First(NamedTuple):
+    """Derivatives of the closure with respect to phi, and minus psi'."""
+
+    w_ph: Any
+    g_ph: Any
+    p: Any
+
+
+class Second(NamedTuple):
+    """Second derivatives of the closure, twice by phi and once by each angle, and minus psi''."""
+
+    g_phph: Any
+    g_phps: Any
+    q: Any
+
+
+@inline
+def rocker(at: Place, t: Any, per: Any) -> Rocker:
+    """The rocker from T and ``per`` = 1/(R T): one division gives both reciprocals, 1/R and 1/T."""
+    per_r, per_t = t * per, at.rr * per
+    return Rocker((at.x * at.w + at.y * t) * per_r, (at.x * t - at.y * at.w) * per_r, t, per_t)
+
+
+@inline
+def velocity(k1: Any, k2: Any, to: Rocker, at: Place) -> First:
+    """Equation (3)."""
+    w_ph = k1 * at.u + k2 * at.v
+    g_ph = w_ph - (at.v * to.c - at.hu * to.s)
+    return First(w_ph, g_ph, g_ph * to.per_t)
+
+
+@inline
+def acceleration(to: Rocker, at: Place, first: First) -> Second:
+    """Equation (4)."""
+    g_phps = at.v * to.s + at.hu * to.c
+    g_phph = at.w1 - (at.u * to.c + at.hv * to.s)
+    # A sum instead of a product with 2: it leaves float32 what it is.
+    q = (g_phph + first.p * (at.w * first.p - (g_phps + g_phps))) * to.per_t
+    return Second(g_phph, g_phps, q)
+
+
+@inline
+def jerk(to: Rocker, at: Place, first: First, second: Second) -> Any:
+    """Equation (5): psi''' with its own sign."""
+    p, q = first.p, second.q
+    g_phphps, g_phpsps = at.u * to.s - at.hv * to.c, first.w_ph - first.g_ph
+    by_p = p * (3.0 * g_phphps - p * (3.0 * g_phpsps + to.t * p))
+    return (first.g_ph + by_p + 3.0 * q * (second.g_phps - at.w * p)) * to.per_t
+
+
+place_fused = inline_fused(place)
+rocker_fused = inline_fused(rocker)
+velocity_fused = inline_fused(velocity)
+acceleration_fused = inline_fused(acceleration)
+jerk_fused = inline_fused(jerk)
 
 
 @inline
 def follower(
     e: float, y0: float, ca: float, k0: float, k1: float, k2: float, u: float, v: float
 ) -> tuple[float, float, float, float]:
-    """psi', psi'', psi''', psi'''' of the mirrored mechanism at (cos phi, sin phi) = (u, v); equations (3)-(5), (5a).
+    """psi', psi'', psi''', psi'''' of the mirrored mechanism at (cos phi, sin phi) = (u, v).
 
-    Delta is clamped to a tiny positive number: it is called for designs that turn fully.  Without a branch, so that it
-    vectorises over whatever the loop runs over; what the caller does not use is not computed.
+    It is meant for designs that turn fully.  There is no branch in it, so that it vectorises over whatever the loop
+    runs over, and what the caller does not use is not computed.
     """
-    hu, hv = ca * u, ca * v
-    x, y, w1 = e - u, y0 + hv, k2 * u - k1 * v
-    w = k0 - w1
-    rr = x * x + y * y
-    t = math.sqrt(largest(rr - w * w, 1e-300))
-    shared = 1.0 / (rr * t)
-    per_r, per_t = t * shared, rr * shared
-    c, s = (x * w + y * t) * per_r, (x * t - y * w) * per_r  # minus cos psi, minus sin psi
-    w_ph = k1 * u + k2 * v
-    g_ph = w_ph - (v * c - hu * s)
-    p = -g_ph * per_t
-    g_phph, g_phps = w1 - (u * c + hv * s), v * s + hu * c
-    q = -(g_phph + p * (2.0 * g_phps + w * p)) * per_t
-    g_phphps, g_phpsps = u * s - hv * c, w_ph - g_ph
-    mixed = g_phps + w * p
-    j = (g_ph - p * (3.0 * g_phphps + p * (3.0 * g_phpsps - t * p)) - 3.0 * q * mixed) * per_t
-    by_p = p * (-4.0 * g_phps + p * (6.0 * (w1 - g_phph) - p * (4.0 * g_phps + w * p)))
+    at = place(e, y0, ca, k0, k1, k2, u, v)
+    # Clamped to a tiny positive number: a design that turns fully has a positive discriminant, except for rounding.
+    t = math.sqrt(largest(at.delta, 1e-300))
+    to = rocker(at, t, 1.0 / (at.rr * t))
+    first = velocity(k1, k2, to, at)
+    second = acceleration(to, at, first)
+    j = jerk(to, at, first, second)
+    p, q, w = -first.p, -second.q, at.w
+    g_phphps, g_phpsps, g_phps = at.u * to.s - at.hv * to.c, first.w_ph - first.g_ph, second.g_phps
+    by_p = p * (-4.0 * g_phps + p * (6.0 * (at.w1 - second.g_phph) - p * (4.0 * g_phps + w * p)))
     by_q = q * (6.0 * g_phphps + p * (12.0 * g_phpsps - 6.0 * t * p) + 3.0 * w * q)
-    k = (g_phph - by_p - by_q - 4.0 * mixed * j) * per_t
+    k = (second.g_phph - by_p - by_q - 4.0 * (g_phps + w * p) * j) * to.per_t
     return p, q, j, k
 
 

@@ -44,6 +44,7 @@ def _rocker(at: Array, r: Reduced) -> bool:
     combine(at, 0.0, 1.0, _A, 1.0, _B, 0.0, R)
     multiply(at, W, W, _A)
     combine(at, 0.0, 1.0, R, -1.0, _A, 0.0, _B)
+    # _B is the discriminant R - W^2; no circle around zero may touch it, or root and reciprocal have no enclosure.
     if not root(at, _B, T, PER) or not inverse(at, R, PER):
         return False
     multiply(at, X, W, _A)

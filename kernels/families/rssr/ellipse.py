@@ -26,6 +26,7 @@ def pressure_ellipse(designs: Array, ellipse: Array) -> None:
         q, q_size, rise = axial_terms(f, g, designs[i, 6], ca)
         per = 1.0 / (b * c)
         out = ellipse[i]
+        # The sizes of the terms are kept apart from their sums: rounding is proportional to the former.
         out[0] = 0.5 * per * (b * b + c * c - a * a - e * e - q)
         out[1], out[2] = per * (a * e), -per * (a * g * sa)
         out[3], out[4], out[5] = -rise / b, 0.0, a * sa / b

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from kernels._jit import kernel
 from kernels.enclosure import EPS, GUARD, WIDTH, add, inverse, multiply, root, trigonometric
-from kernels.families.rssr.closure import Array, Reduced
+from kernels.families.rssr.closure import Array, Reduced, closure_terms
 
 VELOCITY, R, DELTA, B, T, PER_T, _PRODUCT = (k * WIDTH for k in range(7))
 PER_R = T  # which is needed for 1/T only
@@ -25,9 +25,10 @@ def enclose(at: Array, r: Reduced, u: float, v: float, reach: float) -> bool:
     make them up (docs/rssr.md, section 4.2), their derivatives by less; the errors below are those times the sizes of
     sin z and 1 - cos z.
     """
-    x0, x1, x2 = r.e - u, v, u
-    y0, y1, y2 = r.y0 + r.ca * v, r.ca * u, -r.ca * v
-    w0, w1, w2 = r.k0 + r.k1 * v - r.k2 * u, r.k1 * u + r.k2 * v, r.k2 * u - r.k1 * v
+    x0, y0, w0 = closure_terms(r.e, r.y0, r.ca, r.k0, r.k1, r.k2, u, v)
+    x1, x2 = v, u
+    y1, y2 = r.ca * u, -r.ca * v
+    w1, w2 = r.k1 * u + r.k2 * v, r.k2 * u - r.k1 * v
     s, m = 1.18 * reach, 0.55 * reach * reach  # sizes of sin z and 1 - cos z
     # Sizes of X, Y, W and their derivatives, and what they are off by.
     aca, turn = abs(r.ca), abs(r.k1) + abs(r.k2)

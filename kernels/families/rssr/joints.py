@@ -33,8 +33,8 @@ def joints(
 
     Notes
     -----
-    t_tau comes from the discriminant with the sign of the branch, not from differenced points: near a dead point the
-    difference has no digit left (dynamics sheet, rule 3).
+    The component t_tau of the coupler's direction along the rocker's motion has the sign of the branch.  It is taken
+    from the discriminant, which keeps its digits near a dead point (dynamics sheet, rule 3).
     """
     for i in range(designs.shape[0]):
         a, b, c = designs[i, 0], designs[i, 1], designs[i, 2]
@@ -56,5 +56,6 @@ def joints(
             r[12], r[13], r[14] = -v, ca * u, -sa * u
             r[15], r[16], r[17] = cp, sp, 0.0
             r[18], r[19], r[20] = -sp, cp, 0.0
+            # From the root of the discriminant: near a dead point a difference of points has no digit left.
             r[21] = branch * np.sqrt(discriminant[i, j]) / (2.0 * b * c)
             r[22], r[23] = dpsi[i, j], d2psi[i, j]

@@ -1,9 +1,10 @@
 """Limit positions of the rocker, its swing and the stroke ratio (docs/rssr.md, section 5).
 
-At a limit position the rocker ball lies in the plane of crank axis and crank, eta = 0: extended with the crank towards
-it, folded with the crank away.  A fully turning crank with an oscillating rocker passes exactly one of each on its
-branch, so eta changes sign exactly twice per turn.  The rocker turns fully if and only if the discriminant of the
-closure in phi, a trigonometric polynomial of degree 2 in psi, has no negative value.
+At a limit position the rocker ball lies in the plane of crank axis and crank: its coordinate eta across that plane is
+zero.  In the extended position the crank points towards the ball, in the folded position away from it.  A crank that
+turns fully and drives an oscillating rocker passes one position of each kind per turn, so eta changes sign exactly
+twice.  The rocker itself turns fully if and only if the closure can be solved for phi at every psi, which is when its
+discriminant, a trigonometric polynomial of degree 2 in psi, is never negative.
 """
 
 from __future__ import annotations
@@ -32,10 +33,10 @@ from kernels.families.rssr.block import (
     load_block,
     new_block,
 )
-from kernels.families.rssr.closure import EPS, Array, Status
+from kernels.families.rssr.closure import EPS, Array, Status, closure_terms
 from kernels.families.rssr.derivatives import follower
-from kernels.families.rssr.margin import turning_status
 from kernels.trigpoly import minimum
+from kernels.verdict import turning_status
 
 LIMIT_NAMES = ("psi_ext", "psi_fold", "phi_ext", "phi_fold", "swing", "phi0", "stroke_ratio")
 TURN = 2.0 * math.pi
@@ -48,7 +49,7 @@ def _ball(at: Array, k: int, phi: float) -> tuple[float, float, float, float, fl
     """In units of the crank at phi: eta, xi, d eta/d phi along the motion, sin psi, cos psi, T."""
     e, y0, ca, k0, k1, k2, c = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + ROCKER]
     u, v = math.cos(phi), math.sin(phi)
-    x, y, w = e - u, y0 + ca * v, k0 + k1 * v - k2 * u
+    x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
     rr = x * x + y * y
     t = math.sqrt(max(rr - w * w, 0.0))
     cos, sin = -(x * w + y * t) / rr, (y * w - x * t) / rr
@@ -67,6 +68,7 @@ def _root(at: Array, k: int, lo: float, hi: float, rising: bool) -> float:
             hi = phi
         else:
             lo = phi
+        # A step that leaves the bracket, or is not clearly shorter than the one before, is replaced by bisection.
         step = -eta / slope
         if not (lo <= phi + step <= hi and abs(step) <= 0.6 * before):
             step = 0.5 * (lo + hi) - phi
@@ -79,7 +81,7 @@ def _root(at: Array, k: int, lo: float, hi: float, rising: bool) -> float:
 
 @inline
 def _rocker_turns(at: Array, k: int) -> bool:
-    """Is the closure solvable for phi at every psi?  Then the rocker has no limit positions; (6*) of the page."""
+    """Whether the closure is solvable for phi at every psi: then the rocker has no limit positions; (6*)."""
     e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
     m = minimum(2.0 * (k2 - e * k0), 2.0 * (y0 * k0 - k1 * ca), 0.5 * (1.0 - e * e - ca * ca + y0 * y0), e * y0)
     least: float = m.value + (k1 * k1 + k2 * k2 - k0 * k0) + 0.5 * (1.0 - e * e + ca * ca - y0 * y0)
@@ -109,6 +111,7 @@ def _mark_turning_points(count: int, at: Array, cos: Array, sin: Array, marks: A
     """Signs of psi' at FEWEST angles, all designs of the block side by side, as sums of powers of two."""
     for k in range(count):
         marks[k] = 0.0
+    # A sum of powers of two instead of a set of bits: it stays in float64, so the loop over designs vectorises.
     mark = 1.0
     for i in range(FEWEST):
         u, v = cos[i], sin[i]
@@ -142,12 +145,13 @@ def _wrapped(angle: float) -> float:
 
 @inline
 def _swing(at: Array, k: int, s1: float, c1: float, s2: float, c2: float, rho: float) -> tuple[float, float, float]:
-    """Signed swing of the mirrored mechanism, always negative; how its error grows with that of the angles; its own.
+    """Signed swing of the mirrored mechanism, always negative, and two parts of its error.
 
-    rho is the sum of the two distances of the ball from the crank axis.  The half-swing identity keeps its relative
-    accuracy for tiny swings; its sign also tells a swing near 2 pi from one near 0.  Angles that are off turn the lever
-    and move the balls, by no more than the rocker's length times as much; lever and distances round by the terms they
-    are sums of, which may be much larger.
+    The second number is the factor by which errors of the two angles enter the swing, the third the rounding error of
+    the swing's own formula.  ``rho`` is the sum of the two distances of the ball from the crank axis.  The half-swing
+    identity keeps its relative accuracy for tiny swings; its sign also tells a swing near 2 pi from one near 0.  An
+    error of an angle turns the lever and moves the ball by no more than the rocker's length times that error.  Lever
+    and distances round like the terms they are sums of, which may be much larger than the sums.
     """
     difference = math.atan2(s2 * c1 - c2 * s1, c1 * c2 + s1 * s2)
     if abs(difference) > _TINY_SWING:

@@ -29,14 +29,7 @@ from kernels.families.rssr.block import (
     new_block,
 )
 from kernels.families.rssr.closure import EPS, Array, Status
-
-
-@inline
-def turning_status(delta: float, tolerance: float, valid: bool) -> int:
-    """Whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT."""
-    code = st.OK if delta > tolerance else st.UNDECIDABLE
-    code = st.NOT_ROTATABLE if delta < -tolerance else code
-    return code if valid & (delta == delta) else st.INVALID_INPUT
+from kernels.verdict import turning_status
 
 
 @inline
@@ -72,8 +65,8 @@ def margin(
 
     Notes
     -----
-    What is None is neither computed nor compiled.  Outside the error bound of :func:`least_delta` the verdict is that
-    of exact arithmetic on the given doubles.
+    What is None is neither computed nor compiled.  Where the least Delta is farther from zero than the error bound of
+    :func:`least_delta`, the verdict is that of exact arithmetic on the given doubles.
     """
     at = new_block()
     for start in range(0, designs.shape[0], BLOCK):
@@ -90,6 +83,7 @@ def margin(
             if rotatable is not None:
                 turns = 1.0 if delta > 0.0 else 0.0
                 rotatable[i] = turns if known & (code != st.UNDECIDABLE) else math.nan
+            # The bound of Delta, plus the rounding of the quotient by the square of the coupler.
             if error is not None:
                 per_square = 1.0 / (at[k + COUPLER] * at[k + COUPLER])
                 error[i] = (at[k + TOLERANCE] + 4.0 * EPS * abs(delta)) * per_square if known else math.nan

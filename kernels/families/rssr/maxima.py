@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline, kernel
@@ -42,7 +43,6 @@ from kernels.families.rssr.block import (
 from kernels.families.rssr.careful import careful_maximum
 from kernels.families.rssr.closure import Array, Status
 from kernels.families.rssr.derivatives import follower
-from kernels.families.rssr.margin import turning_status
 from kernels.families.rssr.peaks import (
     ERROR,
     HEIGHT,
@@ -62,11 +62,14 @@ from kernels.families.rssr.peaks import (
 )
 from kernels.reduce import largest
 from kernels.trigpoly import far_minimum, point
+from kernels.verdict import turning_status
 
+Counts = NDArray[np.int64]
 FEWEST, MOST = 16, 1024
 _NONE = (math.nan, math.nan, math.nan, math.nan)
 _NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # what the search needs of a design
 _FLOOR, _MARKS = (FEWEST + 2) * BLOCK, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
+# Powers of two below 2^18 leave different remainders modulo 19, so a table turns 2^k into k without a loop.
 _EXPONENT = np.array([0, 0, 1, 13, 2, 16, 14, 6, 3, 8, 17, 12, 15, 5, 7, 11, 4, 10, 9])  # k of 2^k modulo 19
 
 
@@ -126,6 +129,7 @@ def _list_marked(at: Array, k: int, cos: Array, sin: Array, size: Array, m: Arra
     """Append the marked local maxima of design k to the list; returns its new length."""
     marks = int(size[_MARKS + k])
     while marks != 0:
+        # The lowest bit that is set.
         lowest = marks & -marks
         i = _EXPONENT[lowest % 19]
         here = (i + 1) * BLOCK + k
@@ -137,7 +141,7 @@ def _list_marked(at: Array, k: int, cos: Array, sin: Array, size: Array, m: Arra
 
 @inline
 def _list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, m: Array, count: int) -> int:
-    """As the two above for the samples of one design by :func:`_sample`; none if there are implausibly many."""
+    """Append the local maxima among the samples of one design by :func:`_sample`; none if there are too many."""
     most = 0.0
     for i in range(n):
         most = largest(most, size[i])
@@ -153,7 +157,8 @@ def _list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, 
 
 
 @inline
-def _careful(at: Array, k: int, order: int, target: float) -> tuple[float, float, float, float, bool]:
+def _careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float, float, float, float], bool]:
+    """The maximum by marching, and whether it was found; all nan if not."""
     u, v = at[k + COS], at[k + SIN]
     c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2] + 1e-300
     here = point(c1, s1, c2, s2, u, v)
@@ -162,10 +167,11 @@ def _careful(at: Array, k: int, order: int, target: float) -> tuple[float, float
     rho1 = math.sqrt(2.0 * at[k + DELTA] / here.curvature) if here.curvature > 0.0 else math.inf
     rise = at[k + DELTA] + max(there.value - here.value, 0.0)
     rho2 = math.sqrt(2.0 * rise / there.curvature) if there.curvature > 0.0 else math.inf
-    return careful_maximum(
+    best, place, error, reach, agreed = careful_maximum(
         order, at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE],
         math.atan2(v, u), rho1, math.atan2(fv, fu), rho2, target,
     )  # fmt: skip
+    return ((best, place, error, reach) if agreed else _NONE), agreed
 
 
 @inline
@@ -193,6 +199,36 @@ def _put(
         max_abs_d2psi[i] = best
     if max_abs_d3psi is not None:
         max_abs_d3psi[i] = best
+
+
+@inline
+def _keep_what_turns(start: int, count: int, at: Array, who: Counts, status: Status) -> int:
+    """Decide which designs of the block turn and move them together; returns how many, ``who`` says which.
+
+    What does not turn costs its verdict only.
+    """
+    block = 0
+    for k in range(count):
+        i = start + k
+        status[i] = turning_status(at[k + DELTA], at[k + TOLERANCE], at[k + VALID] != 0.0)
+        who[block] = k
+        block += 1 if status[i] == st.OK else 0
+    if block < count:
+        for row in _NEEDED:
+            for i in range(block):
+                at[row + i] = at[row + who[i]]
+    return block
+
+
+@inline
+def _highest(begin: int, end: int, m: Array) -> tuple[float, float, float, float]:
+    """Height, place and the errors of both of the highest refined maximum of a design."""
+    best, winner = 0.0, 0
+    for peak in range(begin, end):
+        winner = peak if m[peak + HEIGHT] > best else winner
+        best = max(best, m[peak + HEIGHT])
+    place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
+    return best, place, m[winner + ERROR] + best * m[winner + ROUNDING], m[winner + REACH]
 
 
 @kernel
@@ -237,19 +273,9 @@ def true_maxima(
         count = min(BLOCK, designs.shape[0] - start)
         load_block(designs, start, count, at)
         least_delta(count, at)
-        # What does not turn costs its verdict only: the others move together.
-        block = 0
-        for k in range(count):
-            i = start + k
-            status[i] = turning_status(at[k + DELTA], at[k + TOLERANCE], at[k + VALID] != 0.0)
-            who[block] = k
-            block += 1 if status[i] == st.OK else 0
-        if block < count:
-            for i in range(start, start + count):
-                _put(i, _NONE, phi, error, phi_error, max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
-            for row in _NEEDED:
-                for i in range(block):
-                    at[row + i] = at[row + who[i]]
+        block = _keep_what_turns(start, count, at, who, status)
+        for i in range(start, start + count if block < count else start):
+            _put(i, _NONE, phi, error, phi_error, max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
         padded = (block + 7) & ~7  # whole vectors; what stands in the surplus is never read
         singularity_distance(padded, at)
         _sample_block(padded, at, cos, sin, grid, max_abs_dpsi, max_abs_d2psi)
@@ -279,16 +305,9 @@ def true_maxima(
                 worst = max(worst, m[peak + ERROR])
             if end > begin and not worst < math.inf:
                 worst = settle(begin, end, m, order, target, max_abs_dpsi, max_abs_d2psi)
-            best, winner = 0.0, 0
-            for peak in range(begin, end):
-                winner = peak if m[peak + HEIGHT] > best else winner
-                best = max(best, m[peak + HEIGHT])
             if worst < math.inf:
-                place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
-                result = best, place, m[winner + ERROR] + best * m[winner + ROUNDING], m[winner + REACH]
+                result = _highest(begin, end, m)
             else:
-                best, place, bound, reach, agreed = _careful(at, i, order, target)
-                result = (best, place, bound, reach) if agreed else _NONE
-                if not agreed:
-                    status[start + who[i]] = st.NOT_CONVERGED
+                result, agreed = _careful(at, i, order, target)
+                status[start + who[i]] = st.OK if agreed else st.NOT_CONVERGED
             _put(start + who[i], result, phi, error, phi_error, max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)

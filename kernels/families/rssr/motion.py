@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import kernel
+from kernels._jit import inline, kernel
 from kernels.complex_step import arctan2, hypotenuse
-from kernels.families.rssr.closure import Numbers, Status, discriminant_tolerance, reduce_design
+from kernels.families.rssr.closure import Numbers, Place, Reduced, Status, discriminant_tolerance, place, reduce_design
+from kernels.families.rssr.derivatives import Rocker, acceleration, jerk, velocity
+from kernels.verdict import pose_status
+
+
+class Joints(NamedTuple):
+    """Coordinates of the crank pin B and the rocker ball C [length], each (n, m) out, or None: not computed."""
+
+    x_b: Numbers | None
+    y_b: Numbers | None
+    z_b: Numbers | None
+    x_c: Numbers | None
+    y_c: Numbers | None
+    z_c: Numbers | None
 
 
 @kernel
@@ -26,12 +40,7 @@ def poses(
     cos_psi: Numbers | None,
     discriminant: Numbers | None,
     pressure_angle: Numbers | None,
-    x_b: Numbers | None,
-    y_b: Numbers | None,
-    z_b: Numbers | None,
-    x_c: Numbers | None,
-    y_c: Numbers | None,
-    z_c: Numbers | None,
+    joints: Joints | None,
 ) -> None:
     """Position, transfer functions, discriminant, pressure angle and joints of every design at its crank angles.
 
@@ -42,45 +51,34 @@ def poses(
     designs : (n, 8) columns of :class:`Design`; complex128 for gradients by the complex step
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; complex128 where they depend on the designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT
-    psi ... z_c : (n, m) out, or None: what is None is neither computed nor compiled; complex128 if an input is
+    psi ... pressure_angle : (n, m) out, or None: what is None is neither computed nor compiled; complex128 if an input
+        is
+    joints : record of (n, m) arrays or None, or None if no joint is wanted
 
     Notes
     -----
     Where the status is not OK the values are nan, except that a dead point keeps its angle (Delta = 0).
-    The dead-point band is the rounding error of Delta itself; outside it the sign of Delta is right for the given
-    doubles up to the rounding of K.  ``discriminant`` is a length to the fourth power and leaves float64 at scales
-    beyond 1e+-77, as inf or 0; the status is decided on Delta in units of the crank.
-    Largest error over the 422 oracle rows, hard ones included: 2.1 x 2^-53 x max(cond, |y|); 134 was found by search,
-    where the coupler is short.  :mod:`kernels.families.rssr.precise` has neither.
+    A discriminant within its own rounding error counts as a dead point.  Outside that band its sign is right for the
+    given doubles, up to the rounding of K.  ``discriminant`` is a length to the fourth power and leaves float64 at
+    scales beyond 1e+-77, as inf or 0; the status is decided on Delta in units of the crank.
+    Largest error over the 422 oracle rows, hard ones included: 2.1 x 2^-53 x max(cond, |y|).  A search found 134 where
+    the coupler is short; :mod:`kernels.families.rssr.precise` has neither.
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
         row = i if cos_phi.shape[0] > 1 else 0
         two_ac = 2.0 * designs[i, 0] * designs[i, 2]
         for j in range(cos_phi.shape[1]):
-            u, v = cos_phi[row, j], sin_phi[row, j]
-            hu, hv = r.ca * u, r.ca * v
-            x, y, w1 = r.e - u, r.y0 + hv, r.k2 * u - r.k1 * v
-            w = r.k0 - w1
-            rr = x * x + y * y
-            delta = rr - w * w
-            tolerance = discriminant_tolerance(r, x, y, w)
-            code = st.OK
-            if not r.valid or delta.real != delta.real:
-                code = st.INVALID_INPUT
-            elif delta.real < -tolerance:
-                code = st.NOT_ASSEMBLED
-            elif delta.real <= tolerance:
-                # B on the rocker axis has every angle as a solution; a dead point has one.
-                code = st.DEAD_POINT if rr.real > tolerance else st.SINGULAR
+            at = place(r.e, r.y0, r.ca, r.k0, r.k1, r.k2, cos_phi[row, j], sin_phi[row, j])
+            tolerance = discriminant_tolerance(r, at.x, at.y, at.w)
+            code = pose_status(r.valid, at.delta.real, tolerance, at.rr.real)
             status[i, j] = code
-
             if discriminant is not None:
-                discriminant[i, j] = (delta * two_ac) * two_ac if r.valid else math.nan
-            t = np.sqrt(delta) if code == st.OK else 0.0
+                discriminant[i, j] = (at.delta * two_ac) * two_ac if r.valid else math.nan
+            t = np.sqrt(at.delta) if code == st.OK else 0.0
             has_angle = code == st.OK or code == st.DEAD_POINT
-            c = (x * w + y * t) / rr if has_angle else math.nan  # -cos psi
-            s = (x * t - y * w) / rr if has_angle else math.nan  # -sin psi of the mirrored mechanism
+            c = (at.x * at.w + at.y * t) / at.rr if has_angle else math.nan
+            s = (at.x * t - at.y * at.w) / at.rr if has_angle else math.nan
             if cos_psi is not None:
                 cos_psi[i, j] = -c
             sine = 0.0 - r.branch * s  # never -0.0, which would turn the angle pi into -pi
@@ -90,39 +88,61 @@ def poses(
                 psi[i, j] = arctan2(sine, -c)
             if pressure_angle is not None:
                 # arctangent, not acos: acos loses half the digits near zero.
-                across = hypotenuse(r.rocker - w, r.z0 - r.sa * v)
+                across = hypotenuse(r.rocker - at.w, r.z0 - r.sa * at.v)
                 pressure_angle[i, j] = arctan2(across, t) if has_angle else math.nan
-            if x_b is not None:
-                x_b[i, j] = designs[i, 0] * u if r.valid else math.nan
-            if y_b is not None:
-                along, across_axis = designs[i, 4] * r.sa, designs[i, 0] * r.branch * hv
-                y_b[i, j] = along + across_axis if r.valid else math.nan
-            if z_b is not None:
-                lift = designs[i, 4] * (r.branch * r.ca) - designs[i, 0] * (r.sa * v)
-                z_b[i, j] = lift if r.valid else math.nan
-            if x_c is not None:
-                x_c[i, j] = designs[i, 3] - designs[i, 2] * c
-            if y_c is not None:
-                y_c[i, j] = -r.branch * designs[i, 2] * s
-            if z_c is not None:
-                z_c[i, j] = designs[i, 5] if has_angle else math.nan
+            if joints is not None:
+                _put_joints(joints, designs, i, j, r, at, c, s, has_angle)
             if dpsi is not None or d2psi is not None or d3psi is not None:
-                per_t = 1.0 / t if code == st.OK else math.nan
-                w_ph = r.k1 * u + r.k2 * v
-                g_ph = w_ph - (v * c - hu * s)
-                p = -g_ph * per_t
-                if dpsi is not None:
-                    dpsi[i, j] = r.branch * p
-                if d2psi is not None or d3psi is not None:
-                    g_phph = w1 - (u * c + hv * s)
-                    g_phps = v * s + hu * c
-                    q = -(g_phph + p * (2.0 * g_phps + w * p)) * per_t
-                    if d2psi is not None:
-                        d2psi[i, j] = r.branch * q
-                    if d3psi is not None:
-                        g_phphps = u * s - hv * c
-                        g_phpsps = w_ph - g_ph
-                        jerk = (
-                            g_ph - p * (3.0 * g_phphps + p * (3.0 * g_phpsps - t * p)) - 3.0 * q * (g_phps + w * p)
-                        ) * per_t
-                        d3psi[i, j] = r.branch * jerk
+                to = Rocker(c, s, t, 1.0 / t if code == st.OK else math.nan)
+                _put_derivatives(dpsi, d2psi, d3psi, i, j, r, at, to)
+
+
+@inline
+def put(out: Numbers | None, i: int, j: int, value: Any) -> None:
+    """Write a value where it is wanted; through a function, since a field that is None cannot be written to."""
+    if out is not None:
+        out[i, j] = value
+
+
+@inline
+def _put_joints(
+    joints: Joints, designs: Numbers, i: int, j: int, r: Reduced, at: Place, c: Any, s: Any, has_angle: bool
+) -> None:
+    """Write the wanted coordinates; c and s are minus cosine and minus sine of the mirrored rocker angle."""
+    if joints.x_b is not None:
+        put(joints.x_b, i, j, designs[i, 0] * at.u if r.valid else math.nan)
+    if joints.y_b is not None:
+        along, across = designs[i, 4] * r.sa, designs[i, 0] * r.branch * at.hv
+        put(joints.y_b, i, j, along + across if r.valid else math.nan)
+    if joints.z_b is not None:
+        lift = designs[i, 4] * (r.branch * r.ca) - designs[i, 0] * (r.sa * at.v)
+        put(joints.z_b, i, j, lift if r.valid else math.nan)
+    if joints.x_c is not None:
+        put(joints.x_c, i, j, designs[i, 3] - designs[i, 2] * c)
+    if joints.y_c is not None:
+        put(joints.y_c, i, j, -r.branch * designs[i, 2] * s)
+    if joints.z_c is not None:
+        put(joints.z_c, i, j, designs[i, 5] if has_angle else math.nan)
+
+
+@inline
+def _put_derivatives(
+    dpsi: Numbers | None,
+    d2psi: Numbers | None,
+    d3psi: Numbers | None,
+    i: int,
+    j: int,
+    r: Reduced,
+    at: Place,
+    to: Rocker,
+) -> None:
+    """Write the wanted transfer functions up to the highest of them, mirrored back to the branch."""
+    first = velocity(r.k1, r.k2, to, at)
+    if dpsi is not None:
+        dpsi[i, j] = -r.branch * first.p
+    if d2psi is not None or d3psi is not None:
+        second = acceleration(to, at, first)
+        if d2psi is not None:
+            d2psi[i, j] = -r.branch * second.q
+        if d3psi is not None:
+            d3psi[i, j] = r.branch * jerk(to, at, first, second)

@@ -28,10 +28,10 @@ CAPACITY = BLOCK * MOST_PEAKS + 120
 ) = (k * CAPACITY for k in range(21))  # fmt: skip
 _ROWS = 21
 _TURNED = 4e-12  # error of an angle that is the sum of a few turns by :func:`rotate`
-# Towards the samples about it a maximum falls off like the parabola at its top, less where it has flanks.  One that
-# falls off less than this share of the parabola has a twin that the samples do not tell from it.
+# From a maximum to the samples beside it the function falls about as far as the parabola that touches it at the top.
+# If it falls by less than this share of the parabola, there may be a second maximum between the samples.
 _NEAREST, _NEXT = 0.6, 0.2  # for the sample it was found by and the two beside that
-_LEVEL = 1e-10  # of the height: less than this is no falling off
+_LEVEL = 1e-10  # a fall by less than this share of the height counts as none
 
 
 @inline

@@ -8,6 +8,7 @@ everything between the given numbers and the results is a pair of numbers (:mod:
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from kernels import status as st
 from kernels import twofold as two
 from kernels._jit import inline, kernel
 from kernels.families.rssr.closure import EPS, Array, Status, reduce_scaled, unit_scale
+from kernels.families.rssr.motion import Joints, put
 from kernels.twofold import Twofold
+from kernels.verdict import pose_status
 
 # Columns of the constants: high and low parts in units of the crank, mirrored to branch +1; then plain numbers.
 E, Y0, CA, K0, K1, K2, RHO, Z0, SA = range(0, 18, 2)
@@ -104,12 +107,7 @@ def precise_poses(
     cos_psi: Array | None,
     discriminant: Array | None,
     pressure_angle: Array | None,
-    x_b: Array | None,
-    y_b: Array | None,
-    z_b: Array | None,
-    x_c: Array | None,
-    y_c: Array | None,
-    z_c: Array | None,
+    joints: Joints | None,
 ) -> None:
     """As :func:`kernels.families.rssr.motion.poses`, for float64 designs only, correct to a few roundings.
 
@@ -118,9 +116,8 @@ def precise_poses(
     designs : (n, 8) columns of :class:`Design`
     constants : (n, PRECISE_COLUMNS) by :func:`precise_constants`
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
-    status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT; the band of dead
-        points is half as wide as in plain arithmetic
-    psi ... z_c : (n, m) out, or None: what is None is neither computed nor compiled
+    status : (n, m) out, as of ``poses``; the band of dead points is half as wide as in plain arithmetic
+    psi ... joints : as of :func:`kernels.families.rssr.motion.poses`
 
     Notes
     -----
@@ -145,13 +142,7 @@ def precise_poses(
             delta = two.subtract(rr, two.multiply(w, w))
             tolerance = BAND * (abs(x[0]) * mx + abs(y[0]) * my + abs(w[0]) * mw)
             tolerance += BAND * BAND * (mx * mx + my * my + mw * mw)
-            code = st.OK
-            if not valid or delta[0] != delta[0]:
-                code = st.INVALID_INPUT
-            elif delta[0] < -tolerance:
-                code = st.NOT_ASSEMBLED
-            elif delta[0] <= tolerance:
-                code = st.DEAD_POINT if rr[0] > tolerance else st.SINGULAR
+            code = pose_status(valid, delta[0], tolerance, rr[0])
             status[i, j] = code
             if discriminant is not None:
                 discriminant[i, j] = (delta[0] * two_ac) * two_ac if valid else math.nan
@@ -168,50 +159,80 @@ def precise_poses(
                 sin_psi[i, j] = sine
             if psi is not None:
                 psi[i, j] = math.atan2(sine, -c[0])
-            if x_b is not None:
-                x_b[i, j] = designs[i, 0] * u[0] if valid else math.nan
-            if y_b is not None:
-                y_b[i, j] = branch * designs[i, 0] * y[0] if valid else math.nan
             z = two.subtract(z0, two.multiply(sa, v))
-            if z_b is not None:
-                z_b[i, j] = designs[i, 0] * z[0] + designs[i, 5] if valid else math.nan
-            if x_c is not None:
-                x_c[i, j] = designs[i, 3] - designs[i, 2] * c[0]
-            if y_c is not None:
-                y_c[i, j] = -branch * designs[i, 2] * s[0]
-            if z_c is not None:
-                z_c[i, j] = designs[i, 5] if has_angle else math.nan
+            if joints is not None:
+                put(joints.x_b, i, j, designs[i, 0] * u[0] if valid else math.nan)
+                put(joints.y_b, i, j, branch * designs[i, 0] * y[0] if valid else math.nan)
+                put(joints.z_b, i, j, designs[i, 0] * z[0] + designs[i, 5] if valid else math.nan)
+                _put_ball(joints, designs, i, j, c[0], branch * s[0], has_angle)
             if pressure_angle is not None:
                 across = math.hypot(two.subtract(rho, w)[0], z[0])
                 pressure_angle[i, j] = math.atan2(across, t[0]) if has_angle else math.nan
             if dpsi is not None or d2psi is not None or d3psi is not None:
-                # d from the crank pin to the ball, B' = (-v, hu, -su), B'' = (-u, -hv, sv), k = -(c, s), k' = (s, -c)
-                dx, dy = two.subtract(x, two.multiply(rho, c)), two.add(y, two.multiply(rho, s))  # dy, dz negative
-                hu, su = two.multiply(ca, u), two.multiply(sa, u)
-                rise = two.multiply(rho, t)
-                per_rise = 1.0 / rise[0] if code == st.OK else math.nan
-                p = two.subtract(two.multiply(z, su), two.add(two.multiply(dy, hu), two.multiply(dx, v)))
-                p = two.divide(p, rise, per_rise)
-                if dpsi is not None:
-                    dpsi[i, j] = branch * p[0]
-                if d2psi is not None or d3psi is not None:
-                    hv, sv = two.multiply(ca, v), two.multiply(sa, v)
-                    inward, turn = two.subtract(rho, w), two.multiply(p, rho)
-                    centre = two.multiply(p, turn)
-                    d1x, d1y = two.add(two.multiply(turn, s), v), two.add(two.multiply(turn, c), hu)  # d1y neg.
-                    square = two.add(two.add(two.multiply(d1x, d1x), two.multiply(d1y, d1y)), two.multiply(su, su))
-                    along = two.subtract(two.multiply(dx, u), two.multiply(centre, inward))
-                    along = two.add(along, two.subtract(two.multiply(z, sv), two.multiply(dy, hv)))
-                    q = two.divide(two.add(square, along), rise, per_rise)  # negative
-                    if d2psi is not None:
-                        d2psi[i, j] = -branch * q[0]
-                    if d3psi is not None:
-                        swing = two.multiply(q, rho)
-                        d2x = two.subtract(two.add(two.multiply(centre, c), u), two.multiply(swing, s))
-                        d2y = two.add(two.add(two.multiply(centre, s), two.multiply(swing, c)), hv)
-                        both = two.subtract(two.multiply(d1x, d2x), two.multiply(d1y, d2y))
-                        both = two.subtract(both, two.multiply(su, sv))
-                        both = two.add(both, two.multiply(two.multiply(turn, q), inward))
-                        cube = two.multiply(p, two.add(two.multiply(p, p), (-1.0, 0.0)))
-                        both = two.divide(both, rise, per_rise)
-                        d3psi[i, j] = branch * two.subtract(cube, two.scale(both, 3.0))[0]
+                # d from the crank pin to the ball; dy and dz (which is z) are negative
+                dx, dy = two.subtract(x, two.multiply(rho, c)), two.add(y, two.multiply(rho, s))
+                at = Pose(u, v, ca, sa, rho, w, c, s, dx, dy, z, two.multiply(rho, t))
+                _put_derivatives(dpsi, d2psi, d3psi, i, j, at, code == st.OK, branch)
+
+
+@inline
+def _put_ball(joints: Joints, designs: Array, i: int, j: int, c: float, s: float, has_angle: bool) -> None:
+    """Write the wanted coordinates of the rocker ball; c and s are minus cosine and minus sine of the rocker angle."""
+    put(joints.x_c, i, j, designs[i, 3] - designs[i, 2] * c)
+    put(joints.y_c, i, j, -designs[i, 2] * s)
+    put(joints.z_c, i, j, designs[i, 5] if has_angle else math.nan)
+
+
+class Pose(NamedTuple):
+    """One pose as a vector d from the crank pin to the rocker ball, all in units of the crank."""
+
+    u: Twofold  # cosine and sine of the crank angle
+    v: Twofold
+    ca: Twofold
+    sa: Twofold
+    rho: Twofold  # length of the rocker
+    w: Twofold  # of the closure
+    c: Twofold  # minus cosine and minus sine of the mirrored rocker angle
+    s: Twofold
+    dx: Twofold
+    dy: Twofold  # negative
+    z: Twofold  # negative
+    rise: Twofold  # rho T: half the derivative of d . d by the rocker angle
+
+
+@inline
+def _put_derivatives(
+    dpsi: Array | None, d2psi: Array | None, d3psi: Array | None, i: int, j: int, at: Pose, regular: bool, branch: float
+) -> None:
+    """Write the wanted transfer functions up to the highest of them.
+
+    With B' = (-v, hu, -su), B'' = (-u, -hv, sv), k = -(c, s) and k' = (s, -c) of the mirrored mechanism.
+    """
+    u, v, c, s, z, rise = at.u, at.v, at.c, at.s, at.z, at.rise
+    hu, su = two.multiply(at.ca, u), two.multiply(at.sa, u)
+    per_rise = 1.0 / rise[0] if regular else math.nan
+    p = two.subtract(two.multiply(z, su), two.add(two.multiply(at.dy, hu), two.multiply(at.dx, v)))
+    p = two.divide(p, rise, per_rise)
+    if dpsi is not None:
+        dpsi[i, j] = branch * p[0]
+    if d2psi is not None or d3psi is not None:
+        hv, sv = two.multiply(at.ca, v), two.multiply(at.sa, v)
+        inward, turn = two.subtract(at.rho, at.w), two.multiply(p, at.rho)
+        centre = two.multiply(p, turn)
+        d1x, d1y = two.add(two.multiply(turn, s), v), two.add(two.multiply(turn, c), hu)  # d1y negative
+        square = two.add(two.add(two.multiply(d1x, d1x), two.multiply(d1y, d1y)), two.multiply(su, su))
+        along = two.subtract(two.multiply(at.dx, u), two.multiply(centre, inward))
+        along = two.add(along, two.subtract(two.multiply(z, sv), two.multiply(at.dy, hv)))
+        q = two.divide(two.add(square, along), rise, per_rise)  # negative
+        if d2psi is not None:
+            d2psi[i, j] = -branch * q[0]
+        if d3psi is not None:
+            swing = two.multiply(q, at.rho)
+            d2x = two.subtract(two.add(two.multiply(centre, c), u), two.multiply(swing, s))
+            d2y = two.add(two.add(two.multiply(centre, s), two.multiply(swing, c)), hv)
+            both = two.subtract(two.multiply(d1x, d2x), two.multiply(d1y, d2y))
+            both = two.subtract(both, two.multiply(su, sv))
+            both = two.add(both, two.multiply(two.multiply(turn, q), inward))
+            cube = two.multiply(p, two.add(two.multiply(p, p), (-1.0, 0.0)))
+            both = two.divide(both, rise, per_rise)
+            d3psi[i, j] = branch * two.subtract(cube, two.scale(both, 3.0))[0]

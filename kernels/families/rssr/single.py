@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from kernels._jit import kernel_fused
 from kernels.families.rssr.closure import Array, reduce_design
+from kernels.families.rssr.derivatives import acceleration_fused, place_fused, rocker_fused, velocity_fused
 from kernels.reduce import largest
 
 Singles: TypeAlias = NDArray[np.float32]
@@ -29,6 +30,7 @@ def dense_acceleration_single(designs: Array, cos_phi: Singles, sin_phi: Singles
     cos_phi, sin_phi : (m,) the grid
     max_abs_d2psi : (n,) out; nan for an invalid design, meaningless where the crank does not turn fully
     """
+    # Constants of type float32: a Python number would make the whole expression float64.
     one, least = np.float32(1.0), np.float32(1e-30)
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
@@ -36,16 +38,9 @@ def dense_acceleration_single(designs: Array, cos_phi: Singles, sin_phi: Singles
         k0, k1, k2 = np.float32(r.k0), np.float32(r.k1), np.float32(r.k2)
         most = np.float32(0.0)
         for j in range(cos_phi.size):
-            u, v = cos_phi[j], sin_phi[j]
-            hu, hv = ca * u, ca * v
-            x, y, w1 = e - u, y0 + hv, k2 * u - k1 * v
-            w = k0 - w1
-            rr = x * x + y * y
-            t = np.sqrt(largest(rr - w * w, least))
-            shared = one / (rr * t)
-            per_r, per_t = t * shared, rr * shared
-            c, s = (x * w + y * t) * per_r, (x * t - y * w) * per_r
-            p = (k1 * u + k2 * v - (v * c - hu * s)) * per_t
-            g_phps = v * s + hu * c
-            most = largest(most, abs((w1 - (u * c + hv * s) + p * (w * p - (g_phps + g_phps))) * per_t))
+            place = place_fused(e, y0, ca, k0, k1, k2, cos_phi[j], sin_phi[j])
+            t = np.sqrt(largest(place.delta, least))
+            rocker = rocker_fused(place, t, one / (place.rr * t))
+            second = acceleration_fused(rocker, place, velocity_fused(k1, k2, rocker, place))
+            most = largest(most, abs(second.q))
         max_abs_d2psi[i] = most if r.valid else math.nan

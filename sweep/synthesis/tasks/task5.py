@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.errors import InputError
-from sweep.families.base import Array
+from sweep.families import slotted
+from sweep.families.base import Angles, Array
 from sweep.synthesis.tasks.crank_rocker import (
     designs_on_locus,
     motion,
@@ -41,11 +42,15 @@ class Slot(NamedTuple):
 def slot(a2: Array, e2: Array, t: Array) -> Slot:
     """The planar slotted link: pin at radius a2 on the rocker, pivot at distance e2, t the angle between them.
 
-    rho^2 = a2^2 + e2^2 - 2 a2 e2 cos t, equation (17) of docs/tasks.md, written without cancellation at t = 0.
+    Equation (17) of docs/tasks.md, which is the fork slot of docs/slotted.md.  ``a2``, ``e2`` : (n,), their signs are
+    equal and without effect; ``t`` : (n, m).
     """
-    rho = np.sqrt((a2 - e2) ** 2 + 4.0 * a2 * e2 * np.sin(0.5 * t) ** 2)
-    first = a2 * e2 * np.sin(t) / rho
-    return Slot(rho, first, (a2 * e2 * np.cos(t) - first * first) / rho)
+    places = {name: np.abs(values) for name, values in (("a", a2), ("e", e2))}
+    matrix = np.array([[p.default or 0.0 for p in slotted.PARAMETERS]] * len(t))
+    for k, parameter in enumerate(slotted.PARAMETERS):
+        matrix[:, k] = places.get(parameter.name, matrix[:, k])
+    columns = slotted.poses(matrix, Angles.of(t), frozenset({"rho", "drho", "d2rho"}))
+    return Slot(*(np.asarray(columns[name], np.float64) for name in ("rho", "drho", "d2rho")))
 
 
 @dataclass(frozen=True)
@@ -110,7 +115,7 @@ class Task5:
         fixed = (self.swing * ones, self.phi0 * ones, phi1, self.e * ones, x[:, 1])
         designs, psi1 = designs_on_locus(*fixed, self.g * ones, self.alpha * ones)
         t2 = t1 + self.kappa * self.swing
-        gain = slot(ones, ratio, t2).rho - slot(ones, ratio, t1).rho
+        gain = (slot(ones, ratio, t2[:, None]).rho - slot(ones, ratio, t1[:, None]).rho)[:, 0]
         a2 = self.rho0 / np.where(gain == 0.0, np.nan, gain)
         e2 = ratio * a2
 
@@ -119,11 +124,11 @@ class Task5:
             law = motion(designs, angles, "psi", "dpsi", "d2psi")
             t = t1[:, None] + self.kappa * (np.asarray(law["psi"], np.float64) - psi1[:, None])
             first, second = (np.asarray(law[name], np.float64) for name in ("dpsi", "d2psi"))
-            return slot(a2[:, None], e2[:, None], t), first, second
+            return slot(a2, e2, t), first, second
 
         here, first, second = rho_at(turn().phi)
         curve = self.kappa * second * here.first + first * first * here.second
-        start = slot(a2, e2, t1).rho
+        start = slot(a2, e2, t1[:, None]).rho[:, 0]
         equations = []
         for position in self.positions:
             there, _, _ = rho_at(np.array([[position.dphi]]))

@@ -1,0 +1,10 @@
+"""Five-link: crank, two perpendicular revolutes in place of the driving ball, coupler, ball and rocker.
+
+``closure`` reduces a design to its constants, ``solve`` finds the rocker angle (``roots`` all of them), ``motion``
+evaluates poses, ``synthesis`` keeps the limit positions of a crank-rocker.
+With h = s2 = 0 it is the spatial crank-rocker, bit for bit.
+"""
+
+from kernels.families.five_link.closure import Design as Design
+from kernels.families.five_link.motion import poses as poses
+from kernels.families.five_link.synthesis import with_limits_of as with_limits_of

@@ -1,0 +1,221 @@
+"""Motion of the five-link at given crank angles: position, transfer functions, joints, pressure angle."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.complex_step import arctan2, hypotenuse
+from kernels.crank_closure import Numbers, Reduced, Status
+from kernels.families.five_link.closure import Joint, axial_reach, reduce_design, slope
+from kernels.families.five_link.roots import MOST, extremes
+from kernels.families.five_link.solve import pose_terms, reaches, real_joint, solve
+
+
+class Bends(NamedTuple):
+    """What the swivelling joint adds to the second and third derivative of the closure, and rho; zero where plain."""
+
+    rho: Any
+    second: Any  # share rho''
+    third: Any  # share (rho' + rho''')
+
+
+@inline
+def _bends(joint: Joint, c: Any, s: Any) -> Bends:
+    z, square = axial_reach(joint, s)
+    rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
+    second, third = 0.0 * rho, 0.0 * rho
+    if not joint.plain:
+        per_rho = 1.0 / rho
+        z1, z2 = joint.sweep * c, -joint.sweep * s
+        rho1 = -z * z1 * per_rho
+        rho2 = -(z1 * z1 + z * z2 + rho1 * rho1) * per_rho
+        rho3 = -(3.0 * z1 * z2 - z * z1 + 3.0 * rho1 * rho2) * per_rho
+        second, third = joint.share * rho2, joint.share * (rho1 + rho3)
+    return Bends(rho, second, third)
+
+
+@inline
+def transfer(r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any, t: Any) -> tuple[Any, Any, Any]:
+    """First three derivatives of the mirrored angle, from minus its cosine, minus its sine and dG5/dpsi; (5)."""
+    bends = _bends(joint, -c, -s)
+    hu, hv = r.ca * u, r.ca * v
+    w1 = r.k2 * u - r.k1 * v
+    w = (r.k0 - w1) - joint.shift - joint.share * bends.rho if joint.share != 0.0 else (r.k0 - w1) - joint.shift
+    per_t, w_ph = 1.0 / t, r.k1 * u + r.k2 * v
+    g_ph = w_ph - (v * c - hu * s)
+    p = -g_ph * per_t
+    g_phph = w1 - (u * c + hv * s)
+    g_phps = v * s + hu * c
+    g_psps, turn = w - bends.second, t + bends.third
+    q = -(g_phph + p * (2.0 * g_phps + g_psps * p)) * per_t
+    g_phphps = u * s - hv * c
+    g_phpsps = w_ph - g_ph
+    jerk = (g_ph - p * (3.0 * g_phphps + p * (3.0 * g_phpsps - turn * p)) - 3.0 * q * (g_phps + g_psps * p)) * per_t
+    return p, q, jerk
+
+
+@inline
+def _extreme(joint: Joint, x: Any, y: Any, w: Any, c: float, s: float) -> Any:
+    """G5 at the place of an extreme; errors and changes of the place count only at the end of an arc."""
+    if reaches(real_joint(joint), s):
+        return slope(joint, x, y, w, c, s).value
+    z, _ = axial_reach(real_joint(joint), s)
+    sine = ((joint.coupler if z > 0.0 else -joint.coupler) - joint.axial) / joint.sweep
+    cosine = np.sqrt((1.0 - sine) * (1.0 + sine))
+    return x * (cosine if c > 0.0 else -cosine) - y * sine + (w - joint.shift)
+
+
+@inline
+def _shortfall(r: Reduced, joint: Joint, u: Any, v: Any) -> Any:
+    """Negative number that says how far the links are from reaching; Delta of a crank-rocker; (7)."""
+    x, y, w = pose_terms(r, u, v)
+    real = real_joint(joint)
+    if joint.plain:
+        close = w - joint.shift
+        _, square = axial_reach(joint, 0.0 * x)
+        if joint.share != 0.0 and square.real > 0.0:
+            close = close - joint.share * np.sqrt(square)
+        value = x * x + y * y - close * close
+        return value if value.real < 0.0 else square
+    low, high = extremes(real, x.real, y.real, w.real)
+    if not low.value < math.inf:
+        nearest = joint.axial - joint.sweep if (joint.axial * joint.sweep).real > 0.0 else joint.axial + joint.sweep
+        return (joint.coupler - nearest) * (joint.coupler + nearest)
+    product = _extreme(joint, x, y, w, math.cos(low.psi), math.sin(low.psi))
+    product *= _extreme(joint, x, y, w, math.cos(high.psi), math.sin(high.psi))
+    return -product if product.real > 0.0 else product
+
+
+@inline
+def across(r: Reduced, joint: Joint, v: Any, w: Any, c: Any, s: Any) -> tuple[Any, Any]:
+    """Force through the rocker ball along the rocker and along its axis; dG5/dpsi is its third part; (6)."""
+    _, square = axial_reach(joint, -s)
+    rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
+    close = w - joint.shift
+    lean = 0.0 * close
+    if joint.share != 0.0:
+        close = close - joint.share * rho
+        z, _ = axial_reach(joint, -s)
+        lean = joint.h * z / rho
+    along = (r.rocker - close) - lean * joint.sweep * s / r.rocker
+    return along, (r.z0 - r.sa * v) - lean * (r.branch * r.ca)
+
+
+@inline
+def discriminant_of(r: Reduced, joint: Joint, code: int, u: Any, v: Any, w: Any, c: Any, s: Any, t: Any) -> Any:
+    """b^2 cos^2(pressure angle) in units of the crank; negative where the links do not reach; (7)."""
+    if joint.h == 0.0 and joint.s2 == 0.0:
+        x, y, _ = pose_terms(r, u, v)
+        return x * x + y * y - w * w
+    if code == st.OK or code == st.DEAD_POINT:
+        along, rise = across(r, joint, v, w, c, s)
+        return joint.coupler * joint.coupler * (t * t / (along * along + rise * rise + t * t))
+    return _shortfall(r, joint, u, v)
+
+
+@kernel
+def poses(
+    designs: Numbers,
+    cos_phi: Numbers,
+    sin_phi: Numbers,
+    status: Status,
+    psi: Numbers | None,
+    dpsi: Numbers | None,
+    d2psi: Numbers | None,
+    d3psi: Numbers | None,
+    sin_psi: Numbers | None,
+    cos_psi: Numbers | None,
+    discriminant: Numbers | None,
+    pressure_angle: Numbers | None,
+    theta: Numbers | None,
+    beta: Numbers | None,
+    places: Numbers | None,
+) -> None:
+    """Position, transfer functions, discriminant, pressure angle and joints of every design at its crank angles.
+
+    Equations (1)-(8) of docs/five_link.md; joints in the fixed frame of its section 1.
+
+    Parameters
+    ----------
+    designs : (n, 11) columns of :class:`Design`; complex128 for gradients by the complex step
+    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; complex128 where they depend on the designs
+    status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR (the coupler is parallel to the crank axis) or
+        INVALID_INPUT
+    psi ... beta : (n, m) out, or None: what is None is neither computed nor compiled; complex128 if an input is
+    places : (9, n, m) out, x y z of crank pin, axis 2 nearest to it, and rocker ball, or None
+
+    Notes
+    -----
+    Where the status is not OK the values are nan, except that a dead point keeps its angle and the discriminant is
+    always given; its complex part is 0 where the closure is not that of a crank-rocker.
+    """
+    room = np.empty(2 * MOST)
+    for i in range(designs.shape[0]):
+        r, joint = reduce_design(designs, i)
+        row = i if cos_phi.shape[0] > 1 else 0
+        two_ac = 2.0 * designs[i, 0] * designs[i, 2]
+        for j in range(cos_phi.shape[1]):
+            u, v = cos_phi[row, j], sin_phi[row, j]
+            code, c, s, t, w = solve(r, joint, u, v, room)
+            status[i, j] = code
+            if discriminant is not None:
+                discriminant[i, j] = math.nan
+                if code != st.INVALID_INPUT:
+                    discriminant[i, j] = (discriminant_of(r, joint, code, u, v, w, c, s, t) * two_ac) * two_ac
+            if cos_psi is not None:
+                cos_psi[i, j] = -c
+            sine = 0.0 - r.branch * s  # never -0.0, which would turn the angle pi into -pi
+            if sin_psi is not None:
+                sin_psi[i, j] = sine
+            if psi is not None:
+                psi[i, j] = arctan2(sine, -c)
+            if pressure_angle is not None:
+                along, rise = across(r, joint, v, w, c, s)
+                pressure_angle[i, j] = arctan2(hypotenuse(along, rise), t)
+            if dpsi is not None or d2psi is not None or d3psi is not None:
+                p, q, jerk = (
+                    transfer(r, joint, u, v, c, s, t) if code == st.OK else (math.nan * t, math.nan * t, math.nan * t)
+                )
+                if dpsi is not None:
+                    dpsi[i, j] = r.branch * p
+                if d2psi is not None:
+                    d2psi[i, j] = r.branch * q
+                if d3psi is not None:
+                    d3psi[i, j] = r.branch * jerk
+            if theta is not None or beta is not None or places is not None:
+                z, square = axial_reach(joint, -s)
+                rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
+                # d from the crank pin to the ball, along e1 and e2 of the crank's frame
+                d1 = r.e - u - r.rocker * c
+                d2 = -r.rocker * (r.ca * s + r.k1) - v
+                reach = joint.h + rho
+                towards, aside = d1 * reach + d2 * joint.s2, d2 * reach - d1 * joint.s2
+                if beta is not None:
+                    beta[i, j] = arctan2(z, rho)
+                if theta is not None:
+                    theta[i, j] = arctan2(aside, towards)
+                if places is not None:
+                    _joints(designs, i, j, r, joint, u, v, c, s, towards, aside, places)
+
+
+@inline
+def _joints(
+    designs: Numbers, i: int, j: int, r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any,
+    towards: Any, aside: Any, places: Numbers,
+) -> None:  # fmt: skip
+    """Crank pin B, the point of axis 2 nearest to axis 1 moved by s2 along it, and the rocker ball C."""
+    a, ca = designs[i, 0], r.branch * r.ca
+    length = hypotenuse(towards, aside)
+    cos_theta, sin_theta = towards / length, aside / length
+    m1, m2 = joint.h * cos_theta - joint.s2 * sin_theta, joint.h * sin_theta + joint.s2 * cos_theta
+    x, y, z = a * u, designs[i, 4] * r.sa + a * (ca * v), designs[i, 4] * ca - a * (r.sa * v)
+    places[0, i, j], places[1, i, j], places[2, i, j] = x, y, z
+    places[3, i, j], places[4, i, j], places[5, i, j] = x + a * m1, y + a * (ca * m2), z - a * (r.sa * m2)
+    places[6, i, j] = designs[i, 3] - designs[i, 2] * c
+    places[7, i, j] = -r.branch * designs[i, 2] * s
+    places[8, i, j] = designs[i, 5] + 0.0 * c

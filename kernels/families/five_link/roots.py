@@ -1,0 +1,191 @@
+"""All rocker angles that close the five-link at one crank angle, by a scan: the slow road, for what Newton leaves.
+
+G5 is defined where the coupler reaches the rocker's plane of motion along the crank axis, rho^2 >= 0: on the whole
+circle, on one arc or on two.  An arc is traversed as psi = centre - half cos(tau), so that the root of rho at its ends
+becomes smooth.  Roots are bracketed between samples, and where |G5| dips between samples of equal sign the dip is
+searched.  Real numbers only; the caller polishes what is found.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from kernels._jit import inline, kernel
+from kernels.crank_closure import Array
+from kernels.families.five_link.closure import Joint, axial_reach
+
+SAMPLES = 32  # cells per arc
+MOST = 8  # roots that are kept; G5 has at most four, and rounding at a double root may show it as a few
+
+
+class Place(NamedTuple):
+    """A rocker angle and G5 there."""
+
+    psi: float
+    value: float
+
+
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+@inline
+def _angle(centre: float, half: float, tau: float) -> float:
+    return tau if half >= math.pi else centre - half * math.cos(tau)
+
+
+@inline
+def _closure(joint: Joint, x: float, y: float, w: float, psi: float) -> float:
+    """G5 with rho^2 < 0 by rounding at the end of an arc taken as 0."""
+    c, s = math.cos(psi), math.sin(psi)
+    _, square = axial_reach(joint, s)
+    return float(x * c - y * s + (w - joint.shift) - joint.share * math.sqrt(max(square, 0.0)))
+
+
+@kernel
+def _bracketed(
+    joint: Joint, x: float, y: float, w: float, centre: float, half: float, lo: float, hi: float, f_lo: float
+) -> float:
+    """Rocker angle of the root between two places of opposite sign: bisection, which no shape misleads."""
+    for _ in range(52):
+        mid = 0.5 * (lo + hi)
+        f = _closure(joint, x, y, w, _angle(centre, half, mid))
+        if (f > 0.0) == (f_lo > 0.0):
+            lo = mid
+        else:
+            hi = mid
+    return _angle(centre, half, 0.5 * (lo + hi))
+
+
+@kernel
+def _dip(
+    joint: Joint, x: float, y: float, w: float, centre: float, half: float, lo: float, hi: float, sign: float
+) -> tuple[float, float]:
+    """Place and value of the least of sign * G5 between two places, by the golden section."""
+    p, q = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
+    f_p = sign * _closure(joint, x, y, w, _angle(centre, half, p))
+    f_q = sign * _closure(joint, x, y, w, _angle(centre, half, q))
+    for _ in range(45):
+        if f_p <= f_q:
+            hi, q, f_q = q, p, f_p
+            p = hi - _GOLDEN * (hi - lo)
+            f_p = sign * _closure(joint, x, y, w, _angle(centre, half, p))
+        else:
+            lo, p, f_p = p, q, f_q
+            q = lo + _GOLDEN * (hi - lo)
+            f_q = sign * _closure(joint, x, y, w, _angle(centre, half, q))
+    return (p, f_p) if f_p <= f_q else (q, f_q)
+
+
+@kernel
+def _scan_arc(
+    joint: Joint, x: float, y: float, w: float, centre: float, half: float, noise: float, count: int, at: Array
+) -> int:
+    """Append the roots on one arc to ``at``; the number of all."""
+    whole = half >= math.pi
+    begin, width = (-math.pi, 2.0 * math.pi) if whole else (0.0, math.pi)
+    step = width / SAMPLES
+    before = _closure(joint, x, y, w, _angle(centre, half, begin - step)) if whole else math.inf
+    here = _closure(joint, x, y, w, _angle(centre, half, begin))
+    for k in range(SAMPLES + 1):
+        tau = begin + step * k
+        last = k == SAMPLES
+        after = math.inf
+        if whole or not last:
+            after = _closure(joint, x, y, w, _angle(centre, half, tau + step))
+        sign = 1.0 if here > 0.0 else -1.0
+        if not last and (after > 0.0) != (here > 0.0):
+            if count < MOST:
+                at[count] = _bracketed(joint, x, y, w, centre, half, tau, tau + step, here)
+                count += 1
+        elif abs(here) <= abs(after) and (before == math.inf or sign * before >= abs(here)) and not (whole and last):
+            # the samples on both sides have the same sign and are no nearer to zero; beyond an end counts as far
+            lo = tau if before == math.inf else tau - step
+            hi = tau if after == math.inf else tau + step
+            place, least = _dip(joint, x, y, w, centre, half, lo, hi, sign)
+            if least <= 0.0 and count + 1 < MOST:
+                at[count] = _bracketed(joint, x, y, w, centre, half, lo, place, sign)
+                at[count + 1] = _bracketed(joint, x, y, w, centre, half, place, hi, -sign)
+                count += 2
+            elif least <= noise and count < MOST:
+                at[count] = _angle(centre, half, place)
+                count += 1
+        before, here = here, after
+    return count
+
+
+@kernel
+def _extremes_of_arc(joint: Joint, x: float, y: float, w: float, centre: float, half: float) -> tuple[Place, Place]:
+    """Places of the smallest and the largest G5 on one arc."""
+    whole = half >= math.pi
+    begin, width = (-math.pi, 2.0 * math.pi) if whole else (0.0, math.pi)
+    step = width / SAMPLES
+    least, most, at_least, at_most = math.inf, -math.inf, 0, 0
+    low, high = Place(0.0, math.inf), Place(0.0, -math.inf)
+    for k in range(SAMPLES + 1):
+        f = _closure(joint, x, y, w, _angle(centre, half, begin + step * k))
+        if f < least:
+            least, at_least = f, k
+        if f > most:
+            most, at_most = f, k
+    for k, sign in ((at_least, 1.0), (at_most, -1.0)):
+        lo, hi = begin + step * (k - 1), begin + step * (k + 1)
+        if not whole:
+            lo, hi = max(lo, 0.0), min(hi, math.pi)
+        tau, f = _dip(joint, x, y, w, centre, half, lo, hi, sign)
+        if sign > 0.0 and f < low.value:
+            low = Place(_angle(centre, half, tau), f)
+        if sign < 0.0 and -f > high.value:
+            high = Place(_angle(centre, half, tau), -f)
+    return low, high
+
+
+@inline
+def arcs(joint: Joint) -> tuple[int, float, float, float, float]:
+    """Number of arcs on which rho^2 >= 0, and centre and half width of both; half width pi is the whole circle."""
+    if joint.sweep == 0.0:
+        reaches = abs(joint.axial) < joint.coupler
+        return (1 if reaches else 0), 0.0, math.pi, 0.0, 0.0
+    one, two = (-joint.coupler - joint.axial) / joint.sweep, (joint.coupler - joint.axial) / joint.sweep
+    low, high = min(one, two), max(one, two)
+    if low >= 1.0 or high <= -1.0:
+        return 0, 0.0, 0.0, 0.0, 0.0
+    if low <= -1.0 and high >= 1.0:
+        return 1, 0.0, math.pi, 0.0, 0.0
+    quarter = 0.5 * math.pi
+    if low <= -1.0:
+        return 1, -quarter, math.atan2(math.sqrt((1.0 - high) * (1.0 + high)), -high), 0.0, 0.0
+    if high >= 1.0:
+        return 1, quarter, math.atan2(math.sqrt((1.0 - low) * (1.0 + low)), low), 0.0, 0.0
+    first, second = math.asin(low), math.asin(high)
+    centre, half = 0.5 * (first + second), 0.5 * (second - first)
+    return 2, centre, half, math.pi - centre, half
+
+
+@kernel
+def all_roots(joint: Joint, x: float, y: float, w: float, noise: float, at: Array) -> int:
+    """Rocker angles (mirrored, in rad) of all solutions, into ``at`` of at least MOST numbers; their number.
+
+    A place where |G5| comes as near to zero as ``noise`` without crossing it counts as one.
+    """
+    number, centre, half, centre2, half2 = arcs(joint)
+    count = 0
+    if number > 0:
+        count = _scan_arc(joint, x, y, w, centre, half, noise, count, at)
+    if number > 1:
+        count = _scan_arc(joint, x, y, w, centre2, half2, noise, count, at)
+    return count
+
+
+@kernel
+def extremes(joint: Joint, x: float, y: float, w: float) -> tuple[Place, Place]:
+    """Where G5 is smallest and largest, on the arc where their product is nearest to zero; infinite without an arc."""
+    number, centre, half, centre2, half2 = arcs(joint)
+    low, high = Place(0.0, math.inf), Place(0.0, -math.inf)
+    if number > 0:
+        low, high = _extremes_of_arc(joint, x, y, w, centre, half)
+    if number > 1:
+        low2, high2 = _extremes_of_arc(joint, x, y, w, centre2, half2)
+        if abs(low2.value * high2.value) < abs(low.value * high.value):
+            low, high = low2, high2
+    return low, high

@@ -1,0 +1,112 @@
+"""One design of the guided four-bar brought to its smallest set of numbers, and its closure at one crank angle.
+
+Polukhin 1971, section 4.4, as worked out in docs/guide.md; the equation numbers are of that page.  Everything is
+computed in lengths divided by a power of two near the rocker length.  Designs may be complex128 (exact gradients by the
+complex step); decisions look at the real part.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels._jit import inline
+
+Array = NDArray[np.float64]
+Status = NDArray[np.uint8]
+EPS = 2.0**-53
+
+
+class Design(NamedTuple):
+    """Columns of the design matrix: lengths in one unit, lam in radians, branch +1 or -1."""
+
+    a: float
+    b: float
+    c: float
+    e: float
+    xi: float
+    eta: float
+    lam: float
+    h: float
+    branch: float
+
+
+class Reduced(NamedTuple):
+    """Per-design numbers in units of ``unit``: the closure X C - Y S + W = 0 and the coupler point in the line's frame.
+
+    X = e - a cos phi, Y = a sin phi, W = k0 - k2 cos phi; along + i (dev + h) = p e^{i phi} + q (e + c e^{i psi}) / c.
+    """
+
+    a: float
+    b: float
+    c: float
+    e: float
+    k0: float
+    k2: float
+    x_size: float  # sums of the magnitudes whose rounding errors make up X and W
+    w_size: float
+    p_along: float  # a (1 - l/b) e^{-i lam}, l = xi + i eta
+    p_across: float
+    q_along: float  # c (l/b) e^{-i lam}
+    q_across: float
+    along0: float  # (l/b) e^{-i lam} e - i h
+    across0: float
+    xi: float  # in units of the coupler
+    eta: float
+    branch: float
+    unit: float
+    valid: bool
+
+
+@inline
+def reduce_design(designs: Array, i: int) -> Reduced:
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    _, exponent = math.frexp(designs[i, 2].real)
+    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
+    lam, h, branch = designs[i, 6], designs[i, 7] * per_unit, designs[i, 8]
+    xi, eta = designs[i, 4] * per_unit / b, designs[i, 5] * per_unit / b
+    cl, sl = np.cos(lam), np.sin(lam)
+    along, across = xi * cl + eta * sl, eta * cl - xi * sl
+    k0 = 0.5 * ((c - b) * (c + b) + (a * a + e * e)) / c
+    k2 = a * e / c
+    w_size = 0.5 * (abs(((c - b) * (c + b)).real) + (a * a + e * e).real) / c.real + abs(k2.real)
+    valid = a.real > 0.0 and b.real > 0.0 and c.real > 0.0 and w_size < 1e140 and branch.real * branch.real == 1.0
+    # 0 * x is nan exactly for what is not finite
+    valid = valid and abs(lam.real) < 1e5 and (0.0 * (xi + eta + h)).real == 0.0
+    return Reduced(
+        a, b, c, e, k0, k2, abs(e.real) + a.real, w_size,
+        a * (cl - along), -a * (sl + across), c * along, c * across, along * e, across * e - h,
+        xi, eta, branch, unit, valid,
+    )  # fmt: skip
+
+
+class Place(NamedTuple):
+    """The closure at one crank angle, in units of ``Reduced.unit``."""
+
+    u: Any  # cos phi
+    v: Any  # sin phi
+    x: Any  # X, Y, W of the closure
+    y: Any
+    w: Any
+    rr: Any  # X^2 + Y^2, squared distance of the crank pin from the rocker pivot
+    delta: Any  # the discriminant X^2 + Y^2 - W^2
+
+
+@inline
+def place(r: Reduced, u: Any, v: Any) -> Place:
+    """Evaluate the closure at (cos phi, sin phi) = (u, v); (1), (2)."""
+    x, y, w = r.e - r.a * u, r.a * v, r.k0 - r.k2 * u
+    rr = x * x + y * y
+    return Place(u, v, x, y, w, rr, rr - w * w)
+
+
+@inline
+def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
+    """Rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (7)."""
+    t = 8.0 * EPS
+    first = abs(x.real) * r.x_size + abs(y.real) * r.a.real + abs(w.real) * r.w_size
+    return t * first + t * t * (r.x_size * r.x_size + r.a.real * r.a.real + r.w_size * r.w_size)

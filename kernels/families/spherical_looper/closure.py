@@ -1,0 +1,125 @@
+"""One design of the spherical looper brought to its constants; equation numbers are of docs/spherical_looper.md.
+
+Everything is computed in lengths divided by a power of two near the first crank, so no scale of the drawing costs a
+bit.  Designs may be complex128 (exact gradients by the complex step); decisions look at the real part.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels._jit import inline
+from kernels.vectors import Vector, cross, dot, mix, scale
+
+Numbers: TypeAlias = NDArray[Any]  # float64, or complex128 for exact gradients by the complex step
+Status: TypeAlias = NDArray[np.uint8]
+
+
+class Design(NamedTuple):
+    """Columns of the design matrix: lengths in one unit, angles in radians, branches +1 or -1."""
+
+    a1: float
+    b1: float
+    c1: float
+    e1: float
+    f1: float
+    g1: float
+    alpha1: float
+    branch1: float
+    o: float
+    delta: float
+    gamma: float
+    c0x: float
+    c0y: float
+    c0z: float
+    p0x: float
+    p0y: float
+    p0z: float
+    a2: float
+    b2: float
+    x2: float
+    y2: float
+    z2: float
+    theta2: float
+    beta2: float
+    offset2: float
+    branch2: float
+
+
+class Reduced(NamedTuple):
+    """Per-design numbers in units of ``unit``."""
+
+    a1: float
+    b1: float
+    c1: float
+    e1: float
+    sa: float
+    ca: float
+    y0: float  # crank pin 1 from the origin: (a u, y0 + a ca v, lift - a sa v)
+    lift: float
+    g1: float
+    branch1: float
+    size1: float  # sums of the magnitudes whose rounding errors make up the driving balls' coordinates
+    o: float
+    radial: Vector  # triad of the looper's axis at psi = 0: towards its ball, across, along the axis
+    across: Vector
+    axis: Vector
+    c2: float  # distance of the looper's ball from its axis, and its place along the axis
+    along: float
+    point: Vector  # working point in that triad
+    a2: float
+    b2: float
+    centre: Vector  # crank 2: centre from Os, directions of crank angles 0 and 90 deg
+    first: Vector
+    second: Vector
+    cos_offset: float
+    sin_offset: float
+    branch2: float
+    size2: float
+    unit: float
+    valid: bool
+
+
+@inline
+def reduce_design(designs: Numbers, i: int) -> Reduced:
+    """Constants of one design; ``valid`` is false for links of no length and for what is not finite."""
+    d = designs[i]
+    _, exponent = math.frexp(d[0].real)
+    unit, per = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    a1, b1, c1, e1, f1, g1 = d[0] * per, d[1] * per, d[2] * per, d[3] * per, d[4] * per, d[5] * per
+    sa, ca = np.sin(d[6]), np.cos(d[6])
+    o = d[8] * per
+    sd, cd, sg, cg = np.sin(d[9]), np.cos(d[9]), np.sin(d[10]), np.cos(d[10])
+    axis = (sd * cg, sd * sg, cd)
+    ball, tip = (d[11] * per, d[12] * per, d[13] * per), (d[14] * per, d[15] * per, d[16] * per)
+    along = dot(ball, axis)
+    foot = mix(1.0, ball, -along, axis)
+    c2 = np.sqrt(dot(foot, foot))
+    ball_size = abs(ball[0].real) + abs(ball[1].real) + abs(ball[2].real)
+    hinged = c2.real > 8.0 * 2.0**-53 * ball_size
+    radial = scale(1.0 / c2 if hinged else math.nan, foot)
+    across = cross(axis, radial)
+    point = (dot(tip, radial), dot(tip, across), dot(tip, axis))
+    a2, b2 = d[17] * per, d[18] * per
+    centre = (d[19] * per - e1, d[20] * per, d[21] * per - o)
+    st, ct, sb, cb = np.sin(d[22]), np.cos(d[22]), np.sin(d[23]), np.cos(d[23])
+    size1 = a1.real + abs(e1.real) + abs(f1.real) + abs(g1.real)
+    size2 = a2.real + abs((d[19] * per).real) + abs(e1.real) + abs(centre[1].real) + abs((d[21] * per).real)
+    size2 += abs(o.real) + ball_size
+    tip_size = abs(tip[0].real) + abs(tip[1].real) + abs(tip[2].real)
+    valid = 0.0 < a1.real <= 1.0 and 0.0 < b1.real < 1e140 and 0.0 < c1.real < 1e140 and size1 < 1e140
+    valid = valid and 0.0 < a2.real < 1e140 and 0.0 < b2.real < 1e140 and size2 < 1e140 and tip_size < 1e140
+    for k in (6, 9, 10, 22, 23, 24):
+        valid = valid and abs(d[k].real) < 1e5
+    branch1, branch2 = d[7].real, d[25].real
+    valid = valid and branch1 * branch1 == 1.0 and branch2 * branch2 == 1.0 and unit < math.inf
+    return Reduced(
+        a1, b1, c1, e1, sa, ca, f1 * sa, f1 * ca, g1, branch1, size1,
+        o, radial, across, axis, c2 if hinged else 0.0 * c2, along, point,
+        a2, b2, centre, (ct * cb, ct * sb, -st), (-sb, cb, 0.0 * cb), np.cos(d[24]), np.sin(d[24]), branch2, size2,
+        unit, valid,
+    )  # fmt: skip

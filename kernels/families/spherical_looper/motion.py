@@ -1,0 +1,159 @@
+"""Motion of the spherical looper at given crank angles: carrier, looper, working point, their derivatives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.complex_step import arctan2, magnitude
+from kernels.driven_ball import Path, Swung, rotated, swing
+from kernels.families.spherical_looper.closure import Numbers, Reduced, Status, reduce_design
+from kernels.vectors import Vector, add, dot, mix, turned
+
+
+@inline
+def _first_crank(r: Reduced, u: float, v: float) -> Path:
+    """Ball of crank 1 from the foot D of the carrier's rocker, (1)."""
+    hu, hv, tu, tv = r.a1 * (r.ca * u), r.a1 * (r.ca * v), r.a1 * (r.sa * u), r.a1 * (r.sa * v)
+    pin = (r.a1 * u - r.e1, r.y0 + hv, r.lift - r.g1 - tv)
+    return pin, (-r.a1 * v, hu, -tu), (-r.a1 * u, -hv, tv), (r.a1 * v, -hu, tu)
+
+
+@inline
+def _second_crank(r: Reduced, u: float, v: float) -> Path:
+    """Ball of crank 2 from the common point Os of both axes, (2)."""
+    u2, v2 = u * r.cos_offset - v * r.sin_offset, v * r.cos_offset + u * r.sin_offset
+    radial = mix(r.a2 * u2, r.first, r.a2 * v2, r.second)
+    tangential = mix(-r.a2 * v2, r.first, r.a2 * u2, r.second)
+    back = (-tangential[0], -tangential[1], -tangential[2])
+    return add(r.centre, radial), tangential, (-radial[0], -radial[1], -radial[2]), back
+
+
+@inline
+def _in_triad(r: Reduced, a: Vector, lift: float) -> Vector:
+    """Components in the triad of the looper's axis, from a height along it."""
+    return dot(a, r.radial), dot(a, r.across), dot(a, r.axis) - lift
+
+
+@inline
+def _seen_from_carrier(r: Reduced, carrier: Swung, path: Path) -> Path:
+    """The driving ball in the looper's frame, which the carrier takes along, (3)."""
+    m, m1, m2, m3 = rotated(carrier.cos, -carrier.sin, -carrier.first, -carrier.second, -carrier.third, path)
+    return _in_triad(r, m, r.along), _in_triad(r, m1, 0.0), _in_triad(r, m2, 0.0), _in_triad(r, m3, 0.0)
+
+
+@inline
+def _carried(r: Reduced, carrier: Swung, looper: Swung, fixed: Vector) -> Path:
+    """A point fixed to the looper, from Os in fixed axes, with its derivatives, (5)."""
+    none = (0.0 * fixed[0], 0.0 * fixed[0], 0.0 * fixed[0])
+    path = (fixed, none, none, none)
+    m, m1, m2, m3 = rotated(looper.cos, looper.sin, looper.first, looper.second, looper.third, path)
+    path = (
+        turned(r.radial, r.across, r.axis, m),
+        turned(r.radial, r.across, r.axis, m1),
+        turned(r.radial, r.across, r.axis, m2),
+        turned(r.radial, r.across, r.axis, m3),
+    )
+    return rotated(carrier.cos, carrier.sin, carrier.first, carrier.second, carrier.third, path)
+
+
+@kernel
+def poses(
+    designs: Numbers,
+    cos_phi: Numbers,
+    sin_phi: Numbers,
+    status: Status,
+    carrier: Numbers | None,
+    carrier_loop: Numbers | None,
+    looper: Numbers | None,
+    looper_loop: Numbers | None,
+    point: Numbers | None,
+    velocity: Numbers | None,
+    acceleration: Numbers | None,
+    jerk: Numbers | None,
+    magnitudes: Numbers | None,
+    joints: Numbers | None,
+) -> None:
+    """Carrier, looper and working point with derivatives, of every design at its crank angles.
+
+    Equations (1)-(6) of docs/spherical_looper.md.
+
+    Parameters
+    ----------
+    designs : (n, 26) columns of :class:`Design`
+    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
+    status : (n, m) out; OK, or that of the first loop that is not: NOT_ASSEMBLED, DEAD_POINT, SINGULAR (a driving ball
+        on the axis it turns the link about, or the looper's ball on the looper's axis); INVALID_INPUT.  Where nothing
+        but the carrier's outputs is wanted, the looper's loop does not count
+    carrier, looper : (4, n, m) out, psi and chi [rad] and their three derivatives, or None
+    carrier_loop, looper_loop : (2, n, m) out, discriminant [length^2] and pressure angle [rad], or None
+    point, velocity, acceleration, jerk : (3, n, m) out [length], x y z of the working point and derivatives, or None
+    magnitudes : (3, n, m) out [length], lengths of velocity, acceleration and jerk, or None
+    joints : (12, n, m) out [length], x y z of crank pin 1, carrier's ball, crank pin 2, looper's ball, or None
+
+    Notes
+    -----
+    What is None is neither computed nor compiled.  Where a loop is not OK its angle is nan (but at a dead point only
+    its derivatives are), and so is what follows from it.
+    """
+    for i in range(designs.shape[0]):
+        r = reduce_design(designs, i)
+        row = i if cos_phi.shape[0] > 1 else 0
+        for j in range(cos_phi.shape[1]):
+            u, v = cos_phi[row, j], sin_phi[row, j]
+            first, second = _first_crank(r, u, v), _second_crank(r, u, v)
+            one = swing(first, r.size1, r.b1, r.c1, r.branch1)
+            two = swing(_seen_from_carrier(r, one, second), r.size2, r.b2, r.c2, r.branch2)
+            code = one.status if r.valid else st.INVALID_INPUT
+            if (
+                looper is not None or looper_loop is not None or point is not None or velocity is not None
+                or acceleration is not None or jerk is not None or magnitudes is not None or joints is not None
+            ):  # fmt: skip
+                code = two.status if code == st.OK else code
+            status[i, j] = code
+            undefined = 0.0 if r.valid else math.nan
+            if carrier is not None:
+                carrier[0, i, j] = arctan2(one.sin + undefined, one.cos)
+                carrier[1, i, j] = one.first + undefined
+                carrier[2, i, j] = one.second + undefined
+                carrier[3, i, j] = one.third + undefined
+            if looper is not None:
+                looper[0, i, j] = arctan2(two.sin + undefined, two.cos)
+                looper[1, i, j] = two.first + undefined
+                looper[2, i, j] = two.second + undefined
+                looper[3, i, j] = two.third + undefined
+            # arctangent, not acos: acos loses half the digits near zero.
+            if carrier_loop is not None:
+                carrier_loop[0, i, j] = (one.delta * r.unit) * r.unit + undefined
+                carrier_loop[1, i, j] = arctan2(np.sqrt(one.across) + undefined, magnitude(one.root))
+            if looper_loop is not None:
+                looper_loop[0, i, j] = (two.delta * r.unit) * r.unit + undefined
+                looper_loop[1, i, j] = arctan2(np.sqrt(two.across) + undefined, magnitude(two.root))
+            p, p1, p2, p3 = _carried(r, one, two, r.point)
+            centre = (r.e1, 0.0 * r.e1, r.o)
+            scale = r.unit + undefined
+            for k in range(3):
+                if point is not None:
+                    point[k, i, j] = (centre[k] + p[k]) * scale
+                if velocity is not None:
+                    velocity[k, i, j] = p1[k] * scale
+                if acceleration is not None:
+                    acceleration[k, i, j] = p2[k] * scale
+                if jerk is not None:
+                    jerk[k, i, j] = p3[k] * scale
+            if magnitudes is not None:
+                magnitudes[0, i, j] = np.sqrt(dot(p1, p1)) * scale
+                magnitudes[1, i, j] = np.sqrt(dot(p2, p2)) * scale
+                magnitudes[2, i, j] = np.sqrt(dot(p3, p3)) * scale
+            if joints is not None:
+                ball, _, _, _ = _carried(r, one, two, (r.c2, 0.0 * r.c2, r.along))
+                rocker = (r.e1 + r.c1 * one.cos, r.c1 * one.sin, r.g1)
+                pin = (first[0][0] + r.e1, first[0][1], r.lift - r.a1 * (r.sa * v))
+                for k in range(3):
+                    joints[k, i, j] = pin[k] * scale
+                    joints[3 + k, i, j] = rocker[k] * scale
+                    joints[6 + k, i, j] = (centre[k] + second[0][k]) * scale
+                    joints[9 + k, i, j] = (centre[k] + ball[k]) * scale

@@ -1,0 +1,62 @@
+"""Which pose outputs of a mechanism are worth a curve over the turn, and which are coordinates for its drawing."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from sweep.families.base import Family
+from sweep.families.capabilities import Assembly, Points
+from sweep.families.chain import Chain
+from sweep.families.members import Machine
+from sweep.families.placing import AXES
+from sweep.quantities.names import parts
+
+_OF_FAMILY = re.compile(r"([xyz])_([a-z][a-z_]*)")
+_OF_MACHINE = re.compile(r"([a-z][a-z_0-9]*)_([xyz])")
+
+
+class Coordinate(NamedTuple):
+    """A coordinate of a joint: the stage or member whose frame it is in, the joint and the axis."""
+
+    part: str
+    joint: str
+    axis: str
+
+
+def coordinate(name: str) -> Coordinate | None:
+    """What a column says of a joint: ``x_b2`` of stage 2, ``looper.tip_z`` in the machine's frame; else None."""
+    member, stem, stage = parts(name)
+    match = _OF_MACHINE.fullmatch(stem) if member else _OF_FAMILY.fullmatch(stem)
+    if match is None:
+        return None
+    if member:
+        return Coordinate(member, match[1], match[2])
+    return Coordinate(stage, match[2], match[1])
+
+
+def motion_curves(family: Family) -> tuple[str, ...]:
+    """Position and its derivatives, deviations, pressure angles; of a machine those of its members, and relations."""
+    if isinstance(family, Machine):
+        members = [f"{m.name}.{name}" for m in family.members for name in _ladder(m.family, 2)]
+        return (*members, *(r.outputs[0].name for r in family.relations))
+    deviations = [o.name for o in family.pose_outputs if o.windowed and not o.stage]
+    loops = [loop.pressure_angle for loop in family.every(Assembly)]
+    return (*_ladder(family, 3), *deviations, *loops)
+
+
+def joint_curves(family: Family) -> tuple[str, ...]:
+    """Coordinates of the joints, of every stage in its own frame, of a machine's points in one frame."""
+    if isinstance(family, Machine):
+        return tuple(f"{m.name}.{point}_{axis}" for m in family.members for point in m.points for axis in AXES)
+    if isinstance(family, Chain):
+        return tuple(f"{name}{s.number}" for s in family.stages for name in joint_curves(s.family))
+    return tuple(name for points in family.every(Points) for at in points.at.values() for name in at if name)
+
+
+def _ladder(family: Family, orders: int) -> list[str]:
+    """The position and its derivatives to an order."""
+    names = [family.position]
+    while len(names) <= orders and names[-1] in family.derivative_of:
+        names.append(family.derivative_of[names[-1]])
+    return names

@@ -1,0 +1,138 @@
+"""The routes to design outputs of a machine: its members' own, and general reductions where members meet.
+
+A member that the main shaft drives turn by turn is asked by itself, by its own exact routes; only what depends on
+several members, or on a gear between, is searched for on the poses of the whole machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from kernels import status as st
+from sweep.errors import InputError
+from sweep.evaluation.route import Part, Route
+from sweep.families.base import Accuracy, Array, Columns
+from sweep.families.capabilities import Assembly
+from sweep.families.members import Machine, Member
+from sweep.families.relations import Timing
+from sweep.quantities.names import error_of, is_place
+from sweep.reductions.catalogue import output, quantity
+from sweep.reductions.margins import NAMES as MARGINS
+from sweep.reductions.margins import combined, margins
+from sweep.reductions.sampling import TWO_PI
+
+
+def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) -> tuple[list[Route], list[str]]:
+    """Routes of members, margins and timings, and the names that are left to general reductions over the machine."""
+    from sweep.evaluation.routes import routes
+
+    found: list[Route] = []
+    left: list[str] = []
+    own: dict[str, list[str]] = {}
+    margin: list[str] = []
+    for name in dict.fromkeys(wanted):
+        member = machine.split(name)
+        timing = next((t for t in machine.timings if t.name == name), None)
+        if member is not None and is_alone(member[0]) and not is_of_point(machine, name):
+            own.setdefault(member[0].name, []).append(member[1])
+        elif name in MARGINS:
+            margin.append(name)
+        elif timing is not None:
+            found.append(_timing(machine, timing, accuracy))
+        elif quantity(machine, name) is not None:
+            left.append(name)
+        else:
+            output(machine, name)  # an unknown name ends here, with the nearest known one
+            allowed = "an output made of poses: this member's crank does not turn with the main shaft"
+            raise InputError("output", name, allowed, f"design outputs of {machine.name}")
+    for m in machine.members:
+        for inner in routes(m.family, own.get(m.name, ()), accuracy):
+            names = tuple(f"{m.name}.{name}" for name in inner.outputs)
+            found.append(Route(f"{m.name}: {inner.name}", names, inner.ns_per_design, partial(_of_member, m, inner)))
+    if margin:
+        found.append(Route("margins", tuple(margin), 100.0 * len(machine.members), partial(_margins, machine)))
+    return found, left
+
+
+def is_alone(member: Member) -> bool:
+    """Whether the member turns with the main shaft, so that its extrema over a turn are those of its family."""
+    return member.driver is None and member.ratio == 1
+
+
+def is_of_point(machine: Machine, name: str) -> bool:
+    """Whether a dotted name is about a point in the machine's frame, which the member alone does not know."""
+    found, member = quantity(machine, name), machine.split(name)
+    assert member is not None
+    return found is not None and bool(found.of) and member[0].own(found.of) not in member[0].family.pose_output
+
+
+def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+    """What a member's own route gives, under the machine's names; computed once where no design varies the member."""
+    from sweep.evaluation.summaries import design_outputs
+
+    own = m.designs(designs)
+    once = len(own) > 1 and bool((own[1:] == own[0]).all())
+    found = design_outputs(m.family, own[:1] if once else own, inner.outputs, accuracy, window)
+    phase = designs[:, m.columns.stop]
+    columns: Columns = {"status": found["status"]}
+    for name in inner.outputs:
+        dotted = f"{m.name}.{name}"
+        columns[dotted] = found[name]
+        if accuracy.target is not None:
+            columns[error_of(dotted)] = found[error_of(name)]
+    if once:
+        columns = {name: np.repeat(values, len(own)) for name, values in columns.items()}
+    for name in filter(is_place, inner.outputs):  # from the member's crank to the main shaft
+        at_crank = np.asarray(columns[f"{m.name}.{name}"], np.float64)
+        columns[f"{m.name}.{name}"] = np.mod(at_crank - phase, TWO_PI)
+    return columns
+
+
+def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+    """Of all members the weakest; a member that another drives has to assemble at the angles that it gets."""
+    from sweep.evaluation.summaries import design_outputs
+
+    status = np.zeros(len(designs), np.uint8)
+    columns: Columns = {}
+    suffixes: list[str] = []
+    for m in machine.members:
+        loops = tuple(loop.stage for loop in machine.every(Assembly) if m.own(loop.stage) or loop.stage == f"{m.name}.")
+        if not loops:
+            continue
+        if is_alone(m):
+            found = design_outputs(m.family, m.designs(designs), MARGINS, accuracy, None)
+            now, none = found["status"], np.zeros(len(designs))
+            for name in MARGINS:
+                columns[f"{name}{m.name}"] = found[name]
+                columns[f"{error_of(name)}{m.name}"] = found.get(error_of(name), none)
+            suffixes.append(m.name)
+        else:
+            found = margins(machine, designs, loops, accuracy)
+            now = found.pop("status")
+            columns |= found
+            suffixes += loops
+        status = np.where(status == st.OK, now, status).astype(np.uint8)
+    return combined(columns, tuple(suffixes)) | {"status": status}
+
+
+def _timing(machine: Machine, timing: Timing, accuracy: Accuracy) -> Route:
+    from sweep.evaluation.routes import routes
+
+    cost = sum(route.ns_per_design for route in routes(machine, timing.places, accuracy))
+    return Route(f"timing {timing.name}", (timing.name,), cost, partial(_difference, machine, timing))
+
+
+def _difference(machine: Machine, timing: Timing, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+    from sweep.evaluation.summaries import design_outputs
+
+    found = design_outputs(machine, designs, timing.places, accuracy, window)
+    first, second = (np.asarray(found[name], np.float64) for name in timing.places)
+    apart = second - first
+    columns: Columns = {timing.name: apart - TWO_PI * np.ceil((apart - np.pi) / TWO_PI), "status": found["status"]}
+    if accuracy.target is not None:
+        errors = [np.asarray(found[error_of(name)], np.float64) for name in timing.places]
+        columns[error_of(timing.name)] = errors[0] + errors[1]
+    return columns

@@ -1,0 +1,73 @@
+"""Registry entry of the cam with a roller follower that slides along a line; the laws that all cams share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from kernels.families.cam import law, translating
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled
+from sweep.families.capabilities import Points
+
+PHASES = (
+    Parameter("rise", "angle", "cam angle of the rise", positive=True, default=0.5 * np.pi),
+    Parameter("dwell", "angle", "cam angle of the dwell at full lift", not_negative=True, default=0.5 * np.pi),
+    Parameter("fall", "angle", "cam angle of the return; what is left is a dwell", positive=True, default=0.5 * np.pi),
+    Parameter("start", "angle", "cam angle at which the rise begins", default=0.0),
+    Parameter(
+        "law", "choice", "1: 3-4-5 polynomial, 2: modified sine, 3: cycloidal, 4: Fourier table", default=1.0,
+        choices=(1.0, 2.0, 3.0, 4.0),
+    ),
+)  # fmt: skip
+
+TABLE = tuple(
+    Parameter(f"{letter}{k}", "ratio", f"{function}({k} phi) of the Fourier table, in lifts", default=0.0)
+    for letter, function in (("c", "cos"), ("s", "sin"))
+    for k in range(1, law.HARMONICS + 1)
+)
+
+PARAMETERS = (
+    Parameter("lift", "length", "lift of the follower", positive=True),
+    *PHASES,
+    Parameter("r0", "length", "radius of the prime circle, on which the roller's centre rests", positive=True),
+    Parameter("e", "length", "offset of the follower's line, to the right of the direction of lift", default=0.0),
+    *TABLE,
+)
+
+POSE_OUTPUTS = (
+    Output("s", "length", "displacement of the follower from its rest", "(1)"),
+    Output("ds", "length", "velocity analogue ds/dphi", "(1)"),
+    Output("d2s", "length", "acceleration analogue", "(1)"),
+    Output("d3s", "length", "jerk analogue", "(1)"),
+    Output("pressure_angle", "rad", "between the normal of the cam and the direction of the follower", "(7)"),
+    Output("x_p", "length", "pitch curve in the frame of the cam, along the direction of lift at phi = 0", "(8)"),
+    Output("y_p", "length", "pitch curve in the frame of the cam, to the left of it", "(8)"),
+)
+
+
+def cam_poses(
+    kernel: Callable[..., object], names: tuple[str, ...], designs: Array, angles: Angles, wanted: frozenset[str]
+) -> Columns:
+    """Wanted pose outputs and status of a cam's kernel, each (n, m)."""
+    status = np.empty((len(designs), angles.phi.shape[1]), np.uint8)
+    dtype = np.result_type(designs, angles.phi)
+    return filled(kernel, (designs, angles.phi), names, wanted, status, dtype)
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its cam angles, each (n, m)."""
+    return cam_poses(translating.poses, tuple(o.name for o in POSE_OUTPUTS), designs, angles, wanted)
+
+
+FAMILY = Family(
+    name="cam",
+    title="cam with a sliding roller follower",
+    parameters=PARAMETERS,
+    position="s",
+    pose_outputs=POSE_OUTPUTS,
+    poses=poses,
+    example={"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0},
+    derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
+    capabilities=(Points({"p": ("x_p", "y_p", None)}),),
+)

@@ -1,0 +1,108 @@
+"""What an entry of the register must be: each rule is checked when the family is first asked for."""
+
+from __future__ import annotations
+
+import re
+
+from sweep.families.base import Family
+from sweep.families.capabilities import Assembly, JointRecords, OutputLink, Points
+from sweep.families.domain import Turn
+
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+_LETTERS = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+RESERVED = ("design", "phi", "status", "offset")
+
+
+class FamilyError(TypeError):
+    """An entry of the register breaks a rule; the message names the remedy.  For who writes the entry."""
+
+
+def check_family(family: Family) -> Family:
+    """The family itself, once every rule of an entry is kept.
+
+    Raises
+    ------
+    FamilyError
+        naming the family, what is wrong and how it is mended.
+    """
+    faults = [*_names(family), *_outputs(family), *_capabilities(family), *_example(family)]
+    if faults:
+        raise FamilyError("\n".join([f"family {family.name}: {len(faults)} faults", *(f"  {x}" for x in faults)]))
+    return family
+
+
+def _names(family: Family) -> list[str]:
+    faults = []
+    if not _NAME.fullmatch(family.name):
+        faults.append(f"name {family.name!r}: use a-z, 0-9 and _, a letter first")
+    seen: set[str] = set()
+    for name in (*family.parameter_names, *family.pose_names):
+        if not _LETTERS.fullmatch(name):
+            faults.append(f"{name!r}: use letters, digits and _, a letter first; dots are for members of machines")
+        if name in seen:
+            faults.append(f"{name!r} stands twice among parameters and pose outputs: rename one")
+        if name in RESERVED or name == family.domain.name:
+            faults.append(f"{name!r} is a column of every table: choose another name")
+        seen.add(name)
+    for p in family.parameters:
+        if p.default is not None and p.choices is not None and p.default not in p.choices:
+            faults.append(f"parameter {p.name}: its default {p.default:g} is none of its choices")
+        if not p.text:
+            faults.append(f"parameter {p.name}: say in words what it is (text)")
+    return faults
+
+
+def _example(family: Family) -> list[str]:
+    needed = [p.name for p in family.parameters if p.default is None]
+    faults = [f"example lacks {name!r}: give an ordinary design" for name in needed if name not in family.example]
+    return faults + [
+        f"example has {x!r}, which is no parameter" for x in family.example if x not in family.parameter_names
+    ]
+
+
+def _outputs(family: Family) -> list[str]:
+    names, faults = family.pose_output, []
+    if family.position not in names:
+        faults.append(f"position {family.position!r} is no pose output: name the follower's coordinate")
+    for name, of in family.derivative_of.items():
+        missing = [one for one in (name, of) if one not in names]
+        faults += [f"derivative_of names {one!r}, which is no pose output: add it or leave it out" for one in missing]
+    if family.outward:
+        sign = next((p for p in family.parameters if p.name == family.outward), None)
+        if sign is None or sign.choices != (-1.0, 1.0):
+            faults.append(f"outward {family.outward!r} is no parameter with the choices -1 and +1")
+    faults += [f"event {e.name} is about {e.of!r}, which is no pose output" for e in family.events if e.of not in names]
+    for o in family.pose_outputs:
+        if o.windowed and family.position in names and names[family.position].wraps:
+            faults.append(f"{o.name} is windowed, but the position is an angle: a window is a part of a stroke")
+        if not o.text or not o.unit:
+            faults.append(f"pose output {o.name}: give its unit and its definition")
+    return faults
+
+
+def _capabilities(family: Family) -> list[str]:
+    names, faults = set(family.pose_names), []
+    for loop in family.every(Assembly):
+        missing = [one for one in (loop.discriminant, loop.pressure_angle) if one not in names]
+        faults += [f"Assembly names {one!r}, which is no pose output: add it" for one in missing]
+    if "discriminant" in names and family.find(Assembly) is None:
+        faults.append("a discriminant without an Assembly: say what divides it (rotatability needs it)")
+    for records in family.every(JointRecords):
+        faults += [f"JointRecords needs {one!r}, which is no pose output" for one in records.needs if one not in names]
+    for points in family.every(Points):
+        faults += [
+            f"point {point}: {one!r} is no pose output; None is a coordinate 0"
+            for point, at in points.at.items()
+            for one in at
+            if one is not None and one not in names
+        ]
+    turned = family.find(OutputLink) is not None
+    if turned and family.position in names and not family.pose_output[family.position].wraps:
+        faults.append("OutputLink turns by the position, which is no angle: mark it (wraps=True) or leave it out")
+    if family.capabilities and not isinstance(family.domain, Turn):
+        faults += [
+            f"{type(found).__name__} is about a closed turn: leave it out over another domain"
+            for found in family.capabilities
+            if isinstance(found, Assembly | JointRecords | OutputLink)
+        ]
+    return faults

@@ -1,0 +1,103 @@
+"""Registry entry of the looper on a cylinder."""
+
+from __future__ import annotations
+
+from itertools import chain
+
+from kernels.families import cylindrical_looper
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from sweep.families.capabilities import Assembly, Points
+from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
+
+PARAMETERS = (
+    Parameter("a1", "length", "crank that swings the shaft", positive=True),
+    Parameter("b1", "length", "coupler of the swinging drive", positive=True),
+    Parameter("c1", "length", "rocker on the shaft", positive=True),
+    Parameter("e1", "length", "common perpendicular, from the axis of crank 1 to the looper's shaft"),
+    Parameter("f1", "length", "offset of the plane of crank 1 along its axis", default=0.0),
+    Parameter("g1", "length", "height of the rocker's ball along the shaft; where it slides, at s = 0", default=0.0),
+    Parameter("alpha1", "angle", "angle from the axis of crank 1 to the looper's shaft", default=0.0),
+    Parameter("branch1", "sign", "assembly mode of the swinging drive", default=1.0, choices=(-1.0, 1.0)),
+    Parameter("a2", "length", "crank that moves the shaft along", positive=True),
+    Parameter("b2", "length", "coupler of the sliding drive; its ball lies on the shaft's axis", positive=True),
+    Parameter("e2", "length", "common perpendicular, from the axis of crank 2 to the shaft", default=0.0),
+    Parameter("f2", "length", "offset of the plane of crank 2 along its axis", default=0.0),
+    Parameter("alpha2", "angle", "90 deg minus the angle between the axis of crank 2 and the shaft", default=0.0),
+    Parameter("offset2", "angle", "angle of crank 2 where phi = 0", default=0.0),
+    Parameter("branch2", "sign", "assembly mode of the sliding drive", default=1.0, choices=(-1.0, 1.0)),
+    Parameter("slides", "choice", "1 where the rocker slides with the shaft, 0 where it stays at its height",
+              default=0.0, choices=(0.0, 1.0)),
+    Parameter("p0x", "length", "working point at psi = s = 0, from the rocker's foot along x"),
+    Parameter("p0y", "length", "working point at psi = s = 0, from the rocker's foot along y"),
+    Parameter("p0z", "length", "working point at psi = s = 0, from the rocker's foot along the shaft"),
+)  # fmt: skip
+
+SHAFT_OUTPUTS = (
+    Output("psi", "rad", "angle of the shaft", "(3)", wraps=True),
+    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(3)"),
+    Output("d2psi", "1", "acceleration analogue", "(3)"),
+    Output("d3psi", "1", "jerk analogue", "(3)"),
+)
+SLIDE_OUTPUTS = (
+    Output("s", "length", "place of the shaft along its axis", "(1)"),
+    Output("ds", "length", "velocity analogue ds/dphi", "(1)"),
+    Output("d2s", "length", "acceleration analogue of s", "(1)"),
+    Output("d3s", "length", "jerk analogue of s", "(1)"),
+)
+SHAFT_LOOP_OUTPUTS = (
+    Output("discriminant1", "length^2", "b1^2 cos^2(pressure_angle1); negative where the links do not reach", "(3)"),
+    Output("pressure_angle1", "rad", "between the force of coupler 1 and the turning velocity of the rocker's ball",
+           "(3)"),
+)  # fmt: skip
+SLIDE_LOOP_OUTPUTS = (
+    Output("discriminant2", "length^2", "b2^2 cos^2(pressure_angle2); negative where the links do not reach", "(1)"),
+    Output("pressure_angle2", "rad", "between the force of coupler 2 and the shaft's direction", "(1)"),
+)
+POINT_OUTPUTS = point_outputs("(4)")
+MAGNITUDE_OUTPUTS = magnitude_outputs("(5)")
+JOINT_OUTPUTS = joint_outputs((("b1", "pin of crank 1"), ("c1", "rocker's ball")), "(2)")
+
+_BLOCKS = (
+    SHAFT_OUTPUTS, SHAFT_LOOP_OUTPUTS, SLIDE_OUTPUTS, SLIDE_LOOP_OUTPUTS,
+    *POINT_OUTPUTS, MAGNITUDE_OUTPUTS, JOINT_OUTPUTS,
+)  # fmt: skip
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return filled_blocks(cylindrical_looper.poses, designs, angles, _BLOCKS, wanted)
+
+
+def first_coupler_square(designs: Array) -> Array:
+    """b1^2 of every design."""
+    square: Array = designs[:, 1] * designs[:, 1]
+    return square
+
+
+def second_coupler_square(designs: Array) -> Array:
+    """b2^2 of every design."""
+    square: Array = designs[:, 9] * designs[:, 9]
+    return square
+
+
+FAMILY = Family(
+    name="cylindrical_looper",
+    title="looper on a cylinder",
+    parameters=PARAMETERS,
+    position="psi",
+    pose_outputs=tuple(chain.from_iterable(_BLOCKS)),
+    poses=poses,
+    derivative_of=ladders("psi", "s", "x_p", "y_p", "z_p"),
+    outward="branch1",
+    example={
+        "a1": 1.0, "b1": 4.2, "c1": 2.5, "e1": 3.5, "f1": 0.5, "g1": -0.3, "alpha1": 1.0,
+        "a2": 0.5, "b2": 3.0, "e2": 0.3, "f2": 0.1, "alpha2": 0.2, "offset2": 0.5, "slides": 1.0,
+        "p0x": 2.0, "p0y": 0.3, "p0z": 3.0,
+    },
+    uses_phi=False,
+    capabilities=(
+        Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
+        Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
+        Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")}),
+    ),
+)  # fmt: skip

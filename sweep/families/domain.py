@@ -1,0 +1,58 @@
+"""Over what a family is evaluated: a closed turn, an interval of some variable, or a march in which history counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+EndsFunction: TypeAlias = Callable[[Array], tuple[Array, Array]]
+
+TWO_PI = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A closed turn: every pose output is a function of the crank angle phi with period 2 pi."""
+
+    kind: ClassVar[str] = "turn"
+    name: str = "phi"
+    unit: str = "rad"
+    text: str = "crank angle"
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An interval of an input variable; its ends are candidates for extrema.
+
+    ``ends(designs)`` gives the first and the last value of the variable for each row of the (n, P) design matrix, both
+    (n,).  ``poses`` of the family gets the values of the variable as ``angles.phi``; cosine and sine mean nothing.
+    """
+
+    kind: ClassVar[str] = "interval"
+    name: str
+    unit: str
+    text: str
+    ends: EndsFunction
+
+
+@dataclass(frozen=True)
+class March:
+    """A motion with history: what a pose is depends on the poses before it, in the order of the crank angle.
+
+    The family marches over ``turns`` turns in equal steps and keeps the last one, so its values exist only on the grid
+    that was marched: ``poses`` takes one row of equally spaced crank angles of one turn, from 0.
+    """
+
+    kind: ClassVar[str] = "march"
+    name: str = "phi"
+    unit: str = "rad"
+    text: str = "crank angle"
+    turns: int = 2
+
+
+Domain: TypeAlias = Turn | Interval | March

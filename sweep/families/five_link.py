@@ -1,0 +1,80 @@
+"""Registry entry of the five-link: a crank-rocker whose driving ball is replaced by two perpendicular revolutes."""
+
+from __future__ import annotations
+
+from kernels.families import five_link
+from sweep.families import rssr as crank_rocker
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
+from sweep.families.capabilities import Assembly, OutputLink, Points
+
+PARAMETERS = (
+    Parameter("a", "length", "crank", positive=True),
+    Parameter("b", "length", "coupler, from the second revolute's axis to the rocker ball", positive=True),
+    Parameter("c", "length", "rocker", positive=True),
+    Parameter("e", "length", "common perpendicular of the two axes, from crank axis to rocker axis"),
+    Parameter("f", "length", "offset of the crank plane along the crank axis"),
+    Parameter("g", "length", "offset of the rocker plane along the rocker axis"),
+    Parameter("alpha", "angle", "angle between the axes"),
+    Parameter("h", "length", "common perpendicular of the two revolutes, from the crank pin towards the coupler"),
+    Parameter("s2", "length", "offset along the second revolute's axis", default=0.0),
+    Parameter("branch", "sign", "assembly mode: sign of dF/dpsi", default=1.0, choices=(-1.0, 1.0)),
+    Parameter("mode", "choice", "which of several solutions of that sign", default=1.0, choices=(1.0, 2.0, 3.0)),
+)
+
+VALUE_OUTPUTS = (
+    Output("psi", "rad", "rocker angle in (-pi, pi]", "(1)", wraps=True),
+    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(5)"),
+    Output("d2psi", "1", "acceleration analogue", "(5)"),
+    Output("d3psi", "1", "jerk analogue", "(5)"),
+    Output("sin_psi", "1", "sine of the rocker angle", "(1)"),
+    Output("cos_psi", "1", "cosine of the rocker angle", "(1)"),
+    Output("discriminant", "length^4", "(2 b c)^2 cos^2(pressure angle); negative where the links do not reach", "(7)"),
+    Output("pressure_angle", "rad", "between the force through the rocker ball and its velocity", "(6)"),
+    Output(
+        "theta",
+        "rad",
+        "angle of the coupler's plane about the crank pin, from the common perpendicular",
+        "(8)",
+        wraps=True,
+    ),
+    Output("beta", "rad", "angle of the coupler against the crank plane, in (-pi/2, pi/2)", "(8)"),
+)
+
+JOINT_OUTPUTS = (
+    Output("x_b", "length", "crank pin, along the common perpendicular of the axes", "(9)"),
+    Output("y_b", "length", "crank pin, across it and the rocker axis", "(9)"),
+    Output("z_b", "length", "crank pin, along the rocker axis", "(9)"),
+    Output("x_h", "length", "second revolute, along the common perpendicular of the axes", "(9)"),
+    Output("y_h", "length", "second revolute, across it and the rocker axis", "(9)"),
+    Output("z_h", "length", "second revolute, along the rocker axis", "(9)"),
+    Output("x_c", "length", "rocker ball, along the common perpendicular of the axes", "(9)"),
+    Output("y_c", "length", "rocker ball, across it and the rocker axis", "(9)"),
+    Output("z_c", "length", "rocker ball, along the rocker axis", "(9)"),
+)
+
+_VALUES = tuple(o.name for o in VALUE_OUTPUTS)
+_JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return filled_with_places(five_link.poses, designs, angles, _VALUES, _JOINTS, wanted)
+
+
+FAMILY = Family(
+    name="five_link",
+    title="five-link with two revolutes at the crank pin",
+    parameters=PARAMETERS,
+    position="psi",
+    pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
+    poses=poses,
+    example={"a": 1.0, "b": 3.9, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "h": 0.3, "s2": 0.1},
+    derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
+    outward="branch",
+    uses_phi=False,
+    capabilities=(
+        Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
+        Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")}),
+        OutputLink(crank_rocker.rocker_origin),
+    ),
+)

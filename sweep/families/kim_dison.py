@@ -1,0 +1,205 @@
+"""Registry entry of the spatial crank-rocker of Kim and Dison: the crank-rocker with perpendicular axes and g = 0.
+
+It has its own symbols and its own frame, and the kernels of the crank-rocker: a = r, b = l, c = h, e = a, f = b, g = 0,
+alpha = 90 deg, branch = -branch; psi is its alpha.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kernels import status as st
+from kernels.families import rssr
+from sweep.families import rssr as crank_rocker
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
+from sweep.families.capabilities import Assembly, CrankRockerLoop, JointRecords, Points, PressureEllipse
+
+PARAMETERS = (
+    Parameter("r", "length", "crank", positive=True),
+    Parameter("l", "length", "coupler", positive=True),
+    Parameter("h", "length", "rocker", positive=True),
+    Parameter("a", "length", "distance of the rocker axis from the crank axis, along y"),
+    Parameter("b", "length", "distance of the rocker axis from the crank plane, along z"),
+    Parameter("omega1", "speed", "angular velocity of the crank", default=1.0),
+    Parameter("epsilon1", "angular_acceleration", "angular acceleration of the crank", default=0.0),
+    Parameter("branch", "sign", "assembly mode: +1 or -1, the source's sign s", default=1.0, choices=(-1.0, 1.0)),
+)
+
+MOTION_OUTPUTS = (
+    Output("alpha", "rad", "rocker angle in (-pi, pi]", "(4)", wraps=True),
+    Output("dalpha", "1", "velocity analogue dalpha/dphi", "(5)"),
+    Output("d2alpha", "1", "acceleration analogue", "(5)"),
+    Output("d3alpha", "1", "jerk analogue", "(5)"),
+    Output("sin_alpha", "1", "sine of the rocker angle", "(4)"),
+    Output("cos_alpha", "1", "cosine of the rocker angle", "(4)"),
+    Output(
+        "discriminant",
+        "length^4",
+        "4 h^2 times the square of the ball's distance from a dead point; negative out of reach",
+        "(3)",
+    ),
+    Output("pressure_angle", "rad", "between the coupler force and the velocity of the rocker ball", "(6)"),
+)
+
+OWN_OUTPUTS = (
+    Output("omega3", "rad/s", "angular velocity of the rocker", "(7)"),
+    Output("epsilon3", "rad/s^2", "angular acceleration of the rocker", "(7)"),
+    Output("sin_transmission", "1", "coupler direction along the velocity of the rocker ball, signed", "(6)"),
+    Output("x_b", "length", "crank pin, normal to the plane of the rocker", "(1)"),
+    Output("y_b", "length", "crank pin, from the crank axis towards the rocker axis", "(1)"),
+    Output("z_b", "length", "crank pin, along the crank axis", "(1)"),
+    Output("x_c", "length", "rocker ball, normal to the plane of the rocker", "(1)"),
+    Output("y_c", "length", "rocker ball, from the crank axis towards the rocker axis", "(1)"),
+    Output("z_c", "length", "rocker ball, along the crank axis", "(1)"),
+)
+
+SWING_OUTPUTS = (
+    Output("alpha_at_phi0", "rad", "rocker angle in the limit position at phi = 0, in (-pi, pi]", "(8)"),
+    Output("alpha_at_phipi", "rad", "rocker angle in the limit position at phi = pi, in (-pi, pi]", "(8)"),
+    Output("swing", "rad", "angle between the two limit positions, not negative", "(8)"),
+)
+
+# Of what is asked here, the pose outputs of the crank-rocker that it is made of.
+_NEEDS = {
+    "omega3": ("dpsi",),
+    "epsilon3": ("dpsi", "d2psi"),
+    "sin_transmission": ("discriminant",),
+    "x_b": ("z_b",), "y_b": ("x_b",), "z_b": ("y_b",), "x_c": ("z_c",), "y_c": ("x_c",), "z_c": ("y_c",),
+}  # fmt: skip
+
+
+def _theirs(name: str) -> str:
+    """The crank-rocker's name of a quantity."""
+    return name.replace("alpha", "psi")
+
+
+def _ours(name: str) -> str:
+    return name.replace("psi", "alpha")
+
+
+def as_crank_rocker(designs: Array) -> Array:
+    """Design matrix of the same linkage as a crank-rocker, (n, 8); no number where the crank's motion is none."""
+    matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)), designs.dtype)
+    matrix[:, :5] = designs[:, :5]
+    with np.errstate(invalid="ignore"):
+        matrix[:, 0] += 0.0 * designs[:, 5] + 0.0 * designs[:, 6]
+    matrix[:, 6] = 0.5 * np.pi
+    matrix[:, 7] = -designs[:, 7]
+    return matrix
+
+
+def _poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    matrix = as_crank_rocker(designs)
+    asked = frozenset(part for name in wanted for part in _NEEDS.get(name, (_theirs(name),)))
+    found = run(matrix, angles, asked)
+    columns: Columns = {"status": found["status"]}
+    omega, epsilon, offset = (designs[:, k, None] for k in (5, 6, 4))
+    for name in wanted - {"status"}:
+        parts: list[Array] = [np.asarray(found[part]) for part in _NEEDS.get(name, (_theirs(name),))]
+        columns[name] = parts[0]
+        if name == "omega3":
+            columns[name] = parts[0] * omega
+        elif name == "epsilon3":
+            columns[name] = parts[1] * omega**2 + parts[0] * epsilon
+        elif name == "sin_transmission":
+            # T/b of the crank-rocker; nan where the links do not reach
+            reached = np.isin(found["status"], (st.OK, st.DEAD_POINT))
+            square = np.where(reached, parts[0], np.nan)
+            columns[name] = matrix[:, 7, None] * np.sqrt(square) / (2.0 * matrix[:, 1, None] * matrix[:, 2, None])
+        elif name in ("x_b", "x_c"):
+            columns[name] = -parts[0]
+        elif name in ("z_b", "z_c"):
+            columns[name] = offset - parts[0]
+    return columns
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return _poses(crank_rocker.poses, designs, angles, wanted)
+
+
+def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """As :func:`poses`, in twice the working precision; for float64 only."""
+    return _poses(crank_rocker.precise_poses, designs, angles, wanted)
+
+
+def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Both limit positions and the angle between them, to rounding: the crank is then in the plane of the rocker."""
+    n = len(designs)
+    status, values = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
+    errors = np.empty_like(values)
+    matrix = as_crank_rocker(designs)
+    rssr.limits(matrix, status, values, errors)
+    names = rssr.LIMIT_NAMES
+    ext, fold, whole = (names.index(name) for name in ("psi_ext", "psi_fold", "swing"))
+    # Extended is phi = 0 or pi, whichever places the ball beyond the crank pin: y_C > 0 or < 0.
+    first = np.cos(values[:, names.index("phi_ext")]) > 0.0
+    found = {
+        "alpha_at_phi0": (
+            np.where(first, values[:, ext], values[:, fold]),
+            np.where(first, errors[:, ext], errors[:, fold]),
+        ),
+        "alpha_at_phipi": (
+            np.where(first, values[:, fold], values[:, ext]),
+            np.where(first, errors[:, fold], errors[:, ext]),
+        ),
+        "swing": (np.abs(values[:, whole]), errors[:, whole]),
+    }
+    columns: Columns = {"status": status}
+    for name, (value, error) in found.items():
+        if name in wanted:
+            columns |= {name: value, f"err_{name}": error} if accuracy.target is not None else {name: value}
+    return columns
+
+
+def _as_ours(step: Step) -> Step:
+    """A step of the crank-rocker under the symbols of this family."""
+
+    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+        asked = frozenset(_theirs(name) for name in wanted)
+        found = step.run(
+            as_crank_rocker(designs), asked, replace(accuracy, proven=tuple(map(_theirs, accuracy.proven)))
+        )
+        return {_ours(name): values for name, values in found.items()}
+
+    provides = tuple(replace(o, name=_ours(o.name), equation="") for o in step.provides)
+    return replace(step, provides=provides, run=run)
+
+
+def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
+    """Fill the joint records that effects work from, in the frame of the crank-rocker."""
+    matrix = as_crank_rocker(designs)
+    turned = crank_rocker.poses(matrix, angles, frozenset(crank_rocker.JOINT_NEEDS))
+    crank_rocker.joint_records(matrix, angles, turned, per_pose, per_design)
+
+
+def ellipse(designs: Array) -> Array:
+    """The curve of the coupler direction across the rocker's motion, (n, 7)."""
+    return crank_rocker.ellipse(as_crank_rocker(designs))
+
+
+FAMILY = Family(
+    name="kim_dison",
+    title="spatial crank-rocker of Kim and Dison",
+    parameters=PARAMETERS,
+    position="alpha",
+    pose_outputs=MOTION_OUTPUTS + OWN_OUTPUTS,
+    poses=poses,
+    example={"r": 1.0, "l": 6.0, "h": 3.2, "a": 2.9, "b": 4.0, "branch": -1.0},
+    steps=(
+        Step("swing", SWING_OUTPUTS, swing, 700.0),
+        *(_as_ours(step) for step in crank_rocker.FAMILY.steps if step.name != "limit positions"),
+    ),
+    derivative_of={"alpha": "dalpha", "dalpha": "d2alpha", "d2alpha": "d3alpha"},
+    uses_phi=False,
+    capabilities=(
+        Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
+        JointRecords(joint_records, (), "rocker"),
+        PressureEllipse(ellipse),
+        CrankRockerLoop(as_crank_rocker),
+        Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
+    ),
+    precise_poses=precise_poses,
+)

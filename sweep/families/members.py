@@ -1,0 +1,313 @@
+"""Several mechanisms on one main shaft as one `Family`: dotted names, every point in the machine's frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from kernels.chain import chain_rule
+from kernels.status import OK
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from sweep.families.capabilities import Assembly, OutputLink, Points
+from sweep.families.placing import AXES, Place
+from sweep.families.relations import Relation, Timing
+
+TIP = "tip"
+
+
+@dataclass(frozen=True)
+class Member:
+    """One mechanism of a machine.
+
+    Parameters
+    ----------
+    name : what stands before the dot of its parameters and outputs
+    family : a family or chain, evaluated over a closed turn
+    ratio : whole turns of its crank for one of what drives it, with the sense; not 0
+    offset : its crank angle where the driving angle is 0 [rad]; the default of the parameter ``offset``
+    driver : member and pose output that drive it, as ("needle", "psi1"); None is the main shaft
+    place : its frame in the machine's frame; ``at`` is the default of the parameters ``x_at``, ``y_at``, ``z_at``
+    drives : of the driver's outputs, the derivative of each
+    tip : a point fixed to the output link: along it, across it, along its axis; the defaults of ``x_tip`` ...
+    columns : where its own parameters stand in the machine's design matrix
+    """
+
+    name: str
+    family: Family
+    ratio: int = 1
+    offset: float = 0.0
+    driver: tuple[str, str] | None = None
+    drives: Mapping[str, str] = field(default_factory=dict)
+    place: Place = field(default_factory=Place)
+    tip: tuple[float, float, float] | None = None
+    columns: slice = field(default_factory=lambda: slice(0, 0))
+
+    def designs(self, designs: Array) -> Array:
+        """The design matrix of this member's family."""
+        return np.ascontiguousarray(designs[:, self.columns])
+
+    def own(self, name: str) -> str:
+        """A dotted name as the member's family knows it; "" for a name of another member."""
+        prefix = f"{self.name}."
+        return name.removeprefix(prefix) if name.startswith(prefix) else ""
+
+    @property
+    def added(self) -> tuple[Parameter, ...]:
+        """Its parameters beside those of its family: phase, place and tip."""
+        crank = Parameter("offset", "angle", "crank angle where the driving angle is 0", default=self.offset)
+        place = [
+            Parameter(f"{axis}_at", "length", f"{axis} of the member's origin in the machine's frame", default=x)
+            for axis, x in zip(AXES, self.place.at, strict=True)
+        ]
+        tip = [
+            Parameter(f"{axis}_tip", "length", f"tip {way} the output link", default=x)
+            for axis, way, x in zip(AXES, ("along", "across", "along the axis of"), self.tip or (), strict=False)
+        ]
+        return crank, *place, *tip
+
+    @cached_property
+    def derivatives(self) -> frozenset[str]:
+        """Pose outputs that are derivatives with respect to the crank angle."""
+        return frozenset(self.family.derivative_of.values())
+
+    @cached_property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points whose coordinates are given in the machine's frame."""
+        named = [name for points in self.family.every(Points) for name in points.at]
+        return (*named, TIP) if self.tip is not None else tuple(named)
+
+
+@dataclass(frozen=True)
+class Machine(Family):
+    """A family made of members.
+
+    Pose outputs of a member carry its name, derivatives are with respect to the angle of the main shaft.  A point
+    ``point`` of a member gives ``point_x``, ``point_y``, ``point_z`` in the machine's frame.
+    """
+
+    members: tuple[Member, ...] = ()
+    relations: tuple[Relation, ...] = ()
+    timings: tuple[Timing, ...] = ()
+
+    def member(self, name: str) -> Member:
+        """The member of that name."""
+        return next(m for m in self.members if m.name == name)
+
+    def split(self, name: str) -> tuple[Member, str] | None:
+        """Member and the name there of a dotted name; None for a name of the machine itself."""
+        return next(((m, m.own(name)) for m in self.members if m.own(name)), None)
+
+    @cached_property
+    def positions(self) -> Mapping[str, str]:
+        """Positions of all members' followers."""
+        return {f"{m.name}.{p}": f"{m.name}.{stage}" for m in self.members for p, stage in m.family.positions.items()}
+
+    def outward_sign(self, position: str) -> str:
+        """The sign parameter of the member whose position it is."""
+        found = self.split(position)
+        assert found is not None
+        own = found[0].family.outward_sign(found[1])
+        return own and f"{found[0].name}.{own}"
+
+    def precise(self) -> Machine:
+        """The machine with the most accurate poses its members have."""
+        return _built(self, tuple(replace(m, family=m.family.precise()) for m in self.members))
+
+    def with_families(self, families: Mapping[str, Family]) -> Machine:
+        """The same machine with other families of its members: those that effects extended."""
+        return _built(self, tuple(replace(m, family=families.get(m.name, m.family)) for m in self.members))
+
+
+def assemble(name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing, ...]) -> Machine:
+    """The machine of these members; each may be driven by one that stands before it."""
+    timings = tuple(r for r in relations if isinstance(r, Timing))
+    others = tuple(r for r in relations if not isinstance(r, Timing))
+    bare = Machine(name, "", (), "", (), _no_poses, relations=others, timings=timings)
+    return _built(bare, members)
+
+
+def _no_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    raise AssertionError("a machine without members")
+
+
+def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
+    parameters: list[Parameter] = []
+    placed = []
+    for m in members:
+        start = len(parameters)
+        own = [replace(p, name=f"{m.name}.{p.name}", text=f"{m.name}: {p.text}") for p in m.family.parameters]
+        parameters += own
+        placed.append(replace(m, columns=slice(start, start + len(own))))
+        parameters += [replace(p, name=f"{m.name}.{p.name}", text=f"{m.name}: {p.text}") for p in m.added]
+    outputs = [
+        replace(o, name=f"{m.name}.{o.name}", own=f"{m.name}.{o.base}") for m in placed for o in m.family.pose_outputs
+    ]
+    for m in placed:
+        outputs += [
+            Output(f"{m.name}.{point}_{axis}", "length", f"{m.name}: {axis} of {point}, machine's frame", "ours")
+            for point in m.points
+            for axis in AXES
+        ]
+    derivative_of = {
+        f"{m.name}.{name}": f"{m.name}.{of}" for m in placed for name, of in m.family.derivative_of.items()
+    }
+    outputs += [o for relation in machine.relations for o in relation.outputs]
+    loops = tuple(_loop(m, loop) for m in placed for loop in m.family.every(Assembly))
+    found = replace(
+        machine,
+        title=" and ".join(f"{m.name} ({m.family.title})" for m in placed),
+        parameters=tuple(parameters),
+        position=f"{placed[0].name}.{placed[0].family.position}",
+        pose_outputs=tuple(outputs),
+        derivative_of=derivative_of,
+        outward="",
+        analytic=all(m.family.analytic for m in placed),
+        capabilities=loops,
+        dear={f"{m.name}.{k}": (f"{m.name}.{what}", ns) for m in placed for k, (what, ns) in m.family.dear.items()},
+        members=tuple(placed),
+    )
+    poses = partial(_poses, found)
+    precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
+    return replace(found, poses=poses, precise_poses=precise)
+
+
+def _loop(member: Member, loop: Assembly) -> Assembly:
+    return Assembly(
+        f"{member.name}.{loop.discriminant}", f"{member.name}.{loop.pressure_angle}", partial(_scale, member, loop),
+        f"{member.name}.{loop.stage}",
+    )  # fmt: skip
+
+
+def _scale(member: Member, loop: Assembly, designs: Array) -> Array:
+    return loop.scale(member.designs(designs))
+
+
+def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    return machine.precise().poses(designs, angles, wanted)
+
+
+def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted outputs of members and relations, and the first status that is not OK, in the order of the members."""
+    relations = [r for r in machine.relations if not wanted.isdisjoint(o.name for o in r.outputs)]
+    needed = set(wanted).union(*(r.needs for r in relations))
+    for m in reversed(machine.members):
+        needed |= _driving(m, needed)
+    shape = (len(designs), angles.cos.shape[1])
+    status = np.zeros(shape, np.uint8)
+    found: dict[str, Any] = {}
+    for m in machine.members:
+        own = {name for name in map(m.own, needed) if name}
+        if own:
+            columns = _member(m, designs, angles, own, found)
+            np.copyto(status, columns.pop("status"), where=status == OK)
+            found |= {f"{m.name}.{name}": values for name, values in columns.items()}
+    for relation in relations:
+        found |= relation.compute(found, {m.name: m.place.rotation for m in machine.members}, wanted)
+    return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
+
+
+def _whole(values: Any, shape: tuple[int, int]) -> Any:
+    """Values of one design for all where it was computed once; an array of their own, which may be written on."""
+    return values if values.shape == shape else np.array(np.broadcast_to(values, shape))
+
+
+def _driving(member: Member, needed: set[str]) -> set[str]:
+    """What the driver of a member has to give: its output and as many derivatives as the member's outputs need."""
+    own = {name for name in map(member.own, needed) if name}
+    if member.driver is None or not own:
+        return set()
+    driver, output = member.driver
+    most = max((len(_orders(member.family, name)) for name in own), default=0)
+    names = [output]
+    for _ in range(most):
+        names.append(member.drives[names[-1]])
+    return {f"{driver}.{name}" for name in names}
+
+
+def _orders(family: Family, name: str) -> list[str]:
+    """The derivatives 1..k up to ``name`` of the output it derives from; empty if it is no derivative."""
+    lower = {derivative: of for of, derivative in family.derivative_of.items()}
+    names: list[str] = []
+    while name in lower:
+        names.insert(0, name)
+        name = lower[name]
+    return names
+
+
+def _member(m: Member, designs: Array, angles: Angles, own: set[str], found: Mapping[str, Any]) -> dict[str, Any]:
+    """Pose outputs of a member by their own names, and ``status``; what no design varies is computed once."""
+    columns = slice(m.columns.start, m.columns.stop + 1)  # its own parameters and the phase
+    rows = designs[:, columns]
+    if m.driver is None and angles.cos.shape[0] == 1 and len(rows) > 1 and (rows[1:] == rows[0]).all():
+        rows = rows[:1]
+    own_designs, phase = np.ascontiguousarray(rows[:, :-1]), rows[:, -1]
+    motion = {name for name in own if name in m.family.pose_output}
+    motion |= {x for point in m.points for x in _coordinates(m, point, own)}
+    motion |= {name for derivative in motion for name in _orders(m.family, derivative)}
+    turned = _turned(m, phase, angles, found)
+    result: dict[str, Any] = dict(m.family.poses(own_designs, turned, frozenset(motion)))
+    _with_respect_to_shaft(m, result, found)
+    for point in m.points:
+        if any(f"{point}_{axis}" in own for axis in AXES):
+            result |= _point(m, point, designs, own_designs, result)
+    return {name: result[name] for name in (*own, "status")}
+
+
+def _turned(m: Member, phase: Array, angles: Angles, found: Mapping[str, Any]) -> Angles:
+    """The input angles of a member: of its driver, times its ratio, plus its phase."""
+    if m.driver is not None:
+        return Angles.of(m.ratio * found[".".join(m.driver)] + phase[:, None])
+    if m.ratio == 1 and not phase.any():
+        return angles
+    return Angles.of(m.ratio * angles.phi + phase[:, None])
+
+
+def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str, Any]) -> None:
+    """Make derivatives by the member's crank angle those by the angle of the main shaft, in place."""
+    tops = [name for name in result if name in m.derivatives and m.family.derivative_of.get(name) not in result]
+    for top in tops:
+        names = _orders(m.family, top)
+        if m.driver is None:
+            for order, name in enumerate(names, start=1):
+                if m.ratio != 1:
+                    result[name] = result[name] * float(m.ratio) ** order
+            continue
+        driver, output = m.driver
+        inner = [output]
+        for _ in names:
+            inner.append(m.drives[inner[-1]])
+        given: list[Any] = [np.ascontiguousarray(found[f"{driver}.{name}"]) for name in inner[1:]]
+        outer: list[Any] = [result[name] for name in names]
+        missing: list[Any] = [None] * (3 - len(names))
+        chain_rule(np.full(len(outer[0]), float(m.ratio)), *given, *missing, *outer, *missing)
+
+
+def _coordinates(m: Member, point: str, own: set[str]) -> set[str]:
+    """Pose outputs that a point's coordinates in the machine's frame are made of, where they are wanted."""
+    if not any(f"{point}_{axis}" in own for axis in AXES):
+        return set()
+    if point == TIP:
+        return {m.family.position}
+    return {name for points in m.family.every(Points) for name in points.at.get(point, ()) if name}
+
+
+def _point(m: Member, point: str, designs: Array, own_designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
+    """Coordinates of a point in the machine's frame, (n, m)."""
+    start = m.columns.stop + 1
+    at = designs[:, start : start + 3]
+    if point == TIP:
+        link = m.family.find(OutputLink)
+        assert link is not None
+        x, y, z = (designs[:, [start + k]] for k in range(3, 6))
+        angle = result[m.family.position]
+        cos, sin, origin = np.cos(angle), np.sin(angle), link.origin(own_designs)
+        local = [origin[:, [0]] + x * cos - y * sin, origin[:, [1]] + x * sin + y * cos, origin[:, [2]] + z + 0.0 * cos]
+    else:
+        names = next(points.at[point] for points in m.family.every(Points) if point in points.at)
+        local = [result[name] if name else 0.0 for name in names]
+    turn = m.place.rotation
+    return {f"{point}_{axis}": at[:, [k]] + sum(turn[k, j] * local[j] for j in range(3)) for k, axis in enumerate(AXES)}

@@ -1,0 +1,162 @@
+"""Machines from what a user writes: members and relations as plain words, checked."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from sweep.errors import InputError, nearest
+from sweep.families import Specification
+from sweep.families.base import Family
+from sweep.families.capabilities import OutputLink
+from sweep.families.domain import Turn
+from sweep.families.members import Machine, Member, assemble
+from sweep.families.placing import place, vector
+from sweep.families.relations import Distance, Relation, ShaftTorque, Shaking, Timing
+
+MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip")
+RELATION_KINDS = ("distance", "timing", "torque", "shaking")
+_WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_ENDS_IN_DIGIT = re.compile(r".*\d")
+
+FindFamily = Callable[[str | Sequence[str]], Family]
+
+
+def specification(members: Mapping[str, Any], relations: Mapping[str, Any] | None) -> Specification:
+    """What a user wrote, brought to one form.
+
+    Raises
+    ------
+    InputError
+        if a member is neither a family's name, a list of them, nor a table.
+    """
+    found = []
+    for name, given in members.items():
+        if isinstance(given, str):
+            table: Mapping[str, Any] = {"family": given}
+        elif isinstance(given, Mapping):
+            table = given
+        elif isinstance(given, Sequence):
+            table = {"chain": given}
+        else:
+            raise InputError(str(name), given, "a family, a list of families, or a table", "machine")
+        found.append((name, _frozen(table)))
+    return Specification(tuple(found), tuple((name, _frozen(r)) for name, r in (relations or {}).items()))
+
+
+def _frozen(table: Any) -> tuple[tuple[str, Any], ...]:
+    if not isinstance(table, Mapping):
+        raise InputError("relation", table, f"a table with one of {', '.join(RELATION_KINDS)}", "machine")
+    return tuple((str(key), _hashable(value)) for key, value in table.items())
+
+
+def _hashable(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return tuple((str(key), _hashable(part)) for key, part in value.items())
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return tuple(_hashable(part) for part in value)
+    return value
+
+
+def built(given: Specification, find: FindFamily) -> Machine:
+    """The machine of a specification.
+
+    Raises
+    ------
+    InputError
+        for a name that is no plain word, an unknown key or family, a ratio that is no whole number, a driver that does
+        not stand before, a tip of a member without a turning output link, or a relation of unknown points.
+    """
+    if not given.members:
+        raise InputError("members", {}, "at least one member", "machine")
+    members: dict[str, Member] = {}
+    for name, table in given.members:
+        if not _WORD.fullmatch(name) or name in members:
+            raise InputError("member", name, "a plain word, each once", "machine")
+        members[name] = _member(name, dict(table), members, find)
+    relations = tuple(_relation(name, dict(table), members) for name, table in given.relations)
+    for relation in relations:
+        if not _WORD.fullmatch(relation.name) or _ENDS_IN_DIGIT.fullmatch(relation.name) or relation.name in members:
+            allowed = "a plain word without a digit at its end that is no member"
+            raise InputError("relation", relation.name, allowed, "machine.relations")
+    title = ", ".join(f"{m.name}: {m.family.name}" for m in members.values())
+    return assemble(f"machine ({title})", tuple(members.values()), relations)
+
+
+def _member(name: str, table: dict[str, Any], earlier: Mapping[str, Member], find: FindFamily) -> Member:
+    where = f"machine.{name}"
+    for key in table:
+        if key not in MEMBER_KEYS:
+            raise InputError(key, table[key], f"{', '.join(MEMBER_KEYS)}{nearest(key, MEMBER_KEYS)}", where)
+    if ("family" in table) == ("chain" in table):
+        raise InputError("family", table.get("family"), "either family or chain", where)
+    family = find(table["family"]) if "family" in table else find(list(table["chain"]))
+    if not isinstance(family.domain, Turn):
+        raise InputError("family", family.name, "a family over a closed turn", where)
+    ratio = table.get("ratio", 1)
+    if isinstance(ratio, bool) or not isinstance(ratio, int | float) or ratio != int(ratio) or ratio == 0:
+        allowed = (
+            "a whole number but 0: the machine's turn is one of the main shaft, so choose its slowest shaft as that"
+        )
+        raise InputError("ratio", ratio, allowed, where)
+    offset = table.get("offset", 0.0)
+    if isinstance(offset, bool) or not isinstance(offset, int | float) or not math.isfinite(offset):
+        raise InputError("offset", offset, "an angle in rad", where)
+    tip = None if table.get("tip") is None else vector(table["tip"], f"{where}.tip")
+    if tip is not None and family.find(OutputLink) is None:
+        raise InputError("tip", tip, f"a member whose output link turns; {family.name} has none", where)
+    driver = _driver(table.get("driver"), earlier, where)
+    drives = {} if driver is None else dict(earlier[driver[0]].family.derivative_of)
+    spot = place(name, None if table.get("place") is None else dict(table["place"]))
+    return Member(name, family, int(ratio), float(offset), driver, drives, spot, tip)
+
+
+def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[str, str] | None:
+    if given is None or given == "shaft":
+        return None
+    angles = [f"{m.name}.{o.name}" for m in earlier.values() for o in m.family.pose_outputs if o.wraps]
+    if given not in angles:
+        known = ", ".join(["shaft", *angles])
+        raise InputError("driver", given, f"the main shaft, or an angle of a member that stands before: {known}", where)
+    member, _, output = str(given).partition(".")
+    return member, output
+
+
+def _relation(name: str, table: dict[str, Any], members: Mapping[str, Member]) -> Relation | Timing:
+    where = f"machine.relations.{name}"
+    if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
+        raise InputError(name, dict(table), f"one of {', '.join(RELATION_KINDS)} = [...]", where)
+    kind, given = next(iter(table.items()))
+    if not isinstance(given, tuple) or not all(isinstance(part, str) for part in given):
+        raise InputError(kind, given, "a list of names", where)
+    if kind == "distance":
+        points = [f"{m.name}.{point}" for m in members.values() for point in m.points]
+        return Distance(name, _two(given, points, "points", where))
+    if kind == "timing":
+        return Timing(name, _two(given, None, "crank angles", where))
+    known = {f"{m.name}{number}": (m.name, number) for m in members.values() for number in _stages(m.family)}
+    known |= {m.name: (m.name, _stages(m.family)[0]) for m in members.values()}
+    for part in given:
+        if part not in known:
+            raise InputError(kind, part, f"members: {', '.join(known)}{nearest(part, known)}", where)
+    if kind == "torque":
+        return ShaftTorque(
+            name, tuple((f"{known[x][0]}.drive_torque{known[x][1]}", members[known[x][0]].ratio) for x in given)
+        )
+    return Shaking(name, tuple(known[part] for part in given))
+
+
+def _stages(family: Family) -> list[str]:
+    stages = getattr(family, "stages", ())
+    return [str(stage.number) for stage in stages] or [""]
+
+
+def _two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
+    if len(given) != 2:
+        raise InputError(what, given, f"two {what}", where)
+    for part in given if known is not None else ():
+        if part not in known:  # type: ignore[operator]
+            raise InputError(what, part, f"{', '.join(known or ())}{nearest(part, known or ())}", where)
+    return given[0], given[1]

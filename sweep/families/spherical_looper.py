@@ -1,0 +1,111 @@
+"""Registry entry of the looper on a sphere."""
+
+from __future__ import annotations
+
+from itertools import chain
+
+from kernels.families import spherical_looper
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from sweep.families.capabilities import Assembly, Points
+from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
+
+PARAMETERS = (
+    Parameter("a1", "length", "crank that swings the carrier", positive=True),
+    Parameter("b1", "length", "coupler of the carrier's drive", positive=True),
+    Parameter("c1", "length", "rocker of the carrier", positive=True),
+    Parameter("e1", "length", "common perpendicular, from the shaft of crank 1 to the carrier's axis"),
+    Parameter("f1", "length", "offset of the plane of crank 1 along its shaft", default=0.0),
+    Parameter("g1", "length", "height of the carrier's ball along the carrier's axis", default=0.0),
+    Parameter("alpha1", "angle", "angle from the shaft of crank 1 to the carrier's axis", default=0.0),
+    Parameter("branch1", "sign", "assembly mode of the carrier's drive", default=1.0, choices=(-1.0, 1.0)),
+    Parameter("o", "length", "height of the point Os, where both axes meet, along the carrier's axis"),
+    Parameter("delta", "angle", "angle between the carrier's axis and the looper's"),
+    Parameter("gamma", "angle", "direction of the looper's axis about the carrier's at psi = 0, from x"),
+    Parameter("c0x", "length", "looper's ball at psi = chi = 0, from Os along x"),
+    Parameter("c0y", "length", "looper's ball at psi = chi = 0, from Os along y"),
+    Parameter("c0z", "length", "looper's ball at psi = chi = 0, from Os along z"),
+    Parameter("p0x", "length", "working point at psi = chi = 0, from Os along x"),
+    Parameter("p0y", "length", "working point at psi = chi = 0, from Os along y"),
+    Parameter("p0z", "length", "working point at psi = chi = 0, from Os along z"),
+    Parameter("a2", "length", "crank that swings the looper", positive=True),
+    Parameter("b2", "length", "coupler of the looper's drive", positive=True),
+    Parameter("x2", "length", "centre of crank 2 along x"),
+    Parameter("y2", "length", "centre of crank 2 along y"),
+    Parameter("z2", "length", "centre of crank 2 along z"),
+    Parameter("theta2", "angle", "angle between z and the shaft of crank 2", default=0.0),
+    Parameter("beta2", "angle", "direction of the shaft of crank 2 about z, from x", default=0.0),
+    Parameter("offset2", "angle", "angle of crank 2 where phi = 0", default=0.0),
+    Parameter("branch2", "sign", "assembly mode of the looper's drive", default=1.0, choices=(-1.0, 1.0)),
+)
+
+CARRIER_OUTPUTS = (
+    Output("psi", "rad", "angle of the carrier", "(1)", wraps=True),
+    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(1)"),
+    Output("d2psi", "1", "acceleration analogue", "(1)"),
+    Output("d3psi", "1", "jerk analogue", "(1)"),
+)
+LOOPER_OUTPUTS = (
+    Output("chi", "rad", "angle of the looper in the carrier", "(3)", wraps=True),
+    Output("dchi", "1", "velocity analogue dchi/dphi", "(4)"),
+    Output("d2chi", "1", "acceleration analogue of chi", "(4)"),
+    Output("d3chi", "1", "jerk analogue of chi", "(4)"),
+)
+CARRIER_LOOP_OUTPUTS = (
+    Output("discriminant1", "length^2", "b1^2 cos^2(pressure_angle1); negative where the links do not reach", "(1)"),
+    Output("pressure_angle1", "rad", "between the force of coupler 1 and the velocity of the carrier's ball", "(1)"),
+)
+LOOPER_LOOP_OUTPUTS = (
+    Output("discriminant2", "length^2", "b2^2 cos^2(pressure_angle2); negative where the links do not reach", "(3)"),
+    Output("pressure_angle2", "rad", "between the force of coupler 2 and the velocity of the looper's ball in the "
+           "carrier", "(3)"),
+)  # fmt: skip
+POINT_OUTPUTS = point_outputs("(5)")
+MAGNITUDE_OUTPUTS = magnitude_outputs("(6)")
+JOINT_OUTPUTS = joint_outputs(
+    (("b1", "pin of crank 1"), ("c1", "carrier's ball"), ("b2", "pin of crank 2"), ("c2", "looper's ball")), "(1), (2)"
+)
+
+_BLOCKS = (
+    CARRIER_OUTPUTS, CARRIER_LOOP_OUTPUTS, LOOPER_OUTPUTS, LOOPER_LOOP_OUTPUTS,
+    *POINT_OUTPUTS, MAGNITUDE_OUTPUTS, JOINT_OUTPUTS,
+)  # fmt: skip
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return filled_blocks(spherical_looper.poses, designs, angles, _BLOCKS, wanted)
+
+
+def first_coupler_square(designs: Array) -> Array:
+    """b1^2 of every design."""
+    square: Array = designs[:, 1] * designs[:, 1]
+    return square
+
+
+def second_coupler_square(designs: Array) -> Array:
+    """b2^2 of every design."""
+    square: Array = designs[:, 18] * designs[:, 18]
+    return square
+
+
+FAMILY = Family(
+    name="spherical_looper",
+    title="looper on a sphere",
+    parameters=PARAMETERS,
+    position="psi",
+    pose_outputs=tuple(chain.from_iterable(_BLOCKS)),
+    poses=poses,
+    derivative_of=ladders("psi", "chi", "x_p", "y_p", "z_p"),
+    outward="branch1",
+    example={
+        "a1": 1.0, "b1": 4.1, "c1": 3.2, "e1": 2.9, "f1": 0.6, "g1": -0.4, "alpha1": 0.7, "branch1": -1.0,
+        "o": 1.5, "delta": 1.2, "gamma": 2.5, "c0x": -1.0, "c0y": 1.4, "c0z": 0.3, "p0x": -3.0, "p0y": 2.0, "p0z": 2.5,
+        "a2": 0.3, "b2": 7.0, "x2": 0.0, "y2": -4.0, "z2": -4.0, "theta2": 1.0, "beta2": 1.57, "offset2": 0.5,
+    },
+    uses_phi=False,
+    capabilities=(
+        Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
+        Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
+        Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "b2", "c2", "p")}),
+    ),
+)  # fmt: skip

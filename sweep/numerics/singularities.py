@@ -1,0 +1,106 @@
+"""Where a motion is nearly singular: complex zeros of its discriminants, and crank angles that crowd about them.
+
+Near a change point everything of interest happens within a few distances of such a zero from its place, so crank angles
+whose spacing is a share of that distance resolve a curve however close to the change point it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from sweep.numerics.quadrature import Array, Index
+
+TWO_PI = 2.0 * np.pi
+
+Curve: TypeAlias = Callable[[Index, Array], Array]
+"""``f(rows, phi)``: values (k, m) of a discriminant of the designs ``rows`` (k,) at crank angles (k, m)."""
+
+SAMPLES = 64  # of a discriminant, which is smooth whatever the motion does
+NEAREST = 3  # dips of each discriminant that count
+PASSES = 10
+CLOSER = 0.25
+SHORTEST = 1e-8  # steps and distances [rad] below which rounding of the crank angle is all that is seen
+FAR = 10.0  # distance of a zero that does not matter: the poses are then spread evenly
+
+
+class Singularities(NamedTuple):
+    """Places of the nearest zeros of n designs, each (n, k) [rad]: real part, and distance from the real angles."""
+
+    phi: Array
+    rho: Array
+
+    def only(self, which: Index) -> Singularities:
+        """Those of some designs."""
+        return Singularities(self.phi[which], self.rho[which])
+
+    def distance(self, phi: Array) -> Array:
+        """How far the nearest zero is from crank angles (n,), or (n, m)."""
+        one = phi.reshape(len(self.phi), -1)
+        away = np.abs(one[:, :, None] - self.phi[:, None, :])
+        away = np.abs(away - TWO_PI * np.round(away / TWO_PI))
+        nearest: Array = np.hypot(self.rho[:, None, :], away).min(axis=2)
+        return nearest.reshape(phi.shape)
+
+
+def singularities(discriminants: Sequence[Curve], n: int) -> Singularities:
+    """The nearest complex zeros of the discriminants of n designs, from their dips over the turn.
+
+    A dip D + D''/2 x^2 vanishes at x = +- i rho with rho^2 = D/(D''/2).  The parabola through three samples is taken
+    again ever closer to the dip.
+    """
+    if not discriminants:
+        return Singularities(np.ones((n, 1)), np.full((n, 1), FAR))
+    found = [_dips(curve, n, number) for number, curve in enumerate(discriminants)]
+    return Singularities(*(np.concatenate(parts, axis=1) for parts in zip(*found, strict=True)))
+
+
+def _dips(curve: Curve, n: int, number: int) -> Singularities:
+    spacing = TWO_PI / SAMPLES
+    turn = np.tile(np.arange(SAMPLES) * spacing, (n, 1))
+    values = curve(np.arange(n), turn)
+    before, after = np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
+    half_bend = 0.5 * (before + after) - values
+    dip = (values <= before) & (values <= after) & (half_bend > 0.0)
+    nearness = np.where(dip, values / np.where(dip, half_bend, 1.0), np.inf)
+    column = np.argsort(nearness, axis=1)[:, :NEAREST]
+    row, which = np.nonzero(np.take_along_axis(dip, column, axis=1))
+    phi = column[row, which] * spacing
+    rho, step = np.full(phi.size, FAR), np.full(phi.size, spacing)
+    for _ in range(PASSES):
+        left, here, right = curve(row, phi[:, None] + step[:, None] * np.arange(-1.0, 2.0)).T
+        bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
+        usable = bend > 0.0
+        per_bend = np.divide(1.0, bend, out=np.zeros(phi.size), where=usable)
+        move = np.clip(-0.5 * slope * per_bend, -1.0, 1.0)
+        lowest = np.maximum(here - 0.25 * slope * slope * per_bend, 0.0)
+        rho = np.where(usable, np.maximum(step * np.sqrt(lowest * per_bend), SHORTEST), rho)
+        phi += step * move
+        step = np.maximum(CLOSER * step, np.maximum(CLOSER * np.minimum(rho, spacing), SHORTEST))
+    # Where there are fewer dips the others stand somewhere, each elsewhere: no two of their angles coincide.
+    places = np.tile(np.arange(1.0, 1.0 + NEAREST) + 0.1 * number, (n, 1))
+    distances = np.full((n, NEAREST), FAR)
+    places[row, which], distances[row, which] = phi, np.minimum(rho, FAR)
+    return Singularities(places, distances)
+
+
+def crowded(near: Singularities, share: float) -> Array:
+    """Crank angles (n, m) of a turn in rising order, spaced by at most a share of the distance of the nearest zero.
+
+    About each zero they stand at phi + rho sinh(t) for equidistant t, which spaces them by hypot(rho, x) dt.
+    """
+    n, k = near.phi.shape
+    reach = np.arcsinh(np.pi / near.rho)
+    half = int(np.ceil(reach.max(initial=1.0) / share))
+    t = reach[:, :, None] * (np.arange(-half, half + 1) / half)
+    angles = near.phi[:, :, None] + near.rho[:, :, None] * np.sinh(t)
+    return np.sort(np.mod(angles.reshape(n, k * (2 * half + 1)), TWO_PI), axis=1)
+
+
+def turn_edges(near: Singularities, share: float) -> Array:
+    """Ends of panels of a turn from 0 to 2 pi, (n, p + 1), no longer than a share of the distance of a zero."""
+    inner = crowded(near, share)
+    ends = np.zeros((len(inner), 1))
+    return np.concatenate([ends, inner, ends + TWO_PI], axis=1)

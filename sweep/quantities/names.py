@@ -1,0 +1,80 @@
+"""The one place where names of quantities are taken apart: ``needle.max_abs_d2s2`` is member, stem and stage."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+
+class Parts(NamedTuple):
+    """A name without what tells where it belongs: the member of a machine, and the stage of a chain ("" for none)."""
+
+    member: str
+    stem: str
+    stage: str
+
+
+def parts(name: str) -> Parts:
+    """Take a name apart.
+
+    >>> parts("needle.phi01")
+    Parts(member='needle', stem='phi0', stage='1')
+    >>> parts("swing")
+    Parts(member='', stem='swing', stage='')
+    """
+    member, _, rest = name.rpartition(".")
+    if rest == "phi0" or rest.endswith("_phi0"):
+        return Parts(member, rest, "")
+    stem, stage = re.fullmatch(r"(.*?)(\d*)", rest, re.DOTALL).groups()  # type: ignore[union-attr]
+    if (stem == "phi" or stem.endswith("_phi")) and stage.startswith("0"):
+        return Parts(member, f"{stem}0", stage[1:])  # phi01 is phi0 of stage 1
+    return Parts(member, stem, stage)
+
+
+def stem(name: str) -> str:
+    """The name without member and stage."""
+    return parts(name).stem
+
+
+def at_stage(name: str, number: str) -> str:
+    """The name at the stage of that number without the number; "" for a name of another stage.
+
+    Names such as ``support_d1`` end in a digit of their own, so that the stage has to be known.
+
+    >>> at_stage("support_d12", "2")
+    'support_d1'
+    """
+    return name.removesuffix(number) if name.endswith(number) else ""
+
+
+def is_error(name: str) -> bool:
+    """Whether a column holds the error of another."""
+    return without_error(name) != name
+
+
+def without_error(name: str) -> str:
+    """The name of the column whose error a column holds, or the name itself."""
+    return name.removeprefix(ERROR)
+
+
+def error_of(name: str) -> str:
+    """The name of the column that holds the error of another."""
+    return f"{ERROR}{name}"
+
+
+ERROR = "err_"
+
+
+def is_place(name: str) -> bool:
+    """Whether a design output is a crank angle at which something happens, not a size that could be compared."""
+    return parts(name).stem.startswith("phi_")
+
+
+def is_flag(name: str) -> bool:
+    """Whether a design output is a yes or no."""
+    return stem(name) == "rotatable"
+
+
+def by_magnitude(name: str) -> bool:
+    """Whether limits and objectives compare the magnitude of a design output: its sign tells the assembly mode."""
+    return stem(name) in ("swing", "stroke")

@@ -1,0 +1,125 @@
+"""Events of a family: where a pose output passes a level, found as a root between samples, not as a sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kernels import scan
+from kernels import status as st
+from sweep.families.base import Accuracy, Array, Columns, Event, Family
+from sweep.families.domain import Interval
+from sweep.quantities.names import error_of
+from sweep.reductions.closing import variable
+from sweep.reductions.extrema import DESIGN_STATUS
+from sweep.reductions.sampling import TWO_PI, Index, Status, blocks, pose_columns, sample_turn
+
+START, LIMIT = 256, 16384  # samples of the first look, and those beyond which a design is given up
+PASSES = 80
+EPS = 2.0**-53
+
+
+def event_names(family: Family, event: Event) -> tuple[str, str]:
+    """The design outputs of an event: where it happens first, and how often."""
+    return f"{family.domain.name}_{event.name}", f"count_{event.name}"
+
+
+def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
+    """First place and number of the events that the names are about.
+
+    Parameters
+    ----------
+    family, designs : the (n, P) design matrix; an interval is taken as a closed turn, out and back
+    names : see `event_names`
+    accuracy : on samples, events that come and go between two of them are missed; otherwise samples are doubled until a
+        parabola through three of them leaves no room for that
+
+    Returns
+    -------
+    Columns
+        the names with their ``err_``, each (n,), and ``status``: NO_EVENT where it does not happen, NOT_CONVERGED where
+        16384 samples leave it open
+    """
+    n = len(designs)
+    columns: Columns = {"status": np.zeros(n, np.uint8)}
+    for event in family.events:
+        place, count = event_names(family, event)
+        if place not in names and count not in names:
+            continue
+        phi, err, number, status = _events(family, designs, event, accuracy)
+        phi, err = variable(family, designs, phi, err)
+        none = np.where(status == st.OK, 0.0, np.nan)
+        found = {place: phi, error_of(place): err, count: number + none, error_of(count): none}
+        columns |= {name: x for name, x in found.items() if name in names or name.removeprefix("err_") in names}
+        if place in names:
+            status = np.where((status == st.OK) & (number == 0), st.NO_EVENT, status).astype(np.uint8)
+        columns["status"] = np.where(columns["status"] == st.OK, status, columns["status"]).astype(np.uint8)
+    return columns
+
+
+def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) -> tuple[Array, Array, Array, Status]:
+    """First angle of the event and its error, how often it happens, and status, each (n,)."""
+    n = len(designs)
+    phi, err, number, status = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n), np.zeros(n, np.uint8)
+    pending, samples = np.arange(n), accuracy.samples or START
+    while pending.size:
+        doubtful = np.zeros(n, np.bool_)
+        for rows in blocks(pending, samples):
+            columns, worst, _ = sample_turn(family, designs[rows], samples, [event.of])
+            status[rows] = DESIGN_STATUS[worst]
+            good = status[rows] == st.OK
+            rows, values = rows[good], np.ascontiguousarray(columns[event.of][good])
+            number[rows], phi[rows], err[rows] = _crossings(family, designs, rows, values, event)
+            unsure = np.zeros(rows.size, np.bool_)
+            scan.grazes(values, np.full(rows.size, event.level), unsure)
+            doubtful[rows] = unsure
+        pending, samples = np.flatnonzero(doubtful), 2 * samples
+        if accuracy.samples is not None:
+            break
+        if samples > LIMIT:
+            status[pending] = st.NOT_CONVERGED
+            break
+    return phi, err, number, status
+
+
+def _crossings(family: Family, designs: Array, rows: Index, values: Array, event: Event) -> tuple[Array, Array, Array]:
+    """How often samples (r, m) pass the level in the event's sense, and the first place with its error, each (r,)."""
+    off = (values - event.level) * (1.0 if event.rising else -1.0)
+    passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
+    if isinstance(family.domain, Interval):
+        passes[:, values.shape[1] // 2 :] = False  # the way back
+    number = passes.sum(axis=1).astype(np.float64)
+    phi, err = np.full(rows.size, np.nan), np.full(rows.size, np.nan)
+    row = np.flatnonzero(number > 0)
+    if row.size:
+        column = passes[row].argmax(axis=1)
+        step = TWO_PI / values.shape[1]
+        ends = off[row, column], off[row, (column + 1) % values.shape[1]]
+        phi[row], err[row] = _root(family, designs[rows[row]], event, column * step, (column + 1) * step, *ends)
+    return number, phi, err
+
+
+def _root(
+    family: Family, designs: Array, event: Event, left: Array, right: Array, low: Array, high: Array
+) -> tuple[Array, Array]:
+    """Regula falsi in the Illinois form between two samples, all designs at once; its error from the last slope."""
+    sense = 1.0 if event.rising else -1.0
+    slope = (high - low) / (right - left)
+    side, phi, off = np.zeros(left.size), right.copy(), high.copy()
+    a = np.arange(left.size)
+    for _ in range(PASSES):
+        if not a.size:
+            break
+        phi[a] = right[a] - high[a] * (right[a] - left[a]) / (high[a] - low[a])
+        now = sense * (pose_columns(family, designs[a], phi[a, None], [event.of])[0][event.of][:, 0] - event.level)
+        off[a] = now
+        below = now < 0.0
+        # Illinois: the end that stays a second time has its value halved, so that both ends close in.
+        high[a] = np.where(below, np.where(side[a] == -1.0, 0.5, 1.0) * high[a], now)
+        low[a] = np.where(below, now, np.where(side[a] == 1.0, 0.5, 1.0) * low[a])
+        left[a], right[a] = np.where(below, phi[a], left[a]), np.where(below, right[a], phi[a])
+        side[a] = np.where(below, -1.0, 1.0)
+        a = a[(now != 0.0) & (right[a] - left[a] > 4.0 * EPS * TWO_PI)]
+    rounding = 8.0 * EPS * (np.abs(event.level) + np.abs(off) + np.abs(slope))
+    return np.mod(phi, TWO_PI), (np.abs(off) + rounding) / np.maximum(np.abs(slope), 1e-300) + 8.0 * EPS

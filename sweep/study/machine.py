@@ -1,0 +1,137 @@
+"""[machine] and [relations]: members on one main shaft, and what they are to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from sweep.errors import InputError
+from sweep.families import Specification
+from sweep.families import family as find_family
+from sweep.families.base import Family
+from sweep.families.specification import specification
+from sweep.study import units
+from sweep.study.faults import Faults, Key, read_section
+from sweep.study.model import Number, Section
+
+Names = Annotated[list[str], Field(min_length=1)]
+Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
+ThreeTexts = Annotated[list[str], Field(min_length=3, max_length=3)]
+
+# Tables in which a member's own entries may stand in a table of the member's name.
+BY_MEMBER = (("design",), ("limits",), ("reference", "design"))
+
+
+class PlaceTable(Section):
+    """machine.<member>.place"""
+
+    at: ThreeTexts | None = Field(None, description='three lengths, as ["0 mm", "30 mm", "12 mm"]')
+    axis: Three | None = Field(None, description="a direction [x, y, z]: the member's z")
+    zero: Three | None = Field(None, description="a direction [x, y, z]: the member's x")
+
+
+class MemberSection(Section):
+    """machine.<member>"""
+
+    family: str | None = Field(None, description="the name of a family")
+    chain: Names | None = Field(None, description="a list of names of families")
+    ratio: int | None = Field(None, description="a whole number of turns of its crank for one of what drives it, not 0")
+    offset: str | None = Field(None, description='an angle with its unit, as "180 deg"')
+    driver: str | None = Field(None, description='"shaft", or an angle of an earlier member, as "needle.psi1"')
+    place: PlaceTable | None = Field(None, description="{ at = [...], axis = [...], zero = [...] }")
+    tip: ThreeTexts | None = Field(
+        None, description='three lengths along, across, along the axis, as ["30 mm", "0 mm", "2 mm"]'
+    )
+
+
+class RelationSection(Section):
+    """relations.<name>"""
+
+    distance: Names | None = Field(None, description='two points, as ["needle.point", "looper.tip"]')
+    timing: Names | None = Field(None, description='two crank angles, as ["needle.phi_ext", "phi_min_clearance"]')
+    torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
+    shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
+
+
+def flattened(data: Mapping[str, Any], members: object) -> dict[str, Any]:
+    """The file with the members' entries under dotted names: ``[design.needle] a1`` becomes ``design."needle.a1"``."""
+    result = dict(data)
+    if not isinstance(members, dict):
+        return result
+    for key in BY_MEMBER:
+        _flatten(result, key, members)
+    return result
+
+
+def _flatten(data: dict[str, Any], key: tuple[str, ...], members: Mapping[str, Any]) -> None:
+    table = data.get(key[0])
+    if not isinstance(table, dict):
+        return
+    if len(key) > 1:
+        data[key[0]] = dict(table)
+        _flatten(data[key[0]], key[1:], members)
+        return
+    flat: dict[str, Any] = {}
+    for name, entry in table.items():
+        if name in members and isinstance(entry, dict):
+            flat |= {f"{name}.{own}": value for own, value in entry.items()}
+        else:
+            flat[name] = entry
+    data[key[0]] = flat
+
+
+def read_machine(data: Mapping[str, Any], faults: Faults) -> tuple[Specification, Family] | None:
+    """The machine of a file, or None with its faults."""
+    before = len(faults.lines)
+    tables = _tables(data, "machine", faults)
+    members = {name: _member(name, raw, faults) for name, raw in tables.items()}
+    relations = {}
+    for name, raw in _tables(data, "relations", faults).items():
+        section = read_section(RelationSection, raw, ("relations", name), faults)
+        relations[name] = section.model_dump(exclude_none=True)
+    if len(faults.lines) > before:
+        return None
+    try:
+        given = specification(members, relations)
+        return given, find_family(given)
+    except InputError as error:
+        place: Key = tuple(error.place.removeprefix("machine.").split(".")) if error.place != "machine" else ()
+        key: Key = place if place[:1] == ("relations",) else ("machine", *place)
+        faults.value(key if place[:1] == ("relations",) else (*key, error.name), error.value, error.allowed)
+        return None
+
+
+def _tables(data: Mapping[str, Any], name: str, faults: Faults) -> dict[str, Any]:
+    raw = data.get(name, {})
+    if not isinstance(raw, dict):
+        faults.value((name,), raw, f"tables [{name}.NAME]")
+        return {}
+    return raw
+
+
+def _member(name: str, raw: object, faults: Faults) -> dict[str, Any]:
+    key: Key = ("machine", name)
+    section = read_section(MemberSection, raw, key, faults)
+    found: dict[str, Any] = section.model_dump(exclude_none=True, exclude={"offset", "place", "tip"})
+    if section.offset is not None:
+        found["offset"] = _number(section.offset, "rad", (*key, "offset"), faults)
+    if section.tip is not None:
+        found["tip"] = [_number(text, "mm", (*key, "tip", k), faults) for k, text in enumerate(section.tip)]
+    if section.place is not None:
+        place: dict[str, Any] = section.place.model_dump(exclude_none=True, exclude={"at"})
+        if section.place.at is not None:
+            at = section.place.at
+            place["at"] = [_number(text, "mm", (*key, "place", "at", k), faults) for k, text in enumerate(at)]
+        found["place"] = place
+    return found
+
+
+def _number(text: str, internal: str, key: Key, faults: Faults) -> float:
+    try:
+        number, unit = units.split(text, internal)
+        return number * units.factor(unit, internal)
+    except units.UnitFault as fault:
+        faults.value(key, text, str(fault))
+        return 0.0

@@ -1,0 +1,89 @@
+"""Limits of size that keep the code readable: length and arguments of functions, length of files, share of comments.
+
+They are counted on the syntax tree, docstrings and signatures included.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import statistics
+import tokenize
+from pathlib import Path
+
+import pytest
+from numba.core.registry import CPUDispatcher
+
+import kernels
+
+ROOT = Path(kernels.__file__).parent.parent
+LIMITS = {"kernels": (80, 14)}  # lines and arguments of a function, by room
+
+
+def sources(room):
+    return sorted((ROOT / room).rglob("*.py"))
+
+
+def functions(tree):
+    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+
+
+def arguments(function):
+    a = function.args
+    return len([*a.posonlyargs, *a.args, *a.kwonlyargs]) + (a.vararg is not None) + (a.kwarg is not None)
+
+
+def offenders(files, lines, most):
+    """Functions longer than ``lines`` or with more than ``most`` arguments, as "file: name lines arguments"."""
+    return [
+        f"{path}: {f.name} {f.end_lineno - f.lineno + 1} {arguments(f)}"
+        for path, text in files
+        for f in functions(ast.parse(text))
+        if f.end_lineno - f.lineno + 1 > lines or arguments(f) > most
+    ]
+
+
+@pytest.mark.parametrize("room", LIMITS)
+def test_no_function_is_longer_or_takes_more_arguments_than_its_room_allows(room):
+    files = [(path.relative_to(ROOT), path.read_text()) for path in sources(room)]
+    assert len(files) > 30
+    assert offenders(files, *LIMITS[room]) == []
+
+
+def test_a_function_that_breaks_a_limit_is_named():
+    text = "def f(a, b, *, c=1, **d):\n    return (\n        a,\n    )\n"
+    assert offenders([("x.py", text)], 4, 4) == []
+    assert offenders([("x.py", text)], 3, 4) == ["x.py: f 4 4"]
+    assert offenders([("x.py", text)], 4, 3) == ["x.py: f 4 4"]
+
+
+@pytest.mark.parametrize("room", LIMITS)
+def test_files_stay_short(room):
+    lengths = {path: len(path.read_text().splitlines()) for path in sources(room)}
+    assert [str(path) for path, length in lengths.items() if length > 350] == []
+    assert statistics.median(lengths.values()) <= 120
+
+
+def test_kernels_explain_their_numerical_tricks():
+    """Three lines in a hundred carry a comment; what only steers the formatter does not count."""
+    lines, comments = 0, 0
+    for path in sources("kernels"):
+        text = path.read_text()
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        found = [
+            t for t in tokens if t.type == tokenize.COMMENT and not t.string.startswith(("# fmt", "# noqa", "# type"))
+        ]
+        lines, comments = lines + len(text.splitlines()), comments + len({t.start[0] for t in found})
+    assert comments >= 0.03 * lines
+
+
+def test_every_kernel_and_helper_names_its_own_floating_point_flags():
+    """A helper without flags of its own would be compiled with those of whichever kernel called it first."""
+    import importlib
+
+    found = {}
+    for path in sources("kernels"):
+        name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        found |= {id(x): x for x in vars(importlib.import_module(name)).values() if isinstance(x, CPUDispatcher)}
+    assert len(found) > 150
+    assert [str(x) for x in found.values() if x.targetoptions.get("fastmath") not in (False, {"contract"})] == []
