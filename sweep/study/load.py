@@ -241,11 +241,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         objective=Objective(goal) if goal else None,
         accuracy=accuracy,
         window=window,
-        optimise=OptimiseSettings(
-            search.starts, search.seed, time_budget, search.variables, unseen, search.looks, search.globally
-        )
-        if "optimise" in data
-        else None,
+        optimise=_search_settings(search, time_budget, unseen) if "optimise" in data else None,
         pareto=pareto,
         tolerance=tolerance,
         reference=reference,
