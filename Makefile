@@ -85,7 +85,7 @@ bench-extrema: $(VENV)/ready  ## errors and times of the search for true extrema
 bench-scene: $(VENV)/ready  ## all effects on 10^5 designs x 360 angles: rate, its parts, memory; about 5 minutes
 	$(BIN)/python -m tests.bench.effects --scene 100000
 
-bench-optimise: $(VENV)/ready  ## 20 specifications of a crank-rocker against a 50 times larger search: writes docs/optimise-marks.md
+bench-optimise: $(VENV)/ready  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 15 minutes
 	$(BIN)/python -m tests.bench.optimise --out docs/optimise-marks.md
 
 clean:  ## remove results and the environment

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 LONGEST = 200  # letters of a value in a message
 
@@ -82,6 +83,23 @@ class TimeUsedUp(LinksweepError):
     """The time that the study allows is over; finished chunks are kept and the next run continues."""
 
     exit_code = 124
+
+
+class SearchCutShort(TimeUsedUp):
+    """The emergency brake has stopped the optimiser or the front; the folder holds what was found until then.
+
+    Parameters
+    ----------
+    folder : of the dataset
+    message : what was searched
+    """
+
+    def __init__(self, folder: Path, message: str) -> None:
+        self.folder = folder
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[type[SearchCutShort], tuple[Path, str]]:
+        return type(self), (self.folder, str(self))
 
 
 class Interrupted(LinksweepError):

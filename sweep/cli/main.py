@@ -77,9 +77,9 @@ def main() -> None:
     STUDY is a study.toml or the folder that holds one, FOLDER a dataset that `sweep run` left behind, FAMILY a name
     from `sweep families` or a chain of them such as rssr+guide.
 
-    Exit codes: 0 ok, 2 bad input, 3 over budget, 10 values changed, 11 rows changed, 12 slower (compare), 70 worker
-    died, 74 I/O or disk full, 75 folder locked, 124 time budget used up (run again to resume), 130 and 143 stopped by a
-    signal.
+    Exit codes: 0 ok, 2 bad input, 3 over budget, 4 no design within the limits (run), 10 values changed, 11 rows
+    changed, 12 slower (compare), 70 worker died, 74 I/O or disk full, 75 folder locked, 124 time budget used up (run
+    again to resume), 130 and 143 stopped by a signal.
     """
 
 

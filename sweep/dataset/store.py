@@ -225,9 +225,18 @@ def _front_is_complete(path: Path) -> bool:
     import pyarrow.parquet as pq
 
     try:
-        return path.is_file() and (pq.read_schema(path).metadata or {}).get(b"complete") == b"true"
+        about = (pq.read_schema(path).metadata or {}) if path.is_file() else {}
     except pa.ArrowException:
         return False
+    return about.get(b"complete") == b"true" or about.get(b"ended") == b"time"
+
+
+def front_cut_short(path: Path) -> str | None:
+    """``5 of 28`` steps of a front whose search time has cut short; None for a whole one, or where there is none."""
+    import pyarrow.parquet as pq
+
+    about = (pq.read_schema(path).metadata or {}) if path.is_file() else {}
+    return None if about.get(b"complete") != b"false" else about.get(b"steps", b"").decode() or None
 
 
 def load(folder: str | Path) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sweep.dataset import store
 from sweep.engine.log import circumstances, command
 from sweep.engine.opening import known_folder, open_plan, plan_note, refuse_or_clear_older
-from sweep.errors import Interrupted, StoreError, TimeUsedUp, WorkerDied
+from sweep.errors import Interrupted, SearchCutShort, StoreError, TimeUsedUp, WorkerDied
 from sweep.jobs.executors import Here, executor
 from sweep.jobs.signals import Stop, stop_on_signal
 
@@ -70,8 +70,8 @@ def run(
     BudgetError
         if the estimate exceeds the study's budget (3)
     WorkerDied, StoreError, LockedError, TimeUsedUp, Interrupted
-        worker killed (70), disk full or forbidden (74), folder in use (75), the budget's time over (124), signal (130,
-        143); finished chunks stay.
+        worker killed (70), disk full or forbidden (74), folder in use (75), the budget's time or that of the optimiser
+        over (124), signal (130, 143); finished chunks and what was found of the optimum stay.
     """
     executor(backend, jobs)  # refuses what there is not
     model = _model(study, smoke, accuracy, certify)
@@ -87,8 +87,9 @@ def run(
         try:
             computed = _sweep(model, folder, jobs, backend, force, progress)
             if model.optimise is not None:
-                _optimise(replace(model, pareto=None), folder, jobs)
+                _optimise(replace(model, pareto=None), folder, jobs, progress)
             _front(model, folder, jobs)
+            _raise_if_cut_short(folder)
         except Exception as error:
             if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
                 store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
@@ -203,24 +204,38 @@ def _raise_if_signalled(stop: Stop, folder: Path) -> None:
         raise Interrupted(stop.signal_number, text)
 
 
-def _optimise(study: Study, folder: Path, jobs: int) -> None:
-    """Run the optimiser unless its result for these very sources is there already."""
+def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
+    """Run the optimiser unless its result for these very sources is there already, whole."""
     from sweep.chunks.plan import optimiser_hash
-    from sweep.optimise import optimise_study
+    from sweep.jobs.progress import Progress
+    from sweep.optimise import optimise_study, read_survey
 
     note = store.read_plan(folder) or {}
     key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
-    if note.get("optimised") == key and (store.beside(folder) / store.OPTIMUM).is_file():
+    place = store.beside(folder) / store.OPTIMUM
+    found = read_survey(place)
+    if note.get("optimised") == key and place.is_file() and (found is None or found.ended != "time"):
         return
+    assert study.optimise is not None
     store.write_plan(folder, note | {"optimised": None})
-    with stop_on_signal() as stop:
+    with stop_on_signal() as stop, Progress("optimum", study.optimise.starts, 0, progress, unit="starts") as shown:
         try:
-            optimise_study(study, folder, lambda: bool(stop), jobs)
+            optimise_study(study, folder, lambda: bool(stop), jobs, lambda done, _: shown.advance(done - shown.done))
         except KeyboardInterrupt:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
             raise Interrupted(number, text) from None
     store.write_plan(folder, note | {"optimised": key})
+
+
+def _raise_if_cut_short(folder: Path) -> None:
+    """The optimum stands there, but the emergency brake has kept some starts from being searched."""
+    from sweep.optimise import read_survey
+
+    found = read_survey(store.beside(folder) / store.OPTIMUM)
+    if found is not None and found.ended == "time":
+        text = f"{folder}: {found.warnings[0]} searched; run again with a greater optimise.time_budget for all of them"
+        raise SearchCutShort(folder, text)
 
 
 def _front(study: Study, folder: Path, jobs: int) -> None:

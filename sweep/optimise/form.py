@@ -41,10 +41,14 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Label:
-    """What a row stands for: an output and its side, "objective", "minimum", "maximum" or "equal"."""
+    """What a row stands for: an output and its side, "objective", "minimum", "maximum" or "equal".
+
+    ``per`` turns the row's multiplier into one per relative change of the bound: the bound over the row's scale.
+    """
 
     name: str
     side: str
+    per: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -177,6 +181,12 @@ class Program:
         return found.from_inner(float(max(inner))) if inner else math.nan
 
 
+def _label(r: Requirement, side: str, bound: float, size: float) -> Label:
+    """Label of a limit's row; pressure angles and margins are measured by themselves, whatever the bound is."""
+    own = r.measure.inner == "pressure" or any(s.pressure for s in r.measure.series)
+    return Label(r.measure.name, side, 1.0 if own else abs(bound) / size)
+
+
 class _Layout:
     def __init__(self, curves: Curves, points: Points, design: Array, scalars: tuple[str, ...]) -> None:
         self.curves, self.points, self.scalars = curves, points, scalars
@@ -200,18 +210,42 @@ class _Layout:
         if r.equal and r.minimum is not None:
             for term, shift in self.lower(r.measure)[:1]:
                 size = self._size(r, r.minimum)
-                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, True, Label(r.measure.name, "equal"))
+                self.add(
+                    term,
+                    shift,
+                    1.0 / size,
+                    -r.minimum / size,
+                    0.0,
+                    True,
+                    _label(r, "equal", r.minimum, size),
+                )
             return bool(self.lower(r.measure))
         if r.minimum is not None:
             terms, size = self.lower(r.measure), self._size(r, r.minimum)
             found = found and bool(terms)
             for term, shift in terms:
-                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, False, Label(r.measure.name, "minimum"))
+                self.add(
+                    term,
+                    shift,
+                    1.0 / size,
+                    -r.minimum / size,
+                    0.0,
+                    False,
+                    _label(r, "minimum", r.minimum, size),
+                )
         if r.maximum is not None:
             terms, size = self.upper(r.measure), self._size(r, r.maximum)
             found = found and bool(terms)
             for term, shift in terms:
-                self.add(term, shift, -1.0 / size, r.maximum / size, 0.0, False, Label(r.measure.name, "maximum"))
+                self.add(
+                    term,
+                    shift,
+                    -1.0 / size,
+                    r.maximum / size,
+                    0.0,
+                    False,
+                    _label(r, "maximum", r.maximum, size),
+                )
         return found
 
     def upper(self, m: Measure) -> list[tuple[Term, float]]:

@@ -23,7 +23,12 @@ GRACE = 1.0  # for workers to hand back what they have once they are to stop [s]
 
 
 def in_processes(
-    problem: Problem, starts: Array, numbers: list[int], asked: Callable[[], bool], jobs: int
+    problem: Problem,
+    starts: Array,
+    numbers: list[int],
+    asked: Callable[[], bool],
+    jobs: int,
+    allowed: float = math.inf,
 ) -> list[Result]:
     """Results of the starts ``numbers`` that were begun before ``asked`` became true, in their order.
 
@@ -35,6 +40,7 @@ def in_processes(
     numbers : which of the starts
     asked : looked at in this process; workers learn of it by a file, and those that do not answer soon are ended
     jobs : how many workers
+    allowed : looks at designs that each start may take
 
     Raises
     ------
@@ -56,7 +62,8 @@ def in_processes(
                 while todo and len(waiting) <= workers:
                     number = todo.pop()
                     with unheard():
-                        begun.append(executor.submit(_task, number, problem, starts[number], flag, os.getpid()))
+                        task = _task, number, problem, starts[number], flag, os.getpid(), allowed
+                        begun.append(executor.submit(*task))
                     waiting.add(begun[-1])
                 waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED).not_done
                 if not flag.exists() and asked():
@@ -73,8 +80,8 @@ def in_processes(
     return [result for result in found if result is not None]
 
 
-def _task(number: int, problem: Problem, start: Array, flag: Path, parent: int) -> Result | None:
+def _task(number: int, problem: Problem, start: Array, flag: Path, parent: int, allowed: float) -> Result | None:
     if os.getpid() != parent:
         depend_on_parent(parent)
     # A parent that was killed leaves no folder to look into, but then this process ends as well.
-    return None if flag.exists() else search(number, problem, start, flag.exists)
+    return None if flag.exists() else search(number, problem, start, flag.exists, allowed)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from sweep.dataset import store
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
+from sweep.optimise import Survey, read_survey
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +27,8 @@ class Dataset:
 
     ``units`` and ``definitions`` come from the field metadata of the Parquet files; ``best`` is the best row of the
     sweep once it has been read, None if no design is feasible; ``computed_reference`` the reference where no optimiser
-    has left it in the folder.
+    has left it in the folder.  ``survey`` is what the starts tell of the search; ``front_steps`` says how far the front
+    came that time has cut short.
     """
 
     folder: Path
@@ -39,6 +41,8 @@ class Dataset:
     curves: pd.DataFrame | None
     front: pd.DataFrame | None
     runs: tuple[dict[str, Any], ...]
+    survey: Survey | None = None
+    front_steps: str | None = None
     best: Row | None = None
     computed_reference: Row | None = None
 
@@ -152,6 +156,8 @@ def read_dataset(folder: Path) -> Dataset:
         curves=store.read_table(curves) if curves.exists() else None,
         front=store.read_table(front) if front.exists() else None,
         runs=tuple(store.read_runs(folder)),
+        survey=read_survey(optima),
+        front_steps=store.front_cut_short(front),
     )
 
 

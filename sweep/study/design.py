@@ -79,10 +79,11 @@ def read_space(
     return DesignSpace(names, axes, fixed, "sobol", sample.n or 0, sample.seed)
 
 
-def check_varied(family: Family, space: DesignSpace, faults: Faults) -> None:
-    """Report a space in which [optimise] finds nothing to vary: signs do not change steadily."""
+def check_varied(family: Family, space: DesignSpace, raw: Mapping[str, Any], faults: Faults) -> None:
+    """Report a space in which [optimise] finds nothing to vary: signs and listed values do not change steadily."""
     signs = [p.name for p in family.parameters if p.choices is not None]
-    if not any(axis.low < axis.high and axis.name not in signs for axis in space.axes):
+    lists = [name for name, entry in raw.items() if isinstance(entry, dict) and "values" in entry]
+    if not any(axis.low < axis.high and axis.name not in (*signs, *lists) for axis in space.axes):
         faults.value(("optimise",), "no swept parameter", "a study with a length, angle or number that is swept")
 
 
