@@ -17,14 +17,14 @@ from tests.test_optimise_study import STUDY
 def run(folder: Path, text: str) -> tuple[int, str]:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "study.toml").write_text(text)
-    found = CliRunner().invoke(main, ["run", str(folder), "--out", str(folder / "out"), "--jobs", "1"])
+    found = CliRunner().invoke(main, ["run", str(folder), "--out", str(folder / "designs"), "--jobs", "1"])
     return found.exit_code, found.output
 
 
 def test_answer_names_the_optimum_what_holds_it_back_and_the_next_command(tmp_path: Path) -> None:
     code, text = run(tmp_path, STUDY.format(swing=40))
     assert code == 0
-    best = pq.read_table(tmp_path / "out" / "_optimum.parquet").to_pydict()
+    best = pq.read_table(tmp_path / "_optimum.parquet").to_pydict()
     assert "small: 4096 designs, " in text and " within all limits, the best with largest acceleration " in text
     assert f"optimum: largest acceleration {best['max_abs_d2psi'][0]:.5g} rad/rad²" in text
     assert "held back by: " in text and "swing (at least 40°)" in text
@@ -36,7 +36,7 @@ def test_no_feasible_design_ends_with_4_and_says_which_limit_gives_way(tmp_path:
     code, text = run(tmp_path, STUDY.format(swing=150))
     assert code == 4
     assert "no design keeps all limits" in text and "must give way by" in text
-    best = pq.read_table(tmp_path / "out" / "_optimum.parquet").to_pydict()
+    best = pq.read_table(tmp_path / "_optimum.parquet").to_pydict()
     assert best["status"][0] == 5
     page = write_report(tmp_path / "out", tmp_path / "report").read_text(encoding="utf-8")
     assert "No design was found that keeps all limits" in page
@@ -55,7 +55,7 @@ def test_brake_is_told_everywhere_and_the_next_run_searches_again(tmp_path: Path
     assert code == 124
     words = "time ran out: 0 of 30 starts"
     assert f"warning: {words}" in text
-    about = pq.read_schema(tmp_path / "out" / "_optimum.parquet").metadata
+    about = pq.read_schema(tmp_path / "_optimum.parquet").metadata
     assert words in about[b"summary"].decode() and json.loads(about[b"search"])["ended"] == "time"
     page = write_report(tmp_path / "out", tmp_path / "report").read_text(encoding="utf-8")
     assert words in page.replace("T", "t")
@@ -71,7 +71,7 @@ def test_front_cut_short_ends_with_124_and_goes_on(tmp_path: Path) -> None:
     assert "Time ran out: " in page
     code, text = run(tmp_path, STUDY.format(swing=40) + table)
     assert code == 0
-    assert pq.read_schema(tmp_path / "out" / "_pareto.parquet").metadata[b"complete"] == b"true"
+    assert pq.read_schema(tmp_path / "_pareto.parquet").metadata[b"complete"] == b"true"
 
 
 @pytest.mark.parametrize("unseen", ["0 %", "100 %", "2", "2 mm"])
