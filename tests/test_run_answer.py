@@ -29,7 +29,7 @@ def test_answer_names_the_optimum_what_holds_it_back_and_the_next_command(tmp_pa
     assert f"optimum: largest acceleration {best['max_abs_d2psi'][0]:.5g} rad/rad²" in text
     assert "held back by: " in text and "swing (at least 40°)" in text
     assert "search: 3 starts, " in text and "estimated unseen" in text
-    assert f"next: sweep report {tmp_path / 'out'}" in text
+    assert f"next: sweep report {tmp_path / "designs"}" in text
 
 
 def test_no_feasible_design_ends_with_4_and_says_which_limit_gives_way(tmp_path: Path) -> None:
@@ -38,7 +38,7 @@ def test_no_feasible_design_ends_with_4_and_says_which_limit_gives_way(tmp_path:
     assert "no design keeps all limits" in text and "must give way by" in text
     best = pq.read_table(tmp_path / "_optimum.parquet").to_pydict()
     assert best["status"][0] == 5
-    page = write_report(tmp_path / "out", tmp_path / "report").read_text(encoding="utf-8")
+    page = write_report(tmp_path / "designs", tmp_path / "report").read_text(encoding="utf-8")
     assert "No design was found that keeps all limits" in page
 
 
@@ -57,7 +57,7 @@ def test_brake_is_told_everywhere_and_the_next_run_searches_again(tmp_path: Path
     assert f"warning: {words}" in text
     about = pq.read_schema(tmp_path / "_optimum.parquet").metadata
     assert words in about[b"summary"].decode() and json.loads(about[b"search"])["ended"] == "time"
-    page = write_report(tmp_path / "out", tmp_path / "report").read_text(encoding="utf-8")
+    page = write_report(tmp_path / "designs", tmp_path / "report").read_text(encoding="utf-8")
     assert words in page.replace("T", "t")
     code, text = run(tmp_path, STUDY.format(swing=40).replace("starts = 3\n", "starts = 30\n"))
     assert code == 0 and "time ran out" not in text
@@ -67,7 +67,7 @@ def test_front_cut_short_ends_with_124_and_goes_on(tmp_path: Path) -> None:
     table = '[pareto]\noutput = "max_pressure_angle"\nat_most = { from = 30, to = 50, count = 3, unit = "deg" }\n'
     code, text = run(tmp_path, STUDY.format(swing=40) + table + 'time_budget = "0.001 s"\n')
     assert code == 124 and "steps of the front" in text
-    page = write_report(tmp_path / "out", tmp_path / "report").read_text(encoding="utf-8")
+    page = write_report(tmp_path / "designs", tmp_path / "report").read_text(encoding="utf-8")
     assert "Time ran out: " in page
     code, text = run(tmp_path, STUDY.format(swing=40) + table)
     assert code == 0
