@@ -41,6 +41,7 @@ def _in_triad(r: Reduced, a: Vector, lift: float) -> Vector:
 @inline
 def _seen_from_carrier(r: Reduced, carrier: Swung, path: Path) -> Path:
     """The driving ball in the looper's frame, which the carrier takes along, (3)."""
+    # turned back by the carrier's angle: minus the sine and minus all derivatives
     m, m1, m2, m3 = rotated(carrier.cos, -carrier.sin, -carrier.first, -carrier.second, -carrier.third, path)
     return _in_triad(r, m, r.along), _in_triad(r, m1, 0.0), _in_triad(r, m2, 0.0), _in_triad(r, m3, 0.0)
 
@@ -49,6 +50,7 @@ def _seen_from_carrier(r: Reduced, carrier: Swung, path: Path) -> Path:
 def _carried(r: Reduced, carrier: Swung, looper: Swung, fixed: Vector) -> Path:
     """A point fixed to the looper, from Os in fixed axes, with its derivatives, (5)."""
     none = (0.0 * fixed[0], 0.0 * fixed[0], 0.0 * fixed[0])
+    # the point rests in the looper: its derivatives there are zeros of the design's own type
     path = (fixed, none, none, none)
     m, m1, m2, m3 = rotated(looper.cos, looper.sin, looper.first, looper.second, looper.third, path)
     path = (
