@@ -15,7 +15,7 @@ from kernels._jit import inline, kernel
 
 Array = NDArray[np.float64]
 
-NOTHING = 1e-14
+NOTHING = 1e-14  # share of the largest coefficient that the rotations' drift leaves in the others
 
 
 @kernel
@@ -37,6 +37,7 @@ def coefficients(values: Array, turn: Array, cosines: Array, sines: Array) -> No
             cosines[k] += value * c
             sines[k] += value * s
             turn[0, k], turn[1, k] = c * turn[2, k] - s * turn[3, k], s * turn[2, k] + c * turn[3, k]
+    # the mean has half the factor of the harmonics
     cosines[0] *= 0.5
 
 
@@ -59,6 +60,7 @@ def series(cosines: Array, sines: Array, phi: float) -> tuple[float, float]:
     """Value and derivative at any angle of the function with these coefficients."""
     value, slope = cosines[0], 0.0
     step_c, step_s = math.cos(phi), math.sin(phi)
+    # the multiples by rotation: two calls of the library for all harmonics
     c, s = step_c, step_s
     for k in range(1, cosines.size):
         value += cosines[k] * c + sines[k] * s
@@ -86,5 +88,6 @@ def tail(cosines: Array, sines: Array, size: float) -> float:
     for k in range(cosines.size):
         largest = max(largest, math.hypot(cosines[k], sines[k]))
     last = cosines.size - 1
+    # two of them: of a function with symmetry every other harmonic is zero
     highest = math.hypot(cosines[last], sines[last]) + math.hypot(cosines[last - 1], sines[last - 1])
     return highest / largest if largest > 0.0 else 0.0

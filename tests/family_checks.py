@@ -53,10 +53,15 @@ def factors(name, design, phi, expected, got):
 
 
 def of_kernel(function, designs, phi, shapes, dtype):
-    """Status and outputs of a kernel of poses; ``shapes`` are those of its outputs before (n, m)."""
+    """Status and outputs of a kernel of poses; ``shapes`` are those of its outputs before (n, m), or a record."""
     shape = (len(designs), phi.shape[1])
     status = np.empty(shape, np.uint8)
-    rooms = [np.empty((*front, *shape), dtype) for front in shapes]
+    rooms = [
+        front(*np.empty((len(front._fields), *shape), dtype))
+        if isinstance(front, type)
+        else np.empty((*front, *shape), dtype)
+        for front in shapes
+    ]
     function(designs.astype(dtype), np.cos(phi), np.sin(phi), status, *rooms)
     return [status, *rooms]
 

@@ -181,7 +181,7 @@ def test_five_link_kernel_jitted_equals_plain_python():
     designs = np.column_stack([links, np.ones(12), np.ones(12)])
     results = []
     for function in (five_link.poses, five_link.poses.py_func):
-        out, places = [np.empty((12, 12)) for _ in range(10)], np.empty((9, 12, 12))
+        out, places = [np.empty((12, 12)) for _ in range(8)], np.empty((11, 12, 12))
         status = np.empty((12, 12), np.uint8)
         function(designs, np.cos(phi)[None, :], np.sin(phi)[None, :], status, *out, places)
         results.append([status, *out, places])

@@ -35,6 +35,7 @@ def thread_radius(count: float, density: float) -> float:
 @inline
 def growth(x: float) -> float:
     """(e^x - 1)/x, 1 at x = 0; relative error of some roundings for every x."""
+    # expm1: e^x - 1 as it stands has no correct digit left where x is a rounding error of 1
     return math.expm1(x) / x if x != 0.0 else 1.0
 
 
@@ -68,9 +69,11 @@ def thread_contour(
     """
     for i in range(before.shape[0]):
         r, alpha, beta, stiff = data[i, 0], data[i, 1], data[i, 2], data[i, 3]
+        # written so that a nan fails every comparison
         valid = r >= 0.0 and alpha >= 0.0 and beta >= 0.0 and stiff >= 0.0 and data[i, 4] > 0.0 and data[i, 5] > 0.0
         thick = thread_radius(data[i, 4], data[i, 5]) if valid else math.nan
         curvature = 1.0 / (r + thick)
+        # one factor after the other: the square of a large curvature may overflow where the product does not
         pressed = stiff * curvature * curvature
         for j in range(before.shape[1]):
             t1, angle = before[i, j], theta[i, j]
@@ -78,6 +81,7 @@ def thread_contour(
             more = math.expm1(x)
             euler, bent, stuck = t1 * math.exp(x), pressed * more, alpha * r * angle * growth(x)
             t2 = euler + bent + stuck
+            # the sum of positive parts is finite only if each of them is: one test serves all outputs
             if status[i, j] == st.OK and not (valid and t1 >= 0.0 and angle >= 0.0 and math.isfinite(t2)):
                 status[i, j] = st.INVALID_INPUT
             good = 1.0 if status[i, j] == st.OK else math.nan
@@ -96,6 +100,7 @@ def thread_contour(
 @inline
 def least_radius(alpha: float, beta: float, stiff: float, thick: float) -> float:
     """Radius of least tension, (2 B beta/alpha)^(1/3) - r, not below 0; inf without adhesion; (4)."""
+    # no adhesion: the tension falls with R without end, or does not depend on it
     if alpha == 0.0:
         return math.inf if stiff * beta > 0.0 else math.nan
     return max(math.pow(2.0 * stiff * beta / alpha, 1.0 / 3.0) - thick, 0.0)

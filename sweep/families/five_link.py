@@ -30,6 +30,9 @@ VALUE_OUTPUTS = (
     Output("cos_psi", "1", "cosine of the rocker angle", "(1)"),
     Output("discriminant", "length^4", "(2 b c)^2 cos^2(pressure angle); negative where the links do not reach", "(7)"),
     Output("pressure_angle", "rad", "between the force through the rocker ball and its velocity", "(6)"),
+)
+
+PLACE_OUTPUTS = (
     Output(
         "theta",
         "rad",
@@ -38,9 +41,6 @@ VALUE_OUTPUTS = (
         wraps=True,
     ),
     Output("beta", "rad", "angle of the coupler against the crank plane, in (-pi/2, pi/2)", "(8)"),
-)
-
-JOINT_OUTPUTS = (
     Output("x_b", "length", "crank pin, along the common perpendicular of the axes", "(9)"),
     Output("y_b", "length", "crank pin, across it and the rocker axis", "(9)"),
     Output("z_b", "length", "crank pin, along the rocker axis", "(9)"),
@@ -53,12 +53,12 @@ JOINT_OUTPUTS = (
 )
 
 _VALUES = tuple(o.name for o in VALUE_OUTPUTS)
-_JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
+_PLACES = tuple(o.name for o in PLACE_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_with_places(five_link.poses, designs, angles, _VALUES, _JOINTS, wanted)
+    return filled_with_places(five_link.poses, designs, angles, _VALUES, _PLACES, wanted)
 
 
 FAMILY = Family(
@@ -66,7 +66,7 @@ FAMILY = Family(
     title="five-link with two revolutes at the crank pin",
     parameters=PARAMETERS,
     position="psi",
-    pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
+    pose_outputs=VALUE_OUTPUTS + PLACE_OUTPUTS,
     poses=poses,
     example={"a": 1.0, "b": 3.9, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "h": 0.3, "s2": 0.1},
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.families import guided_cam
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
 from sweep.families.capabilities import Points
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
@@ -21,7 +21,7 @@ PARAMETERS = (
     *(Parameter(f"B{k}", "length", f"coefficient of sin({k} phi) in P", default=0.0) for k in _ORDERS),
 )
 
-POSE_OUTPUTS = (
+VALUE_OUTPUTS = (
     Output("P", "length", "thread taken up", "(9)"),
     Output("dP", "length", "thread taken up per radian, dP/dphi", "(9)"),
     Output("d2P", "length", "second derivative of the thread taken up", "(9)"),
@@ -30,10 +30,13 @@ POSE_OUTPUTS = (
     Output("dS", "length", "velocity analogue of the follower", "(11)"),
     Output("d2S", "length", "acceleration analogue of the follower", "(12)"),
     Output("pressure_angle", "rad", "between the normal of the profile and the way of the follower", "(15)"),
+)
+
+PROFILE_OUTPUTS = (
     Output("X_P", "length", "profile of the cam in its own axes, along its zero", "(17)"),
     Output("Y_P", "length", "profile of the cam in its own axes, across its zero", "(17)"),
-    Output("curvature", "1/length", "curvature of the profile, positive where it is convex", "(17)"),
 )
+CURVATURE = Output("curvature", "1/length", "curvature of the profile, positive where it is convex", "(17)")
 
 DESIGN_OUTPUTS = (
     Output("least_radius", "length", "least R0 at which the follower nowhere jams in its guide", "(16)"),
@@ -41,15 +44,14 @@ DESIGN_OUTPUTS = (
     Output("jam_angle", "rad", "pressure angle at which the follower jams", "(13)"),
     Output("least_displacement", "length", "least displacement of the follower over the turn", "(10)"),
 )
-_NAMES = tuple(o.name for o in POSE_OUTPUTS)
+_VALUES = tuple(o.name for o in (*VALUE_OUTPUTS, CURVATURE))
+_PROFILE = tuple(o.name for o in PROFILE_OUTPUTS)
 ROUNDING = 2.0**-53
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its cam angles, each (n, m)."""
-    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-    dtype = np.result_type(designs, angles.cos)
-    return filled(guided_cam.poses, (designs, angles.cos, angles.sin), _NAMES, wanted, status, dtype)
+    return filled_with_places(guided_cam.poses, designs, angles, _VALUES, _PROFILE, wanted)
 
 
 def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -74,7 +76,7 @@ FAMILY = Family(
     title="thread take-up by a cam with a guided follower",
     parameters=PARAMETERS,
     position="S",
-    pose_outputs=POSE_OUTPUTS,
+    pose_outputs=(*VALUE_OUTPUTS, *PROFILE_OUTPUTS, CURVATURE),
     poses=poses,
     steps=(Step("size", DESIGN_OUTPUTS, size, 40_000.0),),
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from kernels.families import slotted
@@ -53,7 +56,13 @@ _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_with_places(slotted.poses, designs, angles, _VALUES, _JOINTS, wanted)
+    return filled_with_places(_with_slide, designs, angles, _VALUES, _JOINTS, wanted)
+
+
+def _with_slide(*given: Any) -> None:
+    """Call the kernel with rho and its derivatives in one record; they follow its six outputs of the angle."""
+    kernel: Callable[..., None] = slotted.poses
+    kernel(*given[:10], slotted.Slide(*given[10:14]), *given[14:])
 
 
 def unit(designs: Array) -> Array:

@@ -16,6 +16,7 @@ from kernels.families.backrest.roots import MOST, all_roots
 @inline
 def _by_law(d: Array, rho: float) -> tuple[Any, bool]:
     """Bracket angle of the let-off regulator, linear in 1/rho; (13)."""
+    # constant angle: then the radii of the full and the empty beam need not be given
     if d[25].real == 0.0:
         return d[24] + 0.0 * d[25], True
     full, empty = d[26], d[27]
@@ -34,6 +35,7 @@ def _by_root(d: Array, plain: Array, rho: float, mode: int, roots: Array) -> tup
     if not 0 <= which < count:
         return math.nan * d[24], count, st.NO_ROOT
     phi = roots[which]
+    # the slope by a complex step, which has no difference to cancel
     slope = residual(plain, complex(phi, 1e-100), rho, mode)[0].imag * 1e100
     value, _ = residual(d, phi + 0.0 * d[24], rho, mode)
     step = value / slope
@@ -82,7 +84,7 @@ def poses(
             good, code, count = valid and 0.0 < radius < 1e140, st.OK, 1
             if mode == Mode.LAW:
                 phi, ordered = _by_law(d, radius)
-                good = good and ordered and (0.0 * phi).real == 0.0
+                good = good and ordered and (0.0 * phi).real == 0.0  # false for inf and nan
             elif good:
                 phi, count, code = _by_root(d, flat, radius, mode, roots)
             else:
@@ -90,6 +92,7 @@ def poses(
             at = place(d, phi, radius)
             code = _code(good, at, code)
             status[i, j] = code
+            # once more with nan, so that whatever follows is nan without a branch for each output
             if code != st.OK:
                 phi = math.nan * phi
                 at = place(d, phi, radius)

@@ -10,7 +10,7 @@ from kernels.families.backrest.closure import EPS, Array, residual
 
 CELLS = 400
 MOST = 8
-_MOST_STEPS = 200
+_MOST_STEPS = 200  # a bound, so that the loops always end; halving takes some 60
 
 
 @inline
@@ -18,6 +18,7 @@ def _edge(d: Array, good: float, bad: float, rho: float, mode: int) -> float:
     """Last angle from ``good`` towards ``bad`` at which the equation is defined."""
     for _ in range(_MOST_STEPS):
         middle = 0.5 * (good + bad)
+        # no number lies between: the edge is known to the last bit
         if middle in (good, bad):
             break
         _, defined = residual(d, middle, rho, mode)
@@ -41,14 +42,17 @@ def _bracketed(d: Array, a: float, fa: float, b: float, fb: float, rho: float, m
             c, b, fc, fb = b, a, fb, fa
         a, fa = x, fx
         best = a if abs(fa) < abs(fb) else b
+        # the small constant: at the root phi = 0 a share of it would never be reached
         room = 2.0 * EPS * abs(best) + 1e-300
         if fa == 0.0 or abs(b - a) <= 2.0 * room:
             return best
         xi, ratio = (a - b) / (c - b), (fa - fb) / (fc - fb)
+        # the inverse parabola is monotonic in the bracket only under this condition; else halve
         if ratio * ratio < xi and (1.0 - ratio) * (1.0 - ratio) < 1.0 - xi:
             t = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
         else:
             t = 0.5
+        # at least the tolerance away from both ends, so that the bracket closes from both sides
         least = room / abs(b - a)
         t = min(max(t, least), 1.0 - least)
     return a if abs(fa) < abs(fb) else b
@@ -57,7 +61,7 @@ def _bracketed(d: Array, a: float, fa: float, b: float, fb: float, rho: float, m
 @inline
 def _dip(d: Array, low: float, high: float, sign: float, rho: float, mode: int) -> tuple[float, float]:
     """Where sign * residual is least between two angles: golden sections, stopped once it is below zero."""
-    share = 0.3819660112501051
+    share = 0.3819660112501051  # (3 - sqrt(5))/2: one new value per step serves the next one too
     x, y = low + share * (high - low), high - share * (high - low)
     fx, fy = sign * residual(d, x, rho, mode)[0], sign * residual(d, y, rho, mode)[0]
     for _ in range(80):
@@ -76,6 +80,7 @@ def _dip(d: Array, low: float, high: float, sign: float, rho: float, mode: int) 
 
 @inline
 def _kept(roots: Any, count: int, root: float) -> int:
+    # a dip that just touches zero gives the same root from both of its sides
     if count < MOST and (count == 0 or root != roots[count - 1]):
         roots[count] = root
         return count + 1
@@ -99,6 +104,7 @@ def all_roots(d: Array, rho: float, mode: int, roots: Array) -> int:
         x2 = high if k == CELLS - 1 else low + (k + 1) * step
         f2, ok2 = residual(d, x2, rho, mode)
         left, f_left, right, f_right = x1, f1, x2, f2
+        # towards the edge the residual may still change its sign: the part up to it is a cell of its own
         if ok1 and not ok2:
             right = _edge(d, x1, x2, rho, mode)
             f_right, _ = residual(d, right, rho, mode)

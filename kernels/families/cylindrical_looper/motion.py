@@ -9,10 +9,10 @@ import numpy as np
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.complex_step import arctan2, magnitude
-from kernels.driven_ball import EPS, Path, rotated, swing
+from kernels.complex_step import magnitude
+from kernels.driven_ball import EPS, Path, Swung, rotated, swing
 from kernels.families.cylindrical_looper.closure import Numbers, Reduced, Status, reduce_design
-from kernels.vectors import dot
+from kernels.looper_outputs import put_angle, put_loop, put_point
 
 
 class Slide(NamedTuple):
@@ -126,56 +126,66 @@ def poses(
                 or magnitudes is not None or joints is not None
             ):  # fmt: skip
                 slide_counts, shaft_counts = True, True
-            code = st.OK if r.valid else st.INVALID_INPUT
-            if code == st.OK and slide_counts:
-                code = two.status
-            if code == st.OK and shaft_counts:
-                code = one.status
-            status[i, j] = code
+            status[i, j] = _code(r.valid, slide_counts, two.status, shaft_counts, one.status)
             undefined = 0.0 if r.valid else math.nan
             scale = r.unit + undefined
-            if shaft is not None:
-                shaft[0, i, j] = arctan2(one.sin + undefined, one.cos)
-                shaft[1, i, j] = one.first + undefined
-                shaft[2, i, j] = one.second + undefined
-                shaft[3, i, j] = one.third + undefined
-            if slide is not None:
-                slide[0, i, j] = two.s * scale
-                slide[1, i, j] = two.first * scale
-                slide[2, i, j] = two.second * scale
-                slide[3, i, j] = two.third * scale
-            # arctangent, not acos: acos loses half the digits near zero.
+            put_angle(shaft, i, j, one, undefined)
+            _put_slide(slide, i, j, two, scale)
             if shaft_loop is not None:
-                shaft_loop[0, i, j] = (one.delta * r.unit) * r.unit + undefined
-                shaft_loop[1, i, j] = arctan2(np.sqrt(one.across) + undefined, magnitude(one.root))
+                put_loop(shaft_loop, i, j, one.delta, magnitude(one.root), one.across, r.unit, undefined)
             if slide_loop is not None:
-                slide_loop[0, i, j] = (two.delta * r.unit) * r.unit + undefined
-                slide_loop[1, i, j] = arctan2(np.sqrt(two.across) + undefined, two.root)
-            along = (
-                (r.point[0], r.point[1], r.point[2] + two.s),
-                (0.0 * r.e1, 0.0 * r.e1, two.first),
-                (0.0 * r.e1, 0.0 * r.e1, two.second),
-                (0.0 * r.e1, 0.0 * r.e1, two.third),
-            )
-            p, p1, p2, p3 = rotated(one.cos, one.sin, one.first, one.second, one.third, along)
+                put_loop(slide_loop, i, j, two.delta, two.root, two.across, r.unit, undefined)
             foot = (r.e1, 0.0 * r.e1, r.g1)
-            for k in range(3):
-                if point is not None:
-                    point[k, i, j] = (foot[k] + p[k]) * scale
-                if velocity is not None:
-                    velocity[k, i, j] = p1[k] * scale
-                if acceleration is not None:
-                    acceleration[k, i, j] = p2[k] * scale
-                if jerk is not None:
-                    jerk[k, i, j] = p3[k] * scale
-            if magnitudes is not None:
-                magnitudes[0, i, j] = np.sqrt(dot(p1, p1)) * scale
-                magnitudes[1, i, j] = np.sqrt(dot(p2, p2)) * scale
-                magnitudes[2, i, j] = np.sqrt(dot(p3, p3)) * scale
+            path = _carried(r, one, two)
+            put_point(point, velocity, acceleration, jerk, magnitudes, i, j, foot, path, scale)
             if joints is not None:
-                pin = (first[0][0] + r.e1, first[0][1], r.lift - r.a1 * (r.sa * v))
-                lift = r.g1 + two.s if r.slides == 1.0 else r.g1 + 0.0 * r.e1
-                ball = (r.e1 + r.c1 * one.cos, r.c1 * one.sin, lift)
-                for k in range(3):
-                    joints[k, i, j] = pin[k] * scale
-                    joints[3 + k, i, j] = ball[k] * scale
+                _put_joints(joints, i, j, r, first, one, two, v, scale)
+
+
+@inline
+def _code(valid: bool, slide_counts: bool, of_slide: int, shaft_counts: bool, of_shaft: int) -> int:
+    """Status of the first loop that counts and is not OK."""
+    if not valid:
+        return st.INVALID_INPUT
+    # the slider-crank first: the crank-rocker's driving ball may hang on it
+    if slide_counts and of_slide != st.OK:
+        return of_slide
+    return of_shaft if shaft_counts else st.OK
+
+
+@inline
+def _put_slide(slide: Numbers | None, i: int, j: int, two: Slide, scale: Any) -> None:
+    """Write place of the shaft along its axis and its three derivatives [length]."""
+    if slide is not None:
+        slide[0, i, j] = two.s * scale
+        slide[1, i, j] = two.first * scale
+        slide[2, i, j] = two.second * scale
+        slide[3, i, j] = two.third * scale
+
+
+@inline
+def _carried(r: Reduced, one: Swung, two: Slide) -> Path:
+    """The working point from the shaft's foot: fixed to the shaft, which turns and slides, (4)."""
+    # zeros of the design's own kind: complex where the design is, or the tuples would mix two types
+    none = 0.0 * r.e1
+    along = (
+        (r.point[0], r.point[1], r.point[2] + two.s),
+        (none, none, two.first),
+        (none, none, two.second),
+        (none, none, two.third),
+    )
+    return rotated(one.cos, one.sin, one.first, one.second, one.third, along)
+
+
+@inline
+def _put_joints(
+    joints: Numbers, i: int, j: int, r: Reduced, first: Path, one: Swung, two: Slide, v: float, scale: Any
+) -> None:
+    """Write x y z of crank pin 1 and of the rocker's ball [length]."""
+    # not from the path's own z, which the slide has been taken off
+    pin = (first[0][0] + r.e1, first[0][1], r.lift - r.a1 * (r.sa * v))
+    lift = r.g1 + two.s if r.slides == 1.0 else r.g1 + 0.0 * r.e1
+    ball = (r.e1 + r.c1 * one.cos, r.c1 * one.sin, lift)
+    for k in range(3):
+        joints[k, i, j] = pin[k] * scale
+        joints[3 + k, i, j] = ball[k] * scale

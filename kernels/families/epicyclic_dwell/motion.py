@@ -92,6 +92,7 @@ def poses(
             code = st.OK
             if not valid or square.real != square.real:
                 code = st.INVALID_INPUT
+            # within its rounding error: the direction of the pin is then arbitrary
             elif square.real <= (8.0 * EPS * arm * size) ** 2:
                 code = st.SINGULAR
             status[i, j] = code
@@ -110,19 +111,42 @@ def poses(
                 if cos_psi is not None:
                     cos_psi[i, j] = x / distance
             if dpsi is not None or d2psi is not None or d3psi is not None:
-                per = 1.0 / square
                 # z' = i (L e^{i phi} + m L p), m = mesh: the pin's vector turns with m L
-                f = mesh * arm
-                x1, y1 = -arm * v - f * ps, arm * u + f * pc
-                r1, t1 = (x * x1 + y * y1) * per, (x * y1 - y * x1) * per
-                if dpsi is not None:
-                    dpsi[i, j] = t1
-                if d2psi is not None or d3psi is not None:
-                    x2, y2 = -arm * u - f * f * pc, -arm * v - f * f * ps
-                    r2, t2 = (x * x2 + y * y2) * per, (x * y2 - y * x2) * per
-                    if d2psi is not None:
-                        d2psi[i, j] = t2 - 2.0 * r1 * t1
-                    if d3psi is not None:
-                        x3, y3 = arm * v + f * f * f * ps, -arm * u - f * f * f * pc
-                        t3 = (x * y3 - y * x3) * per
-                        d3psi[i, j] = t3 - 3.0 * (r2 * t1 + t2 * r1) + 2.0 * (3.0 * r1 * r1 - t1 * t1) * t1
+                _put_derivatives(dpsi, d2psi, d3psi, i, j, (x, y, square), (arm * u, arm * v), (pc, ps), mesh * arm)
+
+
+@inline
+def _put_derivatives(
+    dpsi: Numbers | None,
+    d2psi: Numbers | None,
+    d3psi: Numbers | None,
+    i: int,
+    j: int,
+    pin: tuple[Any, Any, Any],
+    carrier: tuple[Any, Any],
+    turning: tuple[Any, Any],
+    f: float,
+) -> None:
+    """Write the wanted derivatives of the output angle, (3).
+
+    ``pin`` is the pin from the output axis with the square of its distance, ``carrier`` the planet's centre from the
+    carrier's axis, ``turning`` the pin from that centre, which turns ``f`` times as fast.
+    """
+    x, y, square = pin
+    au, av = carrier
+    pc, ps = turning
+    # z^(k) / z = r_k + i t_k; the imaginary part of the logarithm's derivatives is that of the angle
+    per = 1.0 / square
+    x1, y1 = -av - f * ps, au + f * pc
+    r1, t1 = (x * x1 + y * y1) * per, (x * y1 - y * x1) * per
+    if dpsi is not None:
+        dpsi[i, j] = t1
+    if d2psi is not None or d3psi is not None:
+        x2, y2 = -au - f * f * pc, -av - f * f * ps
+        r2, t2 = (x * x2 + y * y2) * per, (x * y2 - y * x2) * per
+        if d2psi is not None:
+            d2psi[i, j] = t2 - 2.0 * r1 * t1
+        if d3psi is not None:
+            x3, y3 = av + f * f * f * ps, -au - f * f * f * pc
+            t3 = (x * y3 - y * x3) * per
+            d3psi[i, j] = t3 - 3.0 * (r2 * t1 + t2 * r1) + 2.0 * (3.0 * r1 * r1 - t1 * t1) * t1

@@ -80,6 +80,7 @@ def on_circle(r: Reduced, c: float, s: float) -> Vector:
 @inline
 def eyelet(r: Reduced, u: float, v: float) -> tuple[Vector, Vector, Vector]:
     """Eyelet, its first and second derivative, for u = cos(phi), v = sin(phi); (5)."""
+    # the angle phi_h + phi by the addition theorem: cosine and sine of phi_h are taken once per design
     c, s = r.cos_h * u - r.sin_h * v, r.sin_h * u + r.cos_h * v
     x, y, z = on_circle(r, c, s)
     place = (r.centre[0] + x, r.centre[1] + y, r.centre[2] + z)
@@ -121,11 +122,13 @@ def poses(
         for j in range(cos_phi.shape[1]):
             place, first, second = eyelet(r, cos_phi[row, j], sin_phi[row, j])
             d1, d2 = sub(place, r.n1), sub(place, r.n2)
+            # On a guide the direction of a branch is undefined, and so is every derivative.
             near, far = dot(d1, d1).real, dot(d2, d2).real
             code = st.OK if near > 0.0 and far > 0.0 else st.SINGULAR
             if not r.valid or not math.isfinite(near + far):
                 code = st.INVALID_INPUT
             status[i, j] = code
+            # a factor, not a branch for each output: nan times anything is nan
             good = 1.0 if code == st.OK else math.nan
             if P is not None:
                 P[i, j] = good * (length(place, r.n1, r.n2) - r.store) * r.unit

@@ -13,7 +13,7 @@ from kernels.families.feed.motion import tooth_at
 
 SAMPLES = 256
 TWO_PI = 2.0 * math.pi
-_MOST_STEPS = 100
+_MOST_STEPS = 100  # a bound, so that the loop always ends
 _PANELS = 16
 # Gauss-Legendre, 8 points: abscissae and weights of the positive half
 _NODES = (0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363)
@@ -41,6 +41,7 @@ def _passage(r: Reduced, low: float, high: float, f_low: float, f_high: float, o
     """
     for _ in range(_MOST_STEPS):
         x = low - f_low * ((high - low) / (f_high - f_low))
+        # rounding may throw the secant's zero out of a bracket that has become narrow
         if not low < x < high:
             x = 0.5 * (low + high)
         if x in (low, high):
@@ -71,11 +72,13 @@ def _between(r: Reduced, entry: float, leave: float) -> tuple[float, float]:
                 phi = middle + side * 0.5 * width * _NODES[n]
                 tooth, _ = tooth_at(r, math.cos(phi), math.sin(phi))
                 area += 0.5 * width * _WEIGHTS[n] * (tooth.y - r.plate) * tooth.x1
+    # the top is where the slope falls through zero: exact, where the largest of the samples would lie below it
     before, f_before = entry, _height(r, entry, 1)
     steps = 4 * _PANELS
     for k in range(1, steps + 1):
         phi = entry + (leave - entry) * (k / steps)
         f = _height(r, phi, 1)
+        # equality on one side alone: a top that falls on a step is found once
         if f_before > 0.0 >= f:
             top = _passage(r, before, phi, f_before, f, 1) if f < 0.0 else phi
             rise = max(rise, _height(r, top, 0))
@@ -120,6 +123,7 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
             if (heights[j] > 0.0) != (after > 0.0):
                 crossings += 1
             if heights[j] <= 0.0 < after:
+                # around the seam of the turn: a stay may begin before phi = 2 pi and end after it
                 stay = 1
                 while heights[(j + 1 + stay) % SAMPLES] > 0.0:
                     stay += 1

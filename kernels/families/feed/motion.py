@@ -39,6 +39,7 @@ def rack_at(
     bar_cos, bar_sin, bar_one, bar_two, bar_code = bar_angle(r, h, e)
     if not r.valid:
         code = st.INVALID_INPUT
+    # The rocker's status comes first, but its dead point still has a position: a rack that has none is worse.
     if code == st.OK or (code == st.DEAD_POINT and bar_code in (st.NOT_ASSEMBLED, st.SINGULAR)):
         code = bar_code
     return (cos, sin, one, two), (bar_cos, bar_sin, bar_one, bar_two), h, e, code
@@ -109,6 +110,7 @@ def differences(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, stat
             e = eccentric(r.x_ecc, r.y_ecc, r.r_ecc, r.cos_ecc, r.sin_ecc, u, v)
             x, y = math.cos(chi[i, j]), math.sin(chi[i, j])
             dx, dy = h.x + x * r.fx - y * r.fy - e.x, h.y + y * r.fx + x * r.fy - e.y
+            # product of difference and sum: the squares nearly cancel for a good coupler, that is where it matters
             length = math.sqrt(dx * dx + dy * dy)
             value = (length - r.q) * (length + r.q)
             assembled = status[i, j] == st.OK or status[i, j] == st.DEAD_POINT
@@ -142,5 +144,6 @@ def lift_rows(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status
             assembled = status[i, j] == st.OK or status[i, j] == st.DEAD_POINT
             unit = r.unit if assembled else math.nan
             rows[0, i, j], rows[1, i, j] = 2.0 * (wx * x + wy * y) * unit, 2.0 * (wy * x - wx * y) * unit
+            # one factor after the other: the square of the unit leaves float64 before the length^2 does
             rows[2, i, j] = ((wx * wx + wy * wy) * unit) * unit
             rows[3, i, j], rows[4, i, j] = h.x * unit, h.y * unit

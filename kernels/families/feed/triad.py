@@ -148,6 +148,7 @@ def _newton(d: Array, u: float, v: float, x: float, y: float, chi: float) -> tup
         rows, f, _ = _links(d, (one, two, three), x, y, chi)
         dx, dy, dchi, det = _solved(rows, f[0], f[1], f[2])
         size = abs(dx) + abs(dy) + abs(dchi)
+        # written so that a nan counts too: the determinant was zero
         if not size < math.inf:
             return x, y, chi, det, st.SINGULAR
         x, y, chi = x - dx, y - dy, chi - dchi
@@ -226,6 +227,7 @@ def triad_poses(designs: Array, phi: Array, status: Status, outputs: Array) -> N
                 if code == st.OK:
                     u, v = math.cos(angle), math.sin(angle)
                     x, y, chi, det, code = _newton(flat, u, v, nodes[k, 0], nodes[k, 1], nodes[k, 2])
+                    # from a node of the right assembly onto another one: a locking position lies between them
                     if code == st.OK and (det > 0.0) != (sign > 0):
                         code = st.SINGULAR
             status[i, j] = code

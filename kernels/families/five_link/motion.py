@@ -132,8 +132,6 @@ def poses(
     cos_psi: Numbers | None,
     discriminant: Numbers | None,
     pressure_angle: Numbers | None,
-    theta: Numbers | None,
-    beta: Numbers | None,
     places: Numbers | None,
 ) -> None:
     """Position, transfer functions, discriminant, pressure angle and joints of every design at its crank angles.
@@ -146,8 +144,9 @@ def poses(
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; complex128 where they depend on the designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR (the coupler is parallel to the crank axis) or
         INVALID_INPUT
-    psi ... beta : (n, m) out, or None: what is None is neither computed nor compiled; complex128 if an input is
-    places : (9, n, m) out, x y z of crank pin, axis 2 nearest to it, and rocker ball, or None
+    psi ... pressure_angle : (n, m) out, or None: what is None is neither computed nor compiled; complex128 if an
+        input is
+    places : (11, n, m) out, theta, beta, and x y z of crank pin, axis 2 nearest to it, and rocker ball, or None
 
     Notes
     -----
@@ -187,35 +186,32 @@ def poses(
                     d2psi[i, j] = r.branch * q
                 if d3psi is not None:
                     d3psi[i, j] = r.branch * jerk
-            if theta is not None or beta is not None or places is not None:
-                z, square = axial_reach(joint, -s)
-                rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
-                # d from the crank pin to the ball, along e1 and e2 of the crank's frame
-                d1 = r.e - u - r.rocker * c
-                d2 = -r.rocker * (r.ca * s + r.k1) - v
-                reach = joint.h + rho
-                towards, aside = d1 * reach + d2 * joint.s2, d2 * reach - d1 * joint.s2
-                if beta is not None:
-                    beta[i, j] = arctan2(z, rho)
-                if theta is not None:
-                    theta[i, j] = arctan2(aside, towards)
-                if places is not None:
-                    _joints(designs, i, j, r, joint, u, v, c, s, towards, aside, places)
+            if places is not None:
+                _put_places(places, designs, i, j, r, joint, u, v, c, s)
 
 
 @inline
-def _joints(
-    designs: Numbers, i: int, j: int, r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any,
-    towards: Any, aside: Any, places: Numbers,
-) -> None:  # fmt: skip
-    """Crank pin B, the point of axis 2 nearest to axis 1 moved by s2 along it, and the rocker ball C."""
+def _put_places(
+    places: Numbers, designs: Numbers, i: int, j: int, r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any
+) -> None:
+    """Write theta and beta; crank pin B, the point of axis 2 nearest to axis 1 moved by s2 along it, rocker ball C."""
+    z, square = axial_reach(joint, -s)
+    # the root of what rounding made negative is no number; the status has dealt with what is truly out of reach
+    rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
+    # d from the crank pin to the ball, along e1 and e2 of the crank's frame
+    d1 = r.e - u - r.rocker * c
+    d2 = -r.rocker * (r.ca * s + r.k1) - v
+    reach = joint.h + rho
+    towards, aside = d1 * reach + d2 * joint.s2, d2 * reach - d1 * joint.s2
+    places[0, i, j], places[1, i, j] = arctan2(aside, towards), arctan2(z, rho)
+
     a, ca = designs[i, 0], r.branch * r.ca
     length = hypotenuse(towards, aside)
     cos_theta, sin_theta = towards / length, aside / length
     m1, m2 = joint.h * cos_theta - joint.s2 * sin_theta, joint.h * sin_theta + joint.s2 * cos_theta
     x, y, z = a * u, designs[i, 4] * r.sa + a * (ca * v), designs[i, 4] * ca - a * (r.sa * v)
-    places[0, i, j], places[1, i, j], places[2, i, j] = x, y, z
-    places[3, i, j], places[4, i, j], places[5, i, j] = x + a * m1, y + a * (ca * m2), z - a * (r.sa * m2)
-    places[6, i, j] = designs[i, 3] - designs[i, 2] * c
-    places[7, i, j] = -r.branch * designs[i, 2] * s
-    places[8, i, j] = designs[i, 5] + 0.0 * c
+    places[2, i, j], places[3, i, j], places[4, i, j] = x, y, z
+    places[5, i, j], places[6, i, j], places[7, i, j] = x + a * m1, y + a * (ca * m2), z - a * (r.sa * m2)
+    places[8, i, j] = designs[i, 3] - designs[i, 2] * c
+    places[9, i, j] = -r.branch * designs[i, 2] * s
+    places[10, i, j] = designs[i, 5] + 0.0 * c  # nan where there is no angle

@@ -47,6 +47,7 @@ def _bracketed(
     joint: Joint, x: float, y: float, w: float, centre: float, half: float, lo: float, hi: float, f_lo: float
 ) -> float:
     """Rocker angle of the root between two places of opposite sign: bisection, which no shape misleads."""
+    # 52 halvings of a cell come to its last bits; what they leave the caller's Newton steps take away
     for _ in range(52):
         mid = 0.5 * (lo + hi)
         f = _closure(joint, x, y, w, _angle(centre, half, mid))
@@ -65,6 +66,7 @@ def _dip(
     p, q = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
     f_p = sign * _closure(joint, x, y, w, _angle(centre, half, p))
     f_q = sign * _closure(joint, x, y, w, _angle(centre, half, q))
+    # 0.618^45 = 4e-10 of the cells: nearer to the least the value no longer changes by a rounding
     for _ in range(45):
         if f_p <= f_q:
             hi, q, f_q = q, p, f_p
@@ -107,6 +109,7 @@ def _scan_arc(
                 at[count] = _bracketed(joint, x, y, w, centre, half, lo, place, sign)
                 at[count + 1] = _bracketed(joint, x, y, w, centre, half, place, hi, -sign)
                 count += 2
+            # zero within the noise of G5 is a double root, which rounding may have lifted off
             elif least <= noise and count < MOST:
                 at[count] = _angle(centre, half, place)
                 count += 1

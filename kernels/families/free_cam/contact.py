@@ -24,15 +24,18 @@ class Contact(NamedTuple):
 @inline
 def shortest(cam: Cam) -> Contact:
     """The global minimum of the length over the edge; minima equally long to rounding: the first along y."""
+    # All extrema lie within reach; the margin keeps one that lies on its very end inside the walk.
     end = reach(cam) + 1e-3
     span = 0.25 * end
     best, place, minima = math.inf, math.nan, 0
     at, slope = -end, along_edge(cam, -end)[1].real
     while at < end:
+        # L' cannot reach zero before |L'| / max|L''|.  At a root of L' that step is 0: FINEST gets across it.
         bound = steepest_slope(cam, at, at + span)
         step = min(span, max(abs(slope) / bound, FINEST * end))
         following = at + step
         new = along_edge(cam, following)[1].real
+        # only rising zeros are minima; the equality on one side alone counts a zero on a step's end once
         if slope < 0.0 <= new:
             y = root_of_slope(cam, at, following)
             length = along_edge(cam, y)[0].real
@@ -53,9 +56,11 @@ def root_of_slope(cam: Cam, low: float, high: float) -> float:
             low = y
         else:
             high = y
+        # Newton's step is good only near the root: where it leaves the bracket, its middle is taken.
         following = y - slope.real / bend.real
         if not (low < following < high):
             following = 0.5 * (low + high)
+        # A middle that equals an end: the bracket is two neighbouring numbers.
         if abs(following - y) <= 2.0**-52 * abs(y) or not (low < following < high):
             return following
         y = following

@@ -49,11 +49,13 @@ def _usable(friction: Array) -> bool:
 @inline
 def lean(cam: Cam, pull: Pull, at: float) -> tuple[float, float]:
     """T12 . tangent and |T12| at a point of the edge, in units of T1; (24)."""
+    # Tensions in units of T1: only their ratio turns the resultant.
     x, tx = cam.a * at * at, 2.0 * cam.a * at
     d1x, d1y, d2x, d2y = cam.x1 - x, cam.y1 - at, cam.x2 - x, cam.y2 - at
     r1 = math.sqrt(d1x * d1x + d1y * d1y + cam.z1 * cam.z1)
     r2 = math.sqrt(d2x * d2x + d2y * d2y + cam.z2 * cam.z2)
     ratio = pull.ratio
+    # without friction along the thread the arctangent of the wrap is spared
     if pull.along != 0.0:
         wrap = wrap_angle((x, at, 0.0), (cam.x1, cam.y1, cam.z1), (cam.x2, cam.y2, cam.z2))
         ratio = ratio * math.exp(pull.along * wrap)
@@ -74,8 +76,10 @@ def steepest_excess(cam: Cam, pull: Pull, low: float, high: float) -> float:
     """Upper bound of the slope of :func:`excess` between two points of the edge."""
     first, second = least_distances(cam, low, high)
     tangent = math.sqrt(1.0 + 4.0 * cam.a * cam.a * max(low * low, high * high))
+    # The edge's tangent turns fastest where it is nearest to y = 0, and that may be inside.
     near = max(max(low, -high), 0.0)
     turning = 2.0 * cam.a / (1.0 + 4.0 * cam.a * cam.a * near * near)
+    # the wrap never exceeds pi, so this bounds the tension ratio for all points at once
     most = pull.ratio * math.exp(math.pi * pull.along)
     swing = tangent * (1.0 / first + most * (1.0 / second + pull.along * (1.0 / first + 1.0 / second)))
     return (1.0 + pull.sine) * swing + (1.0 + most) * turning
@@ -86,9 +90,11 @@ def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, mo
     """The first limit point of one side from ``start`` along the edge, within ``most``; nan if there is none."""
     end = reach(cam) + 1e-3
     at, value = start, excess(cam, pull, side, start)
+    # A start on a limit point is one: the walk looks for a change of sign and would step over it.
     if value == 0.0:
         return start
     while abs(at - start) < most:
+        # far out the branches' directions change with the ratio of two places, so the steps may grow with it
         span = 0.25 * max(end, abs(at))
         bound = steepest_excess(cam, pull, min(at, at + sense * span), max(at, at + sense * span))
         following = at + sense * min(span, max(abs(value) / bound, FINEST * end))
@@ -111,6 +117,7 @@ def _bisected(cam: Cam, pull: Pull, side: float, low: float, high: float, at_low
         if (value < 0.0) != (f_high < 0.0):
             low, f_low = high, f_high
         else:
+            # the same end stayed twice: half its value draws the next secant over to its side (Illinois)
             f_low = 0.5 * f_low
         high, f_high = middle, value
         if abs(high - low) <= 2.0**-52 * abs(high):
@@ -123,6 +130,7 @@ def nearest_limit(cam: Cam, pull: Pull, side: float, centre: float) -> float:
     """The limit point of one side nearest to ``centre``; nan if there is none within FAR."""
     most = FAR * (reach(cam) + 1e-3)
     up = next_limit(cam, pull, side, centre, 1.0, most)
+    # Downwards no farther than what was found upwards: beyond it nothing is nearer.
     down = next_limit(cam, pull, side, centre, -1.0, abs(up - centre) if up == up else most)
     if math.isnan(down):
         return up
@@ -181,6 +189,7 @@ def landed(designs: Array, i: int, u0: float, v0: float, u1: float, v1: float) -
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         u, v = u0 + middle * (u1 - u0), v0 + middle * (v1 - v0)
+        # on the chord between both poses, brought back to the circle: no sine or cosine in the loop
         length = math.sqrt(u * u + v * v)
         line = straight(turned_cam(designs, i, u / length, v / length))
         y = line.y
@@ -232,10 +241,12 @@ def march(
                         at = landed(
                             designs, i, cos_phi[row, last], sin_phi[row, last], cos_phi[row, j], sin_phi[row, j]
                         )
+                    # nan: the first contact of all, where the thread is laid on without friction
                     before = at if at == at else shortest(cam).y
                     at, off = slid(cam, pull, before), False
                     stuck = at == before
                     code = st.OK if at == at else st.NOT_CONVERGED
+            # earlier turns only bring the thread into its cycle
             if count < (turns - 1) * m:
                 continue
             status[i, j] = code

@@ -51,6 +51,7 @@ def over_edge(cam: Cam, at: float) -> tuple[float, float]:
     one = by_angle(cam.a, cam.x1, cam.y1, cam.z1, at)
     two = by_angle(cam.a, cam.x2, cam.y2, cam.z2, at)
     mixed = one[2] + two[2]
+    # The contact moves along the edge so that dL/dy stays 0, which adds nothing to the first derivative.
     return one[0] + two[0], one[1] + two[1] - mixed * mixed / along_edge(cam, at)[2]
 
 
@@ -100,10 +101,12 @@ def poses(
             line = straight(cam)
             touching = line.inside and cam.code == st.OK
             at, count = line.y, 0
+            # the search along the edge is the dear part: not without contact, unless its count is wanted
             if cam.code == st.OK and (touching or minima is not None):
                 found = shortest(cam)
                 count = found.minima
                 if touching:
+                    # the search decides on real parts; the zero gives the place the type of the design
                     at = follow_minimum(cam, found.y) + 0.0 * line.y
             x = cam.a * at * at if touching else line.x
             if L is not None or P is not None:
@@ -137,5 +140,6 @@ def poses(
 @inline
 def follow_minimum(cam: Cam, y: float) -> float:
     """The minimum as a function of complex designs: one step of Newton's method for the imaginary parts alone."""
+    # The real part of the slope is the search's remaining error, which is below rounding: it is left out.
     _, slope, bend = along_edge(cam, y)
     return y + (slope.real - slope) / bend

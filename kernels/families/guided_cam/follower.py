@@ -76,6 +76,7 @@ def follower(data: Array, status: Status, S: Array | None, dS: Array | None, d2S
 @inline
 def jam_angle(mu1: float, mu2: float) -> float:
     """Pressure angle at which the follower jams: 90 deg - arctan mu1 - arctan mu2; (13)."""
+    # one arctangent of the sum's tangent: it goes on below 0 where mu1 mu2 > 1 and subtracts nothing from 90 deg
     return arctan2(1.0 - mu1 * mu2, mu1 + mu2)  # type: ignore[no-any-return]
 
 

@@ -23,8 +23,8 @@ Status = NDArray[np.uint8]
 HARMONICS = 6
 FIRST = 7
 COLUMNS = FIRST + 2 * HARMONICS
-LOOKS = 64
-STEPS = 60
+LOOKS = 64  # over the turn: ten for each period of the highest harmonic
+STEPS = 60  # halvings of two looks' distance, which is 2^-2.3: the angle is then as exact as float64 has it
 
 
 class Reduced(NamedTuple):
@@ -59,6 +59,7 @@ def lowest(designs: Array, i: int) -> tuple[float, float]:
     """Cosine and sine of the cam angle where P is least: the best of some looks, then its slope's zero by bisection."""
     best, where, step = math.inf, 0.0, 2.0 * math.pi / LOOKS
     for j in range(LOOKS):
+        # real part only: where P is least its slope is zero, so a complex step of the place moves the value by nothing
         value = law(designs, i, math.cos(step * j), math.sin(step * j))[0].real
         if value < best:
             best, where = value, step * j
@@ -78,10 +79,11 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     """Constants of one design; its least displacement is a number of the whole turn."""
     size = 0.0
     for k in range(COLUMNS):
-        if k != 5 and k != 6:
+        if k != 5 and k != 6:  # the coefficients of friction are no lengths
             size += abs(designs[i, k].real)
     valid = 1e-140 < size < 1e140 and designs[i, 0].real > 0.0 and designs[i, 4].real >= 0.0
     valid = valid and 0.0 <= designs[i, 5].real < 1e100 and 0.0 <= designs[i, 6].real < 1e100
+    # a store this small against the rest would have squares below float64 after scaling
     valid = valid and designs[i, 0].real > 1e-140 * size
     _, exponent = math.frexp(size if valid else 1.0)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
@@ -109,9 +111,8 @@ def poses(
     dS: Array | None,
     d2S: Array | None,
     pressure_angle: Array | None,
-    X_P: Array | None,
-    Y_P: Array | None,
     curvature: Array | None,
+    profile: Array | None,
 ) -> None:
     """Thread law, follower and profile of the cam; (9) to (17) of docs/takeup.md.
 
@@ -125,13 +126,14 @@ def poses(
     S, dS, d2S : (n, m) out or None; displacement of the follower from the line of the guides, its derivatives [length]
     pressure_angle : (n, m) out or None; between the normal of the profile and the way of the follower [rad]; nan with
         NOT_ASSEMBLED if the thread does not reach somewhere else in the turn, and so for the profile
-    X_P, Y_P, curvature : (n, m) out or None; point of the profile in the cam's axes [length], its curvature [1/length],
-        positive where the profile is convex
+    curvature : (n, m) out or None; curvature of the profile, positive where it is convex [1/length]
+    profile : (2, n, m) out or None; point of the profile in the cam's axes, x and y [length]
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
         row = i if cos_phi.shape[0] > 1 else 0
-        whole = pressure_angle is not None or X_P is not None or Y_P is not None or curvature is not None
+        # the radius is counted from the least displacement, so these need the thread to reach all over the turn
+        whole = pressure_angle is not None or curvature is not None or profile is not None
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
             value, first, second = law(designs, i, u, v)
@@ -164,11 +166,9 @@ def poses(
                 out = r.radius + (s - r.least)
                 if pressure_angle is not None:
                     pressure_angle[i, j] = arctan2(magnitude(ds), out)
-                # The cam turns by phi against the follower: its profile is passed backwards.
-                if X_P is not None:
-                    X_P[i, j] = out * u * r.unit
-                if Y_P is not None:
-                    Y_P[i, j] = -out * v * r.unit
+                if profile is not None:
+                    # The cam turns by phi against the follower: its profile is passed backwards.
+                    profile[0, i, j], profile[1, i, j] = out * u * r.unit, -out * v * r.unit
                 if curvature is not None:
                     way = out * out + ds * ds
                     curvature[i, j] = (way + ds * ds - out * d2s) / (way * np.sqrt(way)) / r.unit

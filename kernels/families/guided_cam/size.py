@@ -15,8 +15,8 @@ from kernels.families.guided_cam.motion import Reduced, law, reduce_design
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
 
-LOOKS = 512
-STEPS = 60
+LOOKS = 512  # over the turn; where S is small its root has far shorter waves than the series P
+STEPS = 60  # halvings of two looks' distance, which is 2^-5: the place is then as exact as float64 has it
 
 
 @kernel
@@ -36,6 +36,7 @@ def least_radius(designs: Array, status: Status, radius: Array, place: Array, an
         r = reduce_design(designs, i)
         limit = jam_angle(designs[i, 5], designs[i, 6])
         code = st.OK if r.least > 0.0 else st.NOT_ASSEMBLED
+        # "not >" also catches a limit that is no number
         if code == st.OK and not limit > 0.0:
             code = st.JAMMED
         if not r.valid:
@@ -45,11 +46,13 @@ def least_radius(designs: Array, status: Status, radius: Array, place: Array, an
         if code == st.OK:
             cotangent = 1.0 / math.tan(limit)
             best, where = -math.inf, 0.0
+            # rise and return: the guide jams alike whichever way the follower is pressed aside
             for sign in (1.0, -1.0):
                 value, at = _largest(designs, i, r, sign * cotangent)
                 if value > best:
                     best, where = value, at
             radius[i] = max(best + r.least, 0.0) * r.unit
+            # the bisection may have left the turn at its seam
             place[i] = where - 2.0 * math.pi * np.rint(where / (2.0 * math.pi))
 
 
@@ -79,4 +82,5 @@ def _largest(designs: Array, i: int, r: Reduced, cotangent: float) -> tuple[floa
         else:
             high = middle
     middle = 0.5 * (low + high)
+    # the larger of both: where two maxima share the bracket the bisection may have come to the lower one
     return max(_need(designs, i, r, cotangent, middle)[0], best), middle

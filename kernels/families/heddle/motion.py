@@ -21,6 +21,7 @@ def _shaft_lever(r: Reduced, cos_turn: Any, sin_turn: Any, rates: bool) -> tuple
         return cos_turn, sin_turn, (one, 0.0 * one, 0.0 * one), st.OK
     u, v = -(r.side_f * sin_turn), r.side_f * cos_turn
     cos, sin, t, _, code = driven(r.second, u, v)
+    # at a dead point the position stands but its rates do not exist: nan, so that no quotient by t = 0 is taken
     safe = t if code == st.OK else math.nan * t
     slopes = driven_rates(r.second, u, v, cos, sin, safe) if rates else (safe, safe, safe)
     return r.side_f * sin, -(r.side_f * cos), slopes, code
@@ -46,6 +47,7 @@ def _lift(r: Reduced, cos: Any, sin: Any, rates: tuple[Any, Any, Any]) -> tuple[
     x1, x2 = -(y * l1), -(y * l2) - x * l1 * l1
     x3 = -(y * (l3 - l1 * l1 * l1)) - 3.0 * x * l1 * l2
     z = x - r.slide
+    # product of sum and difference: the difference of two squares loses digits where the rod lies nearly flat
     square = (r.heddle - z) * (r.heddle + z)
     if not square.real > 0.0:
         none = math.nan * y
@@ -104,23 +106,18 @@ def poses(
             if not assembled:
                 cos, sin, t = math.nan * cos, math.nan * sin, math.nan * t
             turns = driven_rates(r.first, u, v, cos, sin, t if code == st.OK else math.nan * t)
+            # the angle from mid-stroke by the addition theorem: no arctangent, and no jump by a full turn
             cos_turn, sin_turn = cos * r.cos_mid + sin * r.sin_mid, sin * r.cos_mid - cos * r.sin_mid
             lever_cos, lever_sin, slopes, lever_code = _shaft_lever(r, cos_turn, sin_turn, rates_wanted)
             lift, lift1, lift2, lift3, reached = _lift(r, lever_cos, lever_sin, _chained(slopes, turns))
+            # the first loop that fails names the status: without it what follows has no input
             if assembled and lever_code != st.OK:
                 code = lever_code
             elif assembled and not reached:
                 code = st.NOT_ASSEMBLED
             status[i, j] = code
 
-            if chi is not None:
-                chi[i, j] = arctan2(sin, cos)
-            if dchi is not None:
-                dchi[i, j] = turns[0]
-            if d2chi is not None:
-                d2chi[i, j] = turns[1]
-            if d3chi is not None:
-                d3chi[i, j] = turns[2]
+            _put_angle(chi, dchi, d2chi, d3chi, i, j, cos, sin, turns)
             if y is not None:
                 y[i, j] = lift * r.unit
             if dy is not None:
@@ -130,12 +127,39 @@ def poses(
             if d3y is not None:
                 d3y[i, j] = lift3 * r.unit
             if discriminant is not None:
+                # one factor after the other: the square of the unit leaves float64 before the discriminant does
                 discriminant[i, j] = (delta * r.unit) * r.unit if r.valid else math.nan
             if places is not None:
-                bar = r.first
-                places[0, i, j] = -t / r.rod
-                # atan2, not acos: acos loses half the digits near zero.
-                places[1, i, j] = arctan2(magnitude(bar.c - (bar.k0 - bar.k2 * u)), magnitude(t))
-                places[2, i, j] = arctan2(lever_sin, lever_cos)
-                places[3, i, j], places[4, i, j] = bar.a * u * r.unit, bar.a * v * r.unit
-                places[5, i, j], places[6, i, j] = (bar.e + bar.c * cos) * r.unit, bar.c * sin * r.unit
+                _put_places(places, i, j, r, (u, v), (cos, sin, t), (lever_cos, lever_sin))
+
+
+@inline
+def _put_angle(
+    chi: Array | None, dchi: Array | None, d2chi: Array | None, d3chi: Array | None,
+    i: int, j: int, cos: Any, sin: Any, turns: tuple[Any, Any, Any],
+) -> None:  # fmt: skip
+    """Write the bell-crank angle [rad] and its derivatives where they are wanted."""
+    if chi is not None:
+        chi[i, j] = arctan2(sin, cos)
+    if dchi is not None:
+        dchi[i, j] = turns[0]
+    if d2chi is not None:
+        d2chi[i, j] = turns[1]
+    if d3chi is not None:
+        d3chi[i, j] = turns[2]
+
+
+@inline
+def _put_places(
+    places: Array, i: int, j: int, r: Reduced, cam: tuple[Any, Any], bell: tuple[Any, Any, Any], lever: tuple[Any, Any]
+) -> None:
+    """Write transmission and pressure angle of the rod, angle of the shaft lever, and B and C."""
+    u, v = cam
+    cos, sin, t = bell
+    bar = r.first
+    places[0, i, j] = -t / r.rod
+    # atan2, not acos: acos loses half the digits near zero.
+    places[1, i, j] = arctan2(magnitude(bar.c - (bar.k0 - bar.k2 * u)), magnitude(t))
+    places[2, i, j] = arctan2(lever[1], lever[0])
+    places[3, i, j], places[4, i, j] = bar.a * u * r.unit, bar.a * v * r.unit
+    places[5, i, j], places[6, i, j] = (bar.e + bar.c * cos) * r.unit, bar.c * sin * r.unit

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import kernel
+from kernels._jit import inline, kernel
 from kernels.complex_step import arctan2, magnitude
 
 Numbers = NDArray[Any]  # float64, or complex128 for exact gradients by the complex step
@@ -65,12 +65,8 @@ def poses(
     for i in range(designs.shape[0]):
         _, exponent = math.frexp(designs[i, 0].real)
         unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
-        a, e, h, branch = (
-            designs[i, 0] * per_unit,
-            designs[i, 1] * per_unit,
-            designs[i, 2] * per_unit,
-            designs[i, 3].real,
-        )
+        a, e, h = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit
+        branch = designs[i, 3].real
         valid = 0.0 < a.real < 1e140 and abs(e.real) < 1e140 and abs(h.real) < 1e140 and branch * branch == 1.0
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(cos_phi.shape[1]):
@@ -82,15 +78,7 @@ def poses(
             x_size = a.real + abs(e.real)
             tolerance = 8.0 * EPS * (abs(x.real) * x_size + a.real * abs(y.real) + h.real * h.real)
             tolerance += 64.0 * EPS * EPS * x_size * x_size
-            code = st.OK
-            if not valid or delta.real != delta.real:
-                code = st.INVALID_INPUT
-            elif square.real <= tolerance:
-                code = st.SINGULAR
-            elif delta.real < -tolerance:
-                code = st.NOT_ASSEMBLED
-            elif delta.real <= tolerance and h.real != 0.0:
-                code = st.DEAD_POINT
+            code = _code(valid, square.real, delta.real, h.real, tolerance)
             status[i, j] = code
             root = np.sqrt(delta) if code == st.OK else 0.0 * delta
             assembled = code == st.OK or code == st.DEAD_POINT
@@ -98,30 +86,66 @@ def poses(
             per_square = 1.0 / square
             c, sine = (x * w + y * h) * per_square, (y * w - x * h) * per_square
             if psi is not None:
-                psi[i, j] = arctan2(0.0 + sine, c)
+                psi[i, j] = arctan2(0.0 + sine, c)  # + 0.0: -0.0 would turn the angle pi into -pi
             if s is not None:
                 s[i, j] = w * unit
             if discriminant is not None:
                 known = code != st.INVALID_INPUT and code != st.SINGULAR
                 discriminant[i, j] = delta * per_square if known else math.nan * delta
             if pressure_angle is not None:
+                # arctangent, not acos: acos loses half the digits near zero.
                 pressure_angle[i, j] = arctan2(magnitude(h), root) if assembled else math.nan * delta
             if joints is not None:
                 joints[0, i, j], joints[1, i, j] = designs[i, 0] * u, designs[i, 0] * v
             if dpsi is not None or d2psi is not None or d3psi is not None or ds is not None or d2s is not None:
+                # at a dead point (w = 0) the position stands and the derivatives do not exist
                 per_w = 1.0 / w if code == st.OK else math.nan * w
                 along, aside = a * (u * c + v * sine), a * (v * c - u * sine)
-                p = along * per_w
-                slide = p * h - aside
-                q = (aside * (2.0 * p - 1.0) - p * p * h) * per_w
-                if dpsi is not None:
-                    dpsi[i, j] = p
-                if ds is not None:
-                    ds[i, j] = slide * unit
-                if d2psi is not None:
-                    d2psi[i, j] = q
-                if d2s is not None:
-                    d2s[i, j] = (q * h - along * (1.0 - p)) * unit
-                if d3psi is not None:
-                    turn = along * (1.0 - p) * (2.0 * p - 1.0) + 2.0 * q * (aside - p * h)
-                    d3psi[i, j] = (turn - q * slide) * per_w
+                pin = (along, aside, h, per_w)
+                _put_derivatives(dpsi, d2psi, d3psi, ds, d2s, i, j, pin, unit)
+
+
+@inline
+def _code(valid: bool, square: float, delta: float, h: float, tolerance: float) -> int:
+    """Status of a pose from the squared distance of pin and rocker axis and the discriminant, (1)."""
+    if not valid or delta != delta:
+        return st.INVALID_INPUT
+    if square <= tolerance:
+        return st.SINGULAR
+    if delta < -tolerance:
+        return st.NOT_ASSEMBLED
+    # with h = 0 the discriminant is r^2, which vanishes only on the rocker axis: no dead point
+    return st.DEAD_POINT if delta <= tolerance and h != 0.0 else st.OK
+
+
+@inline
+def _put_derivatives(
+    dpsi: Numbers | None,
+    d2psi: Numbers | None,
+    d3psi: Numbers | None,
+    ds: Numbers | None,
+    d2s: Numbers | None,
+    i: int,
+    j: int,
+    pin: tuple[Any, Any, Any, Any],
+    unit: float,
+) -> None:
+    """Write the wanted derivatives of the angle and of the place along the slot; (4), (5).
+
+    ``pin`` holds the crank in the rocker's axes, along the slot and across it, the slot's offset, and 1/w.
+    """
+    along, aside, h, per_w = pin
+    p = along * per_w
+    slide = p * h - aside
+    q = (aside * (2.0 * p - 1.0) - p * p * h) * per_w
+    if dpsi is not None:
+        dpsi[i, j] = p
+    if ds is not None:
+        ds[i, j] = slide * unit
+    if d2psi is not None:
+        d2psi[i, j] = q
+    if d2s is not None:
+        d2s[i, j] = (q * h - along * (1.0 - p)) * unit
+    if d3psi is not None:
+        turn = along * (1.0 - p) * (2.0 * p - 1.0) + 2.0 * q * (aside - p * h)
+        d3psi[i, j] = (turn - q * slide) * per_w

@@ -100,6 +100,7 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     foot = mix(1.0, ball, -along, axis)
     c2 = np.sqrt(dot(foot, foot))
     ball_size = abs(ball[0].real) + abs(ball[1].real) + abs(ball[2].real)
+    # a ball within its own rounding of the axis has no direction from it, and so no triad
     hinged = c2.real > 8.0 * 2.0**-53 * ball_size
     radial = scale(1.0 / c2 if hinged else math.nan, foot)
     across = cross(axis, radial)
@@ -107,6 +108,7 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     a2, b2 = d[17] * per, d[18] * per
     centre = (d[19] * per - e1, d[20] * per, d[21] * per - o)
     st, ct, sb, cb = np.sin(d[22]), np.cos(d[22]), np.sin(d[23]), np.cos(d[23])
+    # magnitudes, not the sums themselves: where those cancel, the errors of their parts stay
     size1 = a1.real + abs(e1.real) + abs(f1.real) + abs(g1.real)
     size2 = a2.real + abs((d[19] * per).real) + abs(e1.real) + abs(centre[1].real) + abs((d[21] * per).real)
     size2 += abs(o.real) + ball_size

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from typing import Any
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.complex_step import arctan2, magnitude
+from kernels.complex_step import magnitude
 from kernels.driven_ball import Path, Swung, rotated, swing
 from kernels.families.spherical_looper.closure import Numbers, Reduced, Status, reduce_design
+from kernels.looper_outputs import put_angle, put_loop, put_point
 from kernels.vectors import Vector, add, dot, mix, turned
 
 
@@ -41,6 +41,7 @@ def _in_triad(r: Reduced, a: Vector, lift: float) -> Vector:
 @inline
 def _seen_from_carrier(r: Reduced, carrier: Swung, path: Path) -> Path:
     """The driving ball in the looper's frame, which the carrier takes along, (3)."""
+    # turned back by the carrier's angle: minus the sine and minus all derivatives
     m, m1, m2, m3 = rotated(carrier.cos, -carrier.sin, -carrier.first, -carrier.second, -carrier.third, path)
     return _in_triad(r, m, r.along), _in_triad(r, m1, 0.0), _in_triad(r, m2, 0.0), _in_triad(r, m3, 0.0)
 
@@ -49,6 +50,7 @@ def _seen_from_carrier(r: Reduced, carrier: Swung, path: Path) -> Path:
 def _carried(r: Reduced, carrier: Swung, looper: Swung, fixed: Vector) -> Path:
     """A point fixed to the looper, from Os in fixed axes, with its derivatives, (5)."""
     none = (0.0 * fixed[0], 0.0 * fixed[0], 0.0 * fixed[0])
+    # the point rests in the looper: its derivatives there are zeros of the design's own type
     path = (fixed, none, none, none)
     m, m1, m2, m3 = rotated(looper.cos, looper.sin, looper.first, looper.second, looper.third, path)
     path = (
@@ -115,45 +117,32 @@ def poses(
                 code = two.status if code == st.OK else code
             status[i, j] = code
             undefined = 0.0 if r.valid else math.nan
-            if carrier is not None:
-                carrier[0, i, j] = arctan2(one.sin + undefined, one.cos)
-                carrier[1, i, j] = one.first + undefined
-                carrier[2, i, j] = one.second + undefined
-                carrier[3, i, j] = one.third + undefined
-            if looper is not None:
-                looper[0, i, j] = arctan2(two.sin + undefined, two.cos)
-                looper[1, i, j] = two.first + undefined
-                looper[2, i, j] = two.second + undefined
-                looper[3, i, j] = two.third + undefined
-            # arctangent, not acos: acos loses half the digits near zero.
+            put_angle(carrier, i, j, one, undefined)
+            put_angle(looper, i, j, two, undefined)
             if carrier_loop is not None:
-                carrier_loop[0, i, j] = (one.delta * r.unit) * r.unit + undefined
-                carrier_loop[1, i, j] = arctan2(np.sqrt(one.across) + undefined, magnitude(one.root))
+                put_loop(carrier_loop, i, j, one.delta, magnitude(one.root), one.across, r.unit, undefined)
             if looper_loop is not None:
-                looper_loop[0, i, j] = (two.delta * r.unit) * r.unit + undefined
-                looper_loop[1, i, j] = arctan2(np.sqrt(two.across) + undefined, magnitude(two.root))
-            p, p1, p2, p3 = _carried(r, one, two, r.point)
+                put_loop(looper_loop, i, j, two.delta, magnitude(two.root), two.across, r.unit, undefined)
             centre = (r.e1, 0.0 * r.e1, r.o)
             scale = r.unit + undefined
-            for k in range(3):
-                if point is not None:
-                    point[k, i, j] = (centre[k] + p[k]) * scale
-                if velocity is not None:
-                    velocity[k, i, j] = p1[k] * scale
-                if acceleration is not None:
-                    acceleration[k, i, j] = p2[k] * scale
-                if jerk is not None:
-                    jerk[k, i, j] = p3[k] * scale
-            if magnitudes is not None:
-                magnitudes[0, i, j] = np.sqrt(dot(p1, p1)) * scale
-                magnitudes[1, i, j] = np.sqrt(dot(p2, p2)) * scale
-                magnitudes[2, i, j] = np.sqrt(dot(p3, p3)) * scale
+            path = _carried(r, one, two, r.point)
+            put_point(point, velocity, acceleration, jerk, magnitudes, i, j, centre, path, scale)
             if joints is not None:
-                ball, _, _, _ = _carried(r, one, two, (r.c2, 0.0 * r.c2, r.along))
-                rocker = (r.e1 + r.c1 * one.cos, r.c1 * one.sin, r.g1)
-                pin = (first[0][0] + r.e1, first[0][1], r.lift - r.a1 * (r.sa * v))
-                for k in range(3):
-                    joints[k, i, j] = pin[k] * scale
-                    joints[3 + k, i, j] = rocker[k] * scale
-                    joints[6 + k, i, j] = (centre[k] + second[0][k]) * scale
-                    joints[9 + k, i, j] = (centre[k] + ball[k]) * scale
+                _put_joints(joints, i, j, r, first, second, one, two, v, scale)
+
+
+@inline
+def _put_joints(
+    joints: Numbers, i: int, j: int, r: Reduced, first: Path, second: Path, one: Swung, two: Swung, v: float, scale: Any
+) -> None:
+    """Write x y z of crank pin 1, carrier's ball, crank pin 2 and looper's ball [length]."""
+    centre = (r.e1, 0.0 * r.e1, r.o)
+    ball, _, _, _ = _carried(r, one, two, (r.c2, 0.0 * r.c2, r.along))
+    rocker = (r.e1 + r.c1 * one.cos, r.c1 * one.sin, r.g1)
+    # the height anew: the path's own is taken from the rocker's plane, and adding that again would round twice
+    pin = (first[0][0] + r.e1, first[0][1], r.lift - r.a1 * (r.sa * v))
+    for k in range(3):
+        joints[k, i, j] = pin[k] * scale
+        joints[3 + k, i, j] = rocker[k] * scale
+        joints[6 + k, i, j] = (centre[k] + second[0][k]) * scale
+        joints[9 + k, i, j] = (centre[k] + ball[k]) * scale
