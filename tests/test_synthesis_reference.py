@@ -268,6 +268,12 @@ def test_arcs_are_where_the_side_condition_holds():
     assert arc == pytest.approx((1.5 * math.pi, 3.5 * math.pi - 3.3), abs=1e-14)
 
 
+def test_arcs_of_a_rocker_of_given_length_are_refused():
+    row = {"swing": 0.7, "phi0": 3.3, "c": 2.0, "f": 0.3, "direction": 0.4, "alpha": 0.8}
+    with pytest.raises(InputError, match="swing, phi0, e, f, g, alpha"):
+        admissible_arcs("rssr", row)
+
+
 def test_locus_designs_are_columns_for_a_study():
     table = requirements(300, 82)
     columns, status = locus_designs("rssr", {name: table[name].to_numpy() for name in table})

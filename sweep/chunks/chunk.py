@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -146,11 +146,16 @@ def compute_chunk(
         for cascade, mine in zip(cascades, (~recalled, recalled), strict=True):
             if mine.any():
                 cascade.feed(index[mine], matrix[mine], status[mine])
-    names = tuple(output_columns(study))
-    found = Batch.joined([cascade.end(names) for cascade in cascades]).ordered()
+    return _result(study, cascades)
+
+
+def _result(study: Study, cascades: Sequence[Cascade]) -> ChunkResult:
+    """The rows and counts of cascades that have been fed all designs of a chunk."""
+    types = output_columns(study)
+    found = Batch.joined([cascade.end(tuple(types)) for cascade in cascades]).ordered()
     columns: Columns = {"design": found.index}
     columns |= {name: found.designs[:, k] for k, name in enumerate(study.family.parameter_names)}
-    columns |= {name: found.outputs[name].astype(dtype) for name, dtype in output_columns(study).items()}
+    columns |= {name: found.outputs[name].astype(dtype) for name, dtype in types.items()}
     columns |= {"status": found.status}
     total = np.sum([cascade.counts for cascade in cascades], axis=0)
     counts = {code: int(total[code]) for code in np.flatnonzero(total).tolist()}

@@ -28,12 +28,6 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     cost : its estimate
     others : what other accuracies would take [s], in words
     """
-    from sweep.chunks.cascade import ordered_routes
-    from sweep.chunks.plan import PARAMETER_UNITS
-    from sweep.evaluation.summaries import output
-    from sweep.report.limits import bound_words
-    from sweep.report.quantities import quantity
-
     lines = [f"{study.name}: {study.title}" if study.title else study.name]
     lines += [f"mechanism {study.family.name} ({study.family.title})"]
     if study.speed is not None:
@@ -42,33 +36,8 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     lines += ["", f"{study.space.count} designs, {kind} of" if study.space.axes else "1 design, nothing is swept"]
     lines += aligned([(axis.name, _axis(axis)) for axis in study.space.axes])
 
-    limits = {
-        limit.output: bound_words(limit, quantity(limit.output, output(study.family, limit.output).unit))
-        for limit in study.output_limits
-    }
-    found = ordered_routes(study)
-    lines += ["", f"will be computed, {_accuracy(study)}; only designs within the limits so far go on to the next line"]
-    lines += aligned(
-        [
-            (
-                f"{k}. {route.name}",
-                f"{route.ns_per_design:.3g} ns per design",
-                ", ".join(name + (f" ({limits[name]})" if name in limits else "") for name in route.outputs),
-            )
-            for k, route in enumerate(found, 1)
-        ]
-    )
-    if study.locus is not None:
-        made, given = ", ".join(study.locus.made), ", ".join(study.prescribed)
-        lines += ["", f"made before all that from {given}: {made}"]
-    if study.fit is not None:
-        aim = "" if study.fit.stroke is None else f", scaled to a stroke of {study.fit.stroke:g} mm"
-        names = ", ".join(study.fit.parameters(study.family))
-        lines += ["", f"fitted to the straightest line{aim}, as soon as no earlier stage is left to test: {names}"]
-    if study.parameter_limits:
-        units = {p.name: PARAMETER_UNITS[p.unit] for p in study.family.parameters}
-        words = [f"{x.output} {bound_words(x, quantity(x.output, units[x.output]))}" for x in study.parameter_limits]
-        lines += ["", f"limits on parameters: {'; '.join(words)}"]
+    lines += _computed(study)
+    lines += _before_and_between(study)
     lines += _effects(study)
     left = [name for name in main_outputs(study.family) if name not in study.want]
     lines += ["", "will not be computed, because nothing asks for it", f"  {', '.join(left)}"]
@@ -91,6 +60,53 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
             *((words, f"{duration(seconds)}, {_times(seconds / cost.seconds)}") for words, seconds in others),
         ]
     )
+    return lines
+
+
+def _computed(study: Study) -> list[str]:
+    """The routes of the sweep in their order, with their cost, outputs and limits."""
+    from sweep.chunks.cascade import ordered_routes
+    from sweep.evaluation.summaries import output
+    from sweep.report.limits import bound_words
+    from sweep.report.quantities import quantity
+
+    limits = {
+        limit.output: bound_words(limit, quantity(limit.output, output(study.family, limit.output).unit))
+        for limit in study.output_limits
+    }
+    found = ordered_routes(study)
+    lines = ["", f"will be computed, {_accuracy(study)}; only designs within the limits so far go on to the next line"]
+    lines += aligned(
+        [
+            (
+                f"{k}. {route.name}",
+                f"{route.ns_per_design:.3g} ns per design",
+                ", ".join(name + (f" ({limits[name]})" if name in limits else "") for name in route.outputs),
+            )
+            for k, route in enumerate(found, 1)
+        ]
+    )
+    return lines
+
+
+def _before_and_between(study: Study) -> list[str]:
+    """Parameters that follow from others: made before the sweep's routes, or fitted between them; and their limits."""
+    from sweep.chunks.plan import PARAMETER_UNITS
+    from sweep.report.limits import bound_words
+    from sweep.report.quantities import quantity
+
+    lines = []
+    if study.locus is not None:
+        made, given = ", ".join(study.locus.made), ", ".join(study.prescribed)
+        lines += ["", f"made before all that from {given}: {made}"]
+    if study.fit is not None:
+        aim = "" if study.fit.stroke is None else f", scaled to a stroke of {study.fit.stroke:g} mm"
+        names = ", ".join(study.fit.parameters(study.family))
+        lines += ["", f"fitted to the straightest line{aim}, as soon as no earlier stage is left to test: {names}"]
+    if study.parameter_limits:
+        units = {p.name: PARAMETER_UNITS[p.unit] for p in study.family.parameters}
+        words = [f"{x.output} {bound_words(x, quantity(x.output, units[x.output]))}" for x in study.parameter_limits]
+        lines += ["", f"limits on parameters: {'; '.join(words)}"]
     return lines
 
 

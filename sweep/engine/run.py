@@ -7,6 +7,7 @@ import signal
 import time
 import uuid
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -79,23 +80,30 @@ def run(
     default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
     folder = default if out is None else store.located(out)
     refuse_or_clear_older(folder, force)
-    with store.locked(folder):
-        head = {"run": uuid.uuid4().hex[:12]}
-        begin = time.monotonic()
-        said = {"event": "start", "command": command(model, folder, smoke, accuracy, certify)}
-        store.append_run(folder, head | said | circumstances(jobs, backend))
-        try:
-            computed = _sweep(model, folder, jobs, backend, force, progress)
-            if model.optimise is not None:
-                _optimise(replace(model, pareto=None), folder, jobs, progress)
-            _front(model, folder, jobs)
-            _raise_if_cut_short(folder)
-        except Exception as error:
-            if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
-                store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
-            raise
-        store.append_run(folder, head | _end(begin, "complete", f"{computed} chunks computed"))
+    with store.locked(folder), _logged(folder, command(model, folder, smoke, accuracy, certify), jobs, backend) as end:
+        computed = _sweep(model, folder, jobs, backend, force, progress)
+        if model.optimise is not None:
+            _optimise(replace(model, pareto=None), folder, jobs, progress)
+        _front(model, folder, jobs)
+        _raise_if_cut_short(folder)
+        end.append(f"{computed} chunks computed")
     return folder
+
+
+@contextmanager
+def _logged(folder: Path, said: str, jobs: int, backend: str) -> Iterator[list[str]]:
+    """Log the start of a run and its end: the error that ended it, or what the caller appends to the list."""
+    head = {"run": uuid.uuid4().hex[:12]}
+    begin = time.monotonic()
+    store.append_run(folder, head | {"event": "start", "command": said} | circumstances(jobs, backend))
+    words: list[str] = []
+    try:
+        yield words
+    except Exception as error:
+        if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
+            store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
+        raise
+    store.append_run(folder, head | _end(begin, "complete", "; ".join(words)))
 
 
 def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certify: bool | None) -> Study:

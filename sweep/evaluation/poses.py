@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +14,7 @@ from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Angles, Family
+from sweep.families.base import Angles, Columns, Family
 from sweep.families.domain import TWO_PI, March
 from sweep.reductions.catalogue import output_names
 
@@ -68,17 +68,10 @@ def evaluate(
     matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))
     index = table.index if isinstance(table, pd.DataFrame) else None
     if phi is None:
-        _refuse_single_poses(mechanism)
-        if variable not in extras:
-            allowed = f"a column {variable}, or the argument phi="
-            raise InputError(variable, None, allowed, f"table of {mechanism.name}")
+        _check_column(mechanism, extras)
         angles, head, repeats = np.ascontiguousarray(extras[variable])[:, None], {}, 1
     else:
-        if variable in map(str, table):
-            allowed = f"either phi= for every design, or a column {variable}, not both"
-            raise InputError(variable, "a column", allowed, f"table of {mechanism.name}")
-        grid = _values_of_the_variable(phi)
-        _check_march(mechanism, grid)
+        grid = _grid(mechanism, table, phi)
         angles, repeats = grid[None, :], grid.size
         head = {"design": np.repeat(np.arange(len(matrix)), repeats), variable: np.tile(grid, len(matrix))}
         index = None if index is None else index.repeat(repeats)
@@ -88,11 +81,17 @@ def evaluate(
     if status_text:
         made["status_text"] = np.array(meanings(made["status"]), dtype=object)
     result = pd.DataFrame(made, index=index)
-    kept = kept_columns(table, keep, made, len(matrix))
+    return _beside(kept_columns(table, keep, made, len(matrix)), result, len(matrix), repeats)
+
+
+def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> pd.DataFrame:
+    """The result with input columns in front, each of whose rows belongs to ``repeats`` rows of the result."""
+    import pandas as pd
+
     if not kept:
         return result
-    input_columns = pd.DataFrame(kept).loc[np.repeat(np.arange(len(matrix)), repeats)].set_axis(result.index)
-    return pd.concat([input_columns, result], axis=1)
+    inputs = pd.DataFrame(kept).loc[np.repeat(np.arange(designs), repeats)].set_axis(result.index)
+    return pd.concat([inputs, result], axis=1)
 
 
 def _values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
@@ -107,10 +106,26 @@ def _values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
     return grid
 
 
-def _refuse_single_poses(mechanism: Family) -> None:
+def _check_column(mechanism: Family, extras: Container[str]) -> None:
+    """Refuse a table without a column of the variable, and any such column for a march."""
     if isinstance(mechanism.domain, March):
         allowed = "the argument phi=, equal steps of one turn from 0: a pose depends on those before it"
         raise InputError("phi", "a column", allowed, f"table of {mechanism.name}")
+    variable = mechanism.domain.name
+    if variable not in extras:
+        allowed = f"a column {variable}, or the argument phi="
+        raise InputError(variable, None, allowed, f"table of {mechanism.name}")
+
+
+def _grid(mechanism: Family, table: Table, phi: ArrayLike) -> NDArray[np.float64]:
+    """The argument phi= for every design, checked against the table and the domain."""
+    variable = mechanism.domain.name
+    if variable in map(str, table):
+        allowed = f"either phi= for every design, or a column {variable}, not both"
+        raise InputError(variable, "a column", allowed, f"table of {mechanism.name}")
+    grid = _values_of_the_variable(phi)
+    _check_march(mechanism, grid)
+    return grid
 
 
 def _check_march(mechanism: Family, grid: NDArray[np.float64]) -> None:

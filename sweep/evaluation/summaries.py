@@ -103,11 +103,10 @@ def summarise(
         check_certifiable(mechanism, wanted, chosen)
     matrix, _ = design_matrix(mechanism, table, unused=input_names(bare))
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
-    errors = [error_of(name) for name in wanted] if chosen.target is not None else []
-    index = table.index if isinstance(table, pd.DataFrame) else None
-    made: dict[str, Any] = {name: columns[name] for name in [*wanted, *errors, "status"]}
+    made: dict[str, Any] = {name: columns[name] for name in (*_with_errors(wanted, chosen), "status")}
     if status_text:
         made["status_text"] = np.array(meanings(columns["status"]), dtype=object)
+    index = table.index if isinstance(table, pd.DataFrame) else None
     return pd.DataFrame(kept_columns(table, keep, made, len(matrix)) | made, index=index)
 
 

@@ -13,7 +13,7 @@ from kernels.chain import chain_rule, input_angle
 from kernels.status import OK
 from sweep.errors import InputError
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, OutputLink, Points
+from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink, Points
 from sweep.families.domain import Turn
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
@@ -75,6 +75,19 @@ def stages_of(family: Family) -> tuple[Stage, ...]:
     if isinstance(family, Chain):
         return family.stages
     return (Stage(1, family, slice(0, len(family.parameters))),)
+
+
+def driven_guide(family: Family) -> tuple[Stage, Stage] | None:
+    """Both stages of a chain in which a crank-rocker drives a linkage with a guided point; None for any other family.
+
+    The crank-rocker is one whose limit positions can be prescribed (`LimitLocus`).
+    """
+    if not isinstance(family, Chain) or len(family.stages) != 2:
+        return None
+    first, last = family.stages
+    if first.family.find(LimitLocus) is None or last.family.find(GuidedPoint) is None:
+        return None
+    return first, last
 
 
 def chain(families: tuple[Family, ...]) -> Chain:

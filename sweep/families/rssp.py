@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from kernels.families import rssp
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
-from sweep.families.capabilities import Assembly, JointRecords, Points, PressureEllipse
+from sweep.families.capabilities import Assembly, JointRecords, LimitLocus, Points, PressureEllipse
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -165,6 +165,7 @@ FAMILY = Family(
         Assembly("discriminant", "pressure_angle", coupler_square),
         JointRecords(joint_records, _JOINT_NEEDS, "slider"),
         PressureEllipse(ellipse),
+        LimitLocus("stroke"),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
     ),
     precise_poses=precise_poses,

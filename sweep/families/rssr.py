@@ -22,7 +22,15 @@ from sweep.families.base import (
     filled,
     optional_outputs,
 )
-from sweep.families.capabilities import Assembly, CrankRockerLoop, JointRecords, OutputLink, Points, PressureEllipse
+from sweep.families.capabilities import (
+    Assembly,
+    CrankRockerLoop,
+    JointRecords,
+    LimitLocus,
+    OutputLink,
+    Points,
+    PressureEllipse,
+)
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -314,6 +322,7 @@ FAMILY = Family(
         JointRecords(joint_records, JOINT_NEEDS, "rocker"),
         PressureEllipse(ellipse),
         CrankRockerLoop(np.ascontiguousarray),
+        LimitLocus("swing", sized=("c", "e", "g")),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(rocker_origin),
     ),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from sweep.families.chain import Chain
+from sweep.families.capabilities import LimitLocus
+from sweep.families.chain import Chain, stages_of
 from sweep.optimise.coordinates import LocusCoordinates
 from sweep.optimise.problem import Problem
 from sweep.synthesis.prescription import OnLocus
@@ -30,22 +32,21 @@ def on_locus(problem: Problem) -> Problem:
     from sweep.study import Limit
 
     family = problem.family
-    first = family.stages[0].family.name if isinstance(family, Chain) else family.name
+    first = stages_of(family)[0].family
     number = "1" if isinstance(family, Chain) else ""
-    if problem.coordinates is not None or first not in ("rssr", "rssp"):
+    locus = first.find(LimitLocus)
+    if problem.coordinates is not None or locus is None:
         return problem
-    wanted = (f"swing{number}" if first == "rssr" else f"stroke{number}", f"phi0{number}")
+    wanted = (f"{locus.travel}{number}", f"phi0{number}")
     equations = {x.output: x.minimum for x in problem.limits if x.minimum is not None and x.minimum == x.maximum}
     if not all(name in equations for name in wanted):
         return problem
     bounds = {n: (float(x), float(y)) for n, x, y in zip(problem.variables, problem.lower, problem.upper, strict=True)}
-    e, g, c = (f"{name}{number}" for name in "egc")
-    sized = first == "rssr" and c in problem.fixed and e in bounds and g in bounds and bounds[e][0] >= 0.0
-    coordinates = LocusCoordinates(OnLocus(first, number, "direction" if sized else "phi1"))
+    ends = _directions(problem, bounds, tuple(f"{name}{number}" for name in locus.sized))
+    coordinates = LocusCoordinates(OnLocus(first.name, number, "phi1" if ends is None else "direction"))
     places = {f"phi_ext{number}": PLACE_BOUNDS}
-    if sized:
-        ends = [math.atan2(y, x) for x in bounds[e] for y in bounds[g]]
-        places[f"direction{number}"] = (min(ends), max(ends))
+    if ends is not None:
+        places[f"direction{number}"] = ends
     held = {name: (float(x), float(x)) for name, x in problem.fixed.items()}
     links = [Limit(name, *(bounds | held)[name]) for name in coordinates.made]
     varied = {name: ends for name, ends in bounds.items() if name not in coordinates.made} | places
@@ -59,3 +60,16 @@ def on_locus(problem: Problem) -> Problem:
         limits=(*(limit for limit in problem.limits if limit.output not in wanted), *links),
         coordinates=coordinates,
     )
+
+
+def _directions(
+    problem: Problem, bounds: Mapping[str, tuple[float, float]], sized: tuple[str, ...]
+) -> tuple[float, float] | None:
+    """Least and greatest direction of the offsets (e, g) where the rocker's length c alone is fixed, else None."""
+    if not sized:
+        return None
+    c, e, g = sized
+    if c not in problem.fixed or e not in bounds or g not in bounds or bounds[e][0] < 0.0:
+        return None
+    ends = [math.atan2(y, x) for x in bounds[e] for y in bounds[g]]
+    return min(ends), max(ends)

@@ -8,12 +8,46 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from sweep.families.base import Array
 
 OUTSIDE = 10.0  # price of a unit beyond the bounds, in values of the best
+
+
+class _Rates(NamedTuple):
+    """Constants of a strategy in n dimensions, by the symbols of the tutorial.
+
+    ``candidates`` per generation, ``weights`` of the better half, ``effective`` is their variance-effective
+    number; then the learning rates and the damping of the step, and ``normal``, the mean length of a normal vector.
+    """
+
+    candidates: int
+    weights: Array
+    effective: float
+    c_sigma: float
+    damping: float
+    c_path: float
+    c_one: float
+    c_mu: float
+    normal: float
+
+
+def _rates(n: int) -> _Rates:
+    count = 4 + int(3.0 * math.log(n))
+    half = count // 2
+    weights = math.log(half + 0.5) - np.log(np.arange(1, half + 1))
+    weights /= weights.sum()
+    effective = 1.0 / float((weights**2).sum())
+    c_sigma = (effective + 2.0) / (n + effective + 5.0)
+    damping = 1.0 + 2.0 * max(0.0, math.sqrt((effective - 1.0) / (n + 1.0)) - 1.0) + c_sigma
+    c_path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n)
+    c_one = 2.0 / ((n + 1.3) ** 2 + effective)
+    c_mu = min(1.0 - c_one, 2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0) ** 2 + effective))
+    normal = math.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n))
+    return _Rates(count, weights, effective, c_sigma, damping, c_path, c_one, c_mu, normal)
 
 
 def evolved(
@@ -36,17 +70,8 @@ def evolved(
     stop : asked before every generation; true ends all strategies
     """
     m, n = places.shape
-    count = 4 + int(3.0 * math.log(n))
-    half = count // 2
-    weights = math.log(half + 0.5) - np.log(np.arange(1, half + 1))
-    weights /= weights.sum()
-    effective = 1.0 / float((weights**2).sum())
-    c_sigma = (effective + 2.0) / (n + effective + 5.0)
-    damping = 1.0 + 2.0 * max(0.0, math.sqrt((effective - 1.0) / (n + 1.0)) - 1.0) + c_sigma
-    c_path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n)
-    c_one = 2.0 / ((n + 1.3) ** 2 + effective)
-    c_mu = min(1.0 - c_one, 2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0) ** 2 + effective))
-    normal = math.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n))
+    count, weights, effective, c_sigma, damping, c_path, c_one, c_mu, normal = _rates(n)
+    half = len(weights)
     mean, sigma = places.copy(), np.full(m, radius)
     covariance = np.repeat(np.eye(n)[None], m, axis=0)
     path, step_path = np.zeros((m, n)), np.zeros((m, n))
@@ -83,6 +108,5 @@ def evolved(
             + c_one * path[:, :, None] * path[:, None, :]
             + c_mu * np.einsum("h,khi,khj->kij", weights, chosen, chosen)
         )
-        sigma *= np.exp(np.clip(c_sigma / damping * (length / normal - 1.0), -1.0, 1.0))
-        sigma = np.minimum(sigma, 1.0)
+        sigma = np.minimum(sigma * np.exp(np.clip(c_sigma / damping * (length / normal - 1.0), -1.0, 1.0)), 1.0)
     return best, value

@@ -210,42 +210,21 @@ class _Layout:
         if r.equal and r.minimum is not None:
             for term, shift in self.lower(r.measure)[:1]:
                 size = self._size(r, r.minimum)
-                self.add(
-                    term,
-                    shift,
-                    1.0 / size,
-                    -r.minimum / size,
-                    0.0,
-                    True,
-                    _label(r, "equal", r.minimum, size),
-                )
+                label = _label(r, "equal", r.minimum, size)
+                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, True, label)
             return bool(self.lower(r.measure))
         if r.minimum is not None:
             terms, size = self.lower(r.measure), self._size(r, r.minimum)
             found = found and bool(terms)
             for term, shift in terms:
-                self.add(
-                    term,
-                    shift,
-                    1.0 / size,
-                    -r.minimum / size,
-                    0.0,
-                    False,
-                    _label(r, "minimum", r.minimum, size),
-                )
+                label = _label(r, "minimum", r.minimum, size)
+                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, False, label)
         if r.maximum is not None:
             terms, size = self.upper(r.measure), self._size(r, r.maximum)
             found = found and bool(terms)
             for term, shift in terms:
-                self.add(
-                    term,
-                    shift,
-                    -1.0 / size,
-                    r.maximum / size,
-                    0.0,
-                    False,
-                    _label(r, "maximum", r.maximum, size),
-                )
+                label = _label(r, "maximum", r.maximum, size)
+                self.add(term, shift, -1.0 / size, r.maximum / size, 0.0, False, label)
         return found
 
     def upper(self, m: Measure) -> list[tuple[Term, float]]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.minimax import minimax
 from sweep.families.base import Accuracy, Angles, Array
-from sweep.families.chain import Chain
+from sweep.families.chain import Chain, driven_guide
 from sweep.optimise.problem import Problem
 
 if TYPE_CHECKING:
@@ -180,11 +180,10 @@ def _missed(limit: Limit, value: Array) -> Array:
 def elimination(problem: Problem) -> Elimination | None:
     """The linear part of a problem, or None where it has none."""
     family = problem.family
-    if not isinstance(family, Chain) or problem.window is not None:
+    stages = driven_guide(family)
+    if stages is None or problem.window is not None:
         return None
-    if [stage.family.name for stage in family.stages] != ["rssr", "guide"]:
-        return None
-    last, before = str(family.stages[-1].number), family.stages[-2]
+    before, last = stages[0], str(stages[1].number)
     limits = {limit.output: limit for limit in problem.limits}
     stroke, deviation = limits.get("stroke"), limits.get("max_abs_dev")
     needed = {f"{name}{last}" for name in (*SOLVED, "a")}

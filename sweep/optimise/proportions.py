@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from sweep.evaluation.summaries import design_outputs
-from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array
+from sweep.families.chain import stages_of
 from sweep.optimise.evolution import evolved
 from sweep.optimise.linear import STUCK, Elimination
 from sweep.optimise.problem import Problem
@@ -49,7 +49,7 @@ class Proportions:
         own = problem.variables.index(f"a{number}")
         self.base[names.index(f"a{number}")] = math.sqrt(float(problem.lower[own]) * float(problem.upper[own]))
         self.offset = names.index(f"offset{number}") if f"offset{number}" in linear.free else -1
-        self.driver = find_family("rssr")
+        self.driver = stages_of(problem.family)[0].family
 
     def designs(self, places: Array) -> Array:
         """Designs (k, P) at places (k, n), with the point, line and scale still to be found."""

@@ -85,27 +85,12 @@ def explore(
         raise InputError("starts", starts.shape, f"at least one row of {len(problem.family.parameters)} values", PLACE)
     Program(problem)  # an unknown name is refused here, not in a worker
     end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
-    results: list[Result] = []
-    ended = "starts"
     with _signals() as own:
 
         def asked() -> bool:
             return time.monotonic() >= end or bool(own) or (stop is not None and stop())
 
-        heat = settings if settings.finalists is None else replace(settings, looks=min(TRIAL, settings.looks))
-        numbers = list(range(len(starts)))
-        for first in range(0, len(starts), BATCH):
-            batch = numbers[first : first + BATCH]
-            results += _batch(problem, starts, batch, results, heat, asked, jobs)
-            if tell is not None:
-                tell(len(results), len(starts))
-            last = batch[-1] == numbers[-1]
-            if _cut(results, first + len(batch)) or (not last and asked()):
-                ended = "time"
-                break
-            if settings.finalists is None and survey(problem, starts, results, settings, "").enough:
-                ended = "enough"
-                break
+        results, ended = _first(problem, starts, settings, asked, jobs, tell)
         if settings.finalists is not None and ended == "starts":
             results, whole = _final(problem, starts, results, settings, asked, jobs)
             ended = "starts" if whole else "time"
@@ -116,6 +101,31 @@ def explore(
     if ended == "time" and (own.signal_number is not None or any(r.ended == "interrupted" for r in results)):
         ended = "interrupted"
     return ranked(results), survey(problem, starts, results, settings, ended)
+
+
+def _first(
+    problem: Problem,
+    starts: Array,
+    settings: OptimiseSettings,
+    asked: Callable[[], bool],
+    jobs: int,
+    tell: Tell | None,
+) -> tuple[list[Result], str]:
+    """Results of the starts in batches, or of their first heat where there are finalists; and what ended it."""
+    results: list[Result] = []
+    heat = settings if settings.finalists is None else replace(settings, looks=min(TRIAL, settings.looks))
+    numbers = list(range(len(starts)))
+    for first in range(0, len(starts), BATCH):
+        batch = numbers[first : first + BATCH]
+        results += _batch(problem, starts, batch, results, heat, asked, jobs)
+        if tell is not None:
+            tell(len(results), len(starts))
+        last = batch[-1] == numbers[-1]
+        if _cut(results, first + len(batch)) or (not last and asked()):
+            return results, "time"
+        if settings.finalists is None and survey(problem, starts, results, settings, "").enough:
+            return results, "enough"
+    return results, "starts"
 
 
 def _cut(results: Sequence[Result], count: int) -> bool:

@@ -215,26 +215,3 @@ class ReportSection(Section):
     figures: list[FigureTable] = Field(
         [], description='a list of { file = "atlas.svg", title = "...", caption = "..." }'
     )
-
-
-TABLES = (
-    "study",
-    "mechanism",
-    "machine",
-    "relations",
-    "scene",
-    "design",
-    "locus",
-    "fit",
-    "limits",
-    "objective",
-    "accuracy",
-    "optimise",
-    "pareto",
-    "tolerance",
-    "reference",
-    "output",
-    "budget",
-    "report",
-)
-REQUIRED_TABLES = ("study", "design")

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from sweep.families.base import Family
-from sweep.families.chain import Chain
+from sweep.families.capabilities import LimitLocus
+from sweep.families.chain import Chain, stages_of
 from sweep.study.design import Entry, missing_parameter, read_entry
 from sweep.study.faults import Faults
 from sweep.study.space import Axis
@@ -21,12 +22,12 @@ WHOLE_TURN = 2.0 * np.pi * (1.0 - 1e-12)
 
 def read_locus(family: Family, faults: Faults) -> OnLocus | None:
     """The stage that [locus] is about, or None with a fault if it has no locus."""
-    first = family.stages[0].family.name if isinstance(family, Chain) else family.name
-    known = tuple(dict.fromkeys(way.family for way in LOCI))
-    if first not in known:
-        faults.value(("locus",), first, f"a mechanism that is or begins with {' or '.join(known)}")
+    first = stages_of(family)[0].family
+    if first.find(LimitLocus) is None:
+        known = tuple(dict.fromkeys(way.family for way in LOCI))
+        faults.value(("locus",), first.name, f"a mechanism that is or begins with {' or '.join(known)}")
         return None
-    return OnLocus(first, "1" if isinstance(family, Chain) else "")
+    return OnLocus(first.name, "1" if isinstance(family, Chain) else "")
 
 
 def read_prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled: bool) -> dict[str, Entry]:

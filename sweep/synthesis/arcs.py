@@ -6,10 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kernels import synthesis as kernels
 from kernels.synthesis import acceptance
 from sweep.errors import InputError
-from sweep.synthesis.locus import TWO_PI, locus
+from sweep.synthesis.locus import LOCI, TWO_PI, locus
 
 
 def admissible_arcs(family: str, requirement: Mapping[str, float]) -> list[tuple[float, float]]:
@@ -28,14 +27,17 @@ def admissible_arcs(family: str, requirement: Mapping[str, float]) -> list[tuple
     Raises
     ------
     InputError
-        for a missing or misspelt column or a bad number.
+        for a missing or misspelt column or a bad number, or a requirement by direction, whose arcs are not known.
     """
     if "phi1" in requirement:
         raise InputError("phi1", requirement["phi1"], "no phi1: its arcs are what is asked for", "requirement")
     way = locus(family, (*requirement, "phi1"))
     row = way.read({**requirement, "phi1": 0.0})
-    ends = np.empty((1, 8 if family == "rssr" else 4))
-    (kernels.rssr_arc_ends if family == "rssr" else kernels.rssp_arc_ends)(row, ends)
+    if way.arc_ends is None:
+        known = [other for other in LOCI if other.family == way.family and other.arc_ends is not None]
+        allowed = "; or ".join(", ".join(n for n in other.parameter_names if n != "phi1") for other in known)
+        raise InputError("columns", ", ".join(requirement), allowed, "requirement")
+    ends = way.arc_ends(row)
     marks = np.unique(ends[np.isfinite(ends)])
     following = np.append(marks[1:], marks[0] + TWO_PI)
     middles = np.repeat(row, marks.size, axis=0)

@@ -42,7 +42,8 @@ class Locus:
     """One way to state what a follower has to do.
 
     ``chosen_by`` is the column that tells this way from the others of its family; ``solve`` takes the (n, P) matrix
-    with the columns of ``parameters``; by phi1 it may be complex128, for gradients by the complex step.
+    with the columns of ``parameters``; by phi1 it may be complex128, for gradients by the complex step.  ``arc_ends``
+    takes it too: where arcs of phi1 may begin and end, (n, k), nan where there are fewer; None if not known.
     """
 
     family: str
@@ -50,6 +51,7 @@ class Locus:
     parameters: tuple[Parameter, ...]
     chosen_by: str
     solve: Callable[[Array], Found]
+    arc_ends: Callable[[Array], Array] | None = None
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -135,6 +137,18 @@ def _rssp_at_place(matrix: Array) -> Found:
     return Found(designs, status, failed, phi1, matrix[:, 1], phi0)
 
 
+def _rssr_arc_ends(matrix: Array) -> Array:
+    ends = np.empty((len(matrix), 8))
+    kernels.rssr_arc_ends(matrix, ends)
+    return ends
+
+
+def _rssp_arc_ends(matrix: Array) -> Array:
+    ends = np.empty((len(matrix), 4))
+    kernels.rssp_arc_ends(matrix, ends)
+    return ends
+
+
 _SWING = Parameter("swing", "angle", "rocker angle from the extended to the folded position, with its sign")
 _STROKE = Parameter("stroke", "length", "slider path from the extended to the folded position, with its sign")
 _PHI0 = Parameter("phi0", "angle", "crank angle from the extended to the folded position")
@@ -150,7 +164,14 @@ _DIRECTION = Parameter("direction", "angle", "atan2(g, e): how the offsets of th
 _ROOT = Parameter("root", "sign", "which of the two solutions", choices=(-1.0, 1.0), default=1.0)
 
 LOCI = (
-    Locus("rssr", "requirement of rssr", (_SWING, _PHI0, _PHI1, _E, _F, _G, _ALPHA), "phi1", _rssr_on_locus),
+    Locus(
+        "rssr",
+        "requirement of rssr",
+        (_SWING, _PHI0, _PHI1, _E, _F, _G, _ALPHA),
+        "phi1",
+        _rssr_on_locus,
+        _rssr_arc_ends,
+    ),
     Locus("rssr", "requirement of rssr", (_SWING, _PHI0, _PSI1, _E, _F, _G, _ALPHA, _ROOT), "psi1", _rssr_at_direction),
     Locus(
         "rssr",
@@ -159,7 +180,7 @@ LOCI = (
         "direction",
         _rssr_of_size,
     ),
-    Locus("rssp", "requirement of rssp", (_STROKE, _PHI0, _PHI1, _F, _ALPHA), "phi1", _rssp_on_locus),
+    Locus("rssp", "requirement of rssp", (_STROKE, _PHI0, _PHI1, _F, _ALPHA), "phi1", _rssp_on_locus, _rssp_arc_ends),
     Locus("rssp", "requirement of rssp", (_STROKE, _S1, _E, _F, _ALPHA), "s1", _rssp_at_place),
     Locus("rssp", "requirement of rssp", (_STROKE, _PHI0, _E, _F, _ALPHA, _ROOT), "e", _rssp_at_offset),
 )

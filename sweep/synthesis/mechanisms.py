@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array
-from sweep.synthesis.locus import TWO_PI, Found, locus
+from sweep.synthesis.locus import TWO_PI, Found, Locus, locus
 from sweep.synthesis.slotted import CentralSlot, central_slots
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
 _EXACT = Accuracy(target=1e-12)
+# Requirements that are met by other mechanisms than those on a locus.
+_OF_THEIR_OWN: dict[str, Callable[[Table], pd.DataFrame]] = {CentralSlot.name: central_slots}
 
 
 def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = None) -> pd.DataFrame:
@@ -57,8 +60,8 @@ def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = 
 
     if max_pressure_angle is not None and not 0.0 < max_pressure_angle <= 0.5 * np.pi:
         raise InputError("max_pressure_angle", max_pressure_angle, "an angle between 0 and pi/2", "synthesise")
-    if family == CentralSlot.name:
-        return central_slots(table)
+    if family in _OF_THEIR_OWN:
+        return _OF_THEIR_OWN[family](table)
     way = locus(family, tuple(str(name) for name in table))
     matrix = way.read(table)
     index = table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(len(matrix))
@@ -71,13 +74,13 @@ def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = 
     columns: dict[str, object] = dict(zip(find_family(family).parameter_names, found.designs.T, strict=True))
     if way.has_roots:
         columns["root"] = matrix[:, -1]
-    columns |= _limits(family, found, amplitude)
+    columns |= _limits(way, found, amplitude)
     columns |= _verdict(family, found, max_pressure_angle)
     return pd.DataFrame(columns, index=index)
 
 
-def _limits(family: str, found: Found, amplitude: Array) -> dict[str, object]:
-    letter, name = ("psi", "swing") if family == "rssr" else ("s", "stroke")
+def _limits(way: Locus, found: Found, amplitude: Array) -> dict[str, object]:
+    letter, name = find_family(way.family).position, way.parameter_names[0]
     good = found.status == st.OK
     phi1, start = (np.where(good, x, np.nan) for x in (found.phi1, found.start))
     return {

@@ -1,0 +1,43 @@
+"""[optimise]: how the optimiser searches."""
+
+from __future__ import annotations
+
+from sweep.families.chain import driven_guide
+from sweep.study.model import OptimiseSection
+from sweep.study.reading import Reading
+from sweep.study.study import OptimiseSettings
+
+
+def read(reading: Reading) -> None:
+    """Read the table."""
+    reading.section(OptimiseSection, "optimise")
+
+
+def read_values(reading: Reading) -> None:
+    """Time budget and share of unseen basins; with them the settings."""
+    search = reading.get(OptimiseSection)
+    settings = OptimiseSettings(
+        starts=search.starts,
+        seed=search.seed,
+        time_budget=reading.quantity(search.time_budget, "s", ("optimise", "time_budget")),
+        variables=search.variables,
+        unseen=reading.share(search.unseen, ("optimise", "unseen")),
+        looks=search.looks,
+        globally=search.globally,
+        finalists=search.finalists,
+    )
+    reading.fields["optimise"] = settings if "optimise" in reading.data else None
+
+
+def check_objective(reading: Reading) -> None:
+    """Report a search for nothing."""
+    if "optimise" in reading.data and "objective" not in reading.data:
+        needed = "a table [objective] with minimise = a design output, as [optimise] is given"
+        reading.faults.missing(("objective",), needed)
+
+
+def check(reading: Reading) -> None:
+    """Report a search over proportions of a mechanism in which nothing is linear."""
+    if reading.get(OptimiseSection).globally == "proportions" and driven_guide(reading.mechanism) is None:
+        allowed = '"none", or the chain ["rssr", "guide"]'
+        reading.faults.value(("optimise", "global"), "proportions", allowed)
