@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from sweep.dataset.comparison import compare
     from sweep.dataset.store import is_complete, load
     from sweep.engine.run import run
+    from sweep.evaluation.joints import joints
     from sweep.evaluation.poses import evaluate
     from sweep.evaluation.summaries import summarise
     from sweep.families import machine
@@ -23,6 +24,7 @@ __all__ = [
     "compare",
     "evaluate",
     "is_complete",
+    "joints",
     "load",
     "machine",
     "run",
@@ -35,6 +37,7 @@ _HOMES = {
     "compare": "sweep.dataset.comparison",
     "evaluate": "sweep.evaluation.poses",
     "is_complete": "sweep.dataset.store",
+    "joints": "sweep.evaluation.joints",
     "load": "sweep.dataset.store",
     "machine": "sweep.families",
     "run": "sweep.engine.run",

@@ -22,7 +22,16 @@ from sweep.families.base import (
     filled,
     optional_outputs,
 )
-from sweep.families.capabilities import Assembly, CrankRockerLoop, JointRecords, OutputLink, Points, PressureEllipse
+from sweep.families.capabilities import (
+    Assembly,
+    CrankRockerLoop,
+    JointRecords,
+    OutputLink,
+    Points,
+    PressureEllipse,
+    Skeleton,
+)
+from sweep.families.skeletons import CRANK_ROCKER, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -316,6 +325,7 @@ FAMILY = Family(
         CrankRockerLoop(np.ascontiguousarray),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(rocker_origin),
+        Skeleton({"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")}, CRANK_ROCKER),
     ),
     precise_poses=precise_poses,
     example={"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "branch": -1.0},
