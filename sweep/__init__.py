@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from sweep.evaluation.joints import joints
     from sweep.evaluation.poses import evaluate
     from sweep.evaluation.summaries import summarise
+    from sweep.exchange.points import from_points
     from sweep.families import machine
     from sweep.synthesis.mechanisms import synthesise
 
@@ -23,6 +24,7 @@ __all__ = [
     "StudyError",
     "compare",
     "evaluate",
+    "from_points",
     "is_complete",
     "joints",
     "load",
@@ -36,6 +38,7 @@ __all__ = [
 _HOMES = {
     "compare": "sweep.dataset.comparison",
     "evaluate": "sweep.evaluation.poses",
+    "from_points": "sweep.exchange.points",
     "is_complete": "sweep.dataset.store",
     "joints": "sweep.evaluation.joints",
     "load": "sweep.dataset.store",

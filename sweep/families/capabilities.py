@@ -143,3 +143,28 @@ class Skeleton:
     fixed: Mapping[str, Fixed]
     links: tuple[Link, ...]
     made: Mapping[str, Made] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Hardpoints:
+    """The family's dimensions can be read off points of a drawing.
+
+    ``needs`` and ``may`` are the names of points and directions that must or may be given.  ``fit(points)``
+    returns parameters, the crank angle [rad], and origin, z and x of the family's frame in that of the drawing; it
+    raises :class:`sweep.errors.InputError` for points that make no such mechanism.
+    """
+
+    needs: tuple[str, ...]
+    may: tuple[str, ...]
+    fit: Callable[[Mapping[str, Array]], Reading]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Parameters, crank angle [rad], and origin, z and x of the family's frame in the drawing's."""
+
+    parameters: dict[str, float]
+    phi: float
+    at: Array
+    z: Array
+    x: Array

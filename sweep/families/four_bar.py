@@ -23,6 +23,7 @@ from sweep.families.capabilities import (
     PressureEllipse,
     Skeleton,
 )
+from sweep.families.hardpoints import FOUR_BAR_POINTS
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, standing
 
 PARAMETERS = (
@@ -147,6 +148,7 @@ FAMILY = Family(
         CrankRockerLoop(as_crank_rocker),
         Points({name: (f"x_{name}", f"y_{name}", None) for name in ("b", "c", "m")}),
         OutputLink(crank_rocker.rocker_origin),
+        FOUR_BAR_POINTS,
         Skeleton(
             {"a": ORIGIN, "d": standing(PARAMETERS, "e")}, (CRANK, Link("coupler", ("b", "c", "m")), ROCKER)
         ),

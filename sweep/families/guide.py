@@ -17,6 +17,7 @@ from sweep.families.capabilities import (
     PressureEllipse,
     Skeleton,
 )
+from sweep.families.hardpoints import GUIDE_POINTS
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, parameter, standing
 
 PARAMETERS = (
@@ -121,6 +122,7 @@ FAMILY = Family(
             direction="lam",
         ),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)}),
+        GUIDE_POINTS,
         Skeleton(
             {"a": ORIGIN, "d": standing(PARAMETERS, "e"), "line": line(guiding_line)},
             (CRANK, Link("coupler", ("b", "c", "point")), ROCKER),

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from kernels.families import rssp
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
 from sweep.families.capabilities import Assembly, JointRecords, Points, PressureEllipse, Skeleton
+from sweep.families.hardpoints import SLIDER_CRANK_POINTS
 from sweep.families.skeletons import SLIDER_CRANK, Y, crank_axis, standing
 
 PARAMETERS = (
@@ -167,6 +168,7 @@ FAMILY = Family(
         JointRecords(joint_records, _JOINT_NEEDS, "slider"),
         PressureEllipse(ellipse),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
+        SLIDER_CRANK_POINTS,
         Skeleton(
             {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", axis=Y, kind="slide")},
             SLIDER_CRANK,

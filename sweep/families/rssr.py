@@ -31,6 +31,7 @@ from sweep.families.capabilities import (
     PressureEllipse,
     Skeleton,
 )
+from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.skeletons import CRANK_ROCKER, crank_axis, standing
 
 PARAMETERS = (
@@ -325,6 +326,7 @@ FAMILY = Family(
         CrankRockerLoop(np.ascontiguousarray),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(rocker_origin),
+        CRANK_ROCKER_POINTS,
         Skeleton({"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")}, CRANK_ROCKER),
     ),
     precise_poses=precise_poses,

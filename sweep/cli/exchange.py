@@ -1,0 +1,38 @@
+"""The verbs that take points in and pass designs on: points, export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+
+
+@click.command()
+@click.argument("family")
+@FILE
+@click.option("--tolerance", type=float, help="Largest residual as a part of the drawing's size; default 1e-4.")
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A table for `sweep eval`: one design.")
+def points(family: str, file: Path, tolerance: float | None, out: Path | None) -> None:
+    """The dimensions of FAMILY from the points of a drawing, FILE.csv with the columns name, x, y, z.
+
+    Names are A (centre of the crank circle), axis_A (crank axis), B (crank pin), C, D, axis_D and so on: see
+    docs/frames.md.  Printed are the parameters, the crank angle of the drawn position, where the family's frame stands
+    in the drawing, and the residual: how far a point lies from its joint at most.  --out writes the parameters and phi
+    as a table.
+    """
+    from sweep.cli.tables import checked_format, write_table
+    from sweep.exchange.points import TOLERANCE, from_points, read_points
+
+    out = checked_format(out)
+    found = from_points(family, tolerance=TOLERANCE if tolerance is None else tolerance, **read_points(file))
+    if out is not None:
+        import pandas as pd
+
+        write_table(pd.DataFrame([found.parameters | {"phi": found.phi}]), out)
+    for name, value in (*found.parameters.items(), ("phi", found.phi)):
+        click.echo(f"{name:10} {value:.17g}")
+    for name, vector in (("at", found.place.at), ("axis", found.place.axis), ("zero", found.place.zero)):
+        click.echo(f"{name:10} {' '.join(f'{x:.17g}' for x in vector)}")
+    click.echo(f"{'residual':10} {found.residual:.3g}")

@@ -1,0 +1,1 @@
+"""Pictures of mechanisms and datasets as matplotlib axes."""
