@@ -139,13 +139,14 @@ def test_round_trip_gives_the_design_back(name, data, phi, branch, share, seed):
 @example(e=0.0, alpha=0.5, seed=1)
 @example(e=0.0, alpha=-1.57, seed=2)
 def test_equivalent_frames_give_the_same_motion(e, alpha, seed):
-    design = {"a": 0.5, "b": 3.0, "c": 3.0, "e": e, "f": 0.3, "g": -0.6, "alpha": alpha, "branch": 1.0}
+    design = {"a": 0.5, "c": 3.0, "e": e, "f": 0.3, "g": -0.6, "alpha": alpha, "branch": 1.0}
+    design["b"] = reaching("rssr", design, 0.4, 0.5)
     rotation, at = turned(seed), np.array([0.3, 0.2, -0.5])
     pose = sweep.evaluate("rssr", design, "psi", phi=[0.4])
     assert pose["status"][0] == 0
     found = sweep.from_points("rssr", **drawing("rssr", design, 0.4, rotation, at))
     assert found.parameters["e"] >= 0.0
-    step = np.linspace(0.0, 0.5, 6)
+    step = np.linspace(0.0, 0.2, 6)
     (first,) = parts("rssr", design, 0.4 + step)
     (second,) = parts("rssr", found.parameters, found.phi + step)
     for joint in "bcd":
