@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from sweep.evaluation.joints import joints
     from sweep.evaluation.poses import evaluate
     from sweep.evaluation.summaries import summarise
+    from sweep.exchange.export import export
     from sweep.exchange.points import from_points
     from sweep.families import machine
     from sweep.synthesis.mechanisms import synthesise
@@ -24,6 +25,7 @@ __all__ = [
     "StudyError",
     "compare",
     "evaluate",
+    "export",
     "from_points",
     "is_complete",
     "joints",
@@ -38,6 +40,7 @@ __all__ = [
 _HOMES = {
     "compare": "sweep.dataset.comparison",
     "evaluate": "sweep.evaluation.poses",
+    "export": "sweep.exchange.export",
     "from_points": "sweep.exchange.points",
     "is_complete": "sweep.dataset.store",
     "joints": "sweep.evaluation.joints",

@@ -36,3 +36,27 @@ def points(family: str, file: Path, tolerance: float | None, out: Path | None) -
     for name, vector in (("at", found.place.at), ("axis", found.place.axis), ("zero", found.place.zero)):
         click.echo(f"{name:10} {' '.join(f'{x:.17g}' for x in vector)}")
     click.echo(f"{'residual':10} {found.residual:.3g}")
+
+
+@click.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--design", help="optimum, reference, best, or the number of a row; default: optimum, else best.")
+@click.option("--format", "kind", required=True, type=click.Choice(["csv", "glb", "dxf", "mjcf", "law"]))
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Default FOLDER/_export/DESIGN.ending.")
+@click.option("--phi", type=float, default=0.0, show_default=True, help="Crank angle of the drawn position [rad].")
+@click.option("--poses", type=click.IntRange(min=3), default=120, show_default=True, help="Steps of a turn.")
+def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: float, poses: int) -> None:
+    """Write one design of a dataset to a file that other programs read.
+
+    csv: hardpoints and axes.  glb: an animated model that a browser opens.  dxf: a drawing.  mjcf: a model for MuJoCo.
+    law: the motion over one turn with units, .csv or .parquet.  dxf needs `pip install 'linksweep[cad]'`.
+    """
+    from sweep.exchange.export import FORMATS
+    from sweep.exchange.export import export as write
+    from sweep.exchange.folder import chosen
+
+    found = chosen(folder, design)
+    if out is None:
+        out = folder / "_export" / f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
+        out.parent.mkdir(exist_ok=True)
+    click.echo(f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed)}")

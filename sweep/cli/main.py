@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from sweep.cli.effects import effects
-from sweep.cli.exchange import points
+from sweep.cli.exchange import export, points
 from sweep.cli.listing import cache, families
 from sweep.cli.studies import check, compare, report, run
 from sweep.cli.tables import evaluate_table, summarise_table
@@ -45,5 +45,5 @@ def main() -> None:
     """
 
 
-for verb in (run, check, evaluate_table, summarise_table, families, effects, report, compare, cache, points):
+for verb in (run, check, evaluate_table, summarise_table, families, effects, report, compare, cache, points, export):
     main.add_command(verb)

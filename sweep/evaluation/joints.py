@@ -37,7 +37,7 @@ class Part:
     frame : in which coordinates are given: "machine", or the family's own, with the number of its stage
     family, design : the stage's own family and its parameters, (P,)
     phi : angle of the driving shaft, (m,)
-    crank : the stage's own crank angle, (m,)
+    crank, position : the stage's own crank angle and its output, the angle or displacement of its follower, (m,)
     joints : by name (m, 3) each, fixed ones too
     axes : unit vectors of axes and slides, by fixed joint
     kinds : "axis", "slide" or "point", by fixed joint
@@ -52,6 +52,7 @@ class Part:
     design: Array
     phi: Array
     crank: Array
+    position: Array
     joints: Mapping[str, Array]
     axes: Mapping[str, Array]
     kinds: Mapping[str, str]
@@ -222,8 +223,9 @@ def _part(
     if where.tip is not None:
         moving[TIP] = _tip(family, matrix, np.asarray(found[family.position][0], np.float64), where.tip)
     turned = {name: path @ where.rotation.T + where.at for name, path in (fixed | moving).items()}
+    crank, position = (np.asarray(values[0], np.float64) for values in (angles.phi, found[family.position]))
     return Part(
-        where.member, where.stage, where.frame, family, matrix[0], phi, np.asarray(angles.phi[0], np.float64), turned,
+        where.member, where.stage, where.frame, family, matrix[0], phi, crank, position, turned,
         {name: where.rotation @ axis for name, axis in axes.items()},
         {name: point.kind for name, point in skeleton.fixed.items()} if skeleton else {},
         skeleton.links if skeleton else (), status,
