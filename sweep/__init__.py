@@ -31,6 +31,7 @@ __all__ = [
     "joints",
     "load",
     "machine",
+    "plot",
     "run",
     "summarise",
     "synthesise",
@@ -53,10 +54,12 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "plot":
+        return import_module("sweep.plot")
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES})
+    return sorted({*globals(), *_HOMES, "plot"})

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from sweep.cli.draw import draw
 from sweep.cli.effects import effects
 from sweep.cli.exchange import export, points
 from sweep.cli.listing import cache, families
@@ -45,5 +46,18 @@ def main() -> None:
     """
 
 
-for verb in (run, check, evaluate_table, summarise_table, families, effects, report, compare, cache, points, export):
+for verb in (
+    run,
+    check,
+    evaluate_table,
+    summarise_table,
+    families,
+    effects,
+    report,
+    compare,
+    cache,
+    points,
+    export,
+    draw,
+):
     main.add_command(verb)

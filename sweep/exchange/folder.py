@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sweep.errors import InputError
 from sweep.families.base import Family
-from sweep.report.dataset import Dataset
+from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.page import gather
 
 ROLES = ("optimum", "reference", "best")
@@ -41,18 +41,19 @@ def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
         return _row(path, int(design))
     if design is not None and design not in ROLES:
         raise InputError("design", design, f"{', '.join(ROLES)}, or the number of a row", str(folder))
-    data, _, _ = gather(path)
+    data = read_dataset(path)
+    if design == "best" or (design == "reference" and data.optima is None) or (design is None and data.optimum is None):
+        data, _, _ = gather(path)  # goes through all rows
     row = {"optimum": data.optimum, "reference": data.reference, "best": data.best, None: data.result}[design]
     if row is None:
-        known = [r for r, found in zip(ROLES, (data.optimum, data.reference, data.best), strict=True) if found]
-        allowed = f"a design this dataset has: {', '.join(known) or 'none is feasible'}, or the number of a row"
-        raise InputError("design", design or "result", allowed, str(folder))
+        raise InputError(
+            "design", design or "result", f"one this dataset has, of {', '.join(ROLES)}, or a row", str(folder)
+        )
     return _chosen(data, {name: float(row[name]) for name in data.study.family.parameter_names})
 
 
 def _row(folder: Path, number: int) -> Chosen:
     from sweep.dataset.store import load
-    from sweep.report.dataset import read_dataset
 
     data = read_dataset(folder)
     rows = load(folder)
