@@ -12,6 +12,7 @@ from sweep.evaluation.joints import parts
 from sweep.families import NAMES, family
 from sweep.families.capabilities import Skeleton
 
+DRAWN = [name for name in NAMES if family(name).find(Skeleton) is not None]
 PHI = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
 ROUNDING = 1e-12  # a few roundings of coordinates of size 10
 
@@ -26,7 +27,7 @@ def example(name):
     return dict(family(name).example)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", DRAWN)
 def test_links_keep_their_lengths_over_the_turn(name):
     (part,) = parts(name, example(name), PHI)
     assert (part.status == 0).all()
@@ -38,7 +39,7 @@ def test_links_keep_their_lengths_over_the_turn(name):
             assert np.ptp(length) < ROUNDING, (link.name, first, second)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", DRAWN)
 def test_cranks_turn_right_handed_about_their_axes(name):
     (part,) = parts(name, example(name), [0.0, 0.1])
     for link in part.links:
@@ -52,7 +53,7 @@ def test_cranks_turn_right_handed_about_their_axes(name):
         assert turned == pytest.approx(0.1, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", [n for n in NAMES if family(n).pose_output[family(n).position].wraps])
+@pytest.mark.parametrize("name", [n for n in DRAWN if family(n).pose_output[family(n).position].wraps])
 def test_output_angle_turns_right_handed_about_the_axis_of_the_output_link(name):
     mechanism = family(name)
     design = example(name) | ({"s": 0.0} if name == "slotted" else {})  # an offset slot points elsewhere than its ball
@@ -68,7 +69,7 @@ def test_output_angle_turns_right_handed_about_the_axis_of_the_output_link(name)
     assert turned == pytest.approx(psi[1] - psi[0], abs=1e-11)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", DRAWN)
 def test_every_family_has_a_skeleton_and_every_linked_joint_has_coordinates(name):
     found = sweep.joints(name, example(name), [0.3])
     skeleton = family(name).find(Skeleton)
@@ -143,3 +144,11 @@ def test_several_designs_and_bad_angles_are_refused():
         sweep.joints("four_bar", design | {"a": [1.0, 1.1]}, 0.0)
     with pytest.raises(sweep.InputError, match="finite angles"):
         sweep.joints("four_bar", design, [math.nan])
+
+
+def test_points_without_links_are_given_and_a_mechanism_without_joints_is_refused():
+    found = sweep.joints("feed", example("feed"), [0.3])
+    assert set(found["joint"]) == {"h", "e", "f", "t"}
+    assert found["x"].notna().all()
+    with pytest.raises(sweep.InputError, match="that has joints"):
+        sweep.joints("foot", example("foot"), [0.0])

@@ -42,7 +42,9 @@ def points(family: str, file: Path, tolerance: float | None, out: Path | None) -
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.option("--design", help="optimum, reference, best, or the number of a row; default: optimum, else best.")
 @click.option("--format", "kind", required=True, type=click.Choice(["csv", "glb", "dxf", "mjcf", "law"]))
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Default FOLDER/_export/DESIGN.ending.")
+@click.option(
+    "--out", type=click.Path(dir_okay=False, path_type=Path), help="Default: export/DESIGN.ending beside FOLDER."
+)
 @click.option("--phi", type=float, default=0.0, show_default=True, help="Crank angle of the drawn position [rad].")
 @click.option("--poses", type=click.IntRange(min=3), default=120, show_default=True, help="Steps of a turn.")
 def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: float, poses: int) -> None:
@@ -51,12 +53,13 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     csv: hardpoints and axes.  glb: an animated model that a browser opens.  dxf: a drawing.  mjcf: a model for MuJoCo.
     law: the motion over one turn with units, .csv or .parquet.  dxf needs `pip install 'linksweep[cad]'`.
     """
+    from sweep.dataset.store import beside
     from sweep.exchange.export import FORMATS
     from sweep.exchange.export import export as write
     from sweep.exchange.folder import chosen
 
     found = chosen(folder, design)
     if out is None:
-        out = folder / "_export" / f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
+        out = beside(folder) / "export" / f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
         out.parent.mkdir(exist_ok=True)
     click.echo(f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed)}")

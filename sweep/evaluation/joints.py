@@ -155,6 +155,8 @@ def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
     given = Angles.of(np.ascontiguousarray(angles[None, :]))
     if isinstance(family, Machine):
         return [part for member in family.members for part in _of_member(family, member, matrix, given)]
+    if not any(stage.family.find(Skeleton) or stage.family.find(Points) for stage in stages_of(family)):
+        raise InputError("mechanism", family.name, "a mechanism that has joints", "joints")
     return list(_of_stages(family, matrix, given, angles, _Where(frame=family.name)))
 
 

@@ -40,6 +40,10 @@ def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pl
     angles = phi + np.linspace(0.0, 2.0 * math.pi, poses + 1)
     found = parts(mechanism, design, angles)
     for part in found:
+        if not part.links:
+            raise InputError(
+                "mechanism", part.family.name, "a mechanism whose links are known: see docs/frames.md", "export"
+            )
         bad = np.flatnonzero([not np.isfinite(path).all(axis=1).all() for path in part.joints.values()])
         if bad.size:
             pose = int(np.argmax(part.status != 0))

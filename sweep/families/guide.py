@@ -16,6 +16,7 @@ from sweep.families.capabilities import (
     Points,
     PressureEllipse,
     Skeleton,
+    ToolPoint,
 )
 from sweep.families.hardpoints import GUIDE_POINTS
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, parameter, standing
@@ -75,7 +76,7 @@ def as_crank_rocker(designs: Array) -> Array:
 
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from: those of the four-bar; the guided point bears no load."""
+    """Fill the joint records that effects work from: those of the four-bar."""
     matrix = as_crank_rocker(designs)
     turned = crank_rocker.poses(matrix, angles, frozenset(crank_rocker.JOINT_NEEDS))
     crank_rocker.joint_records(matrix, angles, turned, per_pose, per_design)
@@ -100,6 +101,16 @@ def guiding_line(designs: Array) -> tuple[Array, Array]:
     return h[:, None] * np.cross(Z, along), along
 
 
+def tool_point(designs: Array) -> Array:
+    """Guided point from the crank pin: along the coupler, across it, out of the plane; (n, 3)."""
+    return np.column_stack([designs[:, 4], designs[:, 5], 0.0 * designs[:, 5]])
+
+
+def tool_direction(designs: Array) -> Array:
+    """Unit vector of the guiding line, (n, 3)."""
+    return np.column_stack([np.cos(designs[:, 6]), np.sin(designs[:, 6]), 0.0 * designs[:, 6]])
+
+
 FAMILY = Family(
     name="guide",
     title="planar four-bar with a guided coupler point",
@@ -121,6 +132,7 @@ FAMILY = Family(
             scaled=("a", "b", "c", "e", "xi", "eta", "h"),
             direction="lam",
         ),
+        ToolPoint(tool_point, tool_direction),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)}),
         GUIDE_POINTS,
         Skeleton(

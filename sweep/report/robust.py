@@ -108,10 +108,8 @@ def _percent(value: float) -> str:
 
 def optimum_rows(data: Dataset, file: str) -> list[dict[str, Any]]:
     """Rows of the optimum in a table beside the dataset; none where there is no such table."""
-    import pandas as pd
-
-    path = data.folder / file
+    path = store.beside(data.folder) / file
     if not path.exists():
         return []
-    frame = pd.read_parquet(path)
+    frame = store.read_table(path)
     return [{str(k): v for k, v in row.items()} for row in frame[frame["role"] == "optimum"].to_dict("records")]
