@@ -21,6 +21,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 PHI = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
 PLANAR = {
     "guide", "four_bar", "slider_crank", "inverted_slider_crank", "geared_dwell", "epicyclic_dwell", "cam", "cam_lever",
+    "feed",
 }  # fmt: skip
 
 
