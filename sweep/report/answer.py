@@ -29,7 +29,8 @@ def answer(data: Dataset, found: Scan) -> list[str]:
         stops = max(fates(data, found)[:-1], key=lambda fate: fate.count, default=None)
         most = [] if stops is None else [f"What stops most of them, {_count(stops.count)}: {stops.text}."]
         return [f"No design of the {_count(total)} in the sweep meets all limits.", *most]
-    sentences = search_warnings(data)
+    cut = data.front_steps is not None or (data.survey is not None and data.survey.ended == "time")
+    sentences = search_warnings(data) if cut else []
     who = "The optimum" if data.optimum is not None else "The best design of the sweep"
     if data.optimum is not None and int(data.optimum.get("status", 0)) == codes.LIMIT_EXCEEDED:
         sentences.append("No design was found that keeps all limits; what follows is the nearest one found.")
@@ -40,6 +41,7 @@ def answer(data: Dataset, found: Scan) -> list[str]:
     second = data.second
     if second is not None and _is_number(data.result, second):
         sentences.append(_comparison(data, second))
+    sentences += [] if cut else search_warnings(data)
     # What [locus] prescribes as an axis is a space that was searched; as a value it holds by construction.
     sentences += _limit_sentences([s for s in limit_states(data) if s.shown.name not in data.study.prescribed])
     sentences += _edge_sentence(data)

@@ -92,9 +92,10 @@ class Dataset:
 
     @property
     def active(self) -> list[str]:
-        """Outputs and parameters whose limits and bounds the optimiser calls active."""
+        """Outputs and parameters whose limits the optimiser calls active; the bounds of its search are no limits."""
         words = "" if self.optimum is None else str(self.optimum.get("active") or "")
-        return [word.split()[0].rstrip(":,") for word in words.split(";") if word.strip()]
+        limits = [word.strip() for word in words.split(";") if word.strip() and not word.strip().endswith(" bound")]
+        return [word.split()[0].rstrip(":,") for word in limits]
 
     @property
     def reference_status(self) -> str:
