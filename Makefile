@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-effects bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-effects bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -72,6 +72,9 @@ bench: $(VENV)/ready  ## ns per sample against numpy and C, one run; what each e
 
 docs: $(VENV)/ready  ## make docs/effects.md from the register
 	$(SWEEP) effects --markdown > docs/effects.md
+
+frames: $(VENV)/ready  ## draw the frames of all families for docs/frames.md
+	$(BIN)/python docs/frames.py
 
 bench-effects: $(VENV)/ready  ## cost of every effect, written into the register; then make docs
 	$(BIN)/python -m tests.bench.effects

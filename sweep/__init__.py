@@ -13,8 +13,11 @@ if TYPE_CHECKING:
     from sweep.dataset.store import is_complete, load
     from sweep.engine.run import run
     from sweep.evaluation import thread
+    from sweep.evaluation.joints import joints
     from sweep.evaluation.poses import evaluate
     from sweep.evaluation.summaries import summarise
+    from sweep.exchange.export import export
+    from sweep.exchange.points import from_points
     from sweep.families import machine
     from sweep.synthesis.mechanisms import synthesise
 
@@ -26,9 +29,13 @@ __all__ = [
     "StudyError",
     "compare",
     "evaluate",
+    "export",
+    "from_points",
     "is_complete",
+    "joints",
     "load",
     "machine",
+    "plot",
     "run",
     "summarise",
     "synthesise",
@@ -41,14 +48,17 @@ check_kernels()
 _HOMES = {
     "compare": "sweep.dataset.comparison",
     "evaluate": "sweep.evaluation.poses",
+    "export": "sweep.exchange.export",
+    "from_points": "sweep.exchange.points",
     "is_complete": "sweep.dataset.store",
+    "joints": "sweep.evaluation.joints",
     "load": "sweep.dataset.store",
     "machine": "sweep.families",
     "run": "sweep.engine.run",
     "summarise": "sweep.evaluation.summaries",
     "synthesise": "sweep.synthesis.mechanisms",
 }
-_MODULES = {"thread": "sweep.evaluation.thread"}
+_MODULES = {"plot": "sweep.plot", "thread": "sweep.evaluation.thread"}
 
 
 def __getattr__(name: str) -> Any:

@@ -21,7 +21,8 @@ from sweep.report.answer import answer
 from sweep.report.curves import aligned_turn, in_window, rotates
 from sweep.report.figures import house_style
 from sweep.report.maps import map_figure
-from sweep.report.page import divided_axes, gather, overlays
+from sweep.report.page import divided_axes, gather
+from sweep.report.pictures import overlays
 from sweep.report.quantities import quantity
 from sweep.report.scan import Cells, Grid
 from sweep.report.tables import parameter_rows

@@ -10,7 +10,9 @@ from typing import Any, TextIO
 
 import click
 
+from sweep.cli.draw import draw
 from sweep.cli.effects import effects
+from sweep.cli.exchange import export, points
 from sweep.cli.listing import cache, families
 from sweep.cli.studies import check, compare, report, run
 from sweep.cli.tables import evaluate_table, summarise_table
@@ -83,5 +85,18 @@ def main() -> None:
     """
 
 
-for verb in (run, check, evaluate_table, summarise_table, families, effects, report, compare, cache):
+for verb in (
+    run,
+    check,
+    evaluate_table,
+    summarise_table,
+    families,
+    effects,
+    report,
+    compare,
+    cache,
+    points,
+    export,
+    draw,
+):
     main.add_command(verb)

@@ -8,7 +8,8 @@ import numpy as np
 
 from kernels.families.cam import law, translating
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled
-from sweep.families.capabilities import Points
+from sweep.families.capabilities import Link, Made, Points, Skeleton
+from sweep.families.skeletons import ORIGIN, X, line, parameter
 
 PHASES = (
     Parameter("rise", "angle", "cam angle of the rise", positive=True, default=0.5 * np.pi),
@@ -60,6 +61,20 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return cam_poses(translating.poses, tuple(o.name for o in POSE_OUTPUTS), designs, angles, wanted)
 
 
+def follower_line(designs: Array) -> tuple[Array, Array]:
+    """The point of the follower's line nearest to the cam's axis, and the direction of lift, each (n, 3)."""
+    zero = np.zeros(len(designs))
+    at = np.stack([zero, -parameter(PARAMETERS, "e", designs), zero], axis=1)
+    return at, np.tile(X, (len(designs), 1))
+
+
+def roller(designs: Array, angles: Angles, motion: Columns) -> Array:
+    """The roller's centre in the fixed frame, (n, m, 3)."""
+    s = np.asarray(motion["s"], np.float64)
+    r0, e = (parameter(PARAMETERS, name, designs)[:, None] for name in ("r0", "e"))
+    return np.stack([np.sqrt((r0 - e) * (r0 + e)) + s, -e + 0.0 * s, np.zeros_like(s)], axis=-1)
+
+
 FAMILY = Family(
     name="cam",
     title="cam with a sliding roller follower",
@@ -69,5 +84,12 @@ FAMILY = Family(
     poses=poses,
     example={"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0},
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
-    capabilities=(Points({"p": ("x_p", "y_p", None)}),),
+    capabilities=(
+        Points({"p": ("x_p", "y_p", None)}),
+        Skeleton(
+            {"a": ORIGIN, "d": line(follower_line)},
+            (Link("cam", ("a",)), Link("follower", ("r",))),
+            {"r": Made(("s",), roller)},
+        ),
+    ),
 )

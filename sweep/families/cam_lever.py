@@ -7,7 +7,8 @@ import numpy as np
 from kernels.families.cam import swinging
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
 from sweep.families.cam import PHASES, TABLE, cam_poses
-from sweep.families.capabilities import OutputLink
+from sweep.families.capabilities import Link, Made, OutputLink, Skeleton
+from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
     Parameter("lift", "angle", "swing of the lever", positive=True),
@@ -48,6 +49,13 @@ def lever_origin(designs: Array) -> Array:
     return origin
 
 
+def roller(designs: Array, angles: Angles, motion: Columns) -> Array:
+    """The roller's centre in the fixed frame, (n, m, 3)."""
+    psi = np.asarray(motion["psi"], np.float64)
+    e, c = (parameter(PARAMETERS, name, designs)[:, None] for name in ("e", "c"))
+    return np.stack([e + c * np.cos(psi), c * np.sin(psi), np.zeros_like(psi)], axis=-1)
+
+
 FAMILY = Family(
     name="cam_lever",
     title="cam with a roller on a swinging lever",
@@ -57,5 +65,12 @@ FAMILY = Family(
     poses=poses,
     example={"lift": 0.4, "r0": 3.0, "c": 5.0, "e": 6.0, "branch": -1.0},
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
-    capabilities=(OutputLink(lever_origin),),
+    capabilities=(
+        OutputLink(lever_origin),
+        Skeleton(
+            {"a": ORIGIN, "d": standing(PARAMETERS, "e")},
+            (Link("cam", ("a",)), Link("lever", ("d", "r"))),
+            {"r": Made(("psi",), roller)},
+        ),
+    ),
 )

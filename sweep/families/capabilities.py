@@ -7,7 +7,7 @@ served.  Nothing asks for a family's name.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -135,3 +135,73 @@ class ToolPoint:
 
     point: DesignMap
     direction: DesignMap
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A point of the frame, and the direction of the axis or the line through it.
+
+    Parameters
+    ----------
+    at : where it stands, (n, 3), in the family's frame
+    axis : unit vector (n, 3) about which its link turns right-handed, or along which its slider moves; None for a point
+        about which a link may turn anyhow
+    kind : "axis" of a link that turns, "slide" of one that moves along a line, "point" for neither
+    """
+
+    at: DesignMap
+    axis: DesignMap | None = None
+    kind: Literal["axis", "slide", "point"] = "axis"
+
+
+@dataclass(frozen=True)
+class Link:
+    """A part of the mechanism, by the joints it connects; the first is the pivot of a link that turns about one."""
+
+    name: str
+    joints: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Made:
+    """A moving point that is no pose output: ``at(designs, angles, motion)``, (n, m, 3), from the outputs ``needs``."""
+
+    needs: tuple[str, ...]
+    at: Callable[[Array, Angles, Columns], Array]
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """What stands still in the family's frame, what else moves, and which joints each link connects.
+
+    Moving joints are those of :class:`Points` and of ``made``.  Drawings and exports are made from it.
+    """
+
+    fixed: Mapping[str, Fixed]
+    links: tuple[Link, ...]
+    made: Mapping[str, Made] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Hardpoints:
+    """The family's dimensions can be read off points of a drawing.
+
+    ``needs`` and ``may`` are the names of points and directions that must or may be given.  ``fit(points)``
+    returns parameters, the crank angle [rad], and origin, z and x of the family's frame in that of the drawing; it
+    raises :class:`sweep.errors.InputError` for points that make no such mechanism.
+    """
+
+    needs: tuple[str, ...]
+    may: tuple[str, ...]
+    fit: Callable[[Mapping[str, Array]], Reading]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Parameters, crank angle [rad], and origin, z and x of the family's frame in the drawing's."""
+
+    parameters: dict[str, float]
+    phi: float
+    at: Array
+    z: Array
+    x: Array

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from sweep.families.base import Family
-from sweep.families.capabilities import Assembly, JointRecords, OutputLink, Points
+from sweep.families.capabilities import Assembly, JointRecords, OutputLink, Points, Skeleton
 from sweep.families.domain import Turn
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -95,6 +95,21 @@ def _capabilities(family: Family) -> list[str]:
             for point, at in points.at.items()
             for one in at
             if one is not None and one not in names
+        ]
+    for skeleton in family.every(Skeleton):
+        moving = {point for points in family.every(Points) for point in points.at}
+        known = moving.union(skeleton.fixed, skeleton.made)
+        faults += [
+            f"link {link.name}: {joint!r} is no point: name it in Points, or in fixed or made of the Skeleton"
+            for link in skeleton.links
+            for joint in link.joints
+            if joint not in known
+        ]
+        faults += [
+            f"point {name} needs {one!r}, which is no pose output"
+            for name, made in skeleton.made.items()
+            for one in made.needs
+            if one not in names
         ]
     turned = family.find(OutputLink) is not None
     if turned and family.position in names and not family.pose_output[family.position].wraps:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from itertools import chain
 
+import numpy as np
+
 from kernels.families import cylindrical_looper
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Points
+from sweep.families.capabilities import Assembly, Link, Made, Points, Skeleton
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
+from sweep.families.skeletons import crank_axis, parameter, standing
 
 PARAMETERS = (
     Parameter("a1", "length", "crank that swings the shaft", positive=True),
@@ -80,6 +83,21 @@ def second_coupler_square(designs: Array) -> Array:
     return square
 
 
+def rocker_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
+    """The point of the shaft at the height of the rocker's ball, (n, m, 3)."""
+    return _on_shaft(designs, np.asarray(motion["z_c1"], np.float64))
+
+
+def looper_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
+    """The point of the shaft at the height of the working point, (n, m, 3)."""
+    return _on_shaft(designs, np.asarray(motion["z_p"], np.float64))
+
+
+def _on_shaft(designs: Array, height: Array) -> Array:
+    e = parameter(PARAMETERS, "e1", designs)[:, None] + 0.0 * height
+    return np.stack([e, np.zeros_like(height), height], axis=-1)
+
+
 FAMILY = Family(
     name="cylindrical_looper",
     title="looper on a cylinder",
@@ -99,5 +117,13 @@ FAMILY = Family(
         Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
         Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")}),
+        Skeleton(
+            {"a1": crank_axis(PARAMETERS, "f1", "alpha1"), "d1": standing(PARAMETERS, "e1", None, "g1")},
+            (
+                Link("crank 1", ("a1", "b1")), Link("coupler 1", ("b1", "c1")),
+                Link("rocker", ("q1", "c1")), Link("looper", ("q", "p")),
+            ),
+            {"q1": Made(("z_c1",), rocker_foot), "q": Made(("z_p",), looper_foot)},
+        ),
     ),
 )  # fmt: skip

@@ -6,7 +6,8 @@ import numpy as np
 
 from kernels.families import epicyclic_dwell
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled
-from sweep.families.capabilities import Points
+from sweep.families.capabilities import Link, Made, Points, Skeleton
+from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
     Parameter("k", "ratio", "distance of the pin from the planet centre, in planet radii", positive=True),
@@ -54,6 +55,13 @@ def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
     return columns | {"status": status}
 
 
+def planet_centre(designs: Array, angles: Angles, motion: Columns) -> Array:
+    """The planet's centre, (n, m, 3), in planet radii."""
+    n, mesh, a = (parameter(PARAMETERS, name, designs)[:, None] for name in ("n", "mesh", "a"))
+    x = a + (n + mesh) * angles.cos
+    return np.stack([x, (n + mesh) * angles.sin, np.zeros_like(x)], axis=-1)
+
+
 FAMILY = Family(
     name="epicyclic_dwell",
     title="geared dwell drive with a whole gear ratio",
@@ -65,5 +73,12 @@ FAMILY = Family(
     steps=(Step("dwell", DWELL_OUTPUTS, dwell, 20000.0),),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     uses_phi=False,
-    capabilities=(Points({"b": ("x_b", "y_b", None)}),),
+    capabilities=(
+        Points({"b": ("x_b", "y_b", None)}),
+        Skeleton(
+            {"a": standing(PARAMETERS, "a"), "d": ORIGIN},
+            (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),
+            {"o": Made((), planet_centre)},
+        ),
+    ),
 )

@@ -8,7 +8,8 @@ from kernels.families import feed
 from kernels.families.feed.events import OUTPUTS as _EVENTS
 from kernels.families.feed.motion import OUTPUTS as _POSES
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
-from sweep.families.capabilities import Points
+from sweep.families.capabilities import Link, Points, Skeleton
+from sweep.families.skeletons import standing
 
 ROCKER = (
     Parameter("h_a", "length", "horizontal chain: crank", positive=True),
@@ -132,5 +133,12 @@ FAMILY = Family(
     uses_phi=False,
     capabilities=(
         Points({k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")}),
+        Skeleton(
+            {"d": standing(PARAMETERS, "h_e"), "l": standing(PARAMETERS, "xE", "yE")},
+            (
+                Link("rocker", ("d", "h")), Link("eccentric", ("l", "e")),
+                Link("lift coupler", ("e", "f")), Link("rack", ("h", "f", "t")),
+            ),
+        ),
     ),
 )  # fmt: skip

@@ -5,7 +5,8 @@ from __future__ import annotations
 from kernels.families import five_link
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, OutputLink, Points
+from sweep.families.capabilities import Assembly, Link, OutputLink, Points, Skeleton
+from sweep.families.skeletons import CRANK, ROCKER, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -76,5 +77,9 @@ FAMILY = Family(
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")}),
         OutputLink(crank_rocker.rocker_origin),
+        Skeleton(
+            {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")},
+            (CRANK, Link("cross-piece", ("b", "h")), Link("coupler", ("h", "c")), ROCKER),
+        ),
     ),
 )

@@ -13,7 +13,18 @@ from kernels import status as st
 from sweep.families import guide
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
-from sweep.families.capabilities import Assembly, CrankRockerLoop, JointRecords, OutputLink, Points, PressureEllipse
+from sweep.families.capabilities import (
+    Assembly,
+    CrankRockerLoop,
+    JointRecords,
+    Link,
+    OutputLink,
+    Points,
+    PressureEllipse,
+    Skeleton,
+)
+from sweep.families.hardpoints import FOUR_BAR_POINTS
+from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -137,6 +148,10 @@ FAMILY = Family(
         CrankRockerLoop(as_crank_rocker),
         Points({name: (f"x_{name}", f"y_{name}", None) for name in ("b", "c", "m")}),
         OutputLink(crank_rocker.rocker_origin),
+        FOUR_BAR_POINTS,
+        Skeleton(
+            {"a": ORIGIN, "d": standing(PARAMETERS, "e")}, (CRANK, Link("coupler", ("b", "c", "m")), ROCKER)
+        ),
     ),
     precise_poses=precise_poses,
 )  # fmt: skip

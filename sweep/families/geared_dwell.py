@@ -8,7 +8,8 @@ import numpy as np
 
 from kernels.families import geared_dwell
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, optional_outputs
-from sweep.families.capabilities import Points
+from sweep.families.capabilities import Link, Made, Points, Skeleton
+from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
     Parameter("k", "ratio", "distance of the pin from the planet centre, in planet radii", positive=True),
@@ -128,6 +129,12 @@ def _columns(outputs: dict[str, Array | None], status: np.ndarray[tuple[int], np
     return columns | {"status": status}
 
 
+def planet_centre(designs: Array, angles: Angles, motion: Columns) -> Array:
+    """The planet's centre, (n, m, 3), in planet radii: both gears are of one size."""
+    x = parameter(PARAMETERS, "a", designs)[:, None] + 2.0 * angles.cos
+    return np.stack([x, 2.0 * angles.sin, np.zeros_like(x)], axis=-1)
+
+
 FAMILY = Family(
     name="geared_dwell",
     title="geared dwell drive",
@@ -141,6 +148,13 @@ FAMILY = Family(
         Step("grid", _SAMPLED_OUTPUTS, sampled_maxima, 50.0, lambda accuracy: accuracy.samples is not None, 0.8),
     ),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
-    capabilities=(Points({"b": ("x_b", "y_b", None)}),),
+    capabilities=(
+        Points({"b": ("x_b", "y_b", None)}),
+        Skeleton(
+            {"a": standing(PARAMETERS, "a"), "d": ORIGIN},
+            (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),
+            {"o": Made((), planet_centre)},
+        ),
+    ),
     example={"k": 1.4, "a": 0.3},
 )

@@ -12,10 +12,14 @@ from sweep.families.capabilities import (
     CrankRockerLoop,
     GuidedPoint,
     JointRecords,
+    Link,
     Points,
     PressureEllipse,
+    Skeleton,
     ToolPoint,
 )
+from sweep.families.hardpoints import GUIDE_POINTS
+from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, parameter, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -90,6 +94,13 @@ def travel_shares(designs: Array) -> Array:
     return shares
 
 
+def guiding_line(designs: Array) -> tuple[Array, Array]:
+    """The point of the guiding line nearest to the crank pivot, and the line's direction, each (n, 3)."""
+    lam, h = parameter(PARAMETERS, "lam", designs), parameter(PARAMETERS, "h", designs)
+    along = np.stack([np.cos(lam), np.sin(lam), np.zeros(len(designs))], axis=1)
+    return h[:, None] * np.cross(Z, along), along
+
+
 def tool_point(designs: Array) -> Array:
     """Guided point from the crank pin: along the coupler, across it, out of the plane; (n, 3)."""
     return np.column_stack([designs[:, 4], designs[:, 5], 0.0 * designs[:, 5]])
@@ -123,6 +134,11 @@ FAMILY = Family(
         ),
         ToolPoint(tool_point, tool_direction),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)}),
+        GUIDE_POINTS,
+        Skeleton(
+            {"a": ORIGIN, "d": standing(PARAMETERS, "e"), "line": line(guiding_line)},
+            (CRANK, Link("coupler", ("b", "c", "point")), ROCKER),
+        ),
     ),
     precise_poses=precise_poses,
     example={"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "lam": 1.1, "h": -0.6, "branch": 1.0},

@@ -6,7 +6,8 @@ import numpy as np
 
 from kernels.families import inverted_slider_crank
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, OutputLink, Points
+from sweep.families.capabilities import Assembly, Link, Made, OutputLink, Points, Skeleton
+from sweep.families.skeletons import CRANK, ORIGIN, parameter, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -57,6 +58,13 @@ def rocker_origin(designs: Array) -> Array:
     return origin
 
 
+def slot_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
+    """The foot of the rocker pivot on the slot, (n, m, 3): ``h`` from the pivot, square to the slot."""
+    psi = np.asarray(motion["psi"], np.float64)
+    h, e = (parameter(PARAMETERS, name, designs)[:, None] for name in ("h", "e"))
+    return np.stack([e - h * np.sin(psi), h * np.cos(psi), np.zeros_like(psi)], axis=-1)
+
+
 FAMILY = Family(
     name="inverted_slider_crank",
     title="inverted slider-crank",
@@ -71,5 +79,10 @@ FAMILY = Family(
         Assembly("discriminant", "pressure_angle", _one),
         Points({"b": ("x_b", "y_b", None)}),
         OutputLink(rocker_origin),
+        Skeleton(
+            {"a": ORIGIN, "d": standing(PARAMETERS, "e")},
+            (CRANK, Link("rocker", ("d", "c", "b"))),
+            {"c": Made(("psi",), slot_foot)},
+        ),
     ),
 )

@@ -14,7 +14,8 @@ from kernels import status as st
 from kernels.families import rssr
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
-from sweep.families.capabilities import Assembly, CrankRockerLoop, JointRecords, Points, PressureEllipse
+from sweep.families.capabilities import Assembly, CrankRockerLoop, JointRecords, Points, PressureEllipse, Skeleton
+from sweep.families.skeletons import CRANK_ROCKER, standing
 
 PARAMETERS = (
     Parameter("r", "length", "crank", positive=True),
@@ -200,6 +201,13 @@ FAMILY = Family(
         PressureEllipse(ellipse),
         CrankRockerLoop(as_crank_rocker),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
+        Skeleton(
+            {
+                "a": standing(PARAMETERS, axis=(0.0, 0.0, -1.0)),
+                "d": standing(PARAMETERS, None, "a", "b", axis=(-1.0, 0.0, 0.0)),
+            },
+            CRANK_ROCKER,
+        ),
     ),
     precise_poses=precise_poses,
 )

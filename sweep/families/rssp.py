@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from kernels.families import rssp
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
-from sweep.families.capabilities import Assembly, JointRecords, LimitLocus, Points, PressureEllipse
+from sweep.families.capabilities import Assembly, JointRecords, LimitLocus, Points, PressureEllipse, Skeleton
+from sweep.families.hardpoints import SLIDER_CRANK_POINTS
+from sweep.families.skeletons import SLIDER_CRANK, Y, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -167,6 +169,11 @@ FAMILY = Family(
         PressureEllipse(ellipse),
         LimitLocus("stroke"),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
+        SLIDER_CRANK_POINTS,
+        Skeleton(
+            {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", axis=Y, kind="slide")},
+            SLIDER_CRANK,
+        ),
     ),
     precise_poses=precise_poses,
     example={"a": 1.3, "b": 5.2, "e": 0.7, "f": 0.4, "alpha": 0.3, "branch": -1.0},

@@ -30,7 +30,10 @@ from sweep.families.capabilities import (
     OutputLink,
     Points,
     PressureEllipse,
+    Skeleton,
 )
+from sweep.families.hardpoints import CRANK_ROCKER_POINTS
+from sweep.families.skeletons import CRANK_ROCKER, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -325,6 +328,8 @@ FAMILY = Family(
         LimitLocus("swing", sized=("c", "e", "g")),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(rocker_origin),
+        CRANK_ROCKER_POINTS,
+        Skeleton({"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")}, CRANK_ROCKER),
     ),
     precise_poses=precise_poses,
     example={"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "branch": -1.0},

@@ -11,7 +11,9 @@ import numpy as np
 
 from sweep.families import rssp
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
-from sweep.families.capabilities import Assembly, JointRecords, Points
+from sweep.families.capabilities import Assembly, JointRecords, Points, Skeleton
+from sweep.families.hardpoints import PLANAR_SLIDER_POINTS
+from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, X, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -104,6 +106,8 @@ FAMILY = Family(
         Assembly("discriminant", "pressure_angle", rssp.coupler_square),
         JointRecords(joint_records, ("s", "ds", "d2s", "discriminant"), "slider"),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
+        PLANAR_SLIDER_POINTS,
+        Skeleton({"a": ORIGIN, "d": standing(PARAMETERS, None, "e", axis=X, kind="slide")}, SLIDER_CRANK),
     ),
     precise_poses=precise_poses,
 )

@@ -9,7 +9,8 @@ import numpy as np
 
 from kernels.families import slotted
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, OutputLink, Points
+from sweep.families.capabilities import Assembly, Link, OutputLink, Points, Skeleton
+from sweep.families.skeletons import CRANK, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -91,5 +92,9 @@ FAMILY = Family(
         Assembly("discriminant", "pressure_angle", unit),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(pivot),
+        Skeleton(
+            {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")},
+            (CRANK, Link("arm", ("b", "c")), Link("driven link", ("d", "c"))),
+        ),
     ),
 )  # fmt: skip

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from itertools import chain
 
+import numpy as np
+
 from kernels.families import spherical_looper
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Points
+from sweep.families.capabilities import Assembly, Fixed, Link, Points, Skeleton
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
+from sweep.families.skeletons import crank_axis, parameter, standing
 
 PARAMETERS = (
     Parameter("a1", "length", "crank that swings the carrier", positive=True),
@@ -88,6 +91,12 @@ def second_coupler_square(designs: Array) -> Array:
     return square
 
 
+def second_shaft(designs: Array) -> Array:
+    """Direction of the shaft of crank 2, (n, 3)."""
+    theta, beta = parameter(PARAMETERS, "theta2", designs), parameter(PARAMETERS, "beta2", designs)
+    return np.stack([np.sin(theta) * np.cos(beta), np.sin(theta) * np.sin(beta), np.cos(theta)], axis=1)
+
+
 FAMILY = Family(
     name="spherical_looper",
     title="looper on a sphere",
@@ -107,5 +116,17 @@ FAMILY = Family(
         Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
         Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "b2", "c2", "p")}),
+        Skeleton(
+            {
+                "a1": crank_axis(PARAMETERS, "f1", "alpha1"),
+                "d1": standing(PARAMETERS, "e1", None, "g1"),
+                "os": standing(PARAMETERS, "e1", None, "o", axis=None, kind="point"),
+                "a2": Fixed(standing(PARAMETERS, "x2", "y2", "z2").at, second_shaft),
+            },
+            (
+                Link("crank 1", ("a1", "b1")), Link("coupler 1", ("b1", "c1")), Link("carrier", ("d1", "c1")),
+                Link("crank 2", ("a2", "b2")), Link("coupler 2", ("b2", "c2")), Link("looper", ("os", "c2", "p")),
+            ),
+        ),
     ),
 )  # fmt: skip

@@ -6,8 +6,9 @@ from itertools import chain
 
 from kernels.families import swivel
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Points
+from sweep.families.capabilities import Link, Points, Skeleton
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, point_outputs
+from sweep.families.skeletons import CRANK, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -48,5 +49,14 @@ FAMILY = Family(
     derivative_of=ladders("rho", "x_p", "y_p", "z_p"),
     example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "Lw": 5.0},
     uses_phi=False,
-    capabilities=(Points({"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")}),),
+    capabilities=(
+        Points({"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")}),
+        Skeleton(
+            {
+                "a": crank_axis(PARAMETERS, "f", "alpha"),
+                "q": standing(PARAMETERS, "e", None, "g", axis=None, kind="point"),
+            },
+            (CRANK, Link("rod", ("b", "q", "p"))),
+        ),
+    ),
 )

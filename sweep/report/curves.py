@@ -41,9 +41,13 @@ def motion_figure(
     speed: float | None,
     limits: tuple[Limit, ...],
     window: tuple[float, float] | None,
+    names: list[str] | None = None,
 ) -> Figure:
-    """Panels over the crank angle from the lowest position, so that two mechanisms can be laid over each other."""
-    names = shown_curves(list(curves.columns))
+    """Panels over the crank angle from the lowest position, so that two mechanisms can be laid over each other.
+
+    ``names`` are the curves that get a panel, all that are none of coordinates if left out.
+    """
+    names = shown_curves(list(curves.columns)) if names is None else names
     turns = {str(role): turn for role, turn in curves.groupby("role", sort=False)}
     label = "crank angle [°]" if turning(curves, position) else "crank angle from the lowest position [°]"
     figure = new_figure(WIDTH, 2.1 * -(-len(names) // 2) + 0.5)

@@ -5,22 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from datetime import date
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from kernels import status as codes
-from sweep.chunks.cascade import compared
 from sweep.errors import StoreError
-from sweep.evaluation.curves import coordinate
-from sweep.report import answer, front, limits, robust, tables
-from sweep.report.curves import motion_caption, motion_figure
+from sweep.report import answer, front, limits, pictures, robust, tables
+from sweep.report.curves import motion_caption
 from sweep.report.dataset import Dataset, read_dataset
-from sweep.report.drawing import mechanism_caption, mechanism_figure
+from sweep.report.drawing import mechanism_caption
 from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
 from sweep.report.files import copy_tables, write_survivors
-from sweep.report.maps import Overlay, line_figure, map_figure, trade_off_figure
-from sweep.report.quantities import Quantity, quantity
 from sweep.report.scan import Cells, Scan, most_telling, scan
 from sweep.report.turns import curves, reference_row
 
@@ -54,19 +49,14 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
     """Read a dataset, go once through its rows, and compute what an optimiser would have left."""
     data = read_dataset(folder)
     cells = divided_axes(data.study, data.counts.get(codes.OK, 0))
-    objective = objective_of(data.study)
+    objective = pictures.objective_of(data.study)
     found = scan(data.parts, cells, objective, data.second if objective is not None else None)
     data = replace(data, best=found.best_row or None)
     if data.optima is None:
         data = replace(data, computed_reference=reference_row(data.study))
     if data.curves is None and data.study.output.curves != "none":
-        data = replace(data, curves=curves(data.study, marked(data)))
+        data = replace(data, curves=curves(data.study, pictures.marked(data)))
     return data, found, cells
-
-
-def objective_of(study: Study) -> str | None:
-    """The output that is to be small, if the study names one."""
-    return None if study.objective is None else study.objective.output
 
 
 def divided_axes(study: Study, feasible: int) -> list[Cells]:
@@ -93,53 +83,18 @@ def divided_axes(study: Study, feasible: int) -> list[Cells]:
 
 def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[str, Saved]:
     """Every figure the data allow, saved; keys are the names the template knows."""
-    study, figures = data.study, {}
-    objective = objective_of(study)
-    shown = None if objective is None else quantity(objective, data.units.get(objective, ""))
-    by_name = {c.name: c for c in cells}
-    marks = {role: row for role, row in marked(data).items() if row is not None}
-    pair = most_telling(found)
-    if pair is not None:
-        x, y = pair
-        at = {role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()}
-        known = overlays(study, x, y)
-        grid = found.grids[pair]
-        sides = (by_name[x], axis_quantity(data, x)), (by_name[y], axis_quantity(data, y))
-        figures["map"] = save(map_figure(grid, *sides, data.designs, shown, at, known), folder / "map.svg")
-    elif len(cells) == 1 and found.feasible:
-        name = cells[0].name
-        side = cells[0], axis_quantity(data, name)
-        figure = line_figure(
-            found.lines[name], side, data.designs, shown, {r: float(row[name]) for r, row in marks.items()}
-        )
-        figures["map"] = save(figure, folder / "map.svg")
-    against = study.pareto.output if study.pareto is not None else data.second
-    if shown is not None and against is not None and (len(found.scatter) or data.front is not None):
-        second = quantity(against, data.units.get(against, ""))
-        first, other = shown.name, second.name
-        at = {role: (compared(first, float(r[first])), compared(other, float(r[other]))) for role, r in marks.items()}
-        bound = next((limit.maximum for limit in study.limits if limit.output == second.name), None)
-        drawn = None if data.front is None else partial(front.draw_front, data=data)
-        figures["trade_off"] = save(trade_off_figure(found, shown, second, at, bound, drawn), folder / "trade-off.svg")
-    if data.curves is not None and len(data.curves):
-        motion = motion_figure(data.curves, data.units, study.family.position, study.speed, study.limits, study.window)
-        figures["motion"] = save(motion, folder / "motion.svg")
-        joint = next((name for name in data.curves.columns if coordinate(str(name))), "")
-        mechanism = mechanism_figure(data.curves, quantity("joint", data.units.get(joint, "mm")).unit)
-        if mechanism is not None:
-            figures["mechanism"] = save(mechanism, folder / "mechanism.svg")
-    return figures
-
-
-def marked(data: Dataset) -> dict[str, Any]:
-    """The designs that are marked in the pictures of the design space."""
-    return {data.result_name: data.result, "reference": data.reference}
-
-
-def axis_quantity(data: Dataset, name: str) -> Quantity:
-    """A swept parameter under its own name, in the unit a designer reads."""
-    shown = quantity(name, data.units.get(name, ""))
-    return replace(shown, symbol=name, words=data.definitions.get(name, name))
+    made = {
+        "map": pictures.design_map(data, found, cells),
+        "trade_off": pictures.trade_off(data, found),
+        "motion": pictures.motion(data),
+        "mechanism": pictures.mechanism(data),
+    }
+    files = {"trade_off": "trade-off"}
+    return {
+        name: save(figure, folder / f"{files.get(name, name)}.svg")
+        for name, figure in made.items()
+        if figure is not None
+    }
 
 
 @dataclass(frozen=True)
@@ -159,20 +114,6 @@ def own_figures(study: Study, folder: Path) -> list[OwnFigure]:
         path = folder / entry["file"]
         uri = drawn_before(path).uri if path.exists() else None
         found.append(OwnFigure(entry["title"], entry["caption"], entry["file"], uri))
-    return found
-
-
-def overlays(study: Study, x: str, y: str) -> list[Overlay]:
-    """Known lines, ``[report] curves`` of the study, that lie in the plane of the map; points in the axes' units."""
-    import numpy as np
-
-    factors = {axis.name: axis.factor for axis in study.space.axes}
-    found = []
-    for curve in study.data.get("report", {}).get("curves", []):
-        if {curve["x"], curve["y"]} == {x, y}:
-            points = np.asarray(curve["points"], dtype=np.float64) * (factors[curve["x"]], factors[curve["y"]])
-            along = points if curve["x"] == x else points[:, ::-1]
-            found.append(Overlay(curve["label"], along[:, 0], along[:, 1]))
     return found
 
 

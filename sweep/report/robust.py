@@ -43,7 +43,7 @@ class SlopeRow:
 def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
     """Distribution of the outputs of the optimum; empty where the study names no tolerances."""
     rows = []
-    for row in _rows(data, store.TOLERANCE):
+    for row in optimum_rows(data, store.TOLERANCE):
         name = str(row["output"])
         within = "" if math.isnan(row["within"]) else f"{number(100.0 * row['within'], 3)}\u00a0%"
         if name == "all limits":
@@ -67,13 +67,29 @@ def tolerance_words(data: Dataset) -> str:
     return " and ".join(parts)
 
 
+@dataclass(frozen=True)
+class Slope:
+    """Change of the objective in percent where a dimension grows, and where it shrinks, by ``step`` (in words)."""
+
+    name: str
+    step: str
+    growing: float
+    shrinking: float
+
+
 def slope_rows(data: Dataset) -> list[SlopeRow]:
     """Dimensions by how much they change the objective, the most telling first."""
+    texts = {p.name: p.text for p in data.study.family.parameters}
+    percent = ((s, _percent(s.growing), _percent(s.shrinking)) for s in slopes(data))
+    return [SlopeRow(s.name, texts.get(s.name, ""), s.step, up, down) for s, up, down in percent]
+
+
+def slopes(data: Dataset) -> list[Slope]:
+    """The numbers of :func:`slope_rows`."""
     if data.study.objective is None:
         return []
     units = {p.name: p.unit for p in data.study.family.parameters}
-    texts = {p.name: p.text for p in data.study.family.parameters}
-    own = [row for row in _rows(data, store.SENSITIVITY) if row["output"] == data.study.objective.output]
+    own = [row for row in optimum_rows(data, store.SENSITIVITY) if row["output"] == data.study.objective.output]
     ranked = []
     for row in own:
         name, value = str(row["parameter"]), abs(float(row["value"]))
@@ -81,9 +97,8 @@ def slope_rows(data: Dataset) -> list[SlopeRow]:
         if not value > 0.0 or math.isnan(row["growing"]):
             continue
         up, down = (100.0 * step * x / value for x in (row["growing"], -row["shrinking"]))
-        shown = SlopeRow(name, texts.get(name, ""), step_words, _percent(up), _percent(down))
-        ranked.append((max(abs(up), abs(down)), shown))
-    return [shown for _, shown in sorted(ranked, key=lambda pair: -pair[0])]
+        ranked.append(Slope(name, step_words, up, down))
+    return sorted(ranked, key=lambda slope: -max(abs(slope.growing), abs(slope.shrinking)))
 
 
 def _percent(value: float) -> str:
@@ -91,7 +106,8 @@ def _percent(value: float) -> str:
     return "0" if abs(value) < 1e-9 else f"{'+' if value > 0.0 else ''}{number(value, 3)}\u00a0%"
 
 
-def _rows(data: Dataset, file: str) -> list[dict[str, Any]]:
+def optimum_rows(data: Dataset, file: str) -> list[dict[str, Any]]:
+    """Rows of the optimum in a table beside the dataset; none where there is no such table."""
     path = store.beside(data.folder) / file
     if not path.exists():
         return []

@@ -1,0 +1,79 @@
+"""The verb that draws one picture of a dataset or a design."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+OF_DATASETS = ("map", "front", "tolerance", "sensitivity")
+OF_DESIGNS = ("motion", "mechanism", "polar_load")
+ENDINGS = (".svg", ".png", ".pdf")
+
+
+@click.command()
+@click.argument("what", type=click.Choice([*OF_DESIGNS, *OF_DATASETS]))
+@click.argument("source")
+@click.argument("table", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option(
+    "--out", required=True, type=click.Path(dir_okay=False, path_type=Path), help="A .svg, .png or .pdf file."
+)
+@click.option("--design", help="Of a dataset: optimum, reference, best, or the number of a row.")
+@click.option("--row", type=click.IntRange(min=0), default=0, show_default=True, help="Of TABLE.")
+@click.option("--want", help="Of motion: outputs, separated by commas.")
+@click.option("--phi", type=float, default=0.0, show_default=True, help="Of mechanism: crank angle [rad].")
+@click.option("--view", help="Of mechanism: space, xy, zy or xz.")
+def draw(
+    what: str,
+    source: str,
+    table: Path | None,
+    out: Path,
+    design: str | None,
+    row: int,
+    want: str | None,
+    phi: float,
+    view: str | None,
+) -> None:
+    """Draw one picture.
+
+    SOURCE is a FOLDER that `sweep run` left behind, or FAMILY with a TABLE of designs (.parquet or .csv, ANGLES IN
+    RAD), of which --row is drawn.  map, front, tolerance and sensitivity are pictures of a folder; motion, mechanism
+    and polar_load of one design.
+    """
+    import sweep.plot as plot
+    from sweep.errors import InputError
+
+    if out.suffix.lower() not in ENDINGS:
+        raise InputError("--out", str(out), f"a file name ending in {' or '.join(ENDINGS)}", "command line")
+    if what in OF_DATASETS:
+        if table is not None or not Path(source).is_dir():
+            raise InputError("SOURCE", source, f"a dataset folder for {what}", "command line")
+        drawn: Any = getattr(plot, what)(source)
+    else:
+        mechanism, columns = _of_one(source, table, design, row)
+        known: dict[str, dict[str, Any]] = {"motion": {"want": want}, "mechanism": {"phi": phi, "view": view}}
+        options = known.get(what, {})
+        drawn = getattr(plot, what)(mechanism, columns, **options)
+    axes = drawn if what in ("front", "tolerance", "sensitivity", "polar_load") else drawn[0]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    axes.figure.savefig(out)
+    click.echo(f"{what}: {out}")
+
+
+def _of_one(source: str, table: Path | None, design: str | None, row: int) -> tuple[Any, dict[str, Any]]:
+    """Mechanism and design out of a folder, or a family's name and a table."""
+    from sweep.cli.listing import family_names
+    from sweep.cli.tables import read_table
+    from sweep.errors import InputError
+    from sweep.exchange.folder import chosen
+
+    if table is None:
+        if not Path(source).is_dir():
+            raise InputError("SOURCE", source, "a dataset folder, or a family with a table of designs", "command line")
+        found = chosen(source, design)
+        return found.family, found.design
+    designs = read_table(table)
+    if row >= len(designs):
+        raise InputError("--row", row, f"a row from 0 to {len(designs) - 1}", str(table))
+    return family_names(source), {str(name): designs[name].iloc[row] for name in designs}

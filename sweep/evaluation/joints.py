@@ -1,0 +1,244 @@
+"""``joints``: where the joints of a mechanism are, stage by stage and member by member."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kernels.status import OK
+from sweep.errors import InputError
+from sweep.evaluation.tables import design_matrix, numbers
+from sweep.families import Mechanism
+from sweep.families import family as find_family
+from sweep.families.base import Angles, Array, Family
+from sweep.families.capabilities import Link, OutputLink, Points, Skeleton
+from sweep.families.chain import Chain, drive, driving_names, stages_of
+from sweep.families.members import TIP, Machine, Member
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.evaluation.tables import Table
+
+UNITS = {"phi": "rad", "x": "length", "y": "length", "z": "length"}
+
+
+@dataclass(frozen=True)
+class Part:
+    """One stage of one member with its joints over the crank angles.
+
+    Parameters
+    ----------
+    member, stage : names; empty where there is one only
+    frame : in which coordinates are given: "machine", or the family's own, with the number of its stage
+    family, design : the stage's own family and its parameters, (P,)
+    phi : angle of the driving shaft, (m,)
+    crank, position : the stage's own crank angle and its output, the angle or displacement of its follower, (m,)
+    joints : by name (m, 3) each, fixed ones too
+    axes : unit vectors of axes and slides, by fixed joint
+    kinds : "axis", "slide" or "point", by fixed joint
+    links : parts, by the joints that they connect
+    status : (m,)
+    """
+
+    member: str
+    stage: str
+    frame: str
+    family: Family
+    design: Array
+    phi: Array
+    crank: Array
+    position: Array
+    joints: Mapping[str, Array]
+    axes: Mapping[str, Array]
+    kinds: Mapping[str, str]
+    links: tuple[Link, ...]
+    status: NDArray[np.uint8]
+
+    @property
+    def label(self) -> str:
+        """Member and stage in words; the family's name where there is one only."""
+        words = [self.member, f"stage {self.stage}" if self.stage else ""]
+        return " ".join(word for word in words if word) or self.family.name
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The stage's own design by parameter."""
+        return dict(zip(self.family.parameter_names, self.design.tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class _Where:
+    """What a stage is called, and its frame in the frame that coordinates are given in."""
+
+    member: str = ""
+    stage: str = ""
+    frame: str = ""
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    at: Array = field(default_factory=lambda: np.zeros(3))
+    tip: Array | None = None
+
+
+def joints(mechanism: Mechanism, design: Table, phi: ArrayLike) -> pd.DataFrame:
+    """Joint coordinates of every stage and member of one design, fixed pivots included.
+
+    Parameters
+    ----------
+    mechanism : a family's name, a list of them for a chain, a table of members for a machine
+    design : the parameters of one design, in one length unit and rad
+    phi : angles of the driving shaft [rad], one or a plain list
+
+    Returns
+    -------
+    DataFrame
+        one row per joint and angle, in the order member, stage, joint, angle; joints of fixed points first:
+
+        ========== ==================================================================================
+        member     name of the machine's member; empty for a family or a chain
+        stage      number of the stage in a chain; empty where there is one stage
+        frame      "machine" where x, y, z are in the machine's frame; else whose own frame they are in
+        joint      name of the joint as on the page of its family; ``tip`` is that of a member
+        kind       "fixed" or "moving"
+        phi        angle of the driving shaft [rad]
+        x, y, z    coordinates [length unit of the design]; nan where the pose does not exist
+        status     why, see :mod:`kernels.status`
+        ========== ==================================================================================
+
+        A machine places the last stage of a member; an earlier stage keeps its own frame.  ``attrs["units"]`` names
+        the units.
+
+    Raises
+    ------
+    InputError
+        for a table of several designs, a faulty parameter, an angle that is no finite number.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> found = sweep.joints("four_bar", {"a": 1.0, "b": 3.0, "c": 3.0, "e": 3.0}, [0.0])
+    >>> found.loc[found["joint"] == "d", ["kind", "x", "y", "z"]].values.tolist()
+    [['fixed', 3.0, 0.0, 0.0]]
+    """
+    import pandas as pd
+
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("member", "stage", "frame", "joint", "kind", "phi", "x", "y", "z", "status")
+    }
+    for part in parts(mechanism, design, phi):
+        m = part.phi.size
+        for name, path in part.joints.items():
+            fixed = name in part.kinds
+            head = (part.member, part.stage, part.frame, name, "fixed" if fixed else "moving")
+            for column, value in zip(columns, head, strict=False):
+                columns[column] += [value] * m
+            for column, values in (("phi", part.phi), *zip("xyz", path.T, strict=True)):
+                columns[column] += values.tolist()
+            columns["status"] += ([OK] * m) if fixed else part.status.tolist()
+    found = pd.DataFrame(columns)
+    found.attrs["units"] = dict(UNITS)
+    return found
+
+
+def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
+    """The stages of a mechanism with their joints, in the order of members and stages; arguments as of `joints`."""
+    family = find_family(mechanism).precise()
+    matrix, _ = design_matrix(family, design)
+    if len(matrix) != 1:
+        raise InputError("design", f"{len(matrix)} rows", "the parameters of one design", f"table of {family.name}")
+    angles = np.atleast_1d(numbers(phi, "phi", "phi, position"))
+    if angles.ndim != 1 or not np.isfinite(angles).all():
+        raise InputError("phi", phi, "finite angles [rad], one or a plain list", "phi")
+    given = Angles.of(np.ascontiguousarray(angles[None, :]))
+    if isinstance(family, Machine):
+        return [part for member in family.members for part in _of_member(family, member, matrix, given)]
+    if not any(stage.family.find(Skeleton) or stage.family.find(Points) for stage in stages_of(family)):
+        raise InputError("mechanism", family.name, "a mechanism that has joints", "joints")
+    return list(_of_stages(family, matrix, given, angles, _Where(frame=family.name)))
+
+
+def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) -> Iterator[Part]:
+    start = member.columns.stop
+    offset, at = float(matrix[0, start]), matrix[0, start + 1 : start + 4]
+    driving = angles.phi
+    if member.driver is not None:
+        name = ".".join(member.driver)
+        driving = np.asarray(machine.poses(matrix, angles, frozenset({name}))[name], np.float64)
+    own = Angles.of(np.ascontiguousarray(member.ratio * driving + offset))
+    tip = matrix[0, start + 4 : start + 7] if member.tip is not None else None
+    where = _Where(member.name, "", "machine", member.place.rotation, at, tip)
+    return _of_stages(member.family, member.designs(matrix), own, angles.phi[0], where)
+
+
+def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, last: _Where) -> Iterator[Part]:
+    """Every stage in its own frame, the last one where ``last`` says."""
+    stages = stages_of(family)
+    status = np.zeros(phi.size, np.uint8)
+    for k, stage in enumerate(stages):
+        own = stage.family
+        more = driving_names(own, stages[k + 1].family) | {own.position} if k + 1 < len(stages) else {own.position}
+        found = own.poses(stage.designs(matrix), angles, frozenset(_needed(own) | more))
+        np.copyto(status, np.asarray(found["status"], np.uint8)[0], where=status == OK)
+        where = last
+        if isinstance(family, Chain):
+            number = str(stage.number)
+            if k + 1 < len(stages) or not last.member:
+                frame = f"{last.member} stage {number} ({own.name})".strip()
+                where = _Where(last.member, number, frame)
+            else:
+                where = _Where(last.member, number, last.frame, last.rotation, last.at, last.tip)
+        yield _part(own, stage.designs(matrix), angles, phi, dict(found), where, status.copy())
+        if k + 1 < len(stages):
+            after = stages[k + 1]
+            kappa, offset = (np.ascontiguousarray(matrix[:, column]) for column in (after.kappa, after.offset))
+            angles = drive(dict(found), own.position, kappa, offset)
+
+
+def _needed(family: Family) -> set[str]:
+    skeleton = family.find(Skeleton)
+    coordinates = {name for points in family.every(Points) for at in points.at.values() for name in at if name}
+    return coordinates | ({name for made in skeleton.made.values() for name in made.needs} if skeleton else set())
+
+
+def _part(
+    family: Family, matrix: Array, angles: Angles, phi: Array, found: dict[str, Any], where: _Where, status: Any
+) -> Part:
+    """The joints of one stage, turned and moved into the frame of ``where``."""
+    skeleton = family.find(Skeleton)
+    moving = {
+        name: np.stack([found[x][0] if x else np.zeros(phi.size) for x in at], axis=-1)
+        for points in family.every(Points)
+        for name, at in points.at.items()
+    }
+    fixed: dict[str, Array] = {}
+    axes: dict[str, Array] = {}
+    if skeleton is not None:
+        moving |= {name: made.at(matrix, angles, found)[0] for name, made in skeleton.made.items()}
+        linked = {joint for link in skeleton.links for joint in link.joints}
+        # What no link carries is no joint of the fixed frame: the pitch curve stands in that of the cam.
+        moving = {name: path for name, path in moving.items() if name in linked}
+        fixed = {name: np.tile(point.at(matrix)[0], (phi.size, 1)) for name, point in skeleton.fixed.items()}
+        axes = {name: point.axis(matrix)[0] for name, point in skeleton.fixed.items() if point.axis is not None}
+    if where.tip is not None:
+        moving[TIP] = _tip(family, matrix, np.asarray(found[family.position][0], np.float64), where.tip)
+    turned = {name: path @ where.rotation.T + where.at for name, path in (fixed | moving).items()}
+    crank, position = (np.asarray(values[0], np.float64) for values in (angles.phi, found[family.position]))
+    return Part(
+        where.member, where.stage, where.frame, family, matrix[0], phi, crank, position, turned,
+        {name: where.rotation @ axis for name, axis in axes.items()},
+        {name: point.kind for name, point in skeleton.fixed.items()} if skeleton else {},
+        skeleton.links if skeleton else (), status,
+    )  # fmt: skip
+
+
+def _tip(family: Family, matrix: Array, angle: Array, tip: Array) -> Array:
+    """A point fixed to the output link, (m, 3), in the stage's frame."""
+    link = family.find(OutputLink)
+    assert link is not None
+    cos, sin, origin = np.cos(angle), np.sin(angle), link.origin(matrix)[0]
+    x, y, z = tip
+    at: Array = origin + np.stack([x * cos - y * sin, x * sin + y * cos, z + 0.0 * cos], axis=-1)
+    return at

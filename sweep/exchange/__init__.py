@@ -1,0 +1,1 @@
+"""Points of a drawing in; hardpoints, CAD, animation, simulation models and motion laws out."""

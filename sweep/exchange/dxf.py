@@ -1,0 +1,85 @@
+"""Views of a mechanism as a drawing: DXF, by ezdxf."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sweep.errors import InputError
+from sweep.exchange.scene import Placed, extent, shown_name
+from sweep.families.base import Array
+
+if TYPE_CHECKING:
+    from sweep.evaluation.joints import Part
+
+LAYERS = {"LINKS": 5, "JOINTS": 7, "PIVOTS": 1, "AXES": 8, "PATHS": 3, "TEXT": 7}
+VIEWS = {"front": (0, 1), "side": (2, 1), "top": (0, 2)}
+UNITS = {"mm": 4, "m": 6}
+
+
+def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
+    """The first pose with the joints' paths; planar parts from the front, spatial ones from the side and top as well.
+
+    Layers are LINKS, JOINTS, PIVOTS, AXES, PATHS and TEXT.  Every frame has its views side by side, the front view of
+    the first one standing at its own coordinates.
+
+    Raises
+    ------
+    InputError
+        if ezdxf is not installed.
+    """
+    try:
+        import ezdxf
+    except ImportError as error:
+        raise InputError("format", "dxf", "the package ezdxf: pip install 'linksweep[cad]'", "export") from error
+    document: Any = ezdxf.new("R2010", setup=True)  # type: ignore[attr-defined]
+    document.header["$INSUNITS"] = UNITS[unit]
+    for layer, colour in LAYERS.items():
+        document.layers.add(layer, color=colour)
+    space = document.modelspace()
+    right, first = 0.0, True
+    for frame in dict.fromkeys(one.part.frame for one in placed):
+        same = [one.part for one in placed if one.part.frame == frame]
+        size = extent(same)
+        points = np.vstack([path for part in same for path in part.joints.values()])
+        spatial = float(np.ptp(points[:, 2])) > 1e-9 * size
+        for view, columns in VIEWS.items():
+            if view != "front" and not spatial:
+                continue
+            seen = list(columns)
+            flat = points[:, seen]
+            shift = np.array([0.0 if first else right + 0.25 * size - float(flat[:, 0].min()), 0.0])
+            first, right = False, float(flat[:, 0].max() + shift[0])
+            for part in same:
+                _draw(space, part, seen, shift, size)
+            title = f"{', '.join(part.label for part in same)}: {view}" if spatial else same[0].label
+            low = np.array([float(flat[:, 0].min()), float(flat[:, 1].min()) - 0.15 * size]) + shift
+            _text(space, title, low, 0.04 * size)
+    document.saveas(path)
+
+
+def _draw(space: Any, part: Part, seen: list[int], shift: Array, size: float) -> None:
+    at = {name: path[:, seen] + shift for name, path in part.joints.items()}
+    for link in part.links:
+        corners = [at[name][0] for name in link.joints]
+        if len(corners) > 1:
+            space.add_lwpolyline([tuple(p) for p in corners], close=len(corners) > 2, dxfattribs={"layer": "LINKS"})
+    for name, path in at.items():
+        layer = "PIVOTS" if name in part.kinds else "JOINTS"
+        here = tuple(path[0])
+        space.add_point(here, dxfattribs={"layer": layer})
+        space.add_circle(here, 0.012 * size, dxfattribs={"layer": layer})
+        _text(space, shown_name(name), path[0] + 0.018 * size, 0.03 * size)
+        if name not in part.kinds and float(np.ptp(path, axis=0).max()) > 0.0:
+            space.add_lwpolyline([tuple(p) for p in path[:-1]], close=True, dxfattribs={"layer": "PATHS"})
+    for name, axis in part.axes.items():
+        along = 0.12 * size * axis[seen]
+        if float(np.linalg.norm(along)) > 1e-6 * size:
+            ends = tuple(at[name][0] - along), tuple(at[name][0] + along)
+            space.add_line(*ends, dxfattribs={"layer": "AXES", "linetype": "CENTER"})
+
+
+def _text(space: Any, words: str, at: Array, height: float) -> None:
+    space.add_text(words, height=height, dxfattribs={"layer": "TEXT", "insert": tuple(at)})

@@ -1,0 +1,135 @@
+"""``export``: one design as hardpoints, CAD, animation, simulation model or motion law."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sweep.errors import InputError, StoreError
+from sweep.exchange.scene import turn
+from sweep.families import Mechanism
+from sweep.families import family as find_family
+
+if TYPE_CHECKING:
+    from sweep.evaluation.tables import Table
+
+FORMATS = {"csv": (".csv",), "glb": (".glb",), "dxf": (".dxf",), "mjcf": (".xml",), "law": (".csv", ".parquet")}
+UNITS = {"mm": 1e-3, "m": 1.0}
+SECONDS = 2.0  # of an animation where no speed is given
+
+
+def export(
+    mechanism: Mechanism,
+    design: Table,
+    path: str | Path,
+    format: str | None = None,
+    *,
+    phi: float = 0.0,
+    poses: int = 120,
+    unit: str = "mm",
+    speed: float | None = None,
+) -> Path:
+    """Write one design to a file that other programs read.
+
+    Parameters
+    ----------
+    mechanism : a family's name, a list of them for a chain, a table of members for a machine
+    design : the parameters of one design [one length unit, rad]; for ``mjcf`` also masses, centres and inertias of its
+        links by the names of docs/effects.md
+    path : the file
+    format : ``csv`` hardpoints and axes in the position ``phi``; ``glb`` an animated model (glTF 2.0) over one turn;
+        ``dxf`` a drawing with front view, and side and top view of spatial stages; ``mjcf`` a model for MuJoCo;
+        ``law`` the motion over one turn with units (.csv or .parquet).  If left out, the ending of the file says it:
+        .csv is hardpoints, .xml is mjcf
+    phi : angle of the driving shaft in the drawn position, where a turn begins [rad]
+    poses : steps of a turn
+    unit : what a length of the design is, "mm" or "m"
+    speed : of the driving shaft [rad/s]: gives the law a column of time and the animation its duration
+
+    Returns
+    -------
+    Path
+        the file
+
+    Raises
+    ------
+    InputError
+        for an unknown format or unit, a design that does not turn, a mechanism the format does not serve, a package
+        that is not installed (``pip install 'linksweep[cad]'``).
+    StoreError
+        if the file cannot be written.
+    """
+    target = Path(path)
+    kind = _format(target, format)
+    if unit not in UNITS:
+        raise InputError("unit", unit, "mm or m", "export")
+    if poses < 3:
+        raise InputError("poses", poses, "at least 3", "export")
+    if speed is not None and not (math.isfinite(speed) and speed > 0.0):
+        raise InputError("speed", speed, "a positive number of rad/s", "export")
+    write = _writer(kind, mechanism, design, phi, poses, unit, speed)
+    partial = target.with_name(f"_tmp-{os.getpid()}-{target.name}")
+    try:
+        write(partial)
+        partial.replace(target)
+    except OSError as error:
+        raise StoreError(f"{target}: cannot be written: {error}") from error
+    finally:
+        partial.unlink(missing_ok=True)
+    return target
+
+
+def _writer(
+    kind: str, mechanism: Mechanism, design: Table, phi: float, poses: int, unit: str, speed: float | None
+) -> Callable[[Path], None]:
+    """What writes the file once its path is known; what can be wrong with the design is found here."""
+    if kind == "csv":
+        from sweep.exchange.hardpoints import write_hardpoints
+
+        return lambda path: write_hardpoints(mechanism, design, path, phi, unit)
+    if kind == "law":
+        from sweep.exchange.law import write_law
+
+        return lambda path: write_law(mechanism, design, path, phi, poses, unit, speed)
+    placed = turn(mechanism, design, phi, poses)
+    name = find_family(mechanism).name
+    if kind == "glb":
+        from sweep.exchange.glb import write_glb
+
+        seconds = SECONDS if speed is None else 2.0 * math.pi / speed
+        return lambda path: write_glb(name, placed, path, UNITS[unit], seconds)
+    if kind == "dxf":
+        from sweep.exchange.dxf import write_dxf
+
+        return lambda path: write_dxf(placed, path, unit)
+    from sweep.exchange.mjcf import write_mjcf
+
+    return lambda path: write_mjcf(name, placed, _numbers(design), path, unit)
+
+
+def _numbers(design: Table) -> dict[str, float]:
+    """The columns of one design as numbers."""
+    columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
+    found = {}
+    for key, value in columns.items():
+        one = value.iloc[0] if hasattr(value, "iloc") else value[0] if isinstance(value, list | tuple) else value
+        if isinstance(one, int | float):
+            found[str(key)] = float(one)
+    return found
+
+
+def _format(path: Path, given: str | None) -> str:
+    suffix = path.suffix.lower()
+    if given is None:
+        for kind, endings in FORMATS.items():
+            if suffix in endings and kind != "law":
+                return kind
+        raise InputError("path", path.name, "a file ending in .csv, .glb, .dxf or .xml, or format=", "export")
+    if given not in FORMATS:
+        raise InputError("format", given, ", ".join(FORMATS), "export")
+    if suffix not in FORMATS[given]:
+        raise InputError("path", path.name, f"a file ending in {' or '.join(FORMATS[given])}", f"export, {given}")
+    return given

@@ -1,0 +1,246 @@
+"""An animated model: glTF 2.0 in one binary file, which browsers and viewers open without a plug-in.
+
+Every link is a node of its name with a bar for each pair of its joints, every joint a ball, every fixed axis a thin
+cylinder.  Lengths are metres and y points upwards, as the format wants; the node at the root carries both.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.exchange.scene import Placed, extent, shown_name
+from sweep.families.base import Array
+
+COLOURS = {
+    "frame": (0.08, 0.09, 0.12), "joint": (0.92, 0.93, 0.95),
+    "link 0": (0.12, 0.35, 0.65), "link 1": (0.18, 0.56, 0.36),
+    "link 2": (0.78, 0.33, 0.11), "link 3": (0.48, 0.31, 0.64), "link 4": (0.08, 0.5, 0.56),
+}  # fmt: skip
+FLOAT, UINT16 = 5126, 5123
+ARRAY_BUFFER, ELEMENT_BUFFER = 34962, 34963
+SIDES, RINGS = 24, 12
+
+
+class Model:
+    """Nodes, meshes and accessors as they are collected, and the bytes that they point to."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+        self.nodes: list[dict[str, Any]] = []
+        self.channels: list[dict[str, Any]] = []
+        self.samplers: list[dict[str, Any]] = []
+        self.meshes: list[dict[str, Any]] = []
+        self.mesh_of: dict[tuple[str, str], int] = {}
+        self.shapes = {"bar": self._shape(*_cylinder()), "ball": self._shape(*_ball())}
+        self.materials = list(COLOURS)
+
+    def accessor(self, values: NDArray[Any], kind: str, target: int | None = None) -> int:
+        """Store an array; whole numbers are indices."""
+        whole = values.dtype.kind in "iu"
+        stored = np.ascontiguousarray(values, np.uint16 if whole else np.float32)
+        self.data += b"\0" * (-len(self.data) % 4)
+        view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.data), "byteLength": stored.nbytes}
+        self.views.append(view | ({"target": target} if target else {}))
+        self.data += stored.tobytes()
+        flat = stored.reshape(len(stored), -1)
+        self.accessors.append(
+            {
+                "bufferView": len(self.views) - 1,
+                "componentType": UINT16 if whole else FLOAT,
+                "count": len(stored),
+                "type": kind,
+                "min": flat.min(axis=0).tolist(),
+                "max": flat.max(axis=0).tolist(),
+            }
+        )
+        return len(self.accessors) - 1
+
+    def mesh(self, shape: str, colour: str) -> int:
+        """The mesh of a shape in a colour, made when it is first asked for."""
+        if (shape, colour) not in self.mesh_of:
+            self.mesh_of[shape, colour] = len(self.meshes)
+            primitive = self.shapes[shape] | {"material": self.materials.index(colour)}
+            self.meshes.append({"name": f"{shape} {colour}", "primitives": [primitive]})
+        return self.mesh_of[shape, colour]
+
+    def node(self, **what: Any) -> int:
+        """Add a node."""
+        self.nodes.append(what)
+        return len(self.nodes) - 1
+
+    def animate(self, node: int, times: int, path: str, values: Array) -> None:
+        """Let a node's translation, rotation or scale follow values over the times."""
+        output = self.accessor(values, "VEC4" if path == "rotation" else "VEC3")
+        self.samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
+        self.channels.append({"sampler": len(self.samplers) - 1, "target": {"node": node, "path": path}})
+
+    def _shape(self, points: Array, normals: Array, faces: NDArray[np.int64]) -> dict[str, Any]:
+        attributes = {
+            "POSITION": self.accessor(points, "VEC3", ARRAY_BUFFER),
+            "NORMAL": self.accessor(normals, "VEC3", ARRAY_BUFFER),
+        }
+        return {"attributes": attributes, "indices": self.accessor(faces.reshape(-1), "SCALAR", ELEMENT_BUFFER)}
+
+
+def write_glb(name: str, placed: list[Placed], path: Path, metres: float, seconds: float) -> None:
+    """One turn in ``seconds``; ``metres`` is the length unit of the joints."""
+    model = Model()
+    poses = placed[0].part.phi.size
+    times = model.accessor(np.linspace(0.0, seconds, poses), "SCALAR")
+    size = extent([one.part for one in placed])
+    groups = [_group(model, one, times, size) for one in placed]
+    half = math.sqrt(0.5)
+    root = model.node(name=name, rotation=[-half, 0.0, 0.0, half], scale=[metres] * 3, children=groups)
+    data = bytes(model.data) + b"\0" * (-len(model.data) % 4)
+    document = {
+        "asset": {"version": "2.0", "generator": "linksweep"},
+        "scene": 0,
+        "scenes": [{"name": name, "nodes": [root]}],
+        "nodes": model.nodes,
+        "meshes": model.meshes,
+        "materials": [_material(colour, rgb) for colour, rgb in COLOURS.items()],
+        "animations": [{"name": "one turn", "channels": model.channels, "samplers": model.samplers}],
+        "accessors": model.accessors,
+        "bufferViews": model.views,
+        "buffers": [{"byteLength": len(data)}],
+    }
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    with path.open("wb") as file:
+        file.write(struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + len(data)))
+        file.write(struct.pack("<I4s", len(text), b"JSON") + text)
+        file.write(struct.pack("<I4s", len(data), b"BIN\0") + data)
+
+
+def _material(name: str, rgb: tuple[float, float, float]) -> dict[str, Any]:
+    surface = {"baseColorFactor": [*rgb, 1.0], "metallicFactor": 0.3, "roughnessFactor": 0.6}
+    return {"name": name, "pbrMetallicRoughness": surface}
+
+
+def _group(model: Model, one: Placed, times: int, size: float) -> int:
+    """The node of a part with those of its links, joints and axes."""
+    part, children, thick = one.part, [], 0.008 * size
+    for k, link in enumerate(part.links):
+        pairs = list(zip(link.joints, link.joints[1:], strict=False))
+        pairs += [(link.joints[-1], link.joints[0])] if len(link.joints) > 2 else []
+        colour = f"link {k % 5}"
+        bars = [
+            _bar(
+                model,
+                f"{link.name} {shown_name(a)}-{shown_name(b)}",
+                colour,
+                part.joints[a],
+                part.joints[b],
+                times,
+                thick,
+            )
+            for a, b in pairs
+            if np.abs(part.joints[b] - part.joints[a]).max() > 1e-9 * size  # the fork slot has an arm of no length
+        ]
+        if bars:
+            children.append(model.node(name=link.name, children=bars))
+    for joint, path in part.joints.items():
+        fixed = joint in part.kinds
+        mesh = model.mesh("ball", "frame" if fixed else "joint")
+        node = model.node(
+            name=shown_name(joint), mesh=mesh, scale=[1.8 * thick] * 3, translation=path[0].astype(np.float32).tolist()
+        )
+        if not fixed:
+            model.animate(node, times, "translation", path)
+        children.append(node)
+    for joint, axis in part.axes.items():
+        reach = 0.12 * size
+        at = part.joints[joint][0] - reach * axis
+        children.append(
+            model.node(
+                name=f"axis_{shown_name(joint)}", mesh=model.mesh("bar", "frame"), translation=at.tolist(),
+                rotation=_unit(_from_z(axis)).tolist(), scale=[0.4 * thick, 0.4 * thick, 2.0 * reach],
+            )
+        )  # fmt: skip
+    return model.node(name=part.label, translation=one.shift.tolist(), children=children)
+
+
+def _bar(model: Model, name: str, colour: str, start: Array, end: Array, times: int, thick: float) -> int:
+    """A bar from one path to the other: turned with its direction, stretched where a joint slides along it."""
+    along = end - start
+    length = np.linalg.norm(along, axis=1)
+    rotation = _following(along / np.maximum(length, 1e-300)[:, None])
+    scale = np.stack([np.full_like(length, thick), np.full_like(length, thick), length], axis=1)
+    node = model.node(
+        name=name, mesh=model.mesh("bar", colour), translation=start[0].tolist(), rotation=rotation[0].tolist(),
+        scale=scale[0].tolist(),
+    )  # fmt: skip
+    model.animate(node, times, "rotation", rotation)
+    if np.ptp(start, axis=0).max() > 0.0:
+        model.animate(node, times, "translation", start)
+    if np.ptp(length) > 1e-6 * length.max():
+        model.animate(node, times, "scale", scale)
+    return node
+
+
+def _following(directions: Array) -> Array:
+    """Quaternions (x, y, z, w) that turn z into each direction, each from the one before by the shortest way."""
+    found = np.empty((len(directions), 4))
+    found[0] = _unit(_from_z(directions[0]))
+    for k in range(1, len(directions)):
+        found[k] = _unit(_product(_shortest(directions[k - 1], directions[k]), found[k - 1]))
+    return found
+
+
+def _from_z(direction: Array) -> Array:
+    if direction[2] < -0.9:  # by a half turn about x first, away from where the shortest way is none
+        return _product(_shortest(np.array([0.0, 0.0, -1.0]), direction), np.array([1.0, 0.0, 0.0, 0.0]))
+    return _shortest(np.array([0.0, 0.0, 1.0]), direction)
+
+
+def _shortest(first: Array, second: Array) -> Array:
+    return _unit(np.append(np.cross(first, second), 1.0 + first @ second))
+
+
+def _product(p: Array, q: Array) -> Array:
+    vector = p[3] * q[:3] + q[3] * p[:3] + np.cross(p[:3], q[:3])
+    return np.append(vector, p[3] * q[3] - p[:3] @ q[:3])
+
+
+def _unit(values: Array) -> Array:
+    found: Array = values / np.linalg.norm(values)
+    return found
+
+
+def _cylinder() -> tuple[Array, Array, NDArray[np.int64]]:
+    """A cylinder of radius 1 from z = 0 to 1, its ends open: the balls of the joints close them."""
+    angle = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
+    k = np.arange(SIDES)
+    after = (k + 1) % SIDES
+    faces = np.concatenate(
+        [np.stack([k, after, after + SIDES], axis=1), np.stack([k, after + SIDES, k + SIDES], axis=1)]
+    )
+    return np.vstack([ring, ring + np.array([0.0, 0.0, 1.0])]), np.vstack([ring, ring]), faces
+
+
+def _ball() -> tuple[Array, Array, NDArray[np.int64]]:
+    """A ball of radius 1."""
+    polar = np.linspace(0.0, math.pi, RINGS + 1)
+    angle = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
+    points = np.array(
+        [[math.sin(p) * math.cos(a), math.sin(p) * math.sin(a), math.cos(p)] for p in polar for a in angle]
+    )
+    faces = []
+    for i in range(RINGS):
+        for j in range(SIDES):
+            a, b = i * SIDES + j, i * SIDES + (j + 1) % SIDES
+            if i:
+                faces.append([a, b + SIDES, b])
+            if i < RINGS - 1:
+                faces.append([a, a + SIDES, b + SIDES])
+    return points, points, np.array(faces)

@@ -1,0 +1,172 @@
+"""From points of a drawing to the dimensions of crank-rockers and slider-cranks: the frames of docs/frames.md.
+
+Points come in one length unit in the drawing's frame; directions come with length 1.  The order of work is the same
+everywhere: common perpendicular, frame, offsets along the axes, links, angles, sign of the assembly mode.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from sweep.errors import InputError
+from sweep.families.base import Array
+from sweep.families.capabilities import Hardpoints, Reading
+
+PARALLEL = 1e-9  # sine of the angle below which two directions are read as one
+NOTHING = 1e-12  # part of the size of a drawing that is a rounding error of its coordinates
+PLACE = "points"
+
+
+def crank_rocker(points: Mapping[str, Array]) -> Reading:
+    """Dimensions of a spatial crank-rocker from A, axis_A, B, C, D, axis_D."""
+    a, b, c, d, u, z = (points[name] for name in ("A", "B", "C", "D", "axis_A", "axis_D"))
+    small = NOTHING * size(points)
+    across = np.cross(z, u)
+    sine = float(np.linalg.norm(across))
+    if sine > PARALLEL:
+        x = across / sine
+        x = -x if float((d - a) @ x) < -small else x
+        sin, cos = float(np.cross(u, z) @ x), float(u @ z)
+        y = np.cross(z, x)
+        f = -float((d - a) @ y) / sin
+    else:
+        x, sin, cos, f = _square(d - a, z, small), 0.0, math.copysign(1.0, float(u @ z)), 0.0
+        y = np.cross(z, x)
+    e = float((d - a) @ x)
+    e = 0.0 if abs(e) <= small else e
+    crank, rocker, coupler = b - a, c - d, c - b
+    phi = math.atan2(float(crank @ np.cross(u, x)), float(crank @ x))
+    psi = math.atan2(float(rocker @ y), float(rocker @ x))
+    lengths = {
+        "a": _length(crank - (crank @ u) * u, small, "B", "a point off the crank axis"),
+        "b": _length(coupler, small, "C", "another point than B"),
+        "c": _length(rocker - (rocker @ z) * z, small, "C", "a point off the rocker axis"),
+    }
+    branch = _sign(float(coupler @ (np.cos(psi) * y - np.sin(psi) * x)), small, "C")
+    offsets = {"e": e, "f": f, "g": float((d - a) @ z) + f * cos, "alpha": math.atan2(sin, cos), "branch": branch}
+    return Reading(lengths | offsets, phi, a - f * u, z, x)
+
+
+def slider_crank(points: Mapping[str, Array]) -> Reading:
+    """Dimensions of a spatial slider-crank from A, axis_A, B, C, axis_D and, if the line is given by a point, D."""
+    a, b, c, u, y = (points[name] for name in ("A", "B", "C", "axis_A", "axis_D"))
+    d = points.get("D", c)
+    small = NOTHING * size(points)
+    across = np.cross(y, u)
+    cosine = float(np.linalg.norm(across))
+    if cosine > PARALLEL:
+        x = across / cosine
+        x = -x if float((d - a) @ x) < -small else x
+        z = np.cross(x, y)
+        f = -float((d - a) @ z) / float(u @ z)
+    else:
+        x, f = _square(d - a, y, small), 0.0
+        z = np.cross(x, y)
+    e = float((d - a) @ x)
+    crank, coupler = b - a, c - b
+    lengths = {
+        "a": _length(crank - (crank @ u) * u, small, "B", "a point off the crank axis"),
+        "b": _length(coupler, small, "C", "another point than B"),
+    }
+    alpha = math.atan2(float(u @ y), float(u @ z) if cosine > PARALLEL else 0.0)
+    offsets = {"e": 0.0 if abs(e) <= small else e, "f": f, "alpha": alpha}
+    phi = math.atan2(float(crank @ np.cross(u, x)), float(crank @ x))
+    return Reading(lengths | offsets | {"branch": _sign(float(coupler @ y), small, "C")}, phi, a - f * u, z, x)
+
+
+def four_bar(points: Mapping[str, Array]) -> Reading:
+    """Dimensions of a planar four-bar from A, B, C, D and, if wanted, axis_A (else z) and the coupler point M."""
+    return _planar(points, points.get("M"))
+
+
+def guide(points: Mapping[str, Array]) -> Reading:
+    """As :func:`four_bar`, with the coupler point ``point``, and ``axis_line`` and ``line`` (else ``point``) of a line.
+
+    Without ``line`` the guiding line runs through the coupler point, which then is where it deviates by 0.
+    """
+    found = _planar(points, points["point"])
+    y = np.cross(found.z, found.x)
+    along = points["axis_line"]
+    lam = math.atan2(float(along @ y), float(along @ found.x))
+    left = np.cos(lam) * y - np.sin(lam) * found.x
+    h = float((points.get("line", points["point"]) - found.at) @ left)
+    return Reading(found.parameters | {"lam": lam, "h": h}, found.phi, found.at, found.z, found.x)
+
+
+def planar_slider_crank(points: Mapping[str, Array]) -> Reading:
+    """Dimensions of a planar slider-crank from A, B, C, axis_D and, if wanted, D and axis_A (else z)."""
+    a, b, c = (points[name] for name in ("A", "B", "C"))
+    z, small = points.get("axis_A", np.array([0.0, 0.0, 1.0])), NOTHING * size(points)
+    x = points["axis_D"] - (points["axis_D"] @ z) * z
+    if np.linalg.norm(x) < PARALLEL:
+        raise InputError("axis_D", points["axis_D"].tolist(), "a direction that is not along axis_A", PLACE)
+    x /= np.linalg.norm(x)
+    y = np.cross(z, x)
+    crank, rod = b - a, c - b
+    parameters = {
+        "a": _length(crank, small, "B", "another point than A"),
+        "b": _length(rod, small, "C", "another point than B"),
+        "e": float((points.get("D", c) - a) @ y),
+        "branch": _sign(float(rod @ x), small, "C"),
+    }
+    return Reading(parameters, math.atan2(float(crank @ y), float(crank @ x)), a, z, x)
+
+
+def _planar(points: Mapping[str, Array], point: Array | None) -> Reading:
+    a, b, c, d = (points[name] for name in ("A", "B", "C", "D"))
+    z, small = points.get("axis_A", np.array([0.0, 0.0, 1.0])), NOTHING * size(points)
+    x = _square(d - a, z, small)
+    y = np.cross(z, x)
+    crank, coupler, rocker = b - a, c - b, c - d
+    psi = math.atan2(float(rocker @ y), float(rocker @ x))
+    parameters = {
+        "a": _length(crank, small, "B", "another point than A"),
+        "b": _length(coupler, small, "C", "another point than B"),
+        "c": _length(rocker, small, "C", "another point than D"),
+        "e": float((d - a) @ x),
+        "branch": _sign(float(coupler @ (np.cos(psi) * y - np.sin(psi) * x)), small, "C"),
+    }
+    if point is not None:
+        along = coupler / parameters["b"]
+        parameters |= {"xi": float((point - b) @ along), "eta": float((point - b) @ np.cross(z, along))}
+    return Reading(parameters, math.atan2(float(crank @ y), float(crank @ x)), a, z, x)
+
+
+def size(points: Mapping[str, Array]) -> float:
+    """Largest extent of the points."""
+    places = np.array([point for name, point in points.items() if not name.startswith("axis_")])
+    return float(np.ptp(places, axis=0).max())
+
+
+def _square(vector: Array, axis: Array, small: float) -> Array:
+    """Direction of the part of a vector that is square to an axis."""
+    rest = vector - (vector @ axis) * axis
+    length = float(np.linalg.norm(rest))
+    if length <= small:
+        raise InputError("D", "on the axis through A", "an axis beside it: axes on one line make no linkage", PLACE)
+    return rest / length
+
+
+def _length(vector: Array, small: float, name: str, allowed: str) -> float:
+    length = float(np.linalg.norm(vector))
+    if length <= small:
+        raise InputError(name, f"a link of length {length:.3g}", allowed, PLACE)
+    return length
+
+
+def _sign(value: float, small: float, name: str) -> float:
+    if abs(value) <= small:
+        allowed = "points of another position: in this one, a dead point, both assembly modes meet"
+        raise InputError(name, "coupler and follower are square", allowed, PLACE)
+    return math.copysign(1.0, value)
+
+
+_SPATIAL = ("A", "axis_A", "B", "C")
+CRANK_ROCKER_POINTS = Hardpoints((*_SPATIAL, "D", "axis_D"), (), crank_rocker)
+SLIDER_CRANK_POINTS = Hardpoints((*_SPATIAL, "axis_D"), ("D",), slider_crank)
+FOUR_BAR_POINTS = Hardpoints(("A", "B", "C", "D"), ("axis_A", "M"), four_bar)
+GUIDE_POINTS = Hardpoints(("A", "B", "C", "D", "point", "axis_line"), ("axis_A", "line"), guide)
+PLANAR_SLIDER_POINTS = Hardpoints(("A", "B", "C", "axis_D"), ("axis_A", "D"), planar_slider_crank)

@@ -1,0 +1,12 @@
+"""Pictures of mechanisms and datasets as matplotlib axes, in the style of the report.
+
+Each function returns the axes it drew, an array where there may be several; ``axes.figure.savefig("name.svg")`` writes
+them.  Nothing opens a window.
+"""
+
+from __future__ import annotations
+
+from sweep.plot.datasets import front, map, sensitivity, tolerance
+from sweep.plot.mechanisms import mechanism, motion, polar_load
+
+__all__ = ["front", "map", "mechanism", "motion", "polar_load", "sensitivity", "tolerance"]

@@ -1,0 +1,166 @@
+"""Pictures of one design: its motion, the mechanism itself, the load on a bearing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.errors import InputError
+from sweep.evaluation.curves import motion_curves
+from sweep.evaluation.joints import parts
+from sweep.evaluation.poses import evaluate, pose_wants
+from sweep.exchange.scene import shown_name
+from sweep.families import Mechanism
+from sweep.families import family as find_family
+from sweep.plot.space import VIEWS, draw_frame, is_spatial, projection
+from sweep.report.curves import motion_figure
+from sweep.report.figures import OPTIMUM, house_style, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from sweep.evaluation.tables import Table
+
+POSES = 720
+
+
+def motion(
+    mechanism: Mechanism,
+    design: Table,
+    want: str | Sequence[str] | None = None,
+    *,
+    unit: str = "mm",
+    speed: float | None = None,
+) -> NDArray[Any]:
+    """Curves over one turn, one panel for each.
+
+    Parameters
+    ----------
+    mechanism, design : as of :func:`sweep.joints`
+    want : pose outputs, as a list or in one string between commas; if left out position and derivatives, deviations
+        and pressure angles
+    unit : the length unit of the design, for the axes
+    speed : of the driving shaft [rad/s]: adds scales of velocity, acceleration and jerk in time
+
+    Returns
+    -------
+    array of Axes
+        in the order of ``want``.  Crank angles count from the lowest position where the follower has one
+    """
+    import pandas as pd
+
+    family = find_family(mechanism)
+    asked = want.split(",") if isinstance(want, str) else want
+    names = (
+        list(dict.fromkeys(motion_curves(family))) if asked is None else pose_wants(family, [n.strip() for n in asked])
+    )
+    phi = np.arange(POSES) * (2.0 * math.pi / POSES)
+    found = evaluate(mechanism, design, list(dict.fromkeys([*names, family.position])), phi=phi)
+    if found["design"].iloc[-1] != 0:
+        raise InputError("design", "several rows", "the parameters of one design", f"table of {family.name}")
+    curves = pd.DataFrame(found.assign(role="design"))
+    units = {o.name: o.unit.replace("length", unit) for o in family.pose_outputs}
+    with house_style():
+        figure = motion_figure(curves, units, family.position, speed, (), None, names)
+    return np.array(figure.axes[: len(names)], dtype=object)
+
+
+def mechanism(
+    mechanism: Mechanism, design: Table, phi: float = 0.0, *, view: str | None = None, unit: str = "mm"
+) -> NDArray[Any]:
+    """The mechanism in one position with the paths of its joints, axes and senses; a panel for each frame.
+
+    Parameters
+    ----------
+    mechanism, design : as of :func:`sweep.joints`
+    phi : angle of the driving shaft [rad]
+    view : "space", from a corner with z upwards, or "xy", "zy", "xz"; if left out "space" for what is spatial
+    unit : the length unit of the design, for the axes
+
+    Returns
+    -------
+    array of Axes
+        one for each frame: stages of a chain have their own, placed members of a machine one in common
+    """
+    if view is not None and view != "space" and view not in VIEWS:
+        raise InputError("view", view, f"space, {', '.join(VIEWS)}", "plot")
+    found = parts(mechanism, design, phi + np.linspace(0.0, 2.0 * math.pi, 181))
+    frames = list(dict.fromkeys(part.frame for part in found))
+    with house_style():
+        figure = new_figure(5.4 * len(frames), 4.6)
+        panels = figure.subplots(1, len(frames), squeeze=False)[0]
+        for axes, frame in zip(panels, frames, strict=True):
+            same = [part for part in found if part.frame == frame]
+            seen = view or ("space" if is_spatial(same) else "xy")
+            draw_frame(axes, same, projection(seen))
+            if seen in VIEWS:
+                axes.set_xlabel(f"{seen[0]} [{unit}]")
+                axes.set_ylabel(f"{seen[1]} [{unit}]")
+            else:
+                axes.set_axis_off()
+            axes.set_title(", ".join(part.label for part in same))
+            if axes.get_legend_handles_labels()[0]:
+                axes.legend(fontsize="small")
+    return np.array(panels, dtype=object)
+
+
+def polar_load(mechanism: Mechanism, design: Table, joint: str = "a", *, member: str = "", stage: str = "") -> Axes:
+    """The force on a link at a fixed axis over one turn, its direction as the angle and its size as the radius.
+
+    Parameters
+    ----------
+    mechanism : a family or chain that has joint loads (`sweep effects kinetostatics`)
+    design : its parameters with masses, inertias and ``speed`` of the load effects, docs/effects.md
+    joint : "a", the frame's force on the crank, or "d", that on the rocker
+    member, stage : name of the member of a machine, number of the stage of a chain
+
+    Returns
+    -------
+    Axes
+        polar; the angle is counted right-handed about the axis, from x of the frame made square to the axis [force
+        unit of the masses: N where lengths are mm and masses t]
+
+    Raises
+    ------
+    InputError
+        for a joint that has no axis, a family without joint loads, a missing mass or speed.
+    """
+    found = [
+        part
+        for part in parts(mechanism, _plain(mechanism, design), 0.0)
+        if part.member == member and part.stage == stage
+    ]
+    known = [name for part in found for name, kind in part.kinds.items() if kind == "axis"]
+    if joint not in known:
+        allowed = f"a joint with an axis: {', '.join(known) or 'none here; name member and stage'}"
+        raise InputError("joint", joint, allowed, "plot")
+    axis = found[0].axes[joint]
+    first = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    first = first - (first @ axis) * axis
+    first /= np.linalg.norm(first)
+    prefix = f"{member}." if member else ""
+    names = [f"{prefix}force_{joint}_{letter}{stage}" for letter in "xyz"]
+    phi = np.arange(POSES) * (2.0 * math.pi / POSES)
+    force = evaluate(mechanism, design, names, phi=phi)[names].to_numpy(np.float64)
+    along, across = force @ first, force @ np.cross(axis, first)
+    with house_style():
+        figure = new_figure(5.0, 5.0)
+        axes = figure.subplots(subplot_kw={"projection": "polar"})
+        angle, size = np.arctan2(across, along), np.hypot(along, across)
+        axes.plot(np.append(angle, angle[:1]), np.append(size, size[:1]), color=OPTIMUM)
+        for k in range(0, POSES, POSES // 8):
+            axes.annotate(f"{360 * k // POSES}°", (angle[k], size[k]), fontsize="small")
+            axes.plot(angle[k], size[k], "o", color=OPTIMUM, markersize=3)
+        axes.set_title(f"force at {shown_name(joint)} [N], marks: crank angle")
+    return axes
+
+
+def _plain(mechanism: Mechanism, design: Table) -> dict[str, Any]:
+    """The columns that are parameters of the mechanism itself."""
+    names = find_family(mechanism).parameter_names
+    columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
+    return {str(key): values for key, values in columns.items() if str(key) in names}

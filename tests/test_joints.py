@@ -1,0 +1,154 @@
+"""Joint coordinates: link lengths, places of members, agreement with the pose outputs, for every family."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.evaluation.joints import parts
+from sweep.families import NAMES, family
+from sweep.families.capabilities import Skeleton
+
+DRAWN = [name for name in NAMES if family(name).find(Skeleton) is not None]
+PHI = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
+ROUNDING = 1e-12  # a few roundings of coordinates of size 10
+
+# Links whose joints keep their distance; of the rest one joint slides along the link.
+SLIDING = {
+    ("swivel", "rod"), ("geared_dwell", "slotted link"), ("epicyclic_dwell", "slotted link"),
+    ("slotted", "driven link"), ("inverted_slider_crank", "rocker"),
+}  # fmt: skip
+
+
+def example(name):
+    return dict(family(name).example)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_links_keep_their_lengths_over_the_turn(name):
+    (part,) = parts(name, example(name), PHI)
+    assert (part.status == 0).all()
+    for link in part.links:
+        for first, second in zip(link.joints, link.joints[1:], strict=False):
+            if (name, link.name) in SLIDING:
+                continue
+            length = np.linalg.norm(part.joints[second] - part.joints[first], axis=1)
+            assert np.ptp(length) < ROUNDING, (link.name, first, second)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_cranks_turn_right_handed_about_their_axes(name):
+    (part,) = parts(name, example(name), [0.0, 0.1])
+    for link in part.links:
+        pivot, end = link.joints[0], link.joints[-1]
+        if not link.name.startswith(("crank", "carrier")) or (name == "spherical_looper" and link.name == "carrier"):
+            continue
+        before, after = part.joints[end] - part.joints[pivot]
+        axis = part.axes[pivot]
+        assert abs(before @ axis) < ROUNDING  # the crank circle is square to the axis, about the joint named
+        turned = math.atan2(np.cross(before, after) @ axis, before @ after)
+        assert turned == pytest.approx(0.1, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", [n for n in DRAWN if family(n).pose_output[family(n).position].wraps])
+def test_output_angle_turns_right_handed_about_the_axis_of_the_output_link(name):
+    mechanism = family(name)
+    design = example(name) | ({"s": 0.0} if name == "slotted" else {})  # an offset slot points elsewhere than its ball
+    (part,) = parts(name, design, [0.2, 0.3])
+    psi = sweep.evaluate(name, design, mechanism.position, phi=[0.2, 0.3])[mechanism.position].to_numpy()
+    pivot = "d1" if name == "spherical_looper" else "q1" if name == "cylindrical_looper" else "d"
+    link = next(link for link in part.links if link.joints[0] == pivot)
+    end = link.joints[1]
+    axis = part.axes["d1" if "looper" in name else "d"]
+    before, after = part.joints[end] - part.joints[pivot]
+    before, after = before - (before @ axis) * axis, after - (after @ axis) * axis
+    turned = math.atan2(np.cross(before, after) @ axis, before @ after)
+    assert turned == pytest.approx(psi[1] - psi[0], abs=1e-11)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_every_family_has_a_skeleton_and_every_linked_joint_has_coordinates(name):
+    found = sweep.joints(name, example(name), [0.3])
+    skeleton = family(name).find(Skeleton)
+    assert skeleton is not None
+    linked = {joint for link in skeleton.links for joint in link.joints}
+    assert set(found["joint"]) == linked | set(skeleton.fixed)
+    assert set(found.loc[found["kind"] == "fixed", "joint"]) == set(skeleton.fixed)
+    assert found[["x", "y", "z"]].notna().all(axis=None)
+    assert found.attrs["units"]["x"] == "length"
+
+
+def test_rows_of_a_joint_are_the_pose_outputs():
+    design = example("rssr")
+    poses = sweep.evaluate("rssr", design, ["x_c", "y_c", "z_c"], phi=PHI)
+    found = sweep.joints("rssr", design, PHI)
+    c = found[found["joint"] == "c"]
+    np.testing.assert_array_equal(c[["x", "y", "z"]].to_numpy(), poses[["x_c", "y_c", "z_c"]].to_numpy())
+    np.testing.assert_array_equal(c["phi"], PHI)
+
+
+def test_stages_of_a_chain_are_in_their_own_frames_and_are_driven_in_series():
+    first, second = example("rssr"), example("guide")
+    design = {f"{k}1": v for k, v in first.items()} | {f"{k}2": v for k, v in second.items()}
+    design |= {"kappa2": -1.0, "offset2": 0.7}
+    found = sweep.joints(["rssr", "guide"], design, PHI)
+    assert set(found["frame"]) == {"stage 1 (rssr)", "stage 2 (guide)"}
+    psi = sweep.evaluate("rssr", first, "psi", phi=PHI)["psi"].to_numpy()
+    alone = sweep.joints("guide", second, 0.7 - psi)
+    for joint in ("b", "c", "point"):
+        chained = found[(found["stage"] == "2") & (found["joint"] == joint)]
+        np.testing.assert_allclose(
+            chained[["x", "y", "z"]], alone.loc[alone["joint"] == joint, ["x", "y", "z"]], atol=1e-13
+        )
+
+
+def test_members_of_a_machine_stand_in_its_frame():
+    place = {"at": [1.0, 30.0, 12.0], "axis": [0.0, 1.0, 1.0], "zero": [1.0, 0.0, 0.0]}
+    machine = sweep.machine(
+        {
+            "needle": ["rssr", "guide"],
+            "looper": {"family": "rssr", "ratio": -2, "offset": 0.4, "tip": [2.0, 0.5, 0.1], "place": place},
+            "feed": {"family": "four_bar", "driver": "needle.psi1", "ratio": 1},
+        }
+    )
+    design = {f"needle.{k}1": v for k, v in example("rssr").items()}
+    design |= {f"needle.{k}2": v for k, v in example("guide").items()}
+    design |= {f"looper.{k}": v for k, v in example("rssr").items()}
+    design |= {f"feed.{k}": v for k, v in example("four_bar").items()}
+    found = sweep.joints(machine, design, PHI)
+    assert set(found["frame"]) == {"needle stage 1 (rssr)", "machine"}
+    for member, joint in (("needle", "point"), ("looper", "tip"), ("looper", "c"), ("feed", "m")):
+        names = [f"{member}.{joint}_{axis}" for axis in "xyz"]
+        poses = sweep.evaluate(machine, design, names, phi=PHI)
+        rows = found[(found["member"] == member) & (found["joint"] == joint) & (found["frame"] == "machine")]
+        np.testing.assert_allclose(rows[["x", "y", "z"]].to_numpy(), poses[names].to_numpy(), atol=1e-13)
+    d = found[(found["member"] == "looper") & (found["joint"] == "d")].iloc[0]
+    r = example("rssr")
+    half = math.sqrt(0.5)  # z of the member is (0, 1, 1)/sqrt(2), x is x
+    np.testing.assert_allclose([d.x, d.y, d.z], [1.0 + r["e"], 30.0 + half * r["g"], 12.0 + half * r["g"]], atol=1e-14)
+
+
+def test_pose_that_does_not_exist_has_its_status_and_no_coordinates():
+    found = sweep.joints("four_bar", {"a": 3.0, "b": 1.0, "c": 1.0, "e": 4.5}, [math.pi])
+    c = found[found["joint"] == "c"].iloc[0]
+    assert math.isnan(c.x) and c.status != 0
+    assert (found.loc[found["kind"] == "fixed", "status"] == 0).all()
+
+
+def test_several_designs_and_bad_angles_are_refused():
+    design = example("four_bar")
+    with pytest.raises(sweep.InputError, match="one design"):
+        sweep.joints("four_bar", design | {"a": [1.0, 1.1]}, 0.0)
+    with pytest.raises(sweep.InputError, match="finite angles"):
+        sweep.joints("four_bar", design, [math.nan])
+
+
+def test_points_without_links_are_given_and_a_mechanism_without_joints_is_refused():
+    found = sweep.joints("heddle", example("heddle"), [0.3])
+    assert set(found["joint"]) == {"b", "c"}
+    assert found["x"].notna().all()
+    with pytest.raises(sweep.InputError, match="that has joints"):
+        sweep.joints("foot", example("foot"), [0.0])
