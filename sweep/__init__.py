@@ -11,6 +11,7 @@ from sweep.errors import IncompleteWarning, InputError, LinksweepError, Linkswee
 if TYPE_CHECKING:
     from sweep.dataset.comparison import compare
     from sweep.dataset.store import is_complete, load
+    from sweep.dataset.verification import verify
     from sweep.engine.run import run
     from sweep.evaluation import thread
     from sweep.evaluation.poses import evaluate
@@ -33,6 +34,7 @@ __all__ = [
     "summarise",
     "synthesise",
     "thread",
+    "verify",
 ]
 
 check_kernels()
@@ -47,6 +49,7 @@ _HOMES = {
     "run": "sweep.engine.run",
     "summarise": "sweep.evaluation.summaries",
     "synthesise": "sweep.synthesis.mechanisms",
+    "verify": "sweep.dataset.verification",
 }
 _MODULES = {"thread": "sweep.evaluation.thread"}
 

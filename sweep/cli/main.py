@@ -14,6 +14,7 @@ from sweep.cli.effects import effects
 from sweep.cli.listing import cache, families
 from sweep.cli.studies import check, compare, report, run
 from sweep.cli.tables import evaluate_table, summarise_table
+from sweep.cli.verify import verify
 from sweep.errors import LinksweepError, LinksweepWarning, StoreError
 from sweep.jobs.signals import leaving_within
 
@@ -83,5 +84,5 @@ def main() -> None:
     """
 
 
-for verb in (run, check, evaluate_table, summarise_table, families, effects, report, compare, cache):
+for verb in (run, check, evaluate_table, summarise_table, families, effects, report, compare, verify, cache):
     main.add_command(verb)
