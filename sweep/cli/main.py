@@ -12,6 +12,7 @@ import click
 
 from sweep.cli.effects import effects
 from sweep.cli.listing import cache, families
+from sweep.cli.nightly import nightly
 from sweep.cli.studies import check, compare, report, run
 from sweep.cli.tables import evaluate_table, summarise_table
 from sweep.cli.verify import verify
@@ -78,11 +79,11 @@ def main() -> None:
     STUDY is a study.toml or the folder that holds one, FOLDER a dataset that `sweep run` left behind, FAMILY a name
     from `sweep families` or a chain of them such as rssr+guide.
 
-    Exit codes: 0 ok, 2 bad input, 3 over budget, 10 values changed, 11 rows changed, 12 slower (compare), 70 worker
-    died, 74 I/O or disk full, 75 folder locked, 124 time budget used up (run again to resume), 130 and 143 stopped by a
-    signal.
+    Exit codes: 0 ok, 2 bad input, 3 over budget, 10 values changed, 11 rows changed or missing, 12 slower (compare,
+    nightly, verify), 70 worker died, 74 I/O, damaged data or disk full, 75 folder locked, 124 time budget used up (run
+    again to resume), 130 and 143 stopped by a signal.
     """
 
 
-for verb in (run, check, evaluate_table, summarise_table, families, effects, report, compare, verify, cache):
+for verb in (run, check, evaluate_table, summarise_table, families, effects, report, compare, verify, nightly, cache):
     main.add_command(verb)

@@ -6,7 +6,7 @@ import math
 import signal
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -203,13 +203,19 @@ def _raise_if_signalled(stop: Stop, folder: Path) -> None:
         raise Interrupted(stop.signal_number, text)
 
 
+def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
+    """What an optimum or a front depends on: the chunks by their plan's note, the study, the optimiser's sources."""
+    from sweep.chunks.plan import optimiser_hash
+
+    return f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
+
+
 def _optimise(study: Study, folder: Path, jobs: int) -> None:
     """Run the optimiser unless its result for these very sources is there already."""
-    from sweep.chunks.plan import optimiser_hash
     from sweep.optimise import optimise_study
 
     note = store.read_plan(folder) or {}
-    key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
+    key = optimum_key(study, note)
     if note.get("optimised") == key and (store.beside(folder) / store.OPTIMUM).is_file():
         return
     store.write_plan(folder, note | {"optimised": None})
@@ -228,11 +234,10 @@ def _front(study: Study, folder: Path, jobs: int) -> None:
     if study.pareto is None:
         (store.beside(folder) / store.PARETO).unlink(missing_ok=True)
         return
-    from sweep.chunks.plan import optimiser_hash
     from sweep.optimise import front_study
 
     note = store.read_plan(folder) or {}
-    key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
+    key = optimum_key(study, note)
     with stop_on_signal() as stop:
         try:
             front_study(study, folder, key, lambda: bool(stop), jobs)
