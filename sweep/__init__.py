@@ -10,6 +10,7 @@ from sweep.errors import IncompleteWarning, InputError, LinksweepError, Linkswee
 
 if TYPE_CHECKING:
     from sweep.dataset.comparison import compare
+    from sweep.dataset.reading import scan
     from sweep.dataset.store import is_complete, load
     from sweep.dataset.verification import verify
     from sweep.engine.run import run
@@ -31,6 +32,7 @@ __all__ = [
     "load",
     "machine",
     "run",
+    "scan",
     "summarise",
     "synthesise",
     "thread",
@@ -47,6 +49,7 @@ _HOMES = {
     "load": "sweep.dataset.store",
     "machine": "sweep.families",
     "run": "sweep.engine.run",
+    "scan": "sweep.dataset.reading",
     "summarise": "sweep.evaluation.summaries",
     "synthesise": "sweep.synthesis.mechanisms",
     "verify": "sweep.dataset.verification",

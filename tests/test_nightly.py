@@ -82,6 +82,7 @@ def noted(into: Path, name: str, **studies: StudyRecord) -> Path:
 GOOD, CUT = StudyRecord("complete"), StudyRecord("cut", 124)
 
 
+@pytest.mark.slow
 def test_a_changed_constant_in_a_kernel_is_found_with_rows_study_and_outputs(tmp_path: Path) -> None:
     sources = tmp_path / "sources"
     for name in ("kernels", "sweep"):
@@ -187,10 +188,11 @@ def test_a_study_with_faults_fails_by_itself_and_the_others_are_computed(tmp_pat
 
 
 def test_an_edited_study_is_said_with_its_edit(tmp_path: Path) -> None:
-    night(tmp_path / "nights", [written(tmp_path / "one")])
-    record, _ = night(tmp_path / "nights", [written(tmp_path / "one", e=91)])
-    assert record.exit_code == 11
-    assert "design.e.value 90 -> 91 mm" in record.studies["tiny"].changes[0]
+    old = sweep.run(written(tmp_path / "one"), tmp_path / "old" / "designs", jobs=1)
+    path = written(tmp_path / "one", e=91)
+    found = changes(load_study(path), old, sweep.run(path, tmp_path / "new" / "designs", jobs=1))
+    assert found.code == 11
+    assert "the study itself was edited: design.e 90 mm -> 91 mm" in found.lines
 
 
 def test_retention_keeps_the_last_good_night_however_old(tmp_path: Path) -> None:
