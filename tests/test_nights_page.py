@@ -25,7 +25,7 @@ def test_the_moved_figure_is_red_at_its_night_only(tmp_path: Path) -> None:
     swing = rows.trends[0]
     assert [dot.red for dot in swing.dots] == [False, False, True, False]
     assert (swing.red, rows.red, rows.state) == (False, False, "no change")
-    assert swing.value == "1.2 rad"
+    assert swing.value == "68.7549°"
     assert swing.dots[0].y > swing.dots[2].y
     assert all(0 < dot.x < WIDTH and 0 < dot.y < HEIGHT for dot in swing.dots)
     last = study_rows("needle", nights[:3], tmp_path)

@@ -6,16 +6,28 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from sweep.dataset.comparison import SLOWER
 from sweep.dataset.files import write_atomically
 from sweep.nights.journal import WORDS
 from sweep.nights.records import NightRecord, StudyRecord, read_history
 from sweep.report.figures import TEMPLATES
-from sweep.report.quantities import number
+from sweep.report.quantities import number, quantity
 
 INDEX = "index.html"
 SHOWN = 60  # nights on the page
 WIDTH, HEIGHT, EDGE = 240.0, 36.0, 5.0  # of a trend line [px]
+DIGITS = 6
 SECONDS = "time of the run"
+
+
+@dataclass(frozen=True)
+class Point:
+    """A figure in one night, by the night's place among those shown."""
+
+    night: int
+    value: float
+    red: bool
+    words: str
 
 
 @dataclass(frozen=True)
@@ -93,8 +105,9 @@ def study_rows(name: str, nights: Sequence[NightRecord], into: Path) -> StudyRow
     last_night, last = mine[-1]
     reports = [night for night, record in mine if record.report and (into / night / name / "report.html").is_file()]
     names = list(dict.fromkeys(figure for _, record in mine for figure in record.figures))
-    trends = [_trend(figure, mine) for figure in names]
-    trends += [_times(mine)] if sum(record.seconds is not None for _, record in mine) else []
+    order = [night.name for night in nights]
+    trends = [_trend(figure, mine, order) for figure in names]
+    trends += [_times(mine, order)] if any(record.seconds is not None for _, record in mine) else []
     words = last.changes or ((last.message,) if last.message else ())
     return StudyRows(
         name,
@@ -106,38 +119,44 @@ def study_rows(name: str, nights: Sequence[NightRecord], into: Path) -> StudyRow
     )
 
 
-def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]]) -> Trend:
-    points = [(night, record, record.figures[name]) for night, record in mine if name in record.figures]
-    unit = points[-1][1].units.get(name, "")
-    shown = [
-        (night, value, name in record.moved, f"{night}: {number(value, 8)} {unit}".strip())
-        for night, record, value in points
+def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> Trend:
+    """A headline figure, in the unit a designer reads."""
+
+    def shown(record: StudyRecord) -> str:
+        unit = record.units.get(name, "")
+        return quantity(name, unit).show(record.figures[name], DIGITS) if unit else number(record.figures[name], DIGITS)
+
+    points = [
+        Point(order.index(night), record.figures[name], name in record.moved, f"{night}: {shown(record)}")
+        for night, record in mine
+        if name in record.figures
     ]
-    return _drawn(name, f"{number(points[-1][2], 8)} {'' if unit == '1' else unit}".strip(), shown)
+    last = next(record for _, record in reversed(mine) if name in record.figures)
+    return _drawn(name, shown(last), points, len(order))
 
 
-def _times(mine: Sequence[tuple[str, StudyRecord]]) -> Trend:
+def _times(mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> Trend:
     """Nights in which something was computed."""
-    runs = [(night, record) for night, record in mine if record.seconds is not None and record.state == "complete"]
-    shown = [
-        (night, record.seconds or 0.0, record.changed == 12, f"{night}: {record.seconds:.3g} s")
-        for night, record in runs
+    points = [
+        Point(order.index(night), record.seconds, record.changed == SLOWER, f"{night}: {record.seconds:.3g} s")
+        for night, record in mine
+        if record.seconds is not None
     ]
-    return _drawn(SECONDS, f"{runs[-1][1].seconds:.3g} s" if runs else "–", shown)
+    return _drawn(SECONDS, f"{points[-1].value:.3g} s", points, len(order))
 
 
-def _drawn(name: str, value: str, points: Sequence[tuple[str, float, bool, str]]) -> Trend:
-    """Place the nights on a line: equally spaced, from the smallest value at the bottom to the largest at the top."""
-    values = [point[1] for point in points]
-    low, high = (min(values), max(values)) if values else (0.0, 0.0)
+def _drawn(name: str, value: str, points: Sequence[Point], nights: int) -> Trend:
+    """Place the nights on a line, the smallest value at the bottom and the largest at the top."""
+    low, high = (end(point.value for point in points) for end in (min, max))
     span = high - low
     dots = []
-    for k, (_, own, red, words) in enumerate(points):
-        x = EDGE + (WIDTH - 2.0 * EDGE) * (k / (len(points) - 1) if len(points) > 1 else 1.0)
-        share = (own - low) / span if span > 0.0 else 0.5
-        dots.append(Dot(round(x, 1), round(HEIGHT - EDGE - share * (HEIGHT - 2.0 * EDGE), 1), red, words))
+    for point in points:
+        x = EDGE + (WIDTH - 2.0 * EDGE) * (point.night / (nights - 1) if nights > 1 else 1.0)
+        share = (point.value - low) / span if span > 0.0 else 0.5
+        y = HEIGHT - EDGE - share * (HEIGHT - 2.0 * EDGE)
+        dots.append(Dot(round(x, 1), round(y, 1), point.red, point.words))
     line = " ".join(f"{dot.x},{dot.y}" for dot in dots)
-    return Trend(name, value, line, tuple(dots), bool(points) and points[-1][2])
+    return Trend(name, value, line, tuple(dots), points[-1].red)
 
 
 def _state(record: StudyRecord) -> str:
