@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -174,6 +175,22 @@ def test_chunks_of_a_night_that_was_cut_off_are_taken_over_and_damaged_ones_are_
     assert len(store.read_runs(designs)) == 2
     other = load_study(written(tmp_path / "one", count=1301))
     assert carry(other, [old], tmp_path / "another" / "tiny") is None
+
+
+def test_where_the_disk_makes_no_links_chunks_are_copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise OSError(errno.EXDEV, "no links here")
+
+    monkeypatch.setattr(os, "link", refused)
+    study = load_study(written(tmp_path / "one"))
+    old = tmp_path / "2026-01-01T00-00-00Z"
+    designs = sweep.run(study, old / "tiny" / "designs", jobs=1)
+    carried = carry(study, [old], tmp_path / "new" / "tiny")
+    assert carried is not None
+    assert carried.whole
+    copies = tmp_path / "new" / "tiny" / "designs"
+    assert [path.read_bytes() for path in copies.iterdir()] == [path.read_bytes() for path in designs.iterdir()]
+    assert not any(path.name.startswith("_tmp") for path in (tmp_path / "new").rglob("*"))
 
 
 def test_a_study_with_faults_fails_by_itself_and_the_others_are_computed(tmp_path: Path) -> None:

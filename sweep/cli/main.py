@@ -13,6 +13,7 @@ import click
 from sweep.cli.effects import effects
 from sweep.cli.listing import cache, families
 from sweep.cli.nightly import nightly
+from sweep.cli.parts import merge, split
 from sweep.cli.studies import check, compare, report, run
 from sweep.cli.tables import evaluate_table, summarise_table
 from sweep.cli.verify import verify
@@ -85,5 +86,19 @@ def main() -> None:
     """
 
 
-for verb in (run, check, evaluate_table, summarise_table, families, effects, report, compare, verify, nightly, cache):
+for verb in (
+    run,
+    check,
+    evaluate_table,
+    summarise_table,
+    families,
+    effects,
+    report,
+    compare,
+    verify,
+    nightly,
+    split,
+    merge,
+    cache,
+):
     main.add_command(verb)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from sweep.dataset import store
 from sweep.engine.log import circumstances, command
-from sweep.engine.opening import known_folder, open_plan, plan_note, refuse_or_clear_older
+from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
 from sweep.errors import Interrupted, StoreError, TimeUsedUp, WorkerDied
 from sweep.jobs.executors import Here, executor
 from sweep.jobs.signals import Stop, stop_on_signal
@@ -86,9 +86,10 @@ def run(
         store.append_run(folder, head | said | circumstances(jobs, backend))
         try:
             computed = _sweep(model, folder, jobs, backend, force, progress)
-            if model.optimise is not None:
-                _optimise(replace(model, pareto=None), folder, jobs)
-            _front(model, folder, jobs)
+            if not is_part(folder):
+                if model.optimise is not None:
+                    _optimise(replace(model, pareto=None), folder, jobs)
+                _front(model, folder, jobs)
         except Exception as error:
             if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
                 store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
@@ -123,7 +124,7 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
         assert plan is not None
         for _ in range(ROUNDS + 1):
             finished = store.finished_chunks(folder, plan)
-            missing = [index for index in range(plan.chunks) if index not in finished]
+            missing = [index for index in part_range(folder, plan.chunks) if index not in finished]
             if not missing:
                 break
             computed += _compute(study, plan, folder, missing, jobs, backend, stop, force, progress)
@@ -131,7 +132,7 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
             raise StoreError(f"{folder}: somebody removes or damages chunks while this run writes them; run again")
         _raise_if_signalled(stop, folder)
     counts, missed = store.totals(folder)
-    note = plan_note(study, folder, plan) | {"counts": counts, "missed": missed, "complete": True}
+    note = plan_note(study, folder, plan) | {"counts": counts, "missed": missed, "complete": not is_part(folder)}
     store.write_plan(folder, note)
     return computed
 

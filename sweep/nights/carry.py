@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sweep.dataset import store
+from sweep.dataset.files import link_or_copy
 from sweep.dataset.verification import verify
 from sweep.engine.run import optimum_key
 
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 
 REPORT, FIGURES, SURVIVORS = "report.html", "figures", "survivors.parquet"
 TABLES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO)
-# What a file system answers that makes no (more) links to a file.
-UNLINKABLE = (errno.EXDEV, errno.EPERM, errno.EMLINK, errno.ENOTSUP, errno.EOPNOTSUPP)
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
     for night in earlier:
         source = night / target.name / store.DESIGNS
         noted = store.read_plan(source)
-        if noted is None or noted.get("known") or make_plan(study, noted["chunk_size"]).identity != noted["identity"]:
+        if noted is None or make_plan(study, noted["chunk_size"]).identity != noted["identity"]:
             continue
         found = verify(source, designs=0)
         bad = {finding.path for finding in found.findings}
@@ -63,12 +60,12 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
         with store.store_errors(target):
             designs.mkdir(parents=True, exist_ok=True)
             for path in sound:
-                _link(path, designs / path.name)
-            _link(store.beside(source) / store.PLAN, target / store.PLAN)
+                link_or_copy(path, designs / path.name)
+            link_or_copy(store.beside(source) / store.PLAN, target / store.PLAN)
             for name in TABLES:
                 path = store.beside(source) / name
                 if path.is_file() and path not in bad:
-                    _link(path, target / name)
+                    link_or_copy(path, target / name)
             # Lines are added to this one, so it is no link.
             if (store.beside(source) / store.RUNS).is_file():
                 shutil.copyfile(store.beside(source) / store.RUNS, target / store.RUNS)
@@ -104,13 +101,4 @@ def _link_report(source: Path, target: Path) -> None:
             if path in copied:
                 shutil.copyfile(path, place)
             else:
-                _link(path, place)
-
-
-def _link(source: Path, target: Path) -> None:
-    try:
-        os.link(source, target)
-    except OSError as error:
-        if error.errno not in UNLINKABLE:
-            raise
-        shutil.copyfile(source, target)
+                link_or_copy(path, place)
