@@ -64,7 +64,7 @@ def command(sources: Path, *words: object) -> subprocess.CompletedProcess[str]:
     """A command of the sources in a folder, in a process of its own."""
     line = [sys.executable, "-P", "-m", "sweep", *map(str, words)]
     path = {"PYTHONPATH": str(sources)}
-    return subprocess.run(line, env=os.environ | path, capture_output=True, text=True, check=False, timeout=120)
+    return subprocess.run(line, env=os.environ | path, capture_output=True, text=True, check=False, timeout=200)
 
 
 def night(into: Path, studies: Sequence[Path], budget: float = 100.0, keep: int = 14) -> tuple[NightRecord, list[str]]:
@@ -89,8 +89,8 @@ def test_a_changed_constant_in_a_kernel_is_found_with_rows_study_and_outputs(tmp
     for name in ("kernels", "sweep"):
         shutil.copytree(ROOT / name, sources / name, ignore=shutil.ignore_patterns("__pycache__"))
     into, told = tmp_path / "nights", tmp_path / "told"
-    studies = [written(tmp_path / "one"), written(tmp_path / "two", "other", e=80)]
-    line = ("nightly", *studies, "--into", into, "--budget", "100 s", "--on-change", f"cat > {told}; exit 3")
+    study = written(tmp_path / "one")
+    line = ("nightly", study, "--into", into, "--budget", "100 s", "--on-change", f"cat > {told}; exit 3")
 
     first = command(sources, *line)
     assert (first.returncode, first.stderr) == (0, "")
@@ -98,7 +98,7 @@ def test_a_changed_constant_in_a_kernel_is_found_with_rows_study_and_outputs(tmp
     second = command(sources, *line)
     assert second.returncode == 0
     assert "no change (exit code 0" in second.stdout
-    assert second.stdout.count("nothing to compute, 1 chunks linked") == 2
+    assert second.stdout.count("nothing to compute, 1 chunks linked") == 1
     assert not told.exists()
     chunks = [next((place / "tiny" / "designs").glob("part-*")) for place in folders.nights(into)]
     assert chunks[0].stat().st_ino == chunks[1].stat().st_ino
@@ -110,20 +110,20 @@ def test_a_changed_constant_in_a_kernel_is_found_with_rows_study_and_outputs(tmp
     third = command(sources, *line)
     assert third.returncode == 10
     assert "max_abs_dP: 6 values changed, at most by " in third.stdout
-    assert third.stdout.count("; the first: 0, 1, 2, 3, 4, ...)") == 2
+    assert third.stdout.count("; the first: 0, 1, 2, 3, 4, ...)") == 1
     assert "range_P" not in third.stdout
-    assert "changed: tiny (10), other (10) (exit code 10" in third.stdout
+    assert "changed: tiny (10) (exit code 10" in third.stdout
     assert "max_abs_dP: 6 values changed" in told.read_text()
     assert "--on-change ended with 3" in third.stdout
     last = folders.nights(into)[-1]
     assert (into / "latest").resolve() == last.resolve() != good
     events = [json.loads(line) for line in (last / "log.jsonl").read_text().splitlines()]
-    assert [event["event"] for event in events] == ["night", "study", "study", "end", "told"]
+    assert [event["event"] for event in events] == ["night", "study", "end", "told"]
     assert (events[1]["study"], events[1]["changed"]) == ("tiny", 10)
     assert any("max_abs_dP" in words for words in events[1]["changes"])
     page = (into / "index.html").read_text()
     assert f'href="{last.name}/tiny/report.html"' in page
-    assert page.count('class="red"><title>') == 2
+    assert page.count('class="red"><title>') == 1
 
 
 def test_what_the_last_night_did_not_finish_comes_first(tmp_path: Path) -> None:
