@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-effects bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-effects bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -51,6 +51,13 @@ $(STUDIES:%=smoke-%): smoke-%: $(VENV)/ready
 	$(SWEEP) run studies/$* --smoke --force --out results/smoke/$*/designs
 	$(if $(wildcard studies/$*/figure.py),$(BIN)/python studies/$*/figure.py results/smoke/$*)
 	$(SWEEP) report results/smoke/$*/designs
+
+NIGHTS ?= nights
+nightly: $(VENV)/ready  ## all studies into a dated folder under nights/, and what changed since the last good night
+	$(SWEEP) nightly studies --into $(NIGHTS) --budget 6h --keep 14
+
+smoke-nightly: $(VENV)/ready  ## the same with every study's tiny version, into nights/smoke
+	$(SWEEP) nightly studies --smoke --into $(NIGHTS)/smoke --budget 1h --keep 3
 
 study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accuracy.md, about 10 minutes
 	$(BIN)/python -m studies.accuracy --out results/accuracy

@@ -10,7 +10,9 @@ from sweep.errors import IncompleteWarning, InputError, LinksweepError, Linkswee
 
 if TYPE_CHECKING:
     from sweep.dataset.comparison import compare
+    from sweep.dataset.reading import scan
     from sweep.dataset.store import is_complete, load
+    from sweep.dataset.verification import verify
     from sweep.engine.run import run
     from sweep.evaluation import thread
     from sweep.evaluation.joints import joints
@@ -37,9 +39,11 @@ __all__ = [
     "machine",
     "plot",
     "run",
+    "scan",
     "summarise",
     "synthesise",
     "thread",
+    "verify",
 ]
 
 check_kernels()
@@ -55,8 +59,10 @@ _HOMES = {
     "load": "sweep.dataset.store",
     "machine": "sweep.families",
     "run": "sweep.engine.run",
+    "scan": "sweep.dataset.reading",
     "summarise": "sweep.evaluation.summaries",
     "synthesise": "sweep.synthesis.mechanisms",
+    "verify": "sweep.dataset.verification",
 }
 _MODULES = {"plot": "sweep.plot", "thread": "sweep.evaluation.thread"}
 

@@ -14,8 +14,11 @@ from sweep.cli.draw import draw
 from sweep.cli.effects import effects
 from sweep.cli.exchange import export, points
 from sweep.cli.listing import cache, families
+from sweep.cli.nightly import nightly
+from sweep.cli.parts import merge, split
 from sweep.cli.studies import check, compare, report, run
 from sweep.cli.tables import evaluate_table, summarise_table
+from sweep.cli.verify import verify
 from sweep.errors import LinksweepError, LinksweepWarning, StoreError
 from sweep.jobs.signals import leaving_within
 
@@ -80,8 +83,8 @@ def main() -> None:
     from `sweep families` or a chain of them such as rssr+guide.
 
     Exit codes: 0 ok, 2 bad input, 3 over budget, 4 no design within the limits (run), 10 values changed, 11 rows
-    changed, 12 slower (compare), 70 worker died, 74 I/O or disk full, 75 folder locked, 124 time budget used up (run
-    again to resume), 130 and 143 stopped by a signal.
+    changed or missing, 12 slower (compare, nightly, verify), 70 worker died, 74 I/O, damaged data or disk full, 75
+    folder locked, 124 time budget used up (run again to resume), 130 and 143 stopped by a signal.
     """
 
 
@@ -94,6 +97,10 @@ for verb in (
     effects,
     report,
     compare,
+    verify,
+    nightly,
+    split,
+    merge,
     cache,
     points,
     export,

@@ -23,6 +23,8 @@ DEFAULT_SLOWER = 1.5
 # A run shorter than this tells nothing about speed [s].
 LEAST_SECONDS = 5.0
 ROLES = ("optimum", "reference")
+# So many rows are named where more have moved.
+NAMED = 5
 
 
 @dataclass
@@ -36,6 +38,7 @@ class Moved:
     relative: float = 0.0
     where: str = ""
     kind: str = "design"
+    places: list[str] = field(default_factory=list)
 
     def look(self, old: NDArray[Any], new: NDArray[Any], places: NDArray[Any], rtol: float) -> None:
         """Take in some rows; ``places`` (n,) are their names."""
@@ -47,6 +50,7 @@ class Moved:
         # nan against a number is no distance; it is counted above
         far = absolute > rtol * size
         self.changed += int(far.sum())
+        self.places += [str(place) for place in places[far][: NAMED - len(self.places)]]
         if far.any():
             relative = np.where(far, absolute / np.where(size > 0.0, size, 1.0), 0.0)
             worst = int(relative.argmax())
@@ -63,6 +67,7 @@ class Comparison:
     only_old: int = 0
     only_new: int = 0
     status_changed: int = 0
+    designs: list[int] = field(default_factory=list)
     columns_only_old: tuple[str, ...] = ()
     columns_only_new: tuple[str, ...] = ()
     moved: dict[str, Moved] = field(default_factory=dict)
@@ -103,11 +108,12 @@ class Comparison:
         for names, words in ((self.columns_only_old, "old"), (self.columns_only_new, "new")):
             found += [f"columns only in the {words} dataset: {', '.join(names)}"] if names else []
         found += [f"{self.status_changed} rows with another status"] if self.status_changed else []
+        found += [f"the first of these rows: designs {', '.join(map(str, self.designs))}"] if self.designs else []
         for column in self.moved.values():
             if column.changed:
                 found.append(
                     f"{column.name}: {column.changed} values changed, at most by {column.absolute:.3g}, "
-                    f"relative {column.relative:.3g} (worst: {column.where})"
+                    f"relative {column.relative:.3g} (worst: {column.where}{_first(column)})"
                 )
             if column.missing:
                 found.append(f"{column.name}: {column.missing} values appeared or went missing")
@@ -118,6 +124,13 @@ class Comparison:
             verdict = f", more than {self.slower:g} times as long" if self.is_slower else ""
             found.append(f"time {old:.3g} s before, {new:.3g} s now{verdict}")
         return found
+
+
+def _first(column: Moved) -> str:
+    """The first rows that moved, where the worst is not the only one."""
+    if column.changed < 2:
+        return ""
+    return f"; the first: {', '.join(column.places)}{', ...' if column.changed > len(column.places) else ''}"
 
 
 def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float = DEFAULT_SLOWER) -> Comparison:
@@ -204,6 +217,10 @@ def _look(result: Comparison, old: pd.DataFrame, new: pd.DataFrame, rtol: float)
     result.only_new += len(new) - designs.size
     before, after = old["status"].to_numpy()[in_old], new["status"].to_numpy()[in_new]
     result.status_changed += int((before != after).sum())
+    if len(result.designs) < NAMED:
+        apart = np.setxor1d(old["design"], new["design"], assume_unique=True)
+        named = np.union1d(apart, designs[before != after]).astype(np.int64)
+        result.designs += named[: NAMED - len(result.designs)].tolist()
     for name, moved in result.moved.items():
         moved.look(old[name].to_numpy()[in_old], new[name].to_numpy()[in_new], designs, rtol)
 

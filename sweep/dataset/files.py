@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -15,6 +16,8 @@ from sweep.errors import StoreError
 if TYPE_CHECKING:
     import pandas as pd
 
+# What a file system answers that makes no (more) links to a file.
+UNLINKABLE = (errno.EXDEV, errno.EPERM, errno.EMLINK, errno.ENOTSUP, errno.EOPNOTSUPP)
 PLAN_KEYS = {"identity", "chunks", "chunk_size", "name", "chunk_data", "optimise"}
 
 
@@ -73,6 +76,16 @@ def set_aside(folder: Path, paths: list[Path], where: str) -> None:
         target.mkdir(parents=True, exist_ok=True)
         for path in paths:
             path.replace(target / path.name)
+
+
+def link_or_copy(source: Path, target: Path) -> None:
+    """Give a file that is never written into a second name; where the file system makes no links it is copied."""
+    try:
+        os.link(source, target)
+    except OSError as error:
+        if error.errno not in UNLINKABLE:
+            raise
+        write_atomically(target, source.read_bytes(), target.parent.parent)
 
 
 def remove_temporary(folder: Path) -> None:

@@ -92,6 +92,12 @@ def content_hash(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:16]
 
 
+def part_of(path: Path) -> Part | None:
+    """The chunk file by its name; None if the name is no chunk's."""
+    match = _PART.fullmatch(path.name)
+    return None if match is None else Part(path, int(match[1]), match[2], match[3])
+
+
 def parts(folder: Path) -> list[Part]:
     """The chunk files by their names, in design order.
 
@@ -102,10 +108,10 @@ def parts(folder: Path) -> list[Part]:
     """
     found = []
     for path in folder.glob("[!_.]*.parquet"):
-        match = _PART.fullmatch(path.name)
-        if match is None:
+        part = part_of(path)
+        if part is None:
             raise InputError("file", path.name, "chunks named part-<index>-<identity>-<hash>.parquet", str(folder))
-        found.append(Part(path, int(match[1]), match[2], match[3]))
+        found.append(part)
     return sorted(found, key=lambda part: (part.index, part.path.name))
 
 

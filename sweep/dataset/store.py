@@ -50,12 +50,14 @@ from sweep.dataset.layout import (
 from sweep.dataset.lock import locked
 from sweep.dataset.parts import (
     METADATA,
+    REMEDY,
     STATUS_NAMES,
     Part,
     about,
     content_hash,
     is_whole,
     missing_chunks,
+    part_of,
     parts,
 )
 from sweep.errors import IncompleteWarning, InputError, StoreError
@@ -76,6 +78,7 @@ __all__ = [
     "OPTIMUM",
     "PARETO",
     "PLAN",
+    "REMEDY",
     "RUNS",
     "SENSITIVITY",
     "STATUS_NAMES",
@@ -89,6 +92,7 @@ __all__ = [
     "encode",
     "finished_chunks",
     "foreign",
+    "front_is_complete",
     "is_complete",
     "is_older",
     "is_whole",
@@ -97,6 +101,7 @@ __all__ = [
     "locked",
     "missing_chunks",
     "named_counts",
+    "part_of",
     "parts",
     "read_plan",
     "read_runs",
@@ -216,11 +221,12 @@ def is_complete(folder: str | Path) -> bool:
         return False
     whole = {part.index for part in parts(place) if part.identity == plan["identity"] and is_whole(part)}
     optimum = plan.get("optimised") is not None and (beside(place) / OPTIMUM).is_file()
-    front = not plan.get("pareto") or _front_is_complete(beside(place) / PARETO)
+    front = not plan.get("pareto") or front_is_complete(beside(place) / PARETO)
     return whole == set(range(plan["chunks"])) and ((optimum and front) or not plan["optimise"])
 
 
-def _front_is_complete(path: Path) -> bool:
+def front_is_complete(path: Path) -> bool:
+    """Whether the search of the front in this file has ended."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

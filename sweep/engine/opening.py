@@ -75,6 +75,17 @@ def known_folder(folder: Path) -> Path | None:
     return store.beside(folder) / where if isinstance(where, str) else None
 
 
+def is_part(folder: Path) -> bool:
+    """Whether the folder is for some of the chunks only, as ``sweep split`` makes it."""
+    return "part" in (store.read_plan(folder) or {})
+
+
+def part_range(folder: Path, chunks: int) -> range:
+    """Indices of the chunks that belong into the folder."""
+    first, stop = (store.read_plan(folder) or {}).get("part", (0, chunks))
+    return range(first, stop)
+
+
 def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
     """In words what sets the data in the folder apart from what this run would compute."""
     before, now = (
@@ -139,5 +150,6 @@ def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
         "counts": noted.get("counts"),
         "missed": noted.get("missed"),
         "known": noted.get("known"),
+        **({"part": noted["part"]} if "part" in noted else {}),
         "complete": False,
     }

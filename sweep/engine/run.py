@@ -6,7 +6,7 @@ import math
 import signal
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from sweep.dataset import store
 from sweep.engine.log import circumstances, command
-from sweep.engine.opening import known_folder, open_plan, plan_note, refuse_or_clear_older
+from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
 from sweep.errors import Interrupted, SearchCutShort, StoreError, TimeUsedUp, WorkerDied
 from sweep.jobs.executors import Here, executor
 from sweep.jobs.signals import Stop, stop_on_signal
@@ -82,10 +82,11 @@ def run(
     refuse_or_clear_older(folder, force)
     with store.locked(folder), _logged(folder, command(model, folder, smoke, accuracy, certify), jobs, backend) as end:
         computed = _sweep(model, folder, jobs, backend, force, progress)
-        if model.optimise is not None:
-            _optimise(replace(model, pareto=None), folder, jobs, progress)
-        _front(model, folder, jobs)
-        _raise_if_cut_short(folder)
+        if not is_part(folder):
+            if model.optimise is not None:
+                _optimise(replace(model, pareto=None), folder, jobs, progress)
+            _front(model, folder, jobs)
+            _raise_if_cut_short(folder)
         end.append(f"{computed} chunks computed")
     return folder
 
@@ -132,7 +133,7 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
         assert plan is not None
         for _ in range(ROUNDS + 1):
             finished = store.finished_chunks(folder, plan)
-            missing = [index for index in range(plan.chunks) if index not in finished]
+            missing = [index for index in part_range(folder, plan.chunks) if index not in finished]
             if not missing:
                 break
             computed += _compute(study, plan, folder, missing, jobs, backend, stop, force, progress)
@@ -140,7 +141,7 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
             raise StoreError(f"{folder}: somebody removes or damages chunks while this run writes them; run again")
         _raise_if_signalled(stop, folder)
     counts, missed = store.totals(folder)
-    note = plan_note(study, folder, plan) | {"counts": counts, "missed": missed, "complete": True}
+    note = plan_note(study, folder, plan) | {"counts": counts, "missed": missed, "complete": not is_part(folder)}
     store.write_plan(folder, note)
     return computed
 
@@ -212,14 +213,20 @@ def _raise_if_signalled(stop: Stop, folder: Path) -> None:
         raise Interrupted(stop.signal_number, text)
 
 
+def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
+    """What an optimum or a front depends on: the chunks by their plan's note, the study, the optimiser's sources."""
+    from sweep.chunks.plan import optimiser_hash
+
+    return f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
+
+
 def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     """Run the optimiser unless its result for these very sources is there already, whole."""
-    from sweep.chunks.plan import optimiser_hash
     from sweep.jobs.progress import Progress
     from sweep.optimise import optimise_study, read_survey
 
     note = store.read_plan(folder) or {}
-    key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
+    key = optimum_key(study, note)
     place = store.beside(folder) / store.OPTIMUM
     found = read_survey(place)
     if note.get("optimised") == key and place.is_file() and (found is None or found.ended != "time"):
@@ -251,11 +258,10 @@ def _front(study: Study, folder: Path, jobs: int) -> None:
     if study.pareto is None:
         (store.beside(folder) / store.PARETO).unlink(missing_ok=True)
         return
-    from sweep.chunks.plan import optimiser_hash
     from sweep.optimise import front_study
 
     note = store.read_plan(folder) or {}
-    key = f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
+    key = optimum_key(study, note)
     with stop_on_signal() as stop:
         try:
             front_study(study, folder, key, lambda: bool(stop), jobs)

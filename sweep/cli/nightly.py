@@ -1,0 +1,54 @@
+"""The verb that computes all studies every night: nightly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sweep.errors import InputError
+
+
+@click.command()
+@click.argument("studies", nargs=-1, required=True, type=click.Path(exists=True, path_type=Path))
+@click.option(
+    "--into", type=click.Path(file_okay=False, path_type=Path), default=Path("nights"), show_default=True,
+    help="Folder of the nights.",
+)  # fmt: skip
+@click.option("--budget", default="6h", show_default=True, help="Time for the whole night, such as 6h or 90 min.")
+@click.option("--keep", type=click.IntRange(min=1), default=14, show_default=True, help="Nights that are kept.")
+@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers.")
+@click.option("--backend", type=click.Choice(["threading", "loky"]), default="threading", show_default=True)
+@click.option("--smoke", is_flag=True, help="The tiny version of every study.")
+@click.option("--on-change", metavar="CMD", help="Command to run unless the exit code is 0; the log is its input.")
+def nightly(
+    studies: tuple[Path, ...],
+    into: Path,
+    budget: str,
+    keep: int,
+    jobs: int,
+    backend: str,
+    smoke: bool,
+    on_change: str | None,
+) -> None:
+    """Compute all STUDIES into a dated folder, and say what changed since the last good night.
+
+    STUDIES are study files, folders with one, or folders of such folders.  What the last night did not finish comes
+    first; what has not changed is linked, not computed again.  nights/latest leads to the last night in which every
+    study came to its end, nights/index.html shows all nights.
+
+    Ends with 0 if nothing changed, 11 if rows or statuses changed, 10 if values did, 124 if the time was over, 12 if a
+    study was slower twice in a row, 74 if the disk refused; with a study's own code if its run failed.
+    """
+    from sweep.nights import Settings
+    from sweep.nights import nightly as run_night
+    from sweep.study.units import factor, split
+
+    try:
+        number, unit = split(budget, "s")
+        seconds = number * factor(unit, "s")
+    except ValueError as error:
+        raise InputError("--budget", budget, f"a time such as 6h or 90 min ({error})", "nightly") from None
+    settings = Settings(into, seconds, keep, jobs, backend, smoke, on_change)
+    record = run_night(studies, settings, click.echo)
+    click.get_current_context().exit(record.exit_code)

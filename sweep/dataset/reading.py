@@ -1,0 +1,194 @@
+"""Datasets of many rows in bounded memory: ``scan`` for pushdown, best designs, Pareto rows, histograms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.chunks.cascade import compared
+from sweep.dataset import store
+from sweep.errors import InputError, StoreError, nearest
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow.dataset as ds
+
+# Rows that are in memory together.
+BATCH_ROWS = 131_072
+MOST_BEST = 100_000
+MOST_BINS = 100_000
+
+
+def scan(folder: str | Path) -> ds.Dataset:
+    """A dataset as an Arrow dataset: columns and filters are applied while the files are read.
+
+    ``sweep.scan(folder).to_table(columns=["design", "swing"], filter=(pc.field("status") == 0)).to_pandas()`` reads
+    two columns and the rows within all limits; ``.scanner(...).to_batches()`` gives them batch by batch.
+
+    Parameters
+    ----------
+    folder : what ``sweep run`` wrote
+
+    Returns
+    -------
+    pyarrow.dataset.Dataset
+        the chunks in design order.  Name and metadata of every chunk are checked, its bytes are not: ``sweep.verify``
+        does that, and ``sweep.load``.
+
+    Raises
+    ------
+    InputError
+        if the folder holds no chunks
+    StoreError
+        if a chunk lies under another chunk's name, is there twice, or belongs to other data.
+    """
+    import pyarrow.dataset as ds
+
+    place = store.located(folder)
+    chunks = store.parts(place) if place.is_dir() else []
+    if not chunks:
+        raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "scan")
+    for one, other in pairwise(chunks):
+        if one.identity != other.identity or one.index == other.index:
+            raise StoreError(f"{place}: {one.path.name} and {other.path.name} are not chunks of one table")
+    for part in chunks:
+        store.about(part)
+    return ds.dataset([str(part.path) for part in chunks], format="parquet")
+
+
+def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
+    """The designs within all limits whose output is smallest, best first; signs of swing and stroke do not count.
+
+    Parameters
+    ----------
+    folder : what ``sweep run`` wrote
+    output : column to be small
+    count : how many rows at most, up to 100000
+
+    Raises
+    ------
+    InputError, StoreError
+        as :func:`scan`; also for an unknown output or a count out of range.
+    """
+    import pandas as pd
+
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_BEST:
+        raise InputError("count", count, f"a whole number from 1 to {MOST_BEST}", "best")
+    source = scan(folder)
+    names = _known(source, [output], "best")
+    kept = pd.DataFrame({name: [] for name in source.schema.names})
+    for batch in _feasible(source, source.schema.names):
+        size = compared(output, batch[names[0]].to_numpy())
+        here = batch[np.isfinite(size)]
+        merged = here if kept.empty else pd.concat([kept, here], ignore_index=True)
+        order = np.argsort(compared(output, merged[output].to_numpy()), kind="stable")[:count]
+        kept = merged.iloc[order].reset_index(drop=True)
+    return kept
+
+
+def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
+    """The designs within all limits that no other one beats in both outputs, ordered by the first; smaller is better.
+
+    Parameters
+    ----------
+    folder : what ``sweep run`` wrote
+    first, second : columns to be small; signs of swing and stroke do not count
+
+    Returns
+    -------
+    DataFrame
+        all columns of these rows; of rows equal in both outputs the first.  Memory is that of one batch and the front.
+
+    Raises
+    ------
+    InputError, StoreError
+        as :func:`scan`; also for an unknown output.
+    """
+    import pandas as pd
+
+    source = scan(folder)
+    _known(source, [first, second], "pareto")
+    kept = pd.DataFrame({name: [] for name in source.schema.names})
+    for batch in _feasible(source, source.schema.names):
+        here = batch[np.isfinite(batch[first].to_numpy()) & np.isfinite(batch[second].to_numpy())]
+        merged = here if kept.empty else pd.concat([kept, here], ignore_index=True)
+        x, y = (compared(name, merged[name].to_numpy()) for name in (first, second))
+        order = np.lexsort((merged["design"].to_numpy(), y, x))
+        least = np.minimum.accumulate(y[order])
+        unbeaten = np.concatenate([[True], least[1:] < least[:-1]])[: len(order)]
+        kept = merged.iloc[order[unbeaten]].reset_index(drop=True)
+    return kept
+
+
+def histogram(
+    folder: str | Path, output: str, bins: int = 100, ends: tuple[float, float] | None = None
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """How many designs within all limits have an output in each of equal bins, and the edges of the bins.
+
+    Parameters
+    ----------
+    folder : what ``sweep run`` wrote
+    output : column
+    bins : how many, up to 100000
+    ends : lowest and highest edge; the rows are read twice without them, once for the smallest and the largest value
+
+    Returns
+    -------
+    counts (bins,), edges (bins + 1,); values outside of ``ends`` and missing ones are not counted.
+
+    Raises
+    ------
+    InputError, StoreError
+        as :func:`scan`; also for an unknown output, or where no design within the limits has a value.
+    """
+    if isinstance(bins, bool) or not isinstance(bins, int) or not 1 <= bins <= MOST_BINS:
+        raise InputError("bins", bins, f"a whole number from 1 to {MOST_BINS}", "histogram")
+    source = scan(folder)
+    _known(source, [output], "histogram")
+    low, high = _ends(source, output) if ends is None else ends
+    if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+        raise InputError("ends", (low, high), "two finite numbers, the smaller one first", "histogram")
+    edges = np.histogram_bin_edges(np.empty(0), bins, (low, high))
+    counts = np.zeros(bins, np.int64)
+    for batch in _feasible(source, [output]):
+        counts += np.histogram(batch[output].to_numpy(), edges)[0]
+    return counts, edges
+
+
+def _ends(source: Any, output: str) -> tuple[float, float]:
+    low, high = math.inf, -math.inf
+    for batch in _feasible(source, [output]):
+        values = batch[output].to_numpy()
+        values = values[np.isfinite(values)]
+        if values.size:
+            low, high = min(low, float(values.min())), max(high, float(values.max()))
+    if low > high:
+        raise InputError("output", output, "a column with a value in some design within the limits", "histogram")
+    return low, high
+
+
+def _feasible(source: Any, names: Sequence[str]) -> Iterator[pd.DataFrame]:
+    """The rows with status 0, batch by batch; one file after the other, so that memory is that of a few batches."""
+    import pyarrow.compute as pc
+
+    scanner = source.scanner(
+        columns=list(names), filter=pc.field("status") == 0, batch_size=BATCH_ROWS, batch_readahead=1,
+        fragment_readahead=1, use_threads=False,
+    )  # fmt: skip
+    for batch in scanner.to_batches():
+        if batch.num_rows:
+            yield batch.to_pandas()
+
+
+def _known(source: Any, names: Sequence[str], place: str) -> Sequence[str]:
+    for name in names:
+        if name not in source.schema.names:
+            columns = ", ".join(source.schema.names)
+            raise InputError("output", name, f"a column: {columns}{nearest(name, source.schema.names)}", place)
+    return names

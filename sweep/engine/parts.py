@@ -1,0 +1,118 @@
+"""A study in parts for batch systems: ``split`` fixes the cut, every part is a run of its own, ``merge`` joins them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from sweep.chunks.plan import make_plan
+from sweep.dataset import store
+from sweep.dataset.files import link_or_copy
+from sweep.engine.opening import open_plan, plan_note
+from sweep.errors import InputError
+from sweep.study import load_study
+
+PARTS = "parts"
+MOST_PARTS = 10_000
+
+
+def split(study: str | Path, out: str | Path, parts: int, *, smoke: bool = False) -> list[Path]:
+    """Cut a study once, and make a folder for each of several runs that may go on at the same time.
+
+    Each part is a run of consecutive chunks of one and the same cut.  ``sweep run STUDY --out PART`` computes it and
+    nothing else, wherever it runs; :func:`merge` brings the chunks together.  Optimum and front are searched by the
+    run of the whole dataset afterwards.
+
+    Parameters
+    ----------
+    study : study file or its folder
+    out : folder of the chunks of the whole dataset
+    parts : how many; no more than there are chunks are made
+    smoke : take the study's tiny version
+
+    Returns
+    -------
+    folders of the chunks of the parts, ``parts/0000/designs`` and so on beside ``out``.
+
+    Raises
+    ------
+    InputError
+        if the number is out of range, or ``out`` or a part holds data of another study
+    LockedError, StoreError
+        if a run is at work in ``out``, or the disk refuses.
+    """
+    if isinstance(parts, bool) or not isinstance(parts, int) or not 1 <= parts <= MOST_PARTS:
+        raise InputError("parts", parts, f"a whole number from 1 to {MOST_PARTS}", "split")
+    model, folder = load_study(study, smoke=smoke), store.located(out)
+    with store.locked(folder):
+        plan = open_plan(model, folder, force=False)
+        note = plan_note(model, folder, plan)
+    count = min(parts, plan.chunks)
+    folders = [store.beside(folder) / PARTS / f"{k:04d}" / store.DESIGNS for k in range(count)]
+    for k, place in enumerate(folders):
+        own = [plan.chunks * k // count, plan.chunks * (k + 1) // count]
+        there = store.read_plan(place)
+        if there is not None and (there["identity"], there.get("part")) != (plan.identity, own):
+            allowed = "parts of this study cut in this way; remove the old ones first"
+            raise InputError("part", str(place), allowed, "split")
+        with store.store_errors(place):
+            place.mkdir(parents=True, exist_ok=True)
+        if there is None:
+            store.write_plan(place, note | {"part": own, "optimised": None, "complete": False})
+    return folders
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What :func:`merge` did: chunks that came in, those still missing, damaged ones that were left where they are."""
+
+    folder: Path
+    taken: int
+    missing: tuple[int, ...]
+    damaged: tuple[Path, ...]
+
+
+def merge(study: str | Path, out: str | Path, *, smoke: bool = False) -> Merged:
+    """Link the finished chunks of all parts into the dataset; it may be called as often as one likes.
+
+    Parameters
+    ----------
+    study : study file or its folder
+    out : folder of the chunks of the whole dataset, as given to :func:`split`
+    smoke : take the study's tiny version
+
+    Returns
+    -------
+    Merged
+        ``sweep run STUDY --out OUT`` computes the chunks that are missing, then optimum and front.
+
+    Raises
+    ------
+    InputError
+        if there are no parts, or ``out`` or a part holds data of another study or other sources
+    LockedError, StoreError
+        if a run is at work in ``out``, or the disk refuses.
+    """
+    model, folder = load_study(study, smoke=smoke), store.located(out)
+    places = sorted((store.beside(folder) / PARTS).glob(f"*/{store.DESIGNS}"))
+    noted = store.read_plan(folder)
+    if noted is None or not places:
+        raise InputError("folder", str(out), "a folder that sweep split has prepared", "merge")
+    plan = make_plan(model, noted["chunk_size"])
+    taken, damaged = 0, []
+    with store.locked(folder):
+        there = store.finished_chunks(folder, plan)
+        for part in [part for place in places for part in store.parts(place)]:
+            if part.identity != plan.identity:
+                raise store.foreign(part.path.parent, f"the chunk {part.path.name}", plan)
+            if part.index in there:
+                continue
+            if not store.is_whole(part):
+                damaged.append(part.path)
+                continue
+            with store.store_errors(folder):
+                link_or_copy(part.path, folder / part.path.name)
+            there[part.index] = part
+            taken += 1
+    missing = tuple(index for index in range(plan.chunks) if index not in there)
+    return Merged(folder, taken, missing, tuple(damaged))

@@ -1,0 +1,104 @@
+"""What an earlier night has computed already: chunks of the same identity are linked, once they have been verified."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sweep.dataset import store
+from sweep.dataset.files import link_or_copy
+from sweep.dataset.verification import verify
+from sweep.engine.run import optimum_key
+
+if TYPE_CHECKING:
+    from sweep.study import Study
+
+REPORT, FIGURES, SURVIVORS = "report.html", "figures", "survivors.parquet"
+TABLES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO)
+
+
+@dataclass(frozen=True)
+class Carried:
+    """From which night how many chunks were linked; ``whole`` if there is nothing left to compute."""
+
+    night: str
+    chunks: int
+    whole: bool
+
+
+def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None:
+    """Link what an earlier night has of the same study, computed by the same sources.
+
+    Parameters
+    ----------
+    study : as it is tonight
+    earlier : folders of nights, the newest first
+    target : this night's folder of the study; it need not exist
+
+    Returns
+    -------
+    Carried
+        None where no night has a chunk of this identity.  Every chunk was compared with its hash, and its rows with
+        the plan; damaged ones are left out.
+    """
+    from sweep.chunks.plan import make_plan
+
+    for night in earlier:
+        source = night / target.name / store.DESIGNS
+        noted = store.read_plan(source)
+        if noted is None or make_plan(study, noted["chunk_size"]).identity != noted["identity"]:
+            continue
+        found = verify(source, designs=0)
+        bad = {finding.path for finding in found.findings}
+        sound = [path for path in sorted(source.glob("part-*.parquet")) if path not in bad]
+        if not sound:
+            continue
+        designs = target / store.DESIGNS
+        with store.store_errors(target):
+            designs.mkdir(parents=True, exist_ok=True)
+            for path in sound:
+                link_or_copy(path, designs / path.name)
+            link_or_copy(store.beside(source) / store.PLAN, target / store.PLAN)
+            for name in TABLES:
+                path = store.beside(source) / name
+                if path.is_file() and path not in bad:
+                    link_or_copy(path, target / name)
+            # Lines are added to this one, so it is no link.
+            if (store.beside(source) / store.RUNS).is_file():
+                shutil.copyfile(store.beside(source) / store.RUNS, target / store.RUNS)
+            whole = not found.findings and bool(noted.get("complete")) and searched(study, target)
+            if whole:
+                _link_report(store.beside(source), target)
+        return Carried(night.name, len(sound), whole)
+    return None
+
+
+def searched(study: Study, folder: Path) -> bool:
+    """Whether optimum and front in a folder, as far as the study asks for them, are its own and of these sources."""
+    from sweep.optimise.front import saved
+
+    note = store.read_plan(folder / store.DESIGNS) or {}
+    if study.optimise is not None and note.get("optimised") != optimum_key(replace(study, pareto=None), note):
+        return False
+    if study.pareto is None:
+        return True
+    front = saved(folder / store.PARETO, optimum_key(study, note))
+    return front is not None and front.complete
+
+
+def _link_report(source: Path, target: Path) -> None:
+    """The report and what belongs to it.  What a new report would write into is copied, not linked."""
+    if not (source / REPORT).is_file():
+        return
+    copied = [*(source / FIGURES).glob("*.svg"), *(source / name.removeprefix("_") for name in TABLES)]
+    for path in (source / SURVIVORS, *copied, source / REPORT):
+        if path.is_file():
+            place = target / path.relative_to(source)
+            place.parent.mkdir(exist_ok=True)
+            if path in copied:
+                shutil.copyfile(path, place)
+            else:
+                link_or_copy(path, place)

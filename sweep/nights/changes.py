@@ -1,0 +1,182 @@
+"""What moved in a study since the last good night, and its headline figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+from sweep.dataset import store
+from sweep.dataset.comparison import LEAST_SECONDS, ROWS_CHANGED, SLOWER, VALUES_CHANGED, compare
+from sweep.dataset.reading import best
+from sweep.engine.conflict import differences
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.nights.records import NightRecord
+    from sweep.study import Study
+
+# A study that samples its extrema has no accuracy of its own: rounding may differ from version to version.
+ROUNDING = {"float64": 1e-12, "float32": 1e-6}
+# Objective and dimensions of an optimum: the search ends within these relative changes, in a flat valley at the second.
+OBJECTIVE_RTOL, DIMENSION_RTOL = 1e-6, 1e-4
+# Slower is what took so many times the median of the nights before, twice in a row; fewer nights tell nothing.
+SLOWER_FACTOR, LEAST_NIGHTS, MOST_NIGHTS = 1.5, 3, 7
+
+DESIGNS, WITHIN, YIELD = "designs", "designs within all limits", "yield"
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What moved: exit code of ``sweep compare``, in words, and the headline figures that moved."""
+
+    code: int
+    lines: tuple[str, ...]
+    moved: tuple[str, ...] = ()
+
+
+def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str]]:
+    """Headline figures of a complete dataset and their units: designs, those within the limits, the best objective.
+
+    The best objective is that of the optimum, or where the study has none that of the best design of the sweep.
+    """
+    counts = (store.read_plan(folder) or {}).get("counts") or {}
+    number, within = sum(counts.values()), counts.get("OK", 0)
+    found: dict[str, float] = {DESIGNS: number, WITHIN: within, YIELD: within / number if number else 0.0}
+    units = {DESIGNS: "", WITHIN: "", YIELD: ""}
+    if study.objective is None:
+        return found, units
+    name = study.objective.output
+    optimum = _role(store.beside(folder) / store.OPTIMUM, "optimum")
+    if optimum is not None:
+        value = float(optimum[name])
+    else:
+        rows = best(folder, name, 1)
+        value = float(rows[name].iloc[0]) if len(rows) else math.nan
+    if math.isfinite(value):
+        found[name] = value
+        plan = store.read_plan(folder) or {}
+        units[name] = next((c["unit"] for c in plan.get("columns", []) if c["name"] == name), "")
+    return found, units
+
+
+def changes(study: Study, old: Path, new: Path) -> Changes:
+    """Compare a study's dataset with the one of an earlier night.
+
+    Values are compared design by design within the study's accuracy, optimum and front within what their searches
+    promise.
+
+    Parameters
+    ----------
+    study : as it is tonight
+    old, new : folders of the chunks, both complete
+    """
+    plans = [store.read_plan(folder) or {} for folder in (old, new)]
+    if plans[0].get("study") != plans[1].get("study"):
+        words = differences(plans[0].get("data") or {}, plans[1].get("data") or {})
+        return Changes(ROWS_CHANGED, (f"the study itself was edited: {'; '.join(words) or 'its fixed tables'}",))
+    rtol = study.accuracy.target or ROUNDING[study.output.dtype]
+    found = compare(old, new, rtol)
+    # The optimum and the reference have promises of their own.
+    found.moved = {name: moved for name, moved in found.moved.items() if moved.kind == "design"}
+    found.seconds = None
+    code = ROWS_CHANGED if found.rows_changed else VALUES_CHANGED if found.values_changed else 0
+    moved = [name for name, column in found.moved.items() if column.changed or column.missing]
+    lines = found.lines() if code else []
+    for more, names in (_yield(plans), _optimum(study, old, new), _front(study, old, new)):
+        lines += more
+        moved += names
+        code = code or (VALUES_CHANGED if more else 0)
+    return Changes(code, tuple(lines), tuple(dict.fromkeys(moved)))
+
+
+def _yield(plans: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[str]]:
+    old, new = (plan.get("counts") or {} for plan in plans)
+    if old == new:
+        return [], []
+    words = [f"{n} {old.get(n, 0)} -> {new.get(n, 0)}" for n in sorted({*old, *new}) if old.get(n, 0) != new.get(n, 0)]
+    names = [WITHIN, YIELD] if old.get("OK", 0) != new.get("OK", 0) else []
+    return [f"yield moved, designs by status: {', '.join(words)}"], names
+
+
+def _optimum(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
+    before, after = (_role(store.beside(folder) / store.OPTIMUM, "optimum") for folder in (old, new))
+    if before is None or after is None or study.objective is None:
+        return [], []
+    name, found = study.objective.output, []
+    if _far(before[name], after[name], OBJECTIVE_RTOL):
+        found.append(f"optimum moved: {name} {before[name]:.10g} -> {after[name]:.10g}")
+    sizes = {p.name: max(abs(before[p.name]), abs(after[p.name])) for p in study.family.parameters}
+    # A length near zero is measured by the longest one.
+    largest = max((sizes[p.name] for p in study.family.parameters if p.unit == "length"), default=0.0)
+    dimensions = []
+    for p in study.family.parameters:
+        scale = largest if p.unit == "length" else max(sizes[p.name], 1.0)
+        if not abs(before[p.name] - after[p.name]) <= DIMENSION_RTOL * scale:
+            dimensions.append(f"{p.name} {before[p.name]:.8g} -> {after[p.name]:.8g}")
+    if dimensions:
+        found.append(f"optimum moved in its dimensions: {', '.join(dimensions)}")
+    return found, [name] if found else []
+
+
+def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
+    paths = [store.beside(folder) / store.PARETO for folder in (old, new)]
+    if study.objective is None or study.pareto is None or not all(path.is_file() for path in paths):
+        return [], []
+    name = study.objective.output
+    tables = [store.read_table(path).drop_duplicates("bound") for path in paths]
+    before, after = (dict(zip(t["bound"].tolist(), t[name].tolist(), strict=True)) for t in tables)
+    shared = [bound for bound in before if bound in after]
+    found = [f"front: {len(before)} bounds before, {len(after)} now"] if len(before) != len(after) else []
+    far = [bound for bound in shared if _far(before[bound], after[bound], OBJECTIVE_RTOL)]
+    if far:
+        worst = max(far, key=lambda bound: abs(after[bound] - before[bound]))
+        found.append(
+            f"front moved at {len(far)} of {len(shared)} bounds, most at {study.pareto.output} = {worst:g}: "
+            f"{name} {before[worst]:.8g} -> {after[worst]:.8g}"
+        )
+    return found, []
+
+
+def slower(name: str, seconds: float, history: Sequence[NightRecord]) -> Changes:
+    """Whether a study takes longer than the recent median allows; one slow night by itself is no alarm.
+
+    Parameters
+    ----------
+    name : of the study
+    seconds : of tonight's run, in which every chunk was computed
+    history : earlier nights, the oldest first; runs that linked chunks are left out
+    """
+    times = [
+        night.studies[name].seconds
+        for night in history
+        if name in night.studies and night.studies[name].state == "complete" and not night.studies[name].linked
+    ]
+    known = [time for time in times if time is not None]
+    before, last = known[:-1][-MOST_NIGHTS:], known[-1:]
+    if len(before) < LEAST_NIGHTS or seconds < LEAST_SECONDS:
+        return Changes(0, ())
+    allowed = SLOWER_FACTOR * median(before)
+    if seconds <= allowed or last[0] <= allowed:
+        return Changes(0, ())
+    words = f"slower twice in a row: {last[0]:.3g} s and {seconds:.3g} s, the median before is {median(before):.3g} s"
+    return Changes(SLOWER, (words,))
+
+
+def _far(old: float, new: float, rtol: float) -> bool:
+    if math.isnan(old) or math.isnan(new):
+        return math.isnan(old) != math.isnan(new)
+    return bool(abs(old - new) > rtol * max(abs(old), abs(new)))
+
+
+def _role(path: Path, role: str) -> pd.Series[Any] | None:
+    """One row of the optimiser's table."""
+    if not path.is_file():
+        return None
+    table = store.read_table(path)
+    rows = table[table["role"] == role]
+    return rows.iloc[0] if len(rows) else None

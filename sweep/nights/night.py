@@ -1,0 +1,235 @@
+"""``nightly``: one night from its first study to its page."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from sweep.dataset import store
+from sweep.errors import InputError, LinksweepError, StoreError, TimeUsedUp, WorkerDied
+from sweep.nights import folders
+from sweep.nights.carry import REPORT, Carried, carry
+from sweep.nights.changes import Changes, changes, figures, slower
+from sweep.nights.chosen import Chosen, chosen, in_order
+from sweep.nights.journal import WORDS, Journal
+from sweep.nights.page import write_page
+from sweep.nights.records import (
+    NightRecord,
+    State,
+    StudyRecord,
+    append_history,
+    read_history,
+    read_night,
+    write_night,
+)
+from sweep.nights.running import RUN_LOG, Ended, call, notify
+from sweep.study import Study
+
+# A run ended so: its own code says why.  Any other end is that of a process that died.
+TOLD = (2, 3, 74, 75)
+CUT = (TimeUsedUp.exit_code, 130, 143)
+GRAVEST_FIRST = (11, 10, TimeUsedUp.exit_code, 12)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a night goes: where to, how long it may take [s], how many nights are kept, workers, whom to tell."""
+
+    into: Path
+    budget: float
+    keep: int = 14
+    jobs: int = 2
+    backend: str = "threading"
+    smoke: bool = False
+    on_change: str | None = None
+
+
+def nightly(studies: Iterable[str | Path], settings: Settings, say: Callable[[str], None]) -> NightRecord:
+    """Compute all studies into a dated folder, compare them with the last good night, write the page of the nights.
+
+    Parameters
+    ----------
+    studies : study files, folders with one, or folders of such folders
+    settings : see :class:`Settings`
+    say : told what happens, line by line
+
+    Returns
+    -------
+    NightRecord
+        ``exit_code`` is 0 if nothing changed; that of the run if one failed, 74 before others; 11 if rows or statuses
+        changed, 10 if values did; 124 if the time was over before all studies were complete; 12 if one was slower.
+
+    Raises
+    ------
+    InputError
+        if there are no studies, or a setting is out of range
+    LockedError
+        if another night is at work in the folder
+    StoreError
+        if the disk is full or refuses.
+    """
+    if not settings.budget > 0.0:
+        raise InputError("budget", settings.budget, "a time above 0 s", "nightly")
+    if settings.keep < 1:
+        raise InputError("keep", settings.keep, "a number of nights from 1", "nightly")
+    wanted = chosen(map(Path, studies), settings.smoke)
+    with folders.one_at_a_time(settings.into):
+        earlier = folders.nights(settings.into)[::-1]
+        night = _Night(settings, earlier, folders.new_night(settings.into), say)
+        return night.through(in_order(wanted, earlier))
+
+
+class _Night:
+    """The state of a night at work."""
+
+    def __init__(self, settings: Settings, earlier: list[Path], folder: Path, say: Callable[[str], None]) -> None:
+        self.settings, self.earlier, self.folder = settings, earlier, folder
+        self.good = folders.good_nights(settings.into)[::-1]
+        self.history = read_history(settings.into)
+        self.journal = Journal(folder, say)
+        self.begin = time.monotonic()
+
+    @property
+    def left(self) -> float:
+        """Time that is left [s]."""
+        return self.settings.budget - (time.monotonic() - self.begin)
+
+    def through(self, studies: list[Chosen]) -> NightRecord:
+        """All studies, then what concerns the night as a whole."""
+        names = ", ".join(one.name for one in studies)
+        self.journal.note("night", f"night {self.folder.name}: {names}", studies=[one.name for one in studies])
+        records: dict[str, StudyRecord] = {}
+        for one in studies:
+            records[one.name] = record = self.study(one)
+            about = {"state": record.state, "code": record.code, "changed": record.changed, "seconds": record.seconds}
+            self.journal.note("study", _words(one.name, record), study=one.name, changes=record.changes, **about)
+        result = NightRecord(self.folder.name, time.monotonic() - self.begin, exit_code(records), records)
+        write_night(self.folder, result)
+        append_history(self.settings.into, result)
+        if result.good:
+            folders.point_latest(self.settings.into, self.folder)
+        gone = folders.drop_old(self.settings.into, self.settings.keep)
+        if gone:
+            self.journal.note("dropped", f"old nights deleted: {', '.join(gone)}", nights=gone)
+        write_page(self.settings.into)
+        verdict = _verdict(result)
+        self.journal.note("end", verdict, exit_code=result.exit_code, good=result.good)
+        if result.exit_code and self.settings.on_change is not None:
+            text = (self.folder / WORDS).read_text(encoding="utf-8")
+            fault = notify(self.settings.on_change, self.folder, result.exit_code, text)
+            self.journal.note("told", f"--on-change {fault or 'ran'}", fault=fault)
+        return result
+
+    def study(self, one: Chosen) -> StudyRecord:
+        """One study: link, compute, report, compare."""
+        if one.study is None:
+            return StudyRecord("failed", 2, message=one.fault)
+        if self.left <= 0.0:
+            return StudyRecord("waiting", TimeUsedUp.exit_code)
+        target = self.folder / one.name
+        carried: Carried | None = None
+        try:
+            carried = carry(one.study, self.earlier, target)
+            ended = Ended(0, 0.0, "") if carried and carried.whole else self.run(one, target)
+            source, linked = (carried.night, carried.chunks) if carried else (None, 0)
+            whole = store.is_complete(target / store.DESIGNS)
+            if not whole:
+                state: State = "cut" if ended.code in CUT else "failed"
+                code = ended.code if ended.code in (*TOLD, *CUT) else WorkerDied.exit_code
+                return StudyRecord(state, code, source, linked, seconds=ended.seconds, message=ended.message)
+            return self.finished(one.study, target, carried, ended)
+        except LinksweepError as error:
+            return StudyRecord("failed", error.exit_code, message=str(error))
+
+    def run(self, one: Chosen, target: Path) -> Ended:
+        """Compute what is not there yet, within the time that is left."""
+        words = ["run", str(one.path.resolve()), "--out", str(target / store.DESIGNS)]
+        words += ["--jobs", str(self.settings.jobs), "--backend", self.settings.backend]
+        return call([*words, *(["--smoke"] if self.settings.smoke else [])], target / RUN_LOG, self.left)
+
+    def finished(self, study: Study, target: Path, carried: Carried | None, ended: Ended) -> StudyRecord:
+        """Report, figures and comparison of a complete dataset."""
+        message = ""
+        if not (target / REPORT).is_file():
+            message = call(["report", str(target)], target / RUN_LOG, max(self.left, 0.0)).message
+        reported = (target / REPORT).is_file()
+        designs = target / store.DESIGNS
+        chunks = len(store.parts(designs))
+        values, units = self.figures(study, target, carried)
+        base = self.base(study.name)
+        found = Changes(0, ())
+        if base is not None and not (carried and carried.whole and carried.night == base.name):
+            found = changes(study, base / study.name / store.DESIGNS, designs)
+        if carried is None:
+            late = slower(study.name, ended.seconds, self.history)
+            found = Changes(found.code or late.code, (*found.lines, *late.lines), found.moved)
+        return StudyRecord(
+            "complete",
+            linked_from=carried.night if carried else None,
+            linked=carried.chunks if carried else 0,
+            computed=chunks - (carried.chunks if carried else 0),
+            seconds=None if carried and carried.whole else ended.seconds,
+            figures=values,
+            units=units,
+            compared_with=base.name if base else None,
+            changed=found.code,
+            changes=found.lines,
+            moved=found.moved,
+            report=reported,
+            message="" if reported else f"no report: {message}",
+        )
+
+    def figures(
+        self, study: Study, target: Path, carried: Carried | None
+    ) -> tuple[Mapping[str, float], Mapping[str, str]]:
+        """Headline figures; those of linked data are known."""
+        if carried and carried.whole:
+            known = read_night(self.settings.into / carried.night)
+            if known is not None and study.name in known.studies and known.studies[study.name].figures:
+                return known.studies[study.name].figures, known.studies[study.name].units
+        return figures(study, target / store.DESIGNS)
+
+    def base(self, name: str) -> Path | None:
+        """The last good night that has this study whole."""
+        return next((night for night in self.good if store.is_complete(night / name / store.DESIGNS)), None)
+
+
+def exit_code(studies: Mapping[str, StudyRecord]) -> int:
+    """What a night ends with: the gravest of its studies' codes."""
+    failed = [record.code for record in studies.values() if record.state == "failed"]
+    if failed:
+        return StoreError.exit_code if StoreError.exit_code in failed else failed[0]
+    changed = {record.changed for record in studies.values()}
+    if any(record.state != "complete" for record in studies.values()):
+        changed.add(TimeUsedUp.exit_code)
+    return next((code for code in GRAVEST_FIRST if code in changed), 0)
+
+
+def _words(name: str, record: StudyRecord) -> str:
+    """One study in words."""
+    if record.state == "waiting":
+        return f"{name}: not begun, the time was over"
+    linked = f", {record.linked} chunks linked from {record.linked_from}" if record.linked else ""
+    if record.state == "cut":
+        return f"{name}: cut off, the time was over{linked}; the next night begins with it"
+    if record.state == "failed":
+        return f"{name}: failed with {record.code}: {record.message}"
+    took = "nothing to compute" if record.seconds is None else f"{record.computed} chunks in {record.seconds:.3g} s"
+    lines = [f"{name}: {took}{linked}", *record.changes, *([record.message] if record.message else [])]
+    if record.compared_with is None:
+        lines.append("the first good night with it, nothing to compare with")
+    elif not record.changed:
+        lines.append(f"no change since {record.compared_with}")
+    return "\n          ".join(lines)
+
+
+def _verdict(record: NightRecord) -> str:
+    """The last line of a night."""
+    changed = [f"{name} ({own.changed})" for name, own in record.studies.items() if own.changed]
+    late = [name for name, own in record.studies.items() if own.state in ("cut", "waiting")]
+    failed = [name for name, own in record.studies.items() if own.state == "failed"]
+    parts = [("changed", changed), ("not ready", late), ("failed", failed)]
+    words = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
+    return f"{words or 'no change'} (exit code {record.exit_code}, {record.seconds:.3g} s)"

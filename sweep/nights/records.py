@@ -1,0 +1,107 @@
+"""What is known of a night and of each study in it; how it is written down and read back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from sweep.dataset.files import store_errors, write_atomically
+
+NIGHT, HISTORY = "night.json", "history.jsonl"
+
+State = Literal["complete", "cut", "waiting", "failed"]
+
+
+@dataclass(frozen=True)
+class StudyRecord:
+    """One study in one night.
+
+    ``state`` is "complete"; "cut" where the time was over before the end; "waiting" where it was over before the
+    beginning; "failed" with the exit code of the run in ``code``.  ``linked`` chunks come from the night
+    ``linked_from``, ``computed`` ones do not.  ``seconds`` is the time of the run, None where nothing had to be
+    computed.  ``figures`` are the headline figures, with their ``units``.  ``changes`` says in words what moved since
+    the night ``compared_with``, ``changed`` is 0, 10, 11 or 12, and ``moved`` names the figures that moved.
+    """
+
+    state: State
+    code: int = 0
+    linked_from: str | None = None
+    linked: int = 0
+    computed: int = 0
+    seconds: float | None = None
+    figures: Mapping[str, float] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    compared_with: str | None = None
+    changed: int = 0
+    changes: tuple[str, ...] = ()
+    moved: tuple[str, ...] = ()
+    report: bool = False
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class NightRecord:
+    """One night; it is ``good`` if every study of it is complete."""
+
+    name: str
+    seconds: float
+    exit_code: int
+    studies: Mapping[str, StudyRecord]
+
+    @property
+    def good(self) -> bool:
+        """Whether every study is complete, whatever has changed."""
+        return all(record.state == "complete" for record in self.studies.values())
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return asdict(self) | {"good": self.good}
+
+
+def write_night(folder: Path, record: NightRecord) -> None:
+    """Write the record into the folder of its night, as a whole."""
+    write_atomically(folder / NIGHT, (json.dumps(record.as_dict(), indent=1) + "\n").encode())
+
+
+def read_night(folder: Path) -> NightRecord | None:
+    """The record of a night; None where the night has not come to its end."""
+    path = folder / NIGHT
+    if not path.is_file():
+        return None
+    with store_errors(path):
+        text = path.read_bytes()
+    return _record(text)
+
+
+def append_history(into: Path, record: NightRecord) -> None:
+    """Add a night to the history, which outlives the night's folder."""
+    before = read_history(into)
+    nights = [*(night for night in before if night.name != record.name), record]
+    text = "".join(json.dumps(night.as_dict()) + "\n" for night in nights)
+    write_atomically(into / HISTORY, text.encode())
+
+
+def read_history(into: Path) -> list[NightRecord]:
+    """All nights that came to their end, the oldest first; lines that cannot be read are left out."""
+    path = into / HISTORY
+    if not path.is_file():
+        return []
+    with store_errors(path):
+        lines = path.read_bytes().splitlines()
+    return [night for night in map(_record, lines) if night is not None]
+
+
+def _record(text: bytes) -> NightRecord | None:
+    try:
+        noted = json.loads(text)
+        studies = {str(name): _study_record(own) for name, own in noted["studies"].items()}
+        return NightRecord(noted["name"], float(noted["seconds"]), int(noted["exit_code"]), studies)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _study_record(noted: dict[str, Any]) -> StudyRecord:
+    return StudyRecord(**noted | {"changes": tuple(noted["changes"]), "moved": tuple(noted["moved"])})
