@@ -124,6 +124,8 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     timing = next((t for t in family.timings if t.name == name), None) if isinstance(family, Machine) else None
     if timing is not None:
         ends = tuple(measure(family, place, window) for place in timing.places)
+        if not all(end.is_angle for end in ends):  # an event is found as a root, not followed as an extremum
+            return Measure(name, "scalar", (), numbers=(name,))
         return Measure(name, "difference", tuple(s for end in ends for s in end.series), parts=ends)
     asked = quantity(family, name)
     if asked is not None and asked.route == "margin":
