@@ -160,3 +160,25 @@ def test_study_file_gives_the_level_in_its_unit() -> None:
 def test_study_file_with_a_level_of_another_unit_is_refused(level: object) -> None:
     with pytest.raises(StudyError, match="a length"):
         study_with(event="looper.tip_y", level=level)
+
+
+def test_pressure_angle_of_a_member_with_two_stages_can_be_searched() -> None:
+    import pandas as pd
+
+    from sweep.optimise.sensitivity import sensitivities
+
+    machine = two()
+    names = list(machine.parameter_names)
+    design = np.array([TABLE.iloc[0].get(n, p.default) for n, p in zip(names, machine.parameters, strict=True)], float)
+    rows = pd.DataFrame(sensitivities(machine, design, ["needle.max_pressure_angle"]))
+    alone = pd.DataFrame(
+        sensitivities(
+            sweep.families.family(["rssr", "guide"]),
+            machine.members[0].designs(design[None, :])[0],
+            ["max_pressure_angle"],
+        )
+    )
+    own = rows[rows["parameter"].str.startswith("needle.")].assign(parameter=lambda r: r["parameter"].str[7:])
+    both = own.merge(alone, on="parameter")
+    assert len(both) == len(alone) > 10
+    np.testing.assert_allclose(both["growing_x"], both["growing_y"], rtol=1e-9, atol=1e-12)
