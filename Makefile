@@ -45,12 +45,12 @@ smoke: $(STUDIES:%=smoke-%) smoke-accuracy  ## every study's tiny version
 $(STUDIES:%=study-%): study-%: $(VENV)/ready
 	$(SWEEP) run studies/$* --out results/$*/designs
 	$(if $(wildcard studies/$*/figure.py),$(BIN)/python studies/$*/figure.py results/$*)
-	$(SWEEP) report results/$*/designs --out results/$*
+	$(SWEEP) report results/$*/designs
 
 $(STUDIES:%=smoke-%): smoke-%: $(VENV)/ready
 	$(SWEEP) run studies/$* --smoke --force --out results/smoke/$*/designs
 	$(if $(wildcard studies/$*/figure.py),$(BIN)/python studies/$*/figure.py results/smoke/$*)
-	$(SWEEP) report results/smoke/$*/designs --out results/smoke/$*
+	$(SWEEP) report results/smoke/$*/designs
 
 study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accuracy.md, about 10 minutes
 	$(BIN)/python -m studies.accuracy --out results/accuracy
@@ -85,7 +85,7 @@ bench-extrema: $(VENV)/ready  ## errors and times of the search for true extrema
 bench-scene: $(VENV)/ready  ## all effects on 10^5 designs x 360 angles: rate, its parts, memory; about 5 minutes
 	$(BIN)/python -m tests.bench.effects --scene 100000
 
-bench-optimise: $(VENV)/ready  ## 20 specifications of a crank-rocker against a 50 times larger search: writes docs/optimise-marks.md
+bench-optimise: $(VENV)/ready  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 15 minutes
 	$(BIN)/python -m tests.bench.optimise --out docs/optimise-marks.md
 
 clean:  ## remove results and the environment

@@ -12,17 +12,24 @@ before the first kernel is imported, and three things keep foreign code out of i
   their files.  Saving is locked.
 
 The place inside the folder is that of the source inside the package, so copies of the same sources share it.
+
+What lies in such a folder is run.  A folder that belongs to somebody else, or that others may write to, is not used;
+ours is closed to others.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import marshal
+import os
 import pickle
+import stat
 import struct
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -41,6 +48,10 @@ PYC_HEADER = 16
 YOUNGER = 2_000_000_000
 # What reading a file that is empty or ends too soon raises; numba does not wait for its files to reach the disk.
 DAMAGED = (EOFError, pickle.UnpicklingError)
+# What a file system answers that has no locks.
+UNLOCKABLE = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOLCK)
+# The folder of the cache and its parent are made by this package.
+OWN_LEVELS = 2
 
 
 def _digests() -> dict[str, str]:
@@ -60,8 +71,55 @@ def source_hash() -> str:
 
 
 def cache_root() -> Path:
-    """Folder that holds the compiled kernels of every version (what ``sweep cache clear`` removes)."""
-    return Path(platformdirs.user_cache_dir("linksweep")) / "kernels"
+    """Folder that holds the compiled kernels of every version (what ``sweep cache clear`` removes).
+
+    It is the user's cache folder.  Where somebody else could have put something there, it is a private folder under the
+    system's one for temporary files, and that is said in a line on the standard error.
+    """
+    usual = Path(platformdirs.user_cache_dir("linksweep")) / "kernels"
+    reason = distrust(usual)
+    if reason is None:
+        return usual
+    private = Path(tempfile.gettempdir()) / f"linksweep-{os.getuid()}" / "kernels"
+    if distrust(private) is not None:
+        private = Path(tempfile.mkdtemp(prefix="linksweep-")) / "kernels"
+    _say(f"compiled kernels are kept in {private}, as {reason}")
+    return private
+
+
+def distrust(folder: Path) -> str | None:
+    """Why what lies in a folder could be somebody else's, in words; None if only this user can have put it there.
+
+    The folder and its parent must be this user's and nobody else may write to them; a folder further up may be the
+    system's, and others may write to it if they cannot rename there what is not theirs.
+    """
+    if not hasattr(os, "getuid"):  # Windows: a user's folders are closed to others
+        return None
+    place = folder.resolve()
+    for depth, above in enumerate((place, *place.parents)):
+        try:
+            about = above.stat()
+        except OSError:
+            continue  # not made yet, or out of reach: then nothing is loaded from it
+        open_to_others = about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+        if about.st_uid != os.getuid() and (depth < OWN_LEVELS or about.st_uid != 0):
+            return f"{above} belongs to another user"
+        if open_to_others and (depth < OWN_LEVELS or not about.st_mode & stat.S_ISVTX):
+            return f"others may write to {above}"
+    return None
+
+
+def _made(folder: Path) -> None:
+    """Make a folder, and those above it that are missing, for this user alone."""
+    for place in (*reversed(folder.parents), folder):
+        if not place.is_dir():
+            with suppress(FileExistsError):  # another process was faster
+                place.mkdir(mode=0o700)
+
+
+def _say(text: str) -> None:
+    with suppress(OSError, AttributeError):  # a lost terminal
+        sys.stderr.write(f"linksweep: {text}\n")
 
 
 CACHE_DIR = cache_root() / source_hash()
@@ -112,6 +170,7 @@ class _Place(UserProvidedCacheLocator):
         """The folder, made if need be; None where it cannot be written."""
         place = cls(function, file)
         try:
+            _made(CACHE_DIR)
             place.ensure_cache_path()  # type: ignore[no-untyped-call]
         except OSError:
             return None
@@ -120,6 +179,23 @@ class _Place(UserProvidedCacheLocator):
     def get_source_stamp(self) -> str:
         """What the code is of; the folder's name says it already."""
         return CACHE_DIR.name
+
+
+_said: set[str] = set()
+
+
+@contextmanager
+def _locked() -> Iterator[None]:
+    """One process at a time; where there are no locks nothing is kept, and that is said once."""
+    try:
+        with FileLock(CACHE_DIR / "_lock", fallback_to_soft=False):
+            yield
+    except OSError as error:
+        if error.errno in UNLOCKABLE and not _said:
+            _said.add("no locks")
+            _say(f"the file system of {CACHE_DIR} has no locks: every process compiles its kernels anew. "
+                 "XDG_CACHE_HOME can name a folder on another one")  # fmt: skip
+        raise
 
 
 class _Form(CompileResultCacheImpl):
@@ -136,14 +212,14 @@ class KernelCache(FunctionCache):
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except DAMAGED:
-            with suppress(OSError), FileLock(CACHE_DIR / "_lock"):
+            with suppress(OSError), _locked():
                 self.flush()  # type: ignore[no-untyped-call]
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the compiled code of one signature; one process at a time."""
         # A disk that is full takes no code; what was compiled serves this process all the same.
-        with suppress(OSError, *DAMAGED), FileLock(CACHE_DIR / "_lock"):
+        with suppress(OSError, *DAMAGED), _locked():
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 

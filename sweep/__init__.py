@@ -5,20 +5,24 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from sweep.errors import InputError, LinksweepError, StudyError
+from sweep._kernels import check_kernels
+from sweep.errors import IncompleteWarning, InputError, LinksweepError, LinksweepWarning, StudyError
 
 if TYPE_CHECKING:
     from sweep.dataset.comparison import compare
     from sweep.dataset.store import is_complete, load
     from sweep.engine.run import run
+    from sweep.evaluation import thread
     from sweep.evaluation.poses import evaluate
     from sweep.evaluation.summaries import summarise
     from sweep.families import machine
     from sweep.synthesis.mechanisms import synthesise
 
 __all__ = [
+    "IncompleteWarning",
     "InputError",
     "LinksweepError",
+    "LinksweepWarning",
     "StudyError",
     "compare",
     "evaluate",
@@ -28,7 +32,10 @@ __all__ = [
     "run",
     "summarise",
     "synthesise",
+    "thread",
 ]
+
+check_kernels()
 
 # Imported when first used, so that the command line answers at once: numba alone takes a quarter of a second.
 _HOMES = {
@@ -41,13 +48,16 @@ _HOMES = {
     "summarise": "sweep.evaluation.summaries",
     "synthesise": "sweep.synthesis.mechanisms",
 }
+_MODULES = {"thread": "sweep.evaluation.thread"}
 
 
 def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(_MODULES[name])
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES})
+    return sorted({*globals(), *_HOMES, *_MODULES})

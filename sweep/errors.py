@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 LONGEST = 200  # letters of a value in a message
 
@@ -84,6 +85,23 @@ class TimeUsedUp(LinksweepError):
     exit_code = 124
 
 
+class SearchCutShort(TimeUsedUp):
+    """The emergency brake has stopped the optimiser or the front; the folder holds what was found until then.
+
+    Parameters
+    ----------
+    folder : of the dataset
+    message : what was searched
+    """
+
+    def __init__(self, folder: Path, message: str) -> None:
+        self.folder = folder
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[type[SearchCutShort], tuple[Path, str]]:
+        return type(self), (self.folder, str(self))
+
+
 class Interrupted(LinksweepError):
     """A signal stopped the run; finished chunks are kept and the next run continues with the missing ones."""
 
@@ -96,13 +114,74 @@ class Interrupted(LinksweepError):
         return type(self), (self.signal_number, str(self))
 
 
+class LinksweepWarning(UserWarning):
+    """What linksweep says without stopping; the command line prints it as one line."""
+
+
+class IncompleteWarning(LinksweepWarning):
+    """A dataset is read that lacks chunks: its run has not ended, or files are missing."""
+
+
+class MeasuredRangeWarning(LinksweepWarning):
+    """Reported constants are used outside the range in which they were measured; the numbers extrapolate."""
+
+
+# Of a misspelt word at most this share of its letters is wrong.
+SLIPS = 0.45
+
+# What people call things, and our names for them; the first one that is known where the word stands is meant.
+SYNONYMS = {
+    "crank": ("a", "a1"),
+    "coupler": ("b", "b1"),
+    "rocker": ("c", "c1"),
+    "frame": ("e", "e1"),
+    "velocity": ("dpsi", "ds"),
+    "acceleration": ("d2psi", "d2s"),
+    "jerk": ("d3psi", "d3s"),
+    "max_velocity": ("max_abs_dpsi", "max_abs_ds"),
+    "max_acceleration": ("max_abs_d2psi", "max_abs_d2s"),
+    "max_jerk": ("max_abs_d3psi", "max_abs_d3s"),
+    "transmission_angle": ("max_pressure_angle", "max_pressure_angle1", "pressure_angle"),
+    "degree": ("deg",),
+    "degrees": ("deg",),
+    "°": ("deg",),
+    "arcmin": ("deg",),
+    "inch": ("in",),
+    "inches": ("in",),
+}
+
+
 def closest(word: str, known: Iterable[str]) -> str | None:
     """The known word nearest to ``word``, or None if none is near."""
     choices = list(known)
     # Case first: among e1, f1, g1 the letters of E1 say nothing.
     matches = [k for k in choices if k.casefold() == word.casefold()]
-    matches = matches or difflib.get_close_matches(word, choices, n=1, cutoff=0.5)
+    matches = matches or [name for name in SYNONYMS.get(word.casefold().replace(" ", "_"), ()) if name in choices]
+    if not matches:
+        alike = difflib.get_close_matches(word, choices, n=8, cutoff=0.5)
+        # Letters in common are not enough: a slip changes few of them.
+        near = sorted((edits(word, name), -alike.index(name), name) for name in alike)
+        matches = [n for count, _, n in near if count <= max(1.0, SLIPS * len(word)) or _begins(word, n)]
     return matches[0] if matches else None
+
+
+def _begins(word: str, name: str) -> bool:
+    """Whether one is the beginning of the other, and not only a letter or two of it."""
+    return min(len(word), len(name)) > 3 and (name.startswith(word) or word.startswith(name))
+
+
+def edits(one: str, other: str) -> int:
+    """How many letters to change, leave out, put in or exchange with their neighbour to make one word the other."""
+    before: list[int] = []
+    row = list(range(len(other) + 1))
+    for i, a in enumerate(one, 1):
+        last, before, row = before, row, [i]
+        for j, b in enumerate(other, 1):
+            count = min(before[j] + 1, row[j - 1] + 1, before[j - 1] + (a != b))
+            if i > 1 and j > 1 and a == other[j - 2] and one[i - 2] == b:
+                count = min(count, last[j - 2] + 1)
+            row.append(count)
+    return row[-1]
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

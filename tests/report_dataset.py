@@ -111,9 +111,15 @@ def write_optimum(folder: Path, study: Study, changes: dict[str, Any]) -> None:
     rows = [{"role": "optimum"} | fixed | OPTIMUM | errors | about | changes]
     rows += [{"role": "start"} | fixed | OPTIMUM | errors | about] * 2
     rows += [{"role": "reference"} | fixed | REFERENCE | errors | about | {"kkt_residual": np.nan, "active": ""}]
-    write_table(folder / store.OPTIMUM, pd.DataFrame(rows), {"max_abs_d2s": "mm", "max_abs_dev": "mm", "stroke": "mm"})
+    write_table(
+        store.beside(folder) / store.OPTIMUM,
+        pd.DataFrame(rows),
+        {"max_abs_d2s": "mm", "max_abs_dev": "mm", "stroke": "mm"},
+    )
     curves = pd.concat([curve("optimum", 12.25), curve("reference", 15.0)])
-    write_table(folder / store.CURVES, curves, {"s": "mm", "ds": "mm", "d2s": "mm", "d3s": "mm", "dev": "mm"})
+    write_table(
+        store.beside(folder) / store.CURVES, curves, {"s": "mm", "ds": "mm", "d2s": "mm", "d3s": "mm", "dev": "mm"}
+    )
 
 
 def curve(role: str, half_stroke: float, poses: int = 72) -> pd.DataFrame:

@@ -10,6 +10,7 @@ import pytest
 
 import sweep
 from sweep.errors import InputError
+from sweep.families import NAMES
 
 ROCKER = {"a": 1.0, "b": 4.0, "c": 2.0, "e": 3.0, "f": 0.5, "g": 0.2, "alpha": 0.3}
 FRAME = pd.DataFrame(ROCKER, index=[0, 1])
@@ -68,7 +69,7 @@ def test_a_column_that_stands_twice() -> None:
 
 @pytest.mark.parametrize("family", [None, 3, [], ["rssr", None], [["rssr"]]])
 def test_families(family: Any) -> None:
-    refused("allowed: one of rssr, rssp, guide, geared_dwell, or a list", sweep.summarise, family, ROCKER, "swing")
+    refused(f"allowed: one of {', '.join(NAMES)}, or a list", sweep.summarise, family, ROCKER, "swing")
 
 
 @pytest.mark.parametrize("want", [None, 3, ["swing", 3]])

@@ -13,6 +13,7 @@ import sweep
 from sweep.cli import main
 from sweep.cli.listing import family_names
 from sweep.cli.tables import read_table, wanted
+from sweep.report.terminal import Ending
 
 STUDY = """
 [study]
@@ -231,8 +232,10 @@ def test_run_passes_its_options_on(study: Path, monkeypatch: pytest.MonkeyPatch)
         return Path("somewhere")
 
     monkeypatch.setattr("sweep.engine.run.run", run)
+    ended = Ending(("the answer",), 0)
+    monkeypatch.setattr("sweep.report.terminal.ending", lambda folder: ended)
     options = ("--jobs", 3, "--backend", "loky", "--accuracy", 1e-5, "--smoke", "--force", "--out", "x")
-    assert call("run", study, *options).output == "dataset: somewhere\n"
+    assert call("run", study, *options).output == "the answer\ndataset: somewhere\n"
     assert given["positional"] == (study, Path("x"), 3, "loky")
     assert {given["accuracy"], given["smoke"], given["force"]} == {1e-5, True}
 

@@ -131,8 +131,8 @@ def test_optima_are_compared(study: Study, dataset: Path, tmp_path: Path) -> Non
     rows = sweep.load(dataset)
     old, new = written(study, rows, tmp_path / "old"), written(study, rows, tmp_path / "new")
     optimum = pd.DataFrame({"role": ["optimum", "start", "reference"], "swing": [1.0, 2.0, 3.0], "x": [0.0, 0.0, 0.0]})
-    optimum.to_parquet(old / store.OPTIMUM)
-    optimum.assign(swing=[1.5, 9.0, 3.0]).to_parquet(new / store.OPTIMUM)
+    optimum.to_parquet(store.beside(old) / store.OPTIMUM)
+    optimum.assign(swing=[1.5, 9.0, 3.0]).to_parquet(store.beside(new) / store.OPTIMUM)
     found = sweep.compare(old, new)
     assert [name for name, moved in found.moved.items() if moved.changed] == ["swing of the optimum"]
     assert found.exit_code == 10 and found.moved["swing of the optimum"].absolute == 0.5
@@ -140,8 +140,8 @@ def test_optima_are_compared(study: Study, dataset: Path, tmp_path: Path) -> Non
 
 def test_other_code_another_study_and_an_unfinished_one_are_said(study: Study, dataset: Path, tmp_path: Path) -> None:
     other = written(study, sweep.load(dataset), tmp_path / "new")
-    note = json.loads((other / store.PLAN).read_text())
-    (other / store.PLAN).write_text(json.dumps(note | {"code": "x", "study": "y", "complete": False}))
+    note = json.loads((store.beside(other) / store.PLAN).read_text())
+    (store.beside(other) / store.PLAN).write_text(json.dumps(note | {"code": "x", "study": "y", "complete": False}))
     text = "\n".join(sweep.compare(dataset, other).lines())
     assert f"{other}: not complete" in text and "the studies differ" in text and "different versions" in text
 

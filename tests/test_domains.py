@@ -133,3 +133,20 @@ def test_intervals_and_marches_are_no_stages_of_a_chain() -> None:
 
     with pytest.raises(sweep.InputError, match="closed turn"):
         chain((BEAM, BEAM))
+
+
+def test_the_optimiser_follows_extrema_over_an_interval_with_and_without_complex_poses() -> None:
+    """Least largest tension (rho - p)^2 over 1 ... 4: p in the middle, 2.25; both ends are active."""
+    from dataclasses import replace
+
+    from sweep.optimise import Problem, minimise
+    from sweep.study import OptimiseSettings
+
+    for family in (BEAM, replace(BEAM, analytic=False)):
+        box = np.array([0.0]), np.array([8.0])
+        problem = Problem(family, ("p",), *box, {"low": 1.0, "high": 4.0}, "max_tension")
+        best = minimise(problem, problem.rows(np.array([[0.5]])), OptimiseSettings())[0]
+        assert best.objective == pytest.approx(2.25, rel=1e-9)
+        assert best.design[0] == pytest.approx(2.5, abs=1e-8)
+    with pytest.raises(sweep.InputError, match="have no gradient"):
+        Problem(MARCHED, ("p",), np.array([0.0]), np.array([1.0]), {}, "max_x")

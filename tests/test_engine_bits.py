@@ -15,7 +15,7 @@ from kernels import status as codes
 from sweep.chunks.cascade import Batch, Cascade, Level, levels, meets
 from sweep.chunks.chunk import compute_chunk, output_columns, parameter_matrix
 from sweep.chunks.plan import make_plan
-from sweep.dataset.store import is_complete, load, read_plan, read_runs
+from sweep.dataset.store import beside, is_complete, load, read_plan, read_runs
 from sweep.engine.run import run
 from sweep.errors import InputError
 from sweep.evaluation.summaries import Route, design_outputs
@@ -43,7 +43,7 @@ def test_chunks_have_same_bytes_with_one_and_two_threads_and_processes(study: St
     assert len(chunk_bytes(one)) == -(-study.space.count // CHUNK) > 10
     assert chunk_bytes(threads) == chunk_bytes(one)
     assert chunk_bytes(processes) == chunk_bytes(one)
-    assert (threads / "_plan.json").read_bytes() == (one / "_plan.json").read_bytes()
+    assert (beside(threads) / "_plan.json").read_bytes() == (beside(one) / "_plan.json").read_bytes()
 
 
 def test_rows_equal_a_direct_computation_of_all_designs(study: Study, tmp_path: Path) -> None:

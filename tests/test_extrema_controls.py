@@ -10,7 +10,7 @@ import pytest
 
 from kernels import status as st
 from sweep.families.base import Family, Output, Parameter
-from sweep.reductions import extrema
+from sweep.reductions import search
 from sweep.reductions.extrema import Request, true_extrema
 from sweep.reductions.sampling import sample_turn
 from tests.turn_designs import RSSR, crank_rockers
@@ -68,8 +68,8 @@ def test_without_the_look_at_roughness_narrow_resonances_are_lost(monkeypatch):
     designs = resonances(300, 0.05)
     true = finest(designs)
     found, _ = true_extrema(BUMPS, designs, [Request("y", 1)], 1e-9)
-    monkeypatch.setattr(extrema, "ROUGH", np.inf)
-    monkeypatch.setattr(extrema, "DISAGREEMENT", np.inf)
+    monkeypatch.setattr(search, "ROUGH", np.inf)
+    monkeypatch.setattr(search, "DISAGREEMENT", np.inf)
     careless, _ = true_extrema(BUMPS, designs, [Request("y", 1)], 1e-9)
     lost = (found[Request("y", 1)].value < true * (1.0 - 1e-3)).sum()
     lost_careless = (careless[Request("y", 1)].value < true * (1.0 - 1e-3)).sum()
@@ -86,11 +86,11 @@ def test_refining_the_top_sample_alone_picks_wrong_peaks(monkeypatch):
     designs = designs[margin[discriminant].value / scale > 1e-3][:20_000]
     peak = Request("d2psi", 0)
     true, _ = true_extrema(RSSR, designs, [peak], 1e-8)
-    monkeypatch.setattr(extrema, "START", 24)
-    monkeypatch.setattr(extrema, "SHARE", 1.0)
-    monkeypatch.setattr(extrema, "ROUGH", np.inf)
-    monkeypatch.setattr(extrema, "PER_SINGULARITY", 0.0)
-    monkeypatch.setattr(extrema, "DISAGREEMENT", np.inf)
+    monkeypatch.setattr(search, "START", 24)
+    monkeypatch.setattr(search, "SHARE", 1.0)
+    monkeypatch.setattr(search, "ROUGH", np.inf)
+    monkeypatch.setattr(search, "PER_SINGULARITY", 0.0)
+    monkeypatch.setattr(search, "DISAGREEMENT", np.inf)
     plain, _ = true_extrema(RSSR, designs, [peak], 1e-8)
     wrong = plain[peak].value < true[peak].value * (1.0 - 1e-4)
     assert 0.0005 < wrong.mean() < 0.05

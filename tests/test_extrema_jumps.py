@@ -64,7 +64,7 @@ def test_the_mean_of_a_curve_with_jumps_is_found_to_its_target():
 
 def test_without_brackets_a_jump_is_never_resolved(monkeypatch):
     """Negative control: it is the bracketing that ends the search."""
-    monkeypatch.setattr("sweep.reductions.extrema.BREAKING", 10**9)
+    monkeypatch.setattr("sweep.reductions.search.BREAKING", 10**9)
     got, _ = found_and_dense("rssp", "drive_torque_friction", count=1)
     assert got["status"][0] == st.NOT_CONVERGED
 
@@ -73,7 +73,7 @@ def test_a_smooth_curve_is_not_taken_for_one_that_jumps(monkeypatch):
     """A made-up family without jumps: the search gives the same whether it may look for them or not."""
     matrix = np.column_stack([np.linspace(-2.0, 2.0, 40), np.linspace(3.0, -3.0, 40), np.zeros(40), np.ones(40)])
     with_brackets = design_outputs(WAVES, matrix, ["max_wave", "max_abs_dev"], Accuracy(target=1e-10))
-    monkeypatch.setattr("sweep.reductions.extrema.BREAKING", 10**9)
+    monkeypatch.setattr("sweep.reductions.search.BREAKING", 10**9)
     without = design_outputs(WAVES, matrix, ["max_wave", "max_abs_dev"], Accuracy(target=1e-10))
     for name, values in without.items():
         assert np.array_equal(values, with_brackets[name]), name

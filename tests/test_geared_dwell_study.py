@@ -11,6 +11,7 @@ import pytest
 
 import sweep
 from kernels import status as st
+from sweep.dataset.layout import beside
 from sweep.evaluation.summaries import design_outputs
 from sweep.study import load_study
 
@@ -32,7 +33,7 @@ def test_full_study_covers_a_million_designs_and_draws_the_optimum_offset():
 
 
 def test_optimum_and_reference_are_the_accepted_ones(swept):
-    best = pd.read_parquet(swept / "_optimum.parquet").set_index("role")
+    best = pd.read_parquet(beside(swept) / "_optimum.parquet").set_index("role")
     for role in ("optimum", "reference"):
         for name, value in EXPECTED[role].items():
             assert best.loc[role, name] == pytest.approx(value, rel=TOLERANCE)

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import sweep.engine.run
-from sweep.dataset.store import OPTIMUM, PARETO, is_complete
+from sweep.dataset.store import OPTIMUM, PARETO, beside, is_complete
 from sweep.engine.run import run
 from sweep.errors import Interrupted, StudyError
 from sweep.optimise import front_study
@@ -46,22 +46,22 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 
 def copied(folder: Path, target: Path) -> Path:
-    shutil.copytree(folder, target)
-    return target
+    shutil.copytree(folder.parent, target)
+    return target / folder.name
 
 
 def test_file_holds_the_front_with_units(whole: tuple[Study, Path]) -> None:
     study, folder = whole
     assert study.pareto == ParetoSettings("max_pressure_angle", tuple(np.radians([30.0, 40.0, 50.0])), False, 1, None)
-    table = pd.read_parquet(folder / PARETO)
+    table = pd.read_parquet(beside(folder) / PARETO)
     np.testing.assert_allclose(np.degrees(table["bound"]), [50.0, 40.0, 30.0], rtol=1e-14)
     assert (table["max_pressure_angle"] <= table["bound"] + 1e-8).all()
     assert (table["status"] == 0).all() and (table["kkt_residual"] <= 1e-6).all()
     assert table["max_abs_d2psi"].is_monotonic_increasing
     # The study's own limit is 50 degrees: the loosest bound is the optimum.
-    optimum = pd.read_parquet(folder / OPTIMUM).iloc[0]
+    optimum = pd.read_parquet(beside(folder) / OPTIMUM).iloc[0]
     assert table["max_abs_d2psi"][0] <= optimum["max_abs_d2psi"] * (1.0 + 1e-9)
-    schema = pq.read_schema(folder / PARETO)
+    schema = pq.read_schema(beside(folder) / PARETO)
     assert schema.field("bound").metadata == {b"unit": b"rad", b"definition": b"upper bound on max_pressure_angle"}
     assert schema.field("a").metadata[b"unit"] == b"mm"
     assert schema.metadata[b"output"] == b"max_pressure_angle" and schema.metadata[b"side"] == b"at most"
@@ -76,19 +76,19 @@ def stop_after(calls: int) -> Callable[[], bool]:
 @pytest.mark.parametrize("calls", [3, 60, 200])
 def test_stopped_front_goes_on_to_the_same_bytes(whole: tuple[Study, Path], tmp_path: Path, calls: int) -> None:
     study, folder = whole
-    expected = (folder / PARETO).read_bytes()
-    key = pq.read_schema(folder / PARETO).metadata[b"key"].decode()
+    expected = (beside(folder) / PARETO).read_bytes()
+    key = pq.read_schema(beside(folder) / PARETO).metadata[b"key"].decode()
     again = copied(folder, tmp_path / "again")
-    (again / PARETO).unlink()
+    (beside(again) / PARETO).unlink()
     assert not is_complete(again)
     with pytest.raises(KeyboardInterrupt):
         front_study(study, again, key, stop_after(calls))
-    begun = saved(again / PARETO, key)
+    begun = saved(beside(again) / PARETO, key)
     assert begun is not None and not begun.complete and not is_complete(again)
-    assert len(pd.read_parquet(again / PARETO)) >= 1
+    assert len(pd.read_parquet(beside(again) / PARETO)) >= 1
     taken = begun.taken
     front_study(study, again, key)
-    assert (again / PARETO).read_bytes() == expected
+    assert (beside(again) / PARETO).read_bytes() == expected
     assert taken < 7
 
 
@@ -111,13 +111,15 @@ def test_finished_steps_are_not_searched_again(
 def test_other_bounds_keep_designs_and_optimum(whole: tuple[Study, Path], tmp_path: Path) -> None:
     study, folder = whole
     again = copied(folder, tmp_path / "again")
-    before = {path.name: path.stat().st_mtime_ns for path in again.glob("*.parquet") if path.name != PARETO}
+    before = {path.name: path.stat().st_mtime_ns for path in again.parent.rglob("*.parquet") if path.name != PARETO}
     assert study.pareto is not None
     run(replace(study, pareto=replace(study.pareto, bounds=(0.7,))), again, jobs=1)
-    assert {path.name: path.stat().st_mtime_ns for path in again.glob("*.parquet") if path.name != PARETO} == before
-    assert pd.read_parquet(again / PARETO)["bound"].tolist() == [0.7]
+    assert {
+        path.name: path.stat().st_mtime_ns for path in again.parent.rglob("*.parquet") if path.name != PARETO
+    } == before
+    assert pd.read_parquet(beside(again) / PARETO)["bound"].tolist() == [0.7]
     run(replace(study, pareto=None), again, jobs=1)
-    assert not (again / PARETO).exists() and is_complete(again)
+    assert not (beside(again) / PARETO).exists() and is_complete(again)
 
 
 def test_interrupted_run_says_so_and_keeps_the_optimum(
@@ -125,7 +127,7 @@ def test_interrupted_run_says_so_and_keeps_the_optimum(
 ) -> None:
     study, folder = whole
     again = copied(folder, tmp_path / "again")
-    (again / PARETO).unlink()
+    (beside(again) / PARETO).unlink()
 
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
@@ -134,7 +136,7 @@ def test_interrupted_run_says_so_and_keeps_the_optimum(
         patched.setattr("sweep.optimise.front_study", stopped)
         with pytest.raises(Interrupted, match="front"):
             sweep.engine.run.run(study, again, jobs=1)
-    assert (again / OPTIMUM).read_bytes() == (folder / OPTIMUM).read_bytes()
+    assert (beside(again) / OPTIMUM).read_bytes() == (beside(folder) / OPTIMUM).read_bytes()
     assert not is_complete(again)
 
 
@@ -155,10 +157,10 @@ def test_report_shows_the_front(whole: tuple[Study, Path], tmp_path: Path) -> No
     page = write_report(folder, tmp_path / "report").read_text(encoding="utf-8")
     for bound in ("at most 50°", "at most 40°", "at most 30°"):
         assert bound in page
-    tight = pd.read_parquet(folder / PARETO)["max_abs_d2psi"].iloc[-1]
+    tight = pd.read_parquet(beside(folder) / PARETO)["max_abs_d2psi"].iloc[-1]
     assert f"{tight:.5g}" in page
     assert "this bound" in page and "settled" in page
-    assert (tmp_path / "report" / "pareto.parquet").read_bytes() == (folder / PARETO).read_bytes()
+    assert (tmp_path / "report" / "pareto.parquet").read_bytes() == (beside(folder) / PARETO).read_bytes()
 
 
 @pytest.mark.parametrize(

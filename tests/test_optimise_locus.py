@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from kernels import status as st
+from sweep.dataset.layout import beside
 from sweep.engine.run import run
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
@@ -199,7 +200,7 @@ def test_study_on_a_locus_optimises_along_it_and_agrees_with_its_equations(tmp_p
         study = load_study(path)
         folder = run(study, tmp_path / "out", jobs=1) if not best else tmp_path / "out"
         optimise_study(study, folder)
-        best[variables] = pd.read_parquet(folder / "_optimum.parquet")
+        best[variables] = pd.read_parquet(beside(folder) / "_optimum.parquet")
     default, along, raw = best.values()
     pd.testing.assert_frame_equal(default, along)
     assert along.iloc[0].ended == raw.iloc[0].ended == "converged"

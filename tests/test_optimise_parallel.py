@@ -16,7 +16,7 @@ import sweep.optimise.solve
 from sweep.errors import WorkerDied
 from sweep.families import family
 from sweep.families.base import Angles
-from sweep.optimise import Problem, minimise
+from sweep.optimise import Problem, explore, minimise
 from sweep.optimise.parallel import in_processes
 from sweep.optimise.search import search
 from sweep.study import Limit, OptimiseSettings
@@ -37,7 +37,7 @@ def problem() -> Problem:
 def test_processes_find_the_bits_of_one_process(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     starts = problem.rows(STARTS[:3] + np.array([[0.0], [0.0], [0.05]]))
     alone = minimise(problem, starts, ONCE)
-    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_SECONDS", 0.0)
+    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_LOOKS", 0)
     together = minimise(problem, starts, ONCE, jobs=2)
     assert [r.start for r in together] == [r.start for r in alone]
     for ours, theirs in zip(together, alone, strict=True):
@@ -50,7 +50,7 @@ def test_processes_find_the_bits_of_one_process(problem: Problem, monkeypatch: p
 
 
 def test_stop_at_once_keeps_an_answer(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_SECONDS", 0.0)
+    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_LOOKS", 0)
     results = minimise(problem, problem.rows(np.repeat(STARTS, 50, axis=0)), ONCE, stop=lambda: True, jobs=2)
     assert len(results) == 1 and results[0].ended == "time" and np.isfinite(results[0].design).all()
 
@@ -63,12 +63,33 @@ def test_start_that_is_to_stop_at_once_still_has_its_first_design(problem: Probl
 
 
 def test_work_left_to_the_processes_may_be_left_at_any_time(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_SECONDS", 0.3)  # in the middle of the second or third start
-    assert len(minimise(problem, problem.rows(STARTS), ONCE, jobs=2)) == 4
+    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_LOOKS", 150)  # in the middle of the first or second start
+    alone = minimise(problem, problem.rows(STARTS), ONCE)
+    assert [r.looks for r in alone if r.looks > 150]
+    together = minimise(problem, problem.rows(STARTS), ONCE, jobs=2)
+    assert [(r.start, r.objective, r.looks) for r in together] == [(r.start, r.objective, r.looks) for r in alone]
+
+
+def test_brake_leaves_only_whole_or_marked_starts_and_says_so(problem: Problem) -> None:
+    starts = problem.rows(np.repeat(STARTS, 20, axis=0))
+    _, found = explore(problem, starts, OptimiseSettings(starts=80, time_budget=1e-9))
+    assert found.ended == "time" and found.warnings[0].startswith("time ran out: 0 of 80 starts")
+
+
+@pytest.mark.parametrize("allowed", [100, 300])
+def test_looks_are_a_budget_that_no_clock_changes(problem: Problem, allowed: int) -> None:
+    starts = problem.rows(STARTS[:2])
+    few = OptimiseSettings(starts=2, looks=allowed)
+    alone, together = minimise(problem, starts, few), minimise(problem, starts, few, jobs=2)
+    assert all(r.looks <= allowed for r in alone)
+    assert [(r.objective, r.ended, r.looks) for r in alone] == [(r.objective, r.ended, r.looks) for r in together]
+    whole = minimise(problem, starts, ONCE)
+    assert {r.ended for r in alone if r.looks == allowed} <= {"looks"}
+    assert min(r.objective for r in whole) <= min(r.objective for r in alone)
 
 
 def test_deadline_ends_workers_within_a_second(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_SECONDS", 0.0)
+    monkeypatch.setattr(sweep.optimise.solve, "SERIAL_LOOKS", 0)
     starts = problem.rows(np.repeat(STARTS, 500, axis=0))
     minimise(problem, starts[:4], ONCE, jobs=2)  # the workers are up and have read their kernels
     begin = time.monotonic()

@@ -133,11 +133,11 @@ def test_second_output_that_cannot_be_is_named(output: str, message: str) -> Non
         pareto(bowl(), settings(output, 1.0), BOWL_START)
 
 
-def test_a_feasible_start_is_not_lost_when_time_is_up() -> None:
+def test_step_cut_short_by_the_brake_is_taken_again() -> None:
     problem, starts = linkage()
-    good = pareto(problem, settings("max_pressure_angle", 0.9), starts)[0]
-    hurried = settings("max_pressure_angle", 0.9, time_budget=1e-9)
-    assert pareto(problem, hurried, starts[:1])[0].status == st.LIMIT_EXCEEDED
-    # There is time for the first design of the first start only, but the second one is a result already.
-    (found,) = pareto(problem, hurried, np.stack([starts[0], good.design]))
-    assert found.status != st.LIMIT_EXCEEDED and found.objective == pytest.approx(good.objective, rel=1e-9)
+    asked = settings("max_pressure_angle", 0.9, 0.8)
+    *_, whole = advance(problem, asked, Front.of(asked), starts)
+    *_, cut = advance(problem, replace(asked, time_budget=1e-9), Front.of(asked), starts)
+    assert cut.taken == 0 and cut.known()[0][1].ended == "time"
+    *_, again = advance(problem, asked, replace(cut, results=(None, None), found=(-1, -1)), starts)
+    assert [r.objective for _, r in again.known()] == [r.objective for _, r in whole.known()]

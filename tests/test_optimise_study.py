@@ -10,6 +10,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from sweep.dataset.layout import beside
 from sweep.engine.run import run
 from sweep.errors import InputError
 from sweep.optimise import optimise_study
@@ -73,7 +74,7 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
 
 def test_optimum_is_better_than_every_row_and_keeps_the_limits(dataset):
     study, folder = dataset
-    found, rows = pd.read_parquet(folder / "_optimum.parquet"), pd.read_parquet(folder)
+    found, rows = pd.read_parquet(beside(folder) / "_optimum.parquet"), pd.read_parquet(folder)
     assert list(found.role) == ["optimum", "start", "start", "reference"]
     best = found.iloc[0]
     assert best.status == 0 and best.ended == "converged" and best.kkt_residual <= 1e-6 and best.violation <= 1e-9
@@ -87,7 +88,7 @@ def test_optimum_is_better_than_every_row_and_keeps_the_limits(dataset):
 
 def test_reference_is_the_given_design_unchanged(dataset):
     _, folder = dataset
-    reference = pd.read_parquet(folder / "_optimum.parquet").iloc[-1]
+    reference = pd.read_parquet(beside(folder) / "_optimum.parquet").iloc[-1]
     assert reference.alpha == pytest.approx(math.radians(20), rel=1e-15)
     assert (reference.a, reference.b, reference.c) == (25.0, 100.0, 60.0)
     assert math.isfinite(reference.max_abs_d2psi) and math.isnan(reference.kkt_residual)
@@ -95,7 +96,10 @@ def test_reference_is_the_given_design_unchanged(dataset):
 
 def test_curves_show_optimum_and_reference_over_one_turn(dataset):
     _, folder = dataset
-    curves, found = pd.read_parquet(folder / "_curves.parquet"), pd.read_parquet(folder / "_optimum.parquet")
+    curves, found = (
+        pd.read_parquet(beside(folder) / "_curves.parquet"),
+        pd.read_parquet(beside(folder) / "_optimum.parquet"),
+    )
     assert curves.role.value_counts().to_dict() == {"optimum": 720, "reference": 720}
     assert {"phi", "psi", "dpsi", "d2psi", "d3psi", "pressure_angle", "x_b", "z_c", "status"} <= set(curves.columns)
     for role in ("optimum", "reference"):
@@ -106,18 +110,18 @@ def test_curves_show_optimum_and_reference_over_one_turn(dataset):
 def test_fields_carry_unit_and_definition_and_the_caveat_stands_in_the_file(dataset):
     _, folder = dataset
     for name in ("_optimum.parquet", "_curves.parquet"):
-        schema = pq.read_schema(folder / name)
+        schema = pq.read_schema(beside(folder) / name)
         assert b"no proof of a global optimum" in schema.metadata[b"caveat"]
         assert all({b"unit", b"definition"} <= set(field.metadata) for field in schema)
-    schema = pq.read_schema(folder / "_optimum.parquet")
+    schema = pq.read_schema(beside(folder) / "_optimum.parquet")
     assert schema.field("a").metadata[b"unit"] == b"mm" and schema.field("swing").metadata[b"unit"] == b"rad"
 
 
 def test_same_dataset_gives_the_same_bytes(dataset):
     study, folder = dataset
-    before = [(folder / name).read_bytes() for name in ("_optimum.parquet", "_curves.parquet")]
+    before = [(beside(folder) / name).read_bytes() for name in ("_optimum.parquet", "_curves.parquet")]
     optimise_study(study, folder)
-    assert before == [(folder / name).read_bytes() for name in ("_optimum.parquet", "_curves.parquet")]
+    assert before == [(beside(folder) / name).read_bytes() for name in ("_optimum.parquet", "_curves.parquet")]
 
 
 def test_best_rows_are_the_feasible_ones(dataset):
@@ -134,7 +138,7 @@ def test_best_rows_are_the_feasible_ones(dataset):
 def test_study_without_a_feasible_row_is_answered_with_a_relaxation(tmp_path):
     study = small(tmp_path, swing=150.0)
     folder = run(study, tmp_path / "out", jobs=1)
-    found = pd.read_parquet(folder / "_optimum.parquet").iloc[0]
+    found = pd.read_parquet(beside(folder) / "_optimum.parquet").iloc[0]
     assert len(pd.read_parquet(folder)) == 0
     assert found.status == 5 and found.ended == "infeasible" and found.violation > 1e-3
     assert "swing by" in found.relaxation or "max_pressure_angle by" in found.relaxation
@@ -148,9 +152,9 @@ def test_stopped_study_leaves_the_best_so_far_and_says_so(dataset, tmp_path):
         (copy / path.name).write_bytes(path.read_bytes())
     with pytest.raises(KeyboardInterrupt):
         optimise_study(study, copy, stop=lambda: True)
-    found = pd.read_parquet(copy / "_optimum.parquet")
+    found = pd.read_parquet(beside(copy) / "_optimum.parquet")
     assert found.iloc[0].ended == "time" and np.isfinite(found.iloc[0].max_abs_d2psi)
-    assert not list(copy.glob("_tmp-*"))
+    assert not list(beside(copy).glob("_tmp-*"))
 
 
 def test_study_without_optimise_is_refused(dataset, tmp_path):

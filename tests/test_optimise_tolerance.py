@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from sweep.dataset.layout import beside
 from sweep.engine.run import run
 from sweep.errors import StudyError
 from sweep.evaluation.summaries import design_outputs
@@ -99,7 +100,7 @@ def test_study_writes_both_tables(tmp_path: Path) -> None:
     study = load_study(tmp_path)
     assert study.tolerance == Tolerance(0.02, pytest.approx(math.radians(0.05), rel=1e-15))
     folder = run(study, tmp_path / "out", jobs=1)
-    slopes, bands = (pd.read_parquet(folder / f"_{name}.parquet") for name in ("sensitivity", "tolerance"))
+    slopes, bands = (pd.read_parquet(beside(folder) / f"_{name}.parquet") for name in ("sensitivity", "tolerance"))
     assert set(slopes.role) == set(bands.role) == {"optimum", "reference"}
     assert set(slopes.parameter) == {"a", "b", "c", "e", "f", "g", "alpha"}
     best = bands[bands.role == "optimum"].set_index("output")
@@ -107,7 +108,7 @@ def test_study_writes_both_tables(tmp_path: Path) -> None:
     assert 0.0 < best.loc["all limits"].within < 0.9  # an active limit is missed by half of what is made
     (tmp_path / "study.toml").write_text(text)
     run(load_study(tmp_path), folder, jobs=1)
-    assert not (folder / "_tolerance.parquet").exists()
+    assert not (beside(folder) / "_tolerance.parquet").exists()
 
 
 @pytest.mark.parametrize(

@@ -50,24 +50,24 @@ def plain(words: str) -> str:
 
 
 def test_every_section_is_there(full: Path) -> None:
-    page = (full / "_report" / "report.html").read_text(encoding="utf-8")
+    page = (full.parent / "report.html").read_text(encoding="utf-8")
     assert re.findall(r'<section id="([a-z-]+)">', page) == SECTIONS
 
 
 def test_page_needs_no_network(full: Path) -> None:
-    page = (full / "_report" / "report.html").read_text(encoding="utf-8")
+    page = (full.parent / "report.html").read_text(encoding="utf-8")
     assert "http" not in page
     assert all(target.startswith("data:") for target in re.findall(r'(?:src|href)="([^"]*)"', page))
     assert not re.search(r"<link|<script|@import|url\(", page)
 
 
 def test_title_is_escaped(full: Path) -> None:
-    page = (full / "_report" / "report.html").read_text(encoding="utf-8")
+    page = (full.parent / "report.html").read_text(encoding="utf-8")
     assert "<h1>A needle &amp; its &lt;drive&gt;</h1>" in page
 
 
 def test_answer_states_optimum_against_reference(full: Path) -> None:
-    words = text_of(full / "_report" / "report.html")
+    words = text_of(full.parent / "report.html")
     # 8 mm/rad^2 at 7000 rpm: 8e-3 m (2 pi 7000/60)^2 = 4299 m/s^2; 8 is 20 % less than 10
     assert "8 mm/rad² (4299 m/s² at 7000 rpm), 20 % less than the reference design with 10 mm/rad² (5373 m/s²" in words
     assert "0.05 mm; the reference has 0.1 mm (50 % less)" in words
@@ -79,25 +79,25 @@ def test_answer_states_optimum_against_reference(full: Path) -> None:
 
 
 def test_counts_agree_with_the_designs(full: Path) -> None:
-    survivors = pd.read_parquet(full / "_report" / "survivors.parquet")
+    survivors = pd.read_parquet(full.parent / "survivors.parquet")
     _, status = designs(study_from_data(study_data(), "study.toml"), 0, 8610)
     assert len(survivors) == (status == 0).sum()
-    words = text_of(full / "_report" / "report.html")
+    words = text_of(full.parent / "report.html")
     for code in (0, 3, 5):
         assert f" {f'{(status == code).sum():,}'.replace(',', ' ')} {100 * (status == code).mean():.3g} %" in words
 
 
 def test_tables_and_figures_stand_beside_the_page(full: Path) -> None:
-    out = full / "_report"
+    out = full.parent
     for name in ("optimum", "curves"):
-        assert (out / f"{name}.parquet").read_bytes() == (full / f"_{name}.parquet").read_bytes()
+        assert (out / f"{name}.parquet").read_bytes() == (out / f"_{name}.parquet").read_bytes()
     assert {f.name for f in (out / "figures").iterdir()} == {"map.svg", "mechanism.svg", "motion.svg", "trade-off.svg"}
     assert pd.read_parquet(full).shape[0] == len(pd.read_parquet(out / "survivors.parquet"))
 
 
 def test_figures_depend_on_the_data_only(full: Path, tmp_path: Path) -> None:
     write_report(full, tmp_path)
-    for figure in (full / "_report" / "figures").iterdir():
+    for figure in (full.parent / "figures").iterdir():
         assert figure.read_bytes() == (tmp_path / "figures" / figure.name).read_bytes()
 
 
@@ -255,7 +255,7 @@ def test_folder_that_is_no_complete_dataset_is_refused(tmp_path: Path) -> None:
     next(folder.glob("part-*")).unlink()
     with pytest.raises(InputError, match="run the study again to resume"):
         write_report(folder)
-    assert not (folder / "_report").exists()
+    assert not (folder.parent / "report.html").exists()
 
 
 def test_report_that_cannot_be_written_is_a_store_error(tmp_path: Path) -> None:
@@ -266,7 +266,7 @@ def test_report_that_cannot_be_written_is_a_store_error(tmp_path: Path) -> None:
 
 
 def test_funnel_names_the_limit_that_designs_miss(full: Path) -> None:
-    words = text_of(full / "_report" / "report.html")
+    words = text_of(full.parent / "report.html")
     data, _, _ = gather(full)
     count = data.missed["max_pressure_angle1"]
     assert count == data.counts[5] > 0 == data.missed["max_abs_dev"]

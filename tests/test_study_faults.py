@@ -309,7 +309,9 @@ def test_an_optimiser_needs_something_to_vary(tmp_path: Path) -> None:
         text = text.replace(axis, fixed)
     (message,) = faults_of(text, tmp_path)  # the branch, which takes two values, does not change steadily
     assert "optimise = 'no swept parameter'" in message
-    (tmp_path / "study.toml").write_text(text.replace("[35.0]", "[35.0, 36.0]"))
+    # Nor do listed values: they are a catalogue, which the sweep tries from end to end.
+    assert "optimise = 'no swept parameter'" in faults_of(text.replace("[35.0]", "[35.0, 36.0]"), tmp_path)[0]
+    (tmp_path / "study.toml").write_text(text.replace("values = [35.0]", "from = 35.0, to = 36.0, count = 2"))
     assert load_study(tmp_path).space.count == 4
 
 

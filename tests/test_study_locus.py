@@ -19,6 +19,7 @@ import pytest
 
 from kernels import status as st
 from sweep.chunks.chunk import compute_chunk
+from sweep.dataset.layout import beside
 from sweep.engine.run import run
 from sweep.errors import StudyError
 from sweep.optimise.study import problem_of
@@ -182,7 +183,7 @@ def test_best_transmission_crank_rocker_comes_out(tmp_path, swing, phi0):
         phi0 = 360.0 - phi0
     a, b, c, mu = best_transmission(math.radians(swing), math.radians(phi0))
     folder = run(study_of(tmp_path, text), tmp_path / "out", jobs=1)
-    best = pd.read_parquet(folder / "_optimum.parquet").iloc[0]
+    best = pd.read_parquet(beside(folder) / "_optimum.parquet").iloc[0]
     assert best.ended == "converged" and best.agree == 3
     np.testing.assert_allclose([best.a / 100, best.b / 100, best.c / 100], [a, b, c], rtol=1e-6)
     assert math.pi / 2 - best.max_pressure_angle == pytest.approx(mu, abs=1e-9)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.effects.coupler import Coupler, orientation
-from kernels.effects.kinetostatics import SPEED, Loads, inertia_loads, pose_status, solve, store_forces
+from kernels.effects.kinetostatics import SPEED, Loads, inertia_loads, loaded, pose_status, solve, store_forces
 from kernels.joints import Joints, read
 from kernels.vectors import Vector, cross, dot, mix, norm, scale, sub
 
@@ -32,6 +32,7 @@ TOLERANCE = 1e-14
 PASSES = 200
 STALLED = 5
 LEAP = 10  # every so many passes the rest of the geometric series is gone at once (Aitken)
+STILL = 2.0**-44  # relative angular velocity of a ball joint below this share of its links' is rounding
 ANSWER = 20  # the six vectors of :func:`kernels.effects.kinetostatics.store_forces`, finger couple, driving torque
 
 
@@ -63,6 +64,21 @@ def _columns(friction: Array, i: int) -> Friction:
         friction[i, 0], friction[i, 1], friction[i, 2], friction[i, 3], friction[i, 4], friction[i, 5], friction[i, 6],
         friction[i, 7], friction[i, 8], friction[i, 9], friction[i, 10], friction[i, 11], friction[i, 12],
         friction[i, 13],
+    )  # fmt: skip
+
+
+@inline
+def _of_moving(f: Friction, load: Loads) -> Friction:
+    """The columns with no friction at a ball joint whose links turn together: there is no direction it could have.
+
+    In planar linkages coupler and rocker do so where the crank points along the frame; what is left is rounding.
+    """
+    size1, size2, size3 = norm(load.omega1), norm(load.omega2), norm(load.omega3)
+    at_b = norm(sub(load.omega2, load.omega1)) > STILL * (size1 + size2)
+    at_c = norm(sub(load.omega2, load.omega3)) > STILL * (size2 + size3)
+    return Friction(
+        f.mu_a, f.mu_b if at_b else 0.0, f.mu_c if at_c else 0.0, f.mu_d, f.r_a, f.r_b, f.r_c, f.r_d, f.rt_a, f.rt_d,
+        f.z_a1, f.z_a2, f.z_d1, f.z_d2,
     )  # fmt: skip
 
 
@@ -100,6 +116,7 @@ def friction_loads(
     couples: Array | None,
     losses: Array | None,
     contraction: Array | None,
+    wrench: Array | None = None,
 ) -> None:
     """Joint reactions and driving torque with friction.
 
@@ -112,15 +129,19 @@ def friction_loads(
         supports 1, 2 and follower supports 1, 2; passes of the iteration
     contraction : (n, m) or None; rho(L), below 1 the solution is proven unique; known also where the iteration jams
     status : also JAMMED where the iteration does not contract
+    wrench : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
     """
     answers, total, matrix = np.empty((4, ANSWER)), np.empty(ANSWER), np.empty((3, 3))
     for i in range(poses.shape[0]):
-        f = _columns(friction, i)
+        given = _columns(friction, i)
         for k in range(poses.shape[1]):
             j = read(poses[i, k], designs[i])
             coupler = orientation(j, finger[i])
             code = pose_status(status[i, k], j, coupler)
             load = inertia_loads(j, coupler, bodies[i], drive[i, k if drive.shape[1] > 1 else 0])
+            if wrench is not None:
+                load = loaded(load, wrench[i, k])
+            f = _of_moving(given, load)
             speed_a = drive[i, k if drive.shape[1] > 1 else 0, SPEED]
             speed_d = speed_a * j.dpsi
             # A rocker turns about k on two supports, a slider moves along tau on two shoes.

@@ -136,6 +136,21 @@ def inertia_loads(j: Joints, coupler: Coupler, bodies: Array, drive: Array) -> L
 
 
 @inline
+def loaded(on: Loads, wrench: Array) -> Loads:
+    """The loads with a force and a moment about B, (6,), that act on the coupler from outside.
+
+    F2 - F takes the place of F2 everywhere; T2 is moved by what that changes in the moment about B.
+    """
+    force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
+    return Loads(
+        on.f1, on.t1, on.d1,
+        sub(on.f2, force), add(sub(on.t2, moment), cross(on.d2, force)), on.d2,
+        on.f3, on.t3, on.d3,
+        on.torque, on.omega1, on.omega2, on.omega3, on.j_red, on.dj_red, on.a_g2,
+    )  # fmt: skip
+
+
+@inline
 def _about_axis(body: Body, axis: Vector) -> float:
     """Moment of inertia about an axis through the frame origin."""
     across = cross(axis, body.centre)
@@ -184,6 +199,7 @@ def kinetostatics(
     forces: Array | None,
     couples: Array | None,
     inertia: Array | None,
+    wrench: Array | None = None,
 ) -> None:
     """Frictionless joint reactions, driving torque and reduced inertia.
 
@@ -200,6 +216,7 @@ def kinetostatics(
         moment of the frame on crank (about A) and follower (about D)
     couples : (n, m, 2) or None; couple of the finger along n x w, torque on the crank about u
     inertia : (n, m, 2) or None; inertia reduced to the crank and its derivative
+    wrench : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
 
     Notes
     -----
@@ -213,6 +230,8 @@ def kinetostatics(
             status[i, k] = pose_status(status[i, k], j, coupler)
             good = 1.0 if status[i, k] == st.OK else math.nan
             load = inertia_loads(j, coupler, bodies[i], drive[i, k if drive.shape[1] > 1 else 0])
+            if wrench is not None:
+                load = loaded(load, wrench[i, k])
             if inertia is not None:
                 inertia[i, k, 0], inertia[i, k, 1] = good * load.j_red, good * load.dj_red
             if forces is not None or couples is not None:

@@ -7,18 +7,18 @@ survivors wait before each route until there are enough of them, or until no mor
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as codes
 from sweep.evaluation.summaries import Route, design_outputs, routes
-from sweep.families.base import Array
+from sweep.families.base import Array, Columns
 from sweep.families.chain import stages_of
-from sweep.quantities.names import by_magnitude, parts
+from sweep.quantities.names import by_magnitude, error_of, parts
 from sweep.synthesis.fit import NS_FIT, fit_line
 
 if TYPE_CHECKING:
@@ -72,6 +72,12 @@ class Batch:
         """Some of them."""
         outputs = {name: values[which] for name, values in self.outputs.items()}
         return Batch(self.index[which], self.designs[which], outputs, self.status[which])
+
+    def ordered(self) -> Batch:
+        """The same designs in the order of their index."""
+        order = np.argsort(self.index, kind="stable")
+        outputs = {name: values[order] for name, values in self.outputs.items()}
+        return Batch(self.index[order], self.designs[order], outputs, self.status[order])
 
     @classmethod
     def joined(cls, batches: Sequence[Batch]) -> Batch:
@@ -145,13 +151,7 @@ class Cascade:
             np.empty(0, np.uint8),
         )
         result = Batch.joined([empty, *found])
-        order = np.argsort(result.index, kind="stable")
-        return Batch(
-            result.index[order],
-            result.designs[order],
-            {name: values[order] for name, values in result.outputs.items()},
-            result.status[order],
-        )
+        return result.ordered()
 
     def _work(self, number: int, whole: bool) -> None:
         """Do what waits at a level, and at those behind it: full batches, or everything."""
@@ -176,13 +176,17 @@ class Cascade:
     def _computed(self, route: Route, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
         """A batch with the outputs of a route, and which of its designs go on."""
         study = self.study
-        found = design_outputs(study.family, batch.designs, route.outputs, study.accuracy, study.window)
+        found = self._found(route, batch)
         status = np.where(batch.status == codes.OK, found["status"], batch.status)
         for limit in study.tested_limits:
             if limit.output in found:
                 self._leave(limit, status, (status == codes.OK) & ~meets(limit, found[limit.output]))
         more = {name: np.asarray(values, np.float64) for name, values in found.items() if name != "status"}
         return Batch(batch.index, batch.designs, batch.outputs | more, status), np.isin(status, self._go_on)
+
+    def _found(self, route: Route, batch: Batch) -> Mapping[str, NDArray[Any]]:
+        """Outputs of a route with their error estimates, and ``status``."""
+        return design_outputs(self.study.family, batch.designs, route.outputs, self.study.accuracy, self.study.window)
 
     def _fitted(self, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
         """A batch with its fitted parameters, and which of its designs keep the limits on parameters."""
@@ -214,6 +218,23 @@ class Cascade:
             leaves &= batch.status == codes.OK
         if leaves.any():
             self._left.append(batch if leaves.all() else batch.only(leaves))
+
+
+@dataclass
+class Recalled(Cascade):
+    """A cascade whose designs have been through all levels once, and had every output.
+
+    Parameters
+    ----------
+    known : column ``design``, ascending, and every output and error estimate of those designs, in float64
+    """
+
+    known: Columns = field(default_factory=dict)
+
+    def _found(self, route: Route, batch: Batch) -> Mapping[str, NDArray[Any]]:
+        rows = np.searchsorted(self.known["design"], batch.index)
+        names = [name for out in route.outputs for name in (out, error_of(out)) if name in self.known]
+        return {name: self.known[name][rows] for name in names} | {"status": np.zeros(batch.index.size, np.uint8)}
 
 
 def levels(study: Study) -> tuple[Level, ...]:

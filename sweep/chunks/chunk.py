@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.chunks.cascade import BLOCK, Cascade, levels
+from kernels.status import OK
+from sweep.chunks.cascade import BLOCK, Batch, Cascade, Recalled, levels
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
@@ -93,7 +95,13 @@ def warm(study: Study) -> None:
             design_outputs(study.family, designs, level.route.outputs, study.accuracy, study.window)
 
 
-def compute_chunk(study: Study, start: int, stop: int, should_stop: Callable[[], bool] = lambda: False) -> ChunkResult:
+def compute_chunk(
+    study: Study,
+    start: int,
+    stop: int,
+    should_stop: Callable[[], bool] = lambda: False,
+    known: Columns | None = None,
+) -> ChunkResult:
     """Rows of the designs start, ..., stop - 1: index, parameters, wanted outputs, status.
 
     The work goes block by block, so memory is a few blocks and the rows that are kept.
@@ -103,6 +111,8 @@ def compute_chunk(study: Study, start: int, stop: int, should_stop: Callable[[],
     study : the question
     start, stop : range of design indices in the study's space
     should_stop : asked before every batch of designs
+    known : rows of the same chunk of a study that differs in its limits only; outputs of designs that were within all
+        of those are taken from them, not computed again
 
     Returns
     -------
@@ -119,14 +129,30 @@ def compute_chunk(study: Study, start: int, stop: int, should_stop: Callable[[],
     """
     if not 0 <= start <= stop <= study.space.count:
         raise InputError("designs", f"{start}:{stop}", f"a range inside 0:{study.space.count}", f"study {study.name}")
-    cascade = Cascade(study, study.output.keep == "all", should_stop)
+    keep = study.output.keep == "all"
+    cascades = [Cascade(study, keep, should_stop)]
+    designs_known = np.empty(0, np.int64)
+    if known is not None:
+        within = known["status"] == OK
+        designs_known = known["design"][within]
+        cascades.append(Recalled(study, keep, should_stop, {name: values[within] for name, values in known.items()}))
     for low in range(start, stop, BLOCK):
-        high = min(low + BLOCK, stop)
-        cascade.feed(np.arange(low, high), *parameter_matrix(study, low, high))
-    found = cascade.end(tuple(output_columns(study)))
+        index = np.arange(low, min(low + BLOCK, stop))
+        matrix, status = parameter_matrix(study, low, low + index.size)
+        if known is None:
+            cascades[0].feed(index, matrix, status)
+            continue
+        recalled = np.isin(index, designs_known)
+        for cascade, mine in zip(cascades, (~recalled, recalled), strict=True):
+            if mine.any():
+                cascade.feed(index[mine], matrix[mine], status[mine])
+    names = tuple(output_columns(study))
+    found = Batch.joined([cascade.end(names) for cascade in cascades]).ordered()
     columns: Columns = {"design": found.index}
     columns |= {name: found.designs[:, k] for k, name in enumerate(study.family.parameter_names)}
     columns |= {name: found.outputs[name].astype(dtype) for name, dtype in output_columns(study).items()}
     columns |= {"status": found.status}
-    counts = {code: int(cascade.counts[code]) for code in np.flatnonzero(cascade.counts).tolist()}
-    return ChunkResult(columns, counts, {name: count for name, count in cascade.missed.items() if count})
+    total = np.sum([cascade.counts for cascade in cascades], axis=0)
+    counts = {code: int(total[code]) for code in np.flatnonzero(total).tolist()}
+    missed = sum((cascade.missed for cascade in cascades), Counter[str]())
+    return ChunkResult(columns, counts, {name: count for name, count in missed.items() if count})

@@ -24,7 +24,7 @@ from sweep.study.units import internal_unit
 if TYPE_CHECKING:
     from sweep.study import Study
 
-FORMAT = 1
+FORMAT = 2
 
 # A chunk should take a few seconds on one core by the routes' own cost figures, so every machine cuts alike; it should
 # hold at most this much before it is encoded; and there should be enough of them to keep the workers even to the end.

@@ -77,7 +77,7 @@ def explain(entry: Effect) -> list[str]:
         lines += aligned(_output_rows(entry.design_result.outputs))
     if entry.inputs:
         lines += ["", "inputs"]
-        lines += aligned([(p.name, internal_unit(p.unit), input_words(p)) for p in entry.inputs])
+        lines += aligned([(p.name, internal_unit(p.unit), input_words(p)) for p in (*entry.inputs, *entry.tool_inputs)])
     return lines
 
 
@@ -111,9 +111,9 @@ def page() -> str:
         "",
         "In a chain inputs and outputs carry the number of their stage (`m_crank2`, `force_c2`), `speed` and",
         "`speed_change` that of the first; a later stage turns as the one before drives it, and its driving torque",
-        "loads that one. The four-bar of a `guide` is a plane crank-rocker whose guided point bears no load of its",
-        "own. What is not listed for a family the theory does not give: geared dwells have no effects, sliders no",
-        "shaft bearings.",
+        "loads that one. A tool at the guided point of a `guide` (`m_tool`, `tool_force`: needle bar and its force)",
+        "loads its joints and the stages before. What is not listed for a family the theory does not give: geared",
+        "dwells have no effects, sliders no shaft bearings.",
         "",
         "Units are any consistent set; in studies and datasets mm, t, s, hence N, N mm, MPa. Costs are measured on one",
         "core (`make bench-effects`), each effect alone with all its outputs, the motion it needs not counted.",
@@ -138,7 +138,10 @@ def page() -> str:
             lines.append(f"| `{o.name}` | {internal_unit(o.unit)} | {_cell(o.text)}{per} | {o.equation} |")
         if e.inputs:
             lines += ["", "| input | unit | definition |", "|---|---|---|"]
-            lines += [f"| `{p.name}` | {internal_unit(p.unit)} | {_cell(input_words(p))} |" for p in e.inputs]
+            lines += [
+                f"| `{p.name}` | {internal_unit(p.unit)} | {_cell(input_words(p))} |"
+                for p in (*e.inputs, *e.tool_inputs)
+            ]
     return "\n".join(lines) + "\n"
 
 

@@ -75,10 +75,10 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     if study.objective is not None:
         lines += ["", f"to be made small: {study.objective.output}"]
     if study.optimise is not None:
-        budget = study.optimise.time_budget
-        lines += [
-            f"optimiser: {study.optimise.starts} starts, {'no limit of time' if budget is None else duration(budget)}"
-        ]
+        settings = study.optimise
+        brake = "" if settings.time_budget is None else f"; emergency brake after {duration(settings.time_budget)}"
+        rule = f"fewer if the estimated share of unseen basins falls to {100.0 * settings.unseen:g} %"
+        lines += [f"optimiser: at most {settings.starts} starts of {settings.looks} looks, {rule}{brake}"]
     lines += _front(study)
     lines += ["", "estimated cost, without the first compilation of the kernels"]
     lines += aligned(
@@ -118,10 +118,10 @@ def _front(study: Study) -> list[str]:
     ends = f"{number(min(bounds) * shown.factor)} to {shown.show(max(bounds))}"
     side = "at least" if study.pareto.at_least else "at most"
     budget = study.pareto.time_budget
-    time = "no limit of time" if budget is None else f"at most {duration(budget)}"
+    time = "" if budget is None else f"; emergency brake after {duration(budget)}"
     return [
         f"front: the same with {name} {side} {ends}, {len(bounds)} bounds; "
-        f"up to {searches(study.pareto)} searches besides those of the optimiser, {time}"
+        f"up to {searches(study.pareto)} searches besides those of the optimiser{time}"
     ]
 
 

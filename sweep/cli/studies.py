@@ -38,15 +38,28 @@ def run(
     """Run or resume a study.
 
     An interrupted run is resumed by the same command.  Finished chunks are never computed twice, and the result is the
-    same, bit for bit, with any number of workers.
+    same, bit for bit, with any number of workers.  The answer comes last; where no design keeps all limits, it says
+    which of them have to give way, and the exit code is 4.
     """
     from sweep.engine.run import run as run_study
+    from sweep.errors import SearchCutShort
+    from sweep.report.terminal import ending
 
     proof = True if certify else None
-    folder = run_study(
-        study, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
-    )
+    late: SearchCutShort | None = None
+    try:
+        folder = run_study(
+            study, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
+        )
+    except SearchCutShort as error:
+        late, folder = error, error.folder
+    found = ending(folder)
+    for line in found.lines:
+        click.echo(line)
     click.echo(f"dataset: {folder}")
+    if late is not None:
+        raise late
+    click.get_current_context().exit(found.exit_code)
 
 
 @click.command()
@@ -71,7 +84,7 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
 
 @click.command()
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default FOLDER/_report.")
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default: beside the chunks.")
 def report(folder: Path, out: Path | None) -> None:
     """Write report.html, figures and tables about a dataset.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -184,4 +185,5 @@ def write_table(frame: pd.DataFrame, out: Path | None) -> None:
     except OSError as error:
         raise StoreError(f"--out {out}: cannot be written: {error}") from error
     finally:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):  # a disk that can only be read has refused already
+            partial.unlink(missing_ok=True)

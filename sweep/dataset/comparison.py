@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import io
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.dataset import store
-from sweep.errors import InputError, StoreError
+from sweep.errors import InputError
 from sweep.quantities.names import is_error
 
 if TYPE_CHECKING:
@@ -141,13 +141,13 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
     InputError
         if a folder holds no dataset, or ``rtol`` or ``slower`` is out of range
     StoreError
-        if a chunk is damaged.
+        if a chunk is damaged, or lies under another chunk's name.
     """
     if not rtol >= 0.0:
         raise InputError("rtol", rtol, "a relative change from 0", "compare")
     if not slower >= 1.0:
         raise InputError("slower", slower, "a factor from 1", "compare")
-    folders = Path(old), Path(new)
+    folders = store.located(old), store.located(new)
     sides = _Rows(folders[0]), _Rows(folders[1])
     result = Comparison(slower=slower, notes=_notes(*folders), seconds=_seconds(*folders))
     names = [side.columns for side in sides]
@@ -171,11 +171,9 @@ class _Rows:
         chunks = store.parts(folder) if folder.is_dir() else []
         if not chunks:
             raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "compare")
-        with store.store_errors(folder):
-            about = [json.loads(pq.read_metadata(part.path).metadata[store.METADATA]) for part in chunks]
-            schema = pq.read_schema(chunks[0].path)
-        self.stops = [chunk["stop"] for chunk in about]
-        self.columns = [name for name in schema.names if not is_error(name)]
+        self.stops = [store.about(part)["stop"] for part in chunks]
+        names = pq.read_schema(io.BytesIO(chunks[0].read())).names
+        self.columns = [name for name in names if not is_error(name)]
         self._chunks: Iterator[tuple[int, store.Part]] = iter(zip(self.stops, chunks, strict=True))
         self._rows: pd.DataFrame | None = None
         self._reached = 0
@@ -190,9 +188,7 @@ class _Rows:
             if following is None:
                 break
             self._reached, part = following
-            if not store.is_whole(part):
-                raise StoreError(f"{part.path}: damaged chunk; run the study again to have it computed anew")
-            pieces.append(pd.read_parquet(part.path, columns=self.columns))
+            pieces.append(part.rows(self.columns))
         if not pieces:
             return pd.DataFrame({name: [] for name in self.columns})
         rows = pd.concat(pieces, ignore_index=True)
@@ -213,12 +209,10 @@ def _look(result: Comparison, old: pd.DataFrame, new: pd.DataFrame, rtol: float)
 
 
 def _compare_optima(result: Comparison, old: Path, new: Path, rtol: float) -> None:
-    import pandas as pd
-
-    paths = old / store.OPTIMUM, new / store.OPTIMUM
+    paths = [store.beside(folder) / store.OPTIMUM for folder in (old, new)]
     if not all(path.is_file() for path in paths):
         return
-    tables = [pd.read_parquet(path).drop_duplicates("role").set_index("role") for path in paths]
+    tables = [store.read_table(path).drop_duplicates("role").set_index("role") for path in paths]
     shared = tuple(result.moved)
     for role in ROLES:
         if not all(role in table.index for table in tables):
@@ -234,7 +228,9 @@ def _compare_optima(result: Comparison, old: Path, new: Path, rtol: float) -> No
 def _notes(old: Path, new: Path) -> tuple[str, ...]:
     plans = [store.read_plan(folder) or {} for folder in (old, new)]
     notes = [
-        f"{folder}: not complete" for folder, plan in zip((old, new), plans, strict=True) if not plan.get("complete")
+        f"{folder}: not complete"
+        for folder, plan in zip((old, new), plans, strict=True)
+        if not plan.get("complete") or store.missing_chunks(folder, store.parts(folder))
     ]
     if plans[0].get("study") != plans[1].get("study"):
         notes.append("the studies differ in what determines the values")
@@ -248,7 +244,7 @@ def _seconds(old: Path, new: Path) -> tuple[float, float] | None:
     times = []
     for folder in (old, new):
         ends = [line for line in store.read_runs(folder) if line.get("event") == "end"]
-        if not ends or ends[-1]["outcome"] != "complete":
+        if not ends or ends[-1].get("outcome") != "complete":
             return None
-        times.append(sum(line["seconds"] for line in ends))
+        times.append(sum(float(line.get("seconds", 0.0)) for line in ends))
     return times[0], times[1]

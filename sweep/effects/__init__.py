@@ -41,6 +41,10 @@ _ENTRIES = {
     "slider_elasticity": ("elasticity", "SLIDER_STATIC"),
     "dynamic_elasticity": ("elasticity", "DYNAMIC"),
     "slider_dynamic_elasticity": ("elasticity", "SLIDER_DYNAMIC"),
+    "tool": ("tool", "EFFECT"),
+    "thread_contour": ("thread", "CONTOUR"),
+    "thread_speed": ("thread", "SPEED"),
+    "capstan": ("thread", "CAPSTAN"),
 }
 NAMES = tuple(_ENTRIES)
 
@@ -187,7 +191,7 @@ def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:
     first = stages_of(family)[0][1]
     for placed in effects:
         for source in (placed, *_carriers(family, placed)):
-            for p in source.entry.inputs:
+            for p in source.entry.inputs_of(stages_of(family)[source.stage][0]):
                 name = f"{p.name}{first if p.name in _FIRST_ONLY else source.number}"
                 kept = merged.get(name, p)
                 merged[name] = kept if p.default is not None else replace(kept, default=None)

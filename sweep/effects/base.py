@@ -16,7 +16,7 @@ from sweep.effects.measured import COSTS
 from sweep.families import NAMES as FAMILY_NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import JointRecords
+from sweep.families.capabilities import JointRecords, ToolPoint
 from sweep.families.chain import drive, driving_names
 
 UNMEASURED = (0.0, 0.0)
@@ -211,7 +211,8 @@ class Effect:
     ``even_crank`` effects presume a crank that turns evenly, so they are no effects of a chain's later stages.
     ``takes_load`` is the key of the effect that hands back the load of a chain's later stages; without it their load
     does not enter.  ``requires`` is the capability that a family must have, ``followers`` are the kinds of
-    follower that the effect is made for.  ``advise(scene)`` applies the effect's rule of negligibility to some designs
+    follower that the effect is made for, ``tool_inputs`` are further inputs where the family has a point that a tool
+    can hang on.  ``advise(scene)`` applies the effect's rule of negligibility to some designs
     over a turn; None where none turns.
     """
 
@@ -232,7 +233,12 @@ class Effect:
     design_result: DesignResult | None = None
     advise: AdviceFunction | None = None
     requires: type = JointRecords
+    tool_inputs: tuple[Parameter, ...] = ()
     followers: tuple[str, ...] = ("rocker", "slider")
+
+    def inputs_of(self, family: Family) -> tuple[Parameter, ...]:
+        """The inputs, with those of a tool where the family has a point that one can hang on."""
+        return self.inputs if family.find(ToolPoint) is None else (*self.inputs, *self.tool_inputs)
 
     def serves(self, family: Family) -> bool:
         """Whether the family has what the effect requires, with a kind of follower that it is made for."""

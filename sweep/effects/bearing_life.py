@@ -181,6 +181,7 @@ EFFECT = Effect(
     followers=(loads.ROCKER.name,),
     needs=("kinetostatics",),
     inputs=(*loads.ROCKER.parameters, *SUPPORTS, *CATALOGUE),
+    tool_inputs=loads.TOOL,
     outputs=OUTPUTS,
     compute=compute,
     called_for="life of the rocker's bearings",

@@ -15,12 +15,13 @@ from sweep.effects import NAMES, effect, with_effects
 from sweep.effects.placing import Placed, first_scene
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Family
+from sweep.families.capabilities import JointRecords
 
 POSES = 360
 MOTION = "motion"
 CENTRE = {
     "a": 20.0, "b": 95.0, "c": 60.0, "e": 70.0, "f": 12.0, "g": 8.0, "alpha": 1.2, "branch": 1.0,
-    "xi": 100.0, "eta": 3.0, "lam": 0.3, "h": 2.0,
+    "xi": 100.0, "eta": 3.0, "lam": 0.3, "h": 2.0, "Z1": -30.0, "Z2": 40.0,
 }  # fmt: skip
 # A small machine in mm, t, s; ours.
 INPUTS = {
@@ -33,7 +34,8 @@ INPUTS = {
     "journal_length1": 15.0, "journal_length2": 15.0, "collar_diameter": 20.0, "permissible_pressure1": 1.0,
     "permissible_pressure2": 1.0, "permissible_pressure3": 0.5, "radial_factor": 0.56, "axial_factor": 1.5,
     "e_limit": 0.3, "dynamic_capacity": 6000.0, "required_life": 2e7, "driven_inertia": 0.6, "driven_mass": 3e-4,
-    "stiffness": 20000.0, "damping": 1.0, "x_point": 40.0,
+    "stiffness": 20000.0, "damping": 1.0, "x_point": 40.0, "m_tool": 2.5e-5, "thread_tension": 5.0,
+    "eyelet_radius": 1.0, "mu_eyelet": 0.2,
 }  # fmt: skip
 
 
@@ -104,8 +106,12 @@ def costs(names: Sequence[str] = NAMES, *, n: int = 64, each: bool = False, repe
 
 
 def motion_ns(name: str, n: int, repeats: int) -> float:
-    """Nanoseconds per pose of a family's motion and the joint records made of it."""
+    """Nanoseconds per pose of a family's motion and the joint records made of it, where it has any."""
     bare = family(name)
     matrix, angles = designs(bare, n), Angles.of(2.0 * np.pi * np.arange(POSES)[None] / POSES)
-    took = least_time(lambda: first_scene(bare, matrix, angles, {}).records, repeats)
+    linked = bare.find(JointRecords) is not None
+    wanted = frozenset({bare.position})
+    took = least_time(
+        lambda: first_scene(bare, matrix, angles, {}).records if linked else bare.poses(matrix, angles, wanted), repeats
+    )
     return took * 1e9 / (n * POSES)

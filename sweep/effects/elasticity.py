@@ -18,7 +18,7 @@ FORMULAS = (
     "(2) frequency ratio nu = sqrt(k/J) |p|/omega",
     "(3) J omega^2 eta'' + h omega p^2 eta' + (k p^2 + h omega p p') eta = M - J omega^2 psi'', 2 pi periodic,",
     "    by its Fourier coefficients; slider: J is the driven mass, c = 1, eta a length (ours)",
-    "(4) stable while the largest Floquet multiplier stays below 1, bounded at 1 (no damping); above 1, and where 241",
+    "(4) stable while the largest Floquet multiplier stays below 1, bounded at 1 (no damping); above 1, and where 1921",
     "    samples of the turn do not resolve it, the steady state is not converged",
 )
 
@@ -67,6 +67,8 @@ FLOQUET = Output(
 # Odd grids of the steady state: the next one is tried for designs that the one before does not resolve.
 MULTIPLIER_ERROR = 1e-6
 GRIDS = (31, 61, 121, 241)
+# Stiff couplers of designs near a dead point: psi'' peaks within a few degrees.
+FINER = (481, 961, 1921)
 
 
 def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
@@ -86,7 +88,7 @@ def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Steady state on its own grid, carried to the wanted angles."""
-    return at_poses(scene, *on_finer_grids(scene, scene.angles.phi, GRIDS, _solve), wanted)
+    return at_poses(scene, *on_finer_grids(scene, scene.angles.phi, GRIDS + FINER, _solve), wanted)
 
 
 def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
@@ -99,9 +101,18 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Floquet multiplier and the reductions of lag and elongation."""
-    phi = scene.on_grid(1 if wanted == {"floquet"} else GRIDS[-1]).angles.phi
-    found, status = on_finer_grids(scene, phi, GRIDS, _solve)
+    """Floquet multiplier and the reductions of lag and elongation; finer grids for the designs that need them."""
+    columns = _turn(scene, wanted, GRIDS)
+    late = np.flatnonzero(columns["status"] == st.NOT_CONVERGED)
+    if late.size:
+        for name, values in _turn(scene.only(late), wanted, FINER).items():
+            columns[name][late] = values
+    return columns
+
+
+def _turn(scene: Scene, wanted: frozenset[str], grids: tuple[int, ...]) -> Columns:
+    phi = scene.on_grid(1 if wanted == {"floquet"} else grids[-1]).angles.phi
+    found, status = on_finer_grids(scene, phi, grids, _solve)
     floquet = found["floquet"]
     if wanted == {"floquet"}:
         # A multiplier is known even where the forced solution is not resolved or not linear.

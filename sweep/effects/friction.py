@@ -11,6 +11,7 @@ from sweep.effects import loads
 from sweep.effects.base import Effect, Scene, largest, refuse, take_over
 from sweep.effects.bearings import together
 from sweep.effects.kinetostatics import bodies, drive, force_outputs, vector_columns, wanted_groups
+from sweep.effects.tool import wrench_and_inertia
 from sweep.families.base import Columns, Output, Parameter, optional_outputs
 
 KEY = "D2"
@@ -118,9 +119,10 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     )
     load = drive(scene, handed_back, "drive_torque_friction")
     poses, designs = scene.records
+    wrench, _ = wrench_and_inertia(scene, load, False)
     finger = scene.inputs["finger"]
     friction_loads(
-        poses, designs, bodies(scene), load, data, finger, status, out[0], out[1], out[2], contraction
+        poses, designs, bodies(scene), load, data, finger, status, out[0], out[1], out[2], contraction, wrench
     )  # fmt: skip
     columns = vector_columns(out[0], wanted, SUFFIX)
     for names, values in ((tuple(_COUPLES), out[1]), (losses, out[2])):
@@ -141,6 +143,7 @@ def _effect(kind: loads.Follower) -> Effect:
         followers=(kind.name,),
         needs=(f"{kind.prefix}kinetostatics",),
         inputs=(*kind.parameters, *_data(kind)),
+        tool_inputs=loads.TOOL,
         outputs=_outputs(kind),
         compute=compute,
         called_for="losses, drive sizing, a check against jamming",

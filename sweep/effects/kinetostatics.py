@@ -8,6 +8,7 @@ from kernels import status as st
 from kernels.effects.kinetostatics import kinetostatics
 from sweep.effects import loads
 from sweep.effects.base import Advice, Effect, Scene, take_over
+from sweep.effects.tool import wrench_and_inertia
 from sweep.families.base import Array, Columns, Output
 
 KEY = "D1, D3"
@@ -134,9 +135,12 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     sizes = zip((18, 2, 2), wanted_groups(wanted), strict=True)
     forces, couples, inertia = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
     load = drive(scene, handed_back)
+    wrench, of_tool = wrench_and_inertia(scene, load, inertia is not None)
     kinetostatics(
-        *scene.records, bodies(scene), load, scene.inputs["finger"], status, forces, couples, inertia
+        *scene.records, bodies(scene), load, scene.inputs["finger"], status, forces, couples, inertia, wrench
     )  # fmt: skip
+    if inertia is not None and of_tool is not None:
+        inertia += of_tool
     if handed_back is not None:
         take_over(status, handed_back["status"])
         if inertia is not None:
@@ -182,6 +186,7 @@ def _effect(kind: loads.Follower) -> Effect:
         followers=(kind.name,),
         needs=("coupler",),
         inputs=kind.parameters,
+        tool_inputs=loads.TOOL,
         outputs=_outputs(kind.name),
         compute=compute,
         called_for="joint loads, drive torque, shaking force, balancing",

@@ -41,6 +41,16 @@ GRAVITY = tuple(
 )
 SPEED = Parameter("speed", "speed", "speed of the crank (scene.speed of a study)", positive=True)
 CHANGE = Parameter("speed_change", "angular_acceleration", "angular acceleration of the crank", default=0.0)
+# Of families with a ToolPoint; without mass and force nothing is computed for them.
+TOOL = (
+    Parameter("m_tool", "mass", "mass of the tool at the guided point (needle bar)", default=0.0, not_negative=True),
+    Parameter("tool_force", "force", "force on the tool along its way; a resisting one opposes ds", default=0.0),
+    Parameter("pierce_force", "force", "force that resists the tool on its way into the fabric", default=0.0,
+              not_negative=True),
+    Parameter("pierce_at", "length", "place s at which the tool meets the fabric", default=0.0),
+    Parameter("pierce_sense", "sign", "side of pierce_at on which the fabric lies: towards growing or falling s",
+              default=1.0, choices=(-1.0, 1.0)),
+)  # fmt: skip
 _TORQUE = Parameter(
     "load_torque", "torque", "torque on the rocker about its axis; a resisting one opposes dpsi", default=0.0
 )

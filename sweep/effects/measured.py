@@ -23,4 +23,8 @@ COSTS: dict[str, tuple[float, float]] = {
     "slider_elasticity": (16.0, 0.0),
     "dynamic_elasticity": (420.0, 210000.0),
     "slider_dynamic_elasticity": (380.0, 210000.0),
+    "tool": (49.0, 0.0),
+    "thread_contour": (35.0, 0.0),
+    "thread_speed": (21.0, 0.0),
+    "capstan": (39.0, 0.0),
 }

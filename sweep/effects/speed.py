@@ -102,6 +102,7 @@ def _effect(kind: loads.Follower) -> Effect:
         followers=(kind.name,),
         needs=(f"{kind.prefix}kinetostatics",),
         inputs=(*kind.parameters, FLYWHEEL),
+        tool_inputs=loads.TOOL,
         outputs=OUTPUTS,
         compute=compute,
         called_for="unevenness of the speed asked for, a light drive",

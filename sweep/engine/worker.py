@@ -1,22 +1,22 @@
-"""What runs in a worker, thread or process: compute one chunk, write it, say so."""
+"""What runs in a worker, wherever that is: compute one chunk, write it, say so."""
 
 from __future__ import annotations
 
-import os
-import threading
 import traceback
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from sweep.chunks import plan as plans
 from sweep.chunks.cascade import Dropped
 from sweep.chunks.chunk import compute_chunk
-from sweep.dataset.store import write_chunk
-from sweep.errors import LinksweepError
-from sweep.jobs.signals import depend_on_parent
+from sweep.dataset.store import parts, write_chunk
+from sweep.errors import InputError, LinksweepError, StoreError
 
 if TYPE_CHECKING:
     from sweep.chunks.plan import Plan
+    from sweep.families.base import Columns
     from sweep.study import Study
 
 
@@ -30,34 +30,54 @@ class Done:
     error: Exception | None = None
 
 
-def work(study: Study, plan: Plan, folder: Path, index: int, parent: int, stop: threading.Event | None) -> Done:
-    """Compute and write one chunk.
+@dataclass(frozen=True)
+class ChunkTask:
+    """Compute and write a chunk of a study.
 
     An error is handed back as a value: the other workers finish what they hold, and the parent raises it when all is
-    quiet.
+    quiet.  A worker whose sources are not those of the plan computes nothing.
 
-    Parameters
-    ----------
-    study, plan, folder : what to compute and where to
-    index : of the chunk
-    parent : process id of the engine
-    stop : flag shared with the engine, None in another process
+    In the folder ``known`` lie the same chunks under other limits.
     """
-    if os.getpid() != parent:
-        depend_on_parent(parent)
 
-    def should_stop() -> bool:
-        return stop is not None and stop.is_set()
+    study: Study
+    plan: Plan
+    folder: Path
+    known: Path | None = None
 
-    start, end = plan.bounds(index)
-    try:
-        result = compute_chunk(study, start, end, should_stop)
-        write_chunk(folder, plan, index, result)
-    except Dropped:
-        return Done(index, dropped=True)
-    except LinksweepError as error:
-        return Done(index, error=error)
-    except Exception as error:  # a bug: the parent raises it again, with the trace of this worker
-        error.add_note(f"in chunk {index}, designs {start}:{end}\n{traceback.format_exc()}")
-        return Done(index, error=error)
-    return Done(index, end - start)
+    def __getstate__(self) -> dict[str, Any]:
+        # A study remembers its family, which is made of functions; whoever unpickles it makes its own.
+        return self.__dict__ | {"study": replace(self.study)}
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Done:
+        """The chunk of that index, unless ``should_stop`` answers true before it is ready."""
+        start, end = self.plan.bounds(number)
+        try:
+            self._check_sources()
+            known = self._known(number)
+            what = (self.study, start, end, should_stop)
+            result = compute_chunk(*what) if known is None else compute_chunk(*what, known)
+            write_chunk(self.folder, self.plan, number, result)
+        except Dropped:
+            return Done(number, dropped=True)
+        except LinksweepError as error:
+            return Done(number, error=error)
+        except Exception as error:  # a bug: the parent raises it again, with the trace of this worker
+            error.add_note(f"in chunk {number}, designs {start}:{end}\n{traceback.format_exc()}")
+            return Done(number, error=error)
+        return Done(number, end - start)
+
+    def _known(self, number: int) -> Columns | None:
+        if self.known is None or not self.known.is_dir():
+            return None
+        try:
+            rows = [part.rows() for part in parts(self.known) if part.index == number]
+        except StoreError:  # damaged since: it is computed
+            return None
+        return {str(name): rows[0][name].to_numpy() for name in rows[0].columns} if len(rows) == 1 else None
+
+    def _check_sources(self) -> None:
+        own = plans.code_hash()
+        if own != self.plan.code:
+            allowed = f"{self.plan.code}, the sources and libraries of the process that plans"
+            raise InputError("code", own, allowed, "worker")

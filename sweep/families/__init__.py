@@ -33,6 +33,18 @@ NAMES = (
     "epicyclic_dwell",
     "cam",
     "cam_lever",
+    "eyelet",
+    "guided_cam",
+    "free_cam",
+    "free_cam_friction",
+    "heddle",
+    "backrest",
+    "backrest_tension",
+    "backrest_closure",
+    "feed",
+    "feed_triad",
+    "foot",
+    "feed_foot",
 )
 
 

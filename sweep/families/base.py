@@ -10,12 +10,13 @@ from typing import Literal, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from kernels.status import INVALID_INPUT, OK
 from sweep.families.domain import Domain, Turn
 
 Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = dict[str, NDArray[np.generic]]
 Unit = Literal[
-    "length", "angle", "ratio", "sign", "count", "none", "choice",
+    "length", "1/length", "angle", "ratio", "sign", "count", "none", "choice",
     "mass", "inertia", "force", "torque", "pressure", "stiffness", "damping", "speed", "angular_acceleration",
     "acceleration", "time",
 ]  # fmt: skip
@@ -235,6 +236,27 @@ class Family:
     def outward_sign(self, position: str) -> str:
         """The sign parameter that tells the extended from the folded limit of a position; "" where there is none."""
         return self.outward
+
+
+def guarded(poses: PoseFunction) -> PoseFunction:
+    """Poses that answer a parameter that is no number, and a value beyond float64, by INVALID_INPUT and nan.
+
+    For kernels that read some parameters only where they matter.
+    """
+
+    def safe(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+        with np.errstate(all="ignore"):  # what is no number has its status
+            columns = poses(designs, angles, wanted)
+        status = np.array(columns["status"], np.uint8)
+        bad = np.zeros(status.shape, np.bool_)
+        bad[~np.all(np.isfinite(designs), axis=1)] = True
+        for name in wanted:
+            bad |= ~np.isfinite(columns[name])
+        status[bad & (status == OK)] = INVALID_INPUT
+        found: Columns = {name: np.where(bad, np.nan, columns[name]) for name in wanted}
+        return found | {"status": status}
+
+    return safe
 
 
 def filled(

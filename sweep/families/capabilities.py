@@ -98,3 +98,27 @@ class OutputLink:
     """
 
     origin: DesignMap
+
+
+@dataclass(frozen=True)
+class ThreadPath:
+    """A thread that is bent at one place: the pose outputs of its wrap angle there, and of the thread taken up.
+
+    ``rate`` and ``rate2`` are the first and second derivative of the thread taken up.
+    """
+
+    wrap: str
+    rate: str
+    rate2: str
+
+
+@dataclass(frozen=True)
+class ToolPoint:
+    """A point of the coupler that a tool hangs on, such as a needle bar, which moves along a fixed direction.
+
+    ``point(designs)``, (n, 3), is its place from B along the coupler, across it (k x s) and along the rocker's axis;
+    ``direction(designs)``, (n, 3), the unit vector of the tool's way in the family's frame.
+    """
+
+    point: DesignMap
+    direction: DesignMap

@@ -10,7 +10,7 @@ from sweep.families.domain import Turn
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _LETTERS = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-RESERVED = ("design", "phi", "status", "offset")
+RESERVED = ("design", "status", "offset")  # and the variable of the domain, phi for a turn
 
 
 class FamilyError(TypeError):

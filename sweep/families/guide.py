@@ -14,6 +14,7 @@ from sweep.families.capabilities import (
     JointRecords,
     Points,
     PressureEllipse,
+    ToolPoint,
 )
 
 PARAMETERS = (
@@ -71,7 +72,7 @@ def as_crank_rocker(designs: Array) -> Array:
 
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from: those of the four-bar; the guided point bears no load."""
+    """Fill the joint records that effects work from: those of the four-bar."""
     matrix = as_crank_rocker(designs)
     turned = crank_rocker.poses(matrix, angles, frozenset(crank_rocker.JOINT_NEEDS))
     crank_rocker.joint_records(matrix, angles, turned, per_pose, per_design)
@@ -87,6 +88,16 @@ def travel_shares(designs: Array) -> Array:
     shares = np.empty((len(designs), 6))
     guide.travel_shares(np.ascontiguousarray(designs), shares)
     return shares
+
+
+def tool_point(designs: Array) -> Array:
+    """Guided point from the crank pin: along the coupler, across it, out of the plane; (n, 3)."""
+    return np.column_stack([designs[:, 4], designs[:, 5], 0.0 * designs[:, 5]])
+
+
+def tool_direction(designs: Array) -> Array:
+    """Unit vector of the guiding line, (n, 3)."""
+    return np.column_stack([np.cos(designs[:, 6]), np.sin(designs[:, 6]), 0.0 * designs[:, 6]])
 
 
 FAMILY = Family(
@@ -110,6 +121,7 @@ FAMILY = Family(
             scaled=("a", "b", "c", "e", "xi", "eta", "h"),
             direction="lam",
         ),
+        ToolPoint(tool_point, tool_direction),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)}),
     ),
     precise_poses=precise_poses,

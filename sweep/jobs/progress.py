@@ -15,7 +15,9 @@ LINE_SECONDS = 10.0
 
 
 class Progress:
-    """Counts designs; used as a context.  Nobody to tell (a closed pipe, a lost terminal) silences it, not the sweep.
+    """Counts designs, or starts; used as a context.
+
+    Nobody to tell (a closed pipe, a lost terminal) silences it, not the sweep.
 
     Parameters
     ----------
@@ -23,17 +25,20 @@ class Progress:
     total : designs in all
     done : designs finished by earlier runs
     show : False for a silent one (the library's way unless asked)
+    unit : what is counted
     """
 
-    def __init__(self, label: str, total: int, done: int, show: bool, stream: TextIO | None = None) -> None:
-        self.label, self.total, self.done = label, total, done
+    def __init__(
+        self, label: str, total: int, done: int, show: bool, stream: TextIO | None = None, unit: str = "designs"
+    ) -> None:
+        self.label, self.total, self.done, self.unit = label, total, done, unit
         self.stream = sys.stderr if stream is None else stream
         self.show = show and self.stream is not None
         self.begin = self.said = time.monotonic()
         self.first = done
         self.bar: tqdm[Never] | None = None
         if self.show and self.stream.isatty():
-            self.bar = tqdm(desc=label, total=total, initial=done, unit=" designs", unit_scale=True, file=self.stream)
+            self.bar = tqdm(desc=label, total=total, initial=done, unit=f" {unit}", unit_scale=True, file=self.stream)
 
     def __enter__(self) -> Progress:
         return self
@@ -66,7 +71,7 @@ class Progress:
     def _line(self) -> None:
         self.said = time.monotonic()
         seconds = self.said - self.begin
-        text = f"{self.label}: {self.done} of {self.total} designs ({self.done / max(self.total, 1):.0%})"
+        text = f"{self.label}: {self.done} of {self.total} {self.unit} ({self.done / max(self.total, 1):.0%})"
         text += f", {seconds:.0f} s"
         if self.first < self.done < self.total:
             text += f", {seconds * (self.total - self.done) / (self.done - self.first):.0f} s left"

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
+
+from sweep.errors import LinksweepError
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -19,17 +22,53 @@ class Stop:
     """A flag that tasks look at, and the signal that set it (None if something else did)."""
 
     def __init__(self) -> None:
+        self._raises = False
         self.event = threading.Event()
         self.signal_number: int | None = None
+        self._listeners: list[Callable[[], object]] = []
 
     def __bool__(self) -> bool:
         return self.event.is_set()
 
+    def set(self) -> None:
+        """Set the flag and tell whom it concerns."""
+        self.event.set()
+        for hear in self._listeners:
+            with suppress(OSError):  # who cannot be told any more is not there any more
+                hear()
+
+    def tell(self, hear: Callable[[], object]) -> None:
+        """Call this when the flag is set, by a signal handler perhaps; at once if it is set already."""
+        self._listeners.append(hear)
+        if self:
+            hear()
+
     def handle(self, number: int, frame: FrameType | None) -> None:
         """Set the flag; whoever asks a second time gets the system's own way, which stops at once."""
         self.signal_number = number
-        self.event.set()
+        self.set()
         signal.signal(number, signal.SIG_DFL)
+        _countdown(number)
+        if self._raises:
+            sys.unraisablehook = _say_nothing
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def raising(self) -> Iterator[None]:
+        """Within this context a signal raises KeyboardInterrupt as well: for work of one process that looks at no flag.
+
+        It ends the context without a word; the flag says why.  A compiler may swallow the interruption and fail over it
+        later: once the flag is set, any error is a consequence.
+        """
+        self._raises, hook = True, sys.unraisablehook
+        try:
+            if not self:
+                yield
+        except (Exception, KeyboardInterrupt):
+            if not self:
+                raise
+        finally:
+            self._raises, sys.unraisablehook = False, hook
 
 
 @contextmanager
@@ -48,6 +87,92 @@ def stop_on_signal() -> Iterator[Stop]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def unheard() -> Iterator[None]:
+    """Processes begun within do not hear signals: Ctrl-C reaches the whole group, also who is still starting up.
+
+    This process hears what came in between as soon as the context ends.
+    """
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
+        yield  # Python lets no other thread decide on signals
+        return
+    # What is ignored stays so in a new process; what is blocked waits, here, until it is neither.
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, where nothing better is to be done than to leave; ``number`` is that of the signal."""
+
+    number = signal.SIGTERM
+
+
+# How long a process that has promised to leave may take to do so by itself [s], and what it says if it does not.
+_promised: list[tuple[float, str]] = []
+
+
+@contextmanager
+def leaving_within(seconds: float, words: str) -> Iterator[None]:
+    """From a signal within this context on the process has so many seconds to leave; then it ends, whatever it does.
+
+    For a program of its own, not for a library: compiling and other people's code look at no flag.  Outside of
+    :func:`stop_on_signal` a signal raises KeyboardInterrupt, or :class:`Terminated`.
+    """
+    heard: list[int] = []
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        heard.append(number)
+        signal.signal(number, signal.SIG_DFL)
+        _countdown(number)
+        sys.unraisablehook = _say_nothing
+        raise _interruption(number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before, hook = {number: signal.signal(number, leave) for number in SIGNALS}, sys.unraisablehook
+    _promised.append((seconds, words))
+    try:
+        yield
+    except Exception as error:
+        if heard and not isinstance(error, LinksweepError):  # a compiler swallowed the interruption and failed over it
+            raise _interruption(heard[-1]) from None
+        raise
+    finally:
+        _promised.pop()
+        sys.unraisablehook = hook
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _interruption(number: int) -> KeyboardInterrupt:
+    return Terminated() if number == signal.SIGTERM else KeyboardInterrupt()
+
+
+def _say_nothing(what: object) -> None:
+    """In place of the words about an interruption in the middle of somebody's callback."""
+
+
+def _countdown(number: int) -> None:
+    if _promised:
+        seconds, words = _promised[-1]
+        timer = threading.Timer(seconds, _leave, (number, words))
+        timer.daemon = True
+        timer.start()
+
+
+def _leave(number: int, words: str) -> None:
+    with suppress(OSError):
+        os.write(2, f"{words}\n".encode())
+    os._exit(128 + number)
 
 
 def depend_on_parent(parent: int) -> None:

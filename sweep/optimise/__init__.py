@@ -8,7 +8,20 @@ from sweep.optimise.front import front_study
 from sweep.optimise.optimum import optimum
 from sweep.optimise.pareto import pareto
 from sweep.optimise.problem import Problem
-from sweep.optimise.solve import minimise
-from sweep.optimise.study import optimise_study
+from sweep.optimise.solve import explore, minimise
+from sweep.optimise.study import optimise_study, read_survey
+from sweep.optimise.survey import Survey
 
-__all__ = ["Problem", "Result", "front_study", "minimise", "on_locus", "optimise_study", "optimum", "pareto"]
+__all__ = [
+    "Problem",
+    "Result",
+    "Survey",
+    "explore",
+    "front_study",
+    "minimise",
+    "on_locus",
+    "optimise_study",
+    "optimum",
+    "pareto",
+    "read_survey",
+]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sweep.chunks.cascade import compared
 from sweep.families.base import Accuracy, Array
+from sweep.optimise.form import measured_in
 from sweep.optimise.problem import Problem
 from sweep.optimise.starts import spread
 from sweep.quantities.names import is_flag, stem
@@ -19,6 +20,7 @@ SAMPLED = 1 << 15  # designs per start: on a locus they cost a third of a micros
 BLOCK = 1 << 15  # designs ranked together
 KEPT = 512  # best of the sample per start
 PARENTS, CHILDREN, ROUNDS = 8, 24, 12  # improved per start; samples around each and round
+FARTHEST = 1e100
 RADIUS = 0.06  # of the first of these samples, in variables scaled to their bounds
 ACCURACY = Accuracy(samples=64)  # misses a peak by less than what the local search gains ...
 VERIFIED, HIDDEN = Accuracy(target=1e-3), 2.0  # ... but near a pole, told by a true extremum so many times larger
@@ -145,7 +147,9 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
         merit[alive[bad]] = OUTSIDE * (left + violation[alive[bad]])
         if left == 2.0 and turning:
             stuck = ~(columns["margin"] >= ROTATABLE_MARGIN)
-            merit[alive[stuck]] = STUCK * (1.0 - np.nan_to_num(columns["margin"][stuck]))
+            # How far a crank is from turning is a rank only; numbers beyond this are all alike, and would overflow.
+            margin = np.maximum(np.nan_to_num(columns["margin"][stuck]), -FARTHEST)
+            merit[alive[stuck]] = STUCK * (1.0 - margin)
             bad |= stuck
         alive = alive[~bad]
     values = _values(problem, designs[alive], [problem.objective], accuracy)[problem.objective]
@@ -172,6 +176,6 @@ def _missed(limit: Any, value: Array) -> Array:
     out = np.zeros(len(value))
     for bound, sense in ((limit.minimum, 1.0), (limit.maximum, -1.0)):
         if bound is not None:
-            size = max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)) or 1.0
+            size = measured_in(max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)))
             out = np.maximum(out, sense * (bound - value) / size)
     return np.nan_to_num(out, nan=ABSENT)

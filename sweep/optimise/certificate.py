@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels import status as st
 from sweep.families.base import Array
 from sweep.optimise.form import Form, Label
 
@@ -87,8 +88,11 @@ class Result:
     violation; ``relaxation`` says by how much every violated limit would have to give way, in the unit of its output.
     ``multipliers`` are relative changes of the objective (of cos^2 of a pressure angle) per relative change of each
     active limit (of sin^2 of a pressure angle, of a margin itself; per width between the bounds of a variable), not
-    negative but for equations.  ``status`` is OK, LIMIT_EXCEEDED (infeasible) or NOT_CONVERGED, and ``ended`` says how
-    the search ended: "converged", "stalled", "infeasible", "time" or "interrupted".
+    negative but for equations.  Where infeasible, they are changes of the smallest relaxation per relative change of
+    each limit, and ``kkt_residual`` is that of the smallest relaxation.  ``status`` is OK, LIMIT_EXCEEDED (infeasible)
+    or NOT_CONVERGED, and ``ended`` says how the search ended: "converged", "stalled", "infeasible", "looks", "left"
+    (after the first heat), "time" or "interrupted".  ``basin`` numbers the
+    values that starts ended at, 1 for the best, 0 where infeasible; ``looks`` counts the evaluations.
     """
 
     start: int
@@ -104,7 +108,14 @@ class Result:
     status: int
     ended: str
     agree: int = 1
+    basin: int = 0
+    looks: int = 0
     caveat: str = CAVEAT
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every limit is kept."""
+        return self.status != st.LIMIT_EXCEEDED
 
 
 def in_words(labels: tuple[Label, ...], found: Multipliers, variables: tuple[str, ...]) -> dict[str, float]:
@@ -113,7 +124,7 @@ def in_words(labels: tuple[Label, ...], found: Multipliers, variables: tuple[str
     for label, weight in zip(labels, found.weights, strict=True):
         if label.side != "objective" and abs(weight) > 1e-9:
             text = f"{label.name} {WORDS[label.side]}"
-            words[text] = words.get(text, 0.0) + float(weight)
+            words[text] = words.get(text, 0.0) + float(weight) * label.per
     for name, weight in zip(variables, found.bounds, strict=True):
         if abs(weight) > 1e-9:
             words[f"{name} at its {'lower' if weight > 0 else 'upper'} bound"] = abs(float(weight))

@@ -33,11 +33,14 @@ class Descent:
     problem, program : what to minimise
     start : (P,) design; its signs are kept
     stop : asked at every evaluation; true ends the search by :class:`sweep.optimise.model.Stopped`
+    allowed : evaluations after which it ends as well
     """
 
-    def __init__(self, problem: Problem, program: Program, start: Array, stop: Callable[[], bool]) -> None:
+    def __init__(
+        self, problem: Problem, program: Program, start: Array, stop: Callable[[], bool], allowed: float = math.inf
+    ) -> None:
         fractions = np.clip(problem.scaled(start[None, :])[0], 0.0, 1.0)
-        self.model = Model(problem, program, problem.placed(start, fractions), stop)
+        self.model = Model(problem, program, problem.placed(start, fractions), stop, allowed)
         self.gap = math.nan
         self.best = self.model.state(fractions)
 

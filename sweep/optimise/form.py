@@ -20,6 +20,7 @@ from sweep.reductions.catalogue import output
 from sweep.reductions.measures import Measure, Series, margins, measure
 
 Term = dict[int, float]
+SMALLEST = 1e-100  # a limit nearer to zero is a limit at zero
 AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first
 FAR = 1e3  # stands for a row that cannot be computed at a trial design: far outside, but a number
 
@@ -40,10 +41,14 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Label:
-    """What a row stands for: an output and its side, "objective", "minimum", "maximum" or "equal"."""
+    """What a row stands for: an output and its side, "objective", "minimum", "maximum" or "equal".
+
+    ``per`` turns the row's multiplier into one per relative change of the bound: the bound over the row's scale.
+    """
 
     name: str
     side: str
+    per: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -119,6 +124,11 @@ class Form:
         )
 
 
+def measured_in(size: float) -> float:
+    """What violations of a limit of that size are divided by: 1 where it is so small that they would overflow."""
+    return size if size > SMALLEST else 1.0
+
+
 class Program:
     """The objective and the limits of a problem, ready to be laid out as rows for any design."""
 
@@ -171,6 +181,12 @@ class Program:
         return found.from_inner(float(max(inner))) if inner else math.nan
 
 
+def _label(r: Requirement, side: str, bound: float, size: float) -> Label:
+    """Label of a limit's row; pressure angles and margins are measured by themselves, whatever the bound is."""
+    own = r.measure.inner == "pressure" or any(s.pressure for s in r.measure.series)
+    return Label(r.measure.name, side, 1.0 if own else abs(bound) / size)
+
+
 class _Layout:
     def __init__(self, curves: Curves, points: Points, design: Array, scalars: tuple[str, ...]) -> None:
         self.curves, self.points, self.scalars = curves, points, scalars
@@ -194,18 +210,42 @@ class _Layout:
         if r.equal and r.minimum is not None:
             for term, shift in self.lower(r.measure)[:1]:
                 size = self._size(r, r.minimum)
-                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, True, Label(r.measure.name, "equal"))
+                self.add(
+                    term,
+                    shift,
+                    1.0 / size,
+                    -r.minimum / size,
+                    0.0,
+                    True,
+                    _label(r, "equal", r.minimum, size),
+                )
             return bool(self.lower(r.measure))
         if r.minimum is not None:
             terms, size = self.lower(r.measure), self._size(r, r.minimum)
             found = found and bool(terms)
             for term, shift in terms:
-                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, False, Label(r.measure.name, "minimum"))
+                self.add(
+                    term,
+                    shift,
+                    1.0 / size,
+                    -r.minimum / size,
+                    0.0,
+                    False,
+                    _label(r, "minimum", r.minimum, size),
+                )
         if r.maximum is not None:
             terms, size = self.upper(r.measure), self._size(r, r.maximum)
             found = found and bool(terms)
             for term, shift in terms:
-                self.add(term, shift, -1.0 / size, r.maximum / size, 0.0, False, Label(r.measure.name, "maximum"))
+                self.add(
+                    term,
+                    shift,
+                    -1.0 / size,
+                    r.maximum / size,
+                    0.0,
+                    False,
+                    _label(r, "maximum", r.maximum, size),
+                )
         return found
 
     def upper(self, m: Measure) -> list[tuple[Term, float]]:
@@ -303,10 +343,10 @@ class _Layout:
         if any(s.pressure for s in r.measure.series):
             return 1.0
         if r.measure.numbers:
-            return max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)) or 1.0
+            return measured_in(max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)))
         ends = [k for side in self._ends(r.measure.series) for k in side]
         amplitude = 1.0 if r.measure.is_angle else max((abs(self.points.value[k]) for k in ends), default=0.0)
-        return max(abs(bound), 1e-3 * amplitude) or 1.0
+        return measured_in(max(abs(bound), 1e-3 * amplitude))
 
     def form(self, complete: bool, reaches: bool) -> Form:
         matrix = np.zeros((len(self.terms), 2 * len(self.points) + len(self.scalars)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -12,10 +13,10 @@ import numpy as np
 
 from kernels import status as st
 from sweep.dataset import store
-from sweep.errors import InputError
+from sweep.errors import InputError, SearchCutShort
 from sweep.families.base import Array
 from sweep.optimise.certificate import Result
-from sweep.optimise.pareto import Front, advance
+from sweep.optimise.pareto import Front, advance, steps
 from sweep.optimise.starts import diverse
 from sweep.optimise.study import problem_and_starts
 from sweep.optimise.written import certificates, outputs, write
@@ -35,7 +36,7 @@ def front_study(
     """Search the least objective for each bound of [pareto] and write the front beside the optimum, step by step.
 
     A front in the folder that carries the same key is taken up where it stopped and ends with the bytes of one that was
-    never stopped, unless a time budget cut a search short.
+    never stopped.
 
     Parameters
     ----------
@@ -56,23 +57,30 @@ def front_study(
     StoreError
         if the folder cannot be written
     KeyboardInterrupt
-        if the search was stopped, after the best so far was written.
+        if the search was stopped, after the best so far was written
+    SearchCutShort
+        if ``pareto.time_budget`` stopped it, likewise.
     """
     if study.pareto is None:
         raise InputError("pareto", None, "a [pareto] section", str(study.path))
     place = Path(folder)
-    settings, path = study.pareto, place / store.PARETO
+    settings, path = study.pareto, store.beside(place) / store.PARETO
     front = saved(path, key) or Front.of(settings)
     if front.complete and path.exists():
         return path
     _, problem, _ = problem_and_starts(study, place)
     starts = _starts(study, settings, problem, place)
-    kept = front
+    kept, begin = front, time.monotonic()
     for best in advance(problem, settings, front, starts, stop, jobs):
         kept = best if best.taken > kept.taken else kept
         _write(path, study, settings, best, key, kept)
-    if not kept.complete:
+    late = settings.time_budget is not None and time.monotonic() - begin >= settings.time_budget
+    if not kept.complete and (not late or (stop is not None and stop())):
         raise KeyboardInterrupt
+    if not kept.complete:
+        _write(path, study, settings, best, key, kept, "time")
+        done = f"{kept.taken} of {len(steps(len(kept.bounds)))} steps of the front"
+        raise SearchCutShort(place, f"{path}: time ran out: {done}; run again to continue the front")
     return path
 
 
@@ -101,7 +109,9 @@ def _noted(result: Result | None) -> dict[str, Any] | None:
     return None if result is None else asdict(result) | {"design": result.design.tolist()}
 
 
-def _write(path: Path, study: Study, settings: ParetoSettings, best: Front, key: str, kept: Front) -> None:
+def _write(
+    path: Path, study: Study, settings: ParetoSettings, best: Front, key: str, kept: Front, ended: str = ""
+) -> None:
     """``best`` becomes the rows; ``kept``, the front after its last finished step, is what a search goes on from."""
     bounds, results = (list(column) for column in zip(*best.known(), strict=True))
     designs = np.array([r.design for r in results])
@@ -112,7 +122,9 @@ def _write(path: Path, study: Study, settings: ParetoSettings, best: Front, key:
     texts = {"bound": (_unit(study, settings.output), f"{side} bound on {settings.output}")}
     state = asdict(replace(kept, results=())) | {"results": [_noted(r) for r in kept.results]}
     about = {"output": settings.output, "side": "at least" if settings.at_least else "at most"}
-    about |= {"complete": str(best.complete).lower(), KEY.decode(): key, STATE.decode(): json.dumps(state)}
+    about |= {"complete": str(best.complete).lower(), "steps": f"{kept.taken} of {len(steps(len(kept.bounds)))}"}
+    about |= {"ended": ended} if ended else {}
+    about |= {KEY.decode(): key, STATE.decode(): json.dumps(state)}
     write(path, columns, study, texts, about)
 
 
@@ -126,7 +138,7 @@ def _unit(study: Study, name: str) -> str:
 def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path) -> list[Array]:
     """For each bound, the loosest first: the optimum, then diverse best designs of the dataset within the bound."""
     names = list(study.family.parameter_names)
-    optimum = _columns(folder / store.OPTIMUM, [*names, "role"])
+    optimum = _columns(store.beside(folder) / store.OPTIMUM, [*names, "role"])
     own = np.column_stack([optimum[name] for name in names])[optimum["role"] == "optimum"].astype(np.float64)
     chosen = []
     for designs, merit in within(study, settings, Front.of(settings).bounds, folder):

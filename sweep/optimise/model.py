@@ -23,7 +23,11 @@ NOT_TURNING = 1e6  # added to the violation of a design some of whose limits do 
 
 
 class Stopped(Exception):
-    """The time budget is used up, or the caller wants to stop."""
+    """The caller wants to stop."""
+
+
+class LooksUsedUp(Stopped):
+    """The start has had all the evaluations it is allowed."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +69,13 @@ class Model:
     problem, program : what to minimise
     start : (P,) design; its signs are kept
     stop : asked at every evaluation; true ends the search by :class:`Stopped`
+    allowed : evaluations after which it ends by :class:`LooksUsedUp`; ``looks`` counts them
     """
 
-    def __init__(self, problem: Problem, program: Program, start: Array, stop: Callable[[], bool]) -> None:
+    def __init__(
+        self, problem: Problem, program: Program, start: Array, stop: Callable[[], bool], allowed: float = math.inf
+    ) -> None:
+        self.looks, self.allowed = 0, allowed
         self.problem, self.program, self.stop, self.base = problem, program, stop, start
         self.curves = Curves(problem, program.series, program.places)
         self.samples = problem.accuracy.samples or SAMPLES
@@ -77,9 +85,12 @@ class Model:
             self.scale = size if 1e-12 < size < math.inf else 1.0
 
     def check(self) -> None:
-        """Raise :class:`Stopped` if the search is to end."""
+        """Count one more look at a design; raise :class:`Stopped` if the search is to end."""
+        if self.looks >= self.allowed:
+            raise LooksUsedUp
         if self.stop():
             raise Stopped
+        self.looks += 1
 
     def design(self, fractions: Array) -> Array:
         """Design (P,) with its variables at the fractions of their bounds."""

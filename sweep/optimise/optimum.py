@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from sweep.optimise.candidates import from_sample
 from sweep.optimise.certificate import Result
 from sweep.optimise.eliminate import on_locus
 from sweep.optimise.problem import Problem
-from sweep.optimise.solve import minimise
+from sweep.optimise.solve import minimise, ranked
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings
@@ -28,18 +29,18 @@ def optimum(
     """Best designs of a problem: equations eliminated where they can be, a sample, local searches from the best of it.
 
     Where no start becomes feasible the equations may give way as well: a second search, in the parameters themselves,
-    begins from the least infeasible design and a sample, and finds the smallest relaxation of all limits.
+    begins from the least infeasible design and a sample; of both searches the smallest relaxation comes first.
 
     Parameters
     ----------
     problem : in the parameters themselves
     signs : combinations of the parameters that are not varied, as ``[{"branch": 1.0}, {"branch": -1.0}]``
-    settings : number of starts, seed of the sample, time for each search
+    settings : the most starts of each search, seed of the sample, what ends a search earlier
     stop, jobs : as for ``minimise``
 
     Returns
     -------
-    Results as of ``minimise``, best first.  Same arguments, same results, unless time ran out.
+    Results as of ``minimise``, best first.  Same arguments, same results, unless it was stopped.
 
     Raises
     ------
@@ -53,4 +54,7 @@ def optimum(
         return results
     near = [result.design for result in results[:1]]
     starts = from_sample(problem, signs, settings.starts, settings.seed)
-    return minimise(problem, np.array([*near, *starts]), settings, stop, jobs)
+    others = minimise(problem, np.array([*near, *starts]), settings, stop, jobs)
+    # The equations give way, or the bounds of the links do: the smaller relaxation is the answer.
+    first = 1 + max((result.start for result in results), default=-1)
+    return ranked([*results, *(replace(result, start=first + result.start) for result in others)])

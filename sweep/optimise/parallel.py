@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 import os
-import signal
 import tempfile
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from sweep.errors import WorkerDied
 from sweep.families.base import Array
-from sweep.jobs.signals import SIGNALS, depend_on_parent
+from sweep.jobs.executors import worker_processes
+from sweep.jobs.signals import depend_on_parent, unheard
 from sweep.optimise.certificate import Result
 from sweep.optimise.problem import Problem
 from sweep.optimise.search import search
@@ -25,7 +23,12 @@ GRACE = 1.0  # for workers to hand back what they have once they are to stop [s]
 
 
 def in_processes(
-    problem: Problem, starts: Array, numbers: list[int], asked: Callable[[], bool], jobs: int
+    problem: Problem,
+    starts: Array,
+    numbers: list[int],
+    asked: Callable[[], bool],
+    jobs: int,
+    allowed: float = math.inf,
 ) -> list[Result]:
     """Results of the starts ``numbers`` that were begun before ``asked`` became true, in their order.
 
@@ -37,6 +40,7 @@ def in_processes(
     numbers : which of the starts
     asked : looked at in this process; workers learn of it by a file, and those that do not answer soon are ended
     jobs : how many workers
+    allowed : looks at designs that each start may take
 
     Raises
     ------
@@ -46,13 +50,10 @@ def in_processes(
     from concurrent.futures import FIRST_COMPLETED, wait
     from concurrent.futures.process import BrokenProcessPool
 
-    from joblib.externals.loky import get_reusable_executor
-
     workers = min(jobs, len(numbers))
     with tempfile.TemporaryDirectory(prefix="linksweep-") as folder:
         flag = Path(folder, "stop")
-        with _unheard():
-            executor = get_reusable_executor(max_workers=workers)
+        executor = worker_processes(workers)
         todo, begun, late = list(reversed(numbers)), list[Any](), math.inf
         waiting: set[Any] = set()
         try:
@@ -60,8 +61,9 @@ def in_processes(
                 # One more than there are workers, so that none of them waits for its next start.
                 while todo and len(waiting) <= workers:
                     number = todo.pop()
-                    with _unheard():
-                        begun.append(executor.submit(_task, number, problem, starts[number], flag, os.getpid()))
+                    with unheard():
+                        task = _task, number, problem, starts[number], flag, os.getpid(), allowed
+                        begun.append(executor.submit(*task))
                     waiting.add(begun[-1])
                 waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED).not_done
                 if not flag.exists() and asked():
@@ -71,26 +73,15 @@ def in_processes(
                 executor.shutdown(kill_workers=True)
             found = [future.result() for future in begun if future not in waiting]
         except BrokenProcessPool as error:
+            if asked():  # the signal that stops us may have hit them too
+                done = [future for future in begun if future.done() and future.exception() is None]
+                return [result for result in (future.result() for future in done) if result is not None]
             raise WorkerDied(f"optimiser: a worker process died ({error}); run again") from error
     return [result for result in found if result is not None]
 
 
-def _task(number: int, problem: Problem, start: Array, flag: Path, parent: int) -> Result | None:
+def _task(number: int, problem: Problem, start: Array, flag: Path, parent: int, allowed: float) -> Result | None:
     if os.getpid() != parent:
         depend_on_parent(parent)
     # A parent that was killed leaves no folder to look into, but then this process ends as well.
-    return None if flag.exists() else search(number, problem, start, flag.exists)
-
-
-@contextmanager
-def _unheard() -> Iterator[None]:
-    """Processes begun within do not hear signals: Ctrl-C reaches the whole group, also who is still starting up."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # Python lets no other thread decide on signals
-        return
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in SIGNALS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    return None if flag.exists() else search(number, problem, start, flag.exists, allowed)

@@ -16,11 +16,10 @@ from sweep.families.base import Array
 from sweep.optimise.certificate import Result
 from sweep.optimise.problem import PLACE, Problem
 from sweep.optimise.solve import minimise
+from sweep.optimise.survey import CUT
 
 if TYPE_CHECKING:
     from sweep.study import ParetoSettings
-
-LEAST_SECONDS = 1e-3  # of a search that only has to certify a design that is known already
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ def pareto(
     Parameters
     ----------
     problem : objective and limits; a limit on the second output gives way to the bound on its side, the other stays
-    settings : second output and bounds; ``time_budget`` is shared out among the steps still to come
+    settings : second output and bounds; ``time_budget`` is an emergency brake for the whole front
     starts : (k, P) designs for all bounds, or one such array for each bound, the loosest first
     stop : as for :func:`sweep.optimise.minimise`; the bounds reached by then are returned
     jobs : processes
@@ -114,7 +113,7 @@ def pareto(
     Returns
     -------
     One result per bound that was begun; an infeasible one says so in its ``status``.  Same starts, same results, unless
-    time ran out.
+    it was stopped.
 
     Raises
     ------
@@ -144,19 +143,20 @@ def advance(
         raise InputError("second output", settings.output, "another output than the objective", PLACE)
     own = [np.atleast_2d(s) for s in ([starts] * len(front.bounds) if isinstance(starts, np.ndarray) else starts)]
     end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
+
+    def asked() -> bool:
+        return time.monotonic() >= end or (stop is not None and stop())
+
     plan = steps(len(front.bounds))
     for number in range(front.taken, len(plan)):
         step = plan[number]
         begin = _begin(front, step, number, own[step.target])
         if begin is not None:
-            rest = [len(own[s.target]) if s.first else 1 for s in plan[number:]]
-            seconds = max((end - time.monotonic()) * rest[0] / sum(rest), LEAST_SECONDS)
-            if seconds > LEAST_SECONDS or _must(front, step):
-                result = _search(problem, settings, front.bounds[step.target], begin, seconds, stop, jobs)
-                front = _with(front, step, number, result)
-                if result.ended == "interrupted" or (stop is not None and stop()):
-                    yield front
-                    return
+            result = _search(problem, settings, front.bounds[step.target], begin, asked, jobs)
+            front = _with(front, step, number, result)
+            if result.ended in CUT or asked():
+                yield front
+                return
         front = replace(front, taken=number + 1)
         yield front
 
@@ -174,18 +174,10 @@ def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None
     seen = step.neighbour < step.target and front.found[step.neighbour] < len(front.bounds)
     worse = near.status == st.LIMIT_EXCEEDED and held.status != st.LIMIT_EXCEEDED
     offers = not (seen or worse or np.array_equal(near.design, held.design))
-    # A search that did not settle, or was cut short, goes on from where it ended.
-    unfinished = held.status == st.NOT_CONVERGED or held.ended == "time"
+    # A search that did not settle goes on from where it ended.
+    unfinished = held.status == st.NOT_CONVERGED
     begin = [near.design] * offers + [held.design] * unfinished
     return np.array(begin) if begin else None
-
-
-def _must(front: Front, step: Step) -> bool:
-    """Whether a search begins even when time is up: the first of all, and where a tighter bound has done better."""
-    held, near = front.results[step.target], None if step.first else front.results[step.neighbour]
-    if held is None or near is None:
-        return step.target == 0 and held is None
-    return step.neighbour > step.target and _order(near) < _order(held)
 
 
 def _search(
@@ -193,20 +185,15 @@ def _search(
     settings: ParetoSettings,
     bound: float,
     begin: Array,
-    seconds: float,
-    stop: Callable[[], bool] | None,
+    asked: Callable[[], bool],
     jobs: int,
 ) -> Result:
     from sweep.study import OptimiseSettings
 
-    own = bounded(problem, settings, bound)
-    shared = OptimiseSettings(len(begin), 0, None if math.isinf(seconds) else seconds)
-    best = minimise(own, begin, shared, stop, jobs)[0]
-    if best.ended == "time":
-        # Some starts were never begun, and the sweep knows them as good designs: none of them may be lost.
-        known = [minimise(own, start, OptimiseSettings(1, 0, LEAST_SECONDS), stop)[0] for start in begin]
-        best = min([best, *known], key=_order)
-    return best
+    # All starts of a bound count: none of them may be lost to a rule that has seen enough.
+    results = minimise(bounded(problem, settings, bound), begin, OptimiseSettings(len(begin), unseen=0.0), asked, jobs)
+    cut = any(r.ended in CUT for r in results) or len(results) < len(begin)
+    return replace(results[0], ended="time") if cut and results[0].ended not in CUT else results[0]
 
 
 def _with(front: Front, step: Step, number: int, result: Result) -> Front:

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from sweep.families.base import Angles, Array
 from sweep.optimise.problem import Problem
+from sweep.reductions.closing import on_closed_turn
+from sweep.reductions.differentiable import differentiable
 from sweep.reductions.measures import Series
 
 Index: TypeAlias = NDArray[np.intp]
@@ -81,8 +83,8 @@ class Curves:
 
     def __init__(self, problem: Problem, series: tuple[Series, ...], places: bool = False) -> None:
         self.problem = problem
-        self.family = problem.family
-        position = Series(self.family.position, wrapped=self.family.position == "psi")
+        self.family = on_closed_turn(differentiable(problem.family))
+        position = Series(self.family.position, wrapped=self.family.pose_output[self.family.position].wraps)
         if any(s.window is not None for s in series) and position not in series:
             series = (*series, position)
         self.series = series

@@ -11,6 +11,7 @@ import numpy as np
 
 from sweep.errors import InputError, nearest
 from sweep.families.base import Accuracy, Array, Family
+from sweep.families.domain import March
 from sweep.optimise.coordinates import Coordinates
 
 if TYPE_CHECKING:
@@ -55,6 +56,9 @@ class Problem:
     coordinates: Coordinates | None = None
 
     def __post_init__(self) -> None:
+        if isinstance(self.family.domain, March):
+            allowed = "a family without history: poses that depend on those before have no gradient"
+            raise InputError("family", self.family.name, allowed, PLACE)
         names = tuple(name for name in self.family.parameter_names if name not in self.made) + self.given
         for name in (*self.variables, *self.fixed):
             if name not in names:

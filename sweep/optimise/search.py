@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from kernels import status as st
 from sweep.families.base import Array
-from sweep.optimise.certificate import Result, in_words
+from sweep.optimise.certificate import Multipliers, Result, in_words, multipliers
 from sweep.optimise.descent import KKT, Descent
-from sweep.optimise.form import Program
-from sweep.optimise.model import State, Stopped
+from sweep.optimise.form import Form, Program
+from sweep.optimise.model import LooksUsedUp, State, Stopped
 from sweep.optimise.problem import Problem
 
+FIRST = 2  # looks that give a start its scale and its first design
 
-def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool]) -> Result:
+
+def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool], allowed: float = math.inf) -> Result:
     """Search from one start, on one BLAS thread: the systems are small, and the bits stay those of any other process.
 
     Parameters
@@ -23,26 +26,30 @@ def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool
     problem : what to minimise
     start : (P,) design
     asked : true ends the search with the best checked design so far; the first one is reached in any case
+    allowed : looks at designs after which it ends in the same way, wherever and however fast it runs
     """
     import scipy.optimize  # noqa: F401  (brings its own BLAS, which has to be there to be limited)
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, user_api="blas"):
         program = Program(problem)
-        descent = Descent(problem, program, start, _after_first(asked))
+        descent = Descent(problem, program, start, _after_first(asked), max(allowed, FIRST))
         ended = ""
         try:
             descent.run()
+        except LooksUsedUp:
+            ended = "looks"
         except Stopped:
             ended = "time"
         except KeyboardInterrupt:
             ended = "interrupted"
-        descent.model.stop = lambda: False
-        return _result(number, problem, program, descent, ended)
+        looks = descent.model.looks
+        descent.model.stop, descent.model.allowed = (lambda: False), math.inf
+        return replace(_result(number, problem, program, descent, ended), looks=looks)
 
 
 def _after_first(asked: Callable[[], bool]) -> Callable[[], bool]:
-    calls = iter(range(3))
+    calls = iter(range(FIRST + 1))
     return lambda: next(calls, None) is None and asked()
 
 
@@ -51,7 +58,10 @@ def _result(number: int, problem: Problem, program: Program, descent: Descent, e
     exists = math.isfinite(state.objective) and math.isfinite(state.violation)
     value = program.value(program.objective, state.form, descent.model.curves, state.design, state.atoms)
     residual, words = math.nan, {}
-    if exists:
+    if exists and not state.feasible and state.form.complete:
+        form, least = _of_relaxation(descent, state)
+        residual, words = least.residual, in_words(form.labels, least, problem.variables)
+    elif exists:
         found = descent.model.certificate(state)
         residual = found.residual
         size = abs(state.objective) or 1.0  # of the objective here, in units of the start's
@@ -71,6 +81,13 @@ def _result(number: int, problem: Problem, program: Program, descent: Descent, e
         kkt_residual=residual, active=tuple(words), multipliers=words, relaxation=_relaxation(program, values, state),
         values=values, status=status, ended=ended or how,
     )  # fmt: skip
+
+
+def _of_relaxation(descent: Descent, state: State) -> tuple[Form, Multipliers]:
+    """The elastic program at a design that misses its limits, and its multipliers."""
+    form = state.form.relaxed({"rotatable"})
+    jacobian = descent.model.jacobian(state.fractions, form, form.points)
+    return form, multipliers(form, form.rows(state.atoms, state.violation), jacobian, state.fractions)
 
 
 def _relaxation(program: Program, values: dict[str, float], state: State) -> dict[str, float]:

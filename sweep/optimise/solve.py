@@ -1,11 +1,11 @@
-"""``minimise``: the search from several starts, within a time budget, best first."""
+"""``minimise``: the search from several starts, best first; its budget is counted in starts and looks."""
 
 from __future__ import annotations
 
 import math
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -21,11 +21,15 @@ from sweep.optimise.form import Program
 from sweep.optimise.parallel import in_processes
 from sweep.optimise.problem import PLACE, Problem
 from sweep.optimise.search import search
+from sweep.optimise.survey import CUT, Survey, survey, with_basins
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings
 
-SERIAL_SECONDS = 1.0  # of search before processes are worth their start
+BATCH = 6  # starts between two looks at whether more are needed: the same for any number of jobs
+SERIAL_LOOKS = 800  # of a search before processes are worth their start, about a second
+TRIAL = 2000  # looks of a first heat, where only the best starts go on
+Tell = Callable[[int, int], None]
 
 
 def minimise(
@@ -35,20 +39,39 @@ def minimise(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
 ) -> list[Result]:
-    """Smallest objective under the limits, from each start; one result per start that was begun, best first.
+    """Smallest objective under the limits; one result per start that was begun, best first.
+
+    Parameters, results and errors are those of :func:`explore`.
+    """
+    return explore(problem, starts, settings, stop, jobs)[0]
+
+
+def explore(
+    problem: Problem,
+    starts: Array,
+    settings: OptimiseSettings,
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+    tell: Tell | None = None,
+) -> tuple[list[Result], Survey]:
+    """Smallest objective under the limits from one start after the other, until enough is known of the basins.
 
     Parameters
     ----------
     problem : what to minimise
     starts : (k, P) designs; their signs are kept, their variables are the starting points
-    settings : ``time_budget`` [s] or None is honoured; a start in progress then ends with its best design so far
-    stop : asked often; when it answers true, or at Ctrl-C, the search ends as if the time were used up
-    jobs : processes the starts are spread over, once the search turns out to take more than a second; the results are
-        those of one process, to the bit
+    settings : ``looks`` are allowed to each start; with ``finalists`` all starts have a first heat of 2000 looks and
+        only so many of the best go on, otherwise starts end when ``unseen`` and the best basin are as asked (see
+        :class:`sweep.optimise.survey.Survey`); ``time_budget`` [s] or None is an emergency brake
+    stop : asked often; when it answers true, or at Ctrl-C, the search ends and each start in progress keeps its best
+        design so far
+    jobs : processes the starts are spread over, once the search turns out to be long; results do not depend on it
+    tell : called with the number of starts that are done and the most there will be
 
     Returns
     -------
-    Feasible results by objective, then infeasible ones by violation.  Same starts, same results, unless time ran out.
+    Feasible results by objective, then infeasible ones by violation; and what they tell of the search.  The same
+    starts give the same results to the bit on any machine, busy or not, unless it was stopped.
 
     Raises
     ------
@@ -62,24 +85,72 @@ def minimise(
         raise InputError("starts", starts.shape, f"at least one row of {len(problem.family.parameters)} values", PLACE)
     Program(problem)  # an unknown name is refused here, not in a worker
     end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
+    results: list[Result] = []
+    ended = "starts"
     with _signals() as own:
 
         def asked() -> bool:
             return time.monotonic() >= end or bool(own) or (stop is not None and stop())
 
-        results, begun = _serial(problem, starts, asked, math.inf if jobs == 1 else SERIAL_SECONDS)
-        done = {r.start for r in results}
-        rest = [k for k in range(len(starts)) if k not in done]
-        stopped = any(r.ended == "interrupted" for r in results) or (bool(results) and asked())
-        if rest and not stopped:
-            results += in_processes(problem, starts, rest, asked, jobs)
-        if begun is not None and begun.start not in {r.start for r in results}:
-            results.append(begun)
+        heat = settings if settings.finalists is None else replace(settings, looks=min(TRIAL, settings.looks))
+        numbers = list(range(len(starts)))
+        for first in range(0, len(starts), BATCH):
+            batch = numbers[first : first + BATCH]
+            results += _batch(problem, starts, batch, results, heat, asked, jobs)
+            if tell is not None:
+                tell(len(results), len(starts))
+            last = batch[-1] == numbers[-1]
+            if _cut(results, first + len(batch)) or (not last and asked()):
+                ended = "time"
+                break
+            if settings.finalists is None and survey(problem, starts, results, settings, "").enough:
+                ended = "enough"
+                break
+        if settings.finalists is not None and ended == "starts":
+            results, whole = _final(problem, starts, results, settings, asked, jobs)
+            ended = "starts" if whole else "time"
     if own.signal_number is not None:
         results = [replace(r, ended="interrupted") if r.ended == "time" else r for r in results]
         if own.signal_number == signal.SIGTERM:
             signal.raise_signal(signal.SIGTERM)
-    return ranked(results)
+    if ended == "time" and (own.signal_number is not None or any(r.ended == "interrupted" for r in results)):
+        ended = "interrupted"
+    return ranked(results), survey(problem, starts, results, settings, ended)
+
+
+def _cut(results: Sequence[Result], count: int) -> bool:
+    """Whether a search was stopped before so many results were there, or within one."""
+    return len(results) < count or any(r.ended in CUT for r in results)
+
+
+def _final(
+    problem: Problem,
+    starts: Array,
+    results: list[Result],
+    settings: OptimiseSettings,
+    asked: Callable[[], bool],
+    jobs: int,
+) -> tuple[list[Result], bool]:
+    """The best of the starts that a first heat has left on their way, searched to their end; and whether all were.
+
+    In a long curved valley the value after so many looks tells how far down it leads.
+    """
+    left = sorted((r for r in results if r.ended == "looks"), key=lambda r: (not r.feasible, _rank(r), r.start))
+    chosen = [r.start for r in left[: settings.finalists]]
+    where = starts.copy()
+    for r in left:
+        where[r.start] = r.design
+    ends: list[Result] = []
+    for first in range(0, len(chosen), BATCH):
+        batch = chosen[first : first + BATCH]
+        ends += _batch(problem, where, batch, [*results, *ends], settings, asked, jobs)
+        if _cut(ends, first + len(batch)):
+            break
+    before = {r.start: r.looks for r in results}
+    ends = [replace(r, looks=r.looks + before[r.start]) for r in ends]
+    known = {r.start for r in ends}
+    others = [replace(r, ended="left") if r.ended == "looks" else r for r in results if r.start not in known]
+    return [*ends, *others], not _cut(ends, len(chosen))
 
 
 @contextmanager
@@ -92,35 +163,47 @@ def _signals() -> Iterator[Stop]:
         yield stop
 
 
-def _serial(
-    problem: Problem, starts: Array, asked: Callable[[], bool], seconds: float
-) -> tuple[list[Result], Result | None]:
-    """The starts one after the other, and how far the one came that has not ended after so many seconds.
+def _batch(
+    problem: Problem,
+    starts: Array,
+    numbers: list[int],
+    before: Sequence[Result],
+    settings: OptimiseSettings,
+    asked: Callable[[], bool],
+    jobs: int,
+) -> list[Result]:
+    """Results of some starts, in this process as long as few looks were needed, then in several.
 
-    That one is left to the workers, from its beginning; what is known counts if they are stopped before they get there.
+    A start that needs more looks than that is left to the processes, from its beginning; what is known of it counts if
+    they are stopped before they get there.
     """
     results: list[Result] = []
-    late = time.monotonic() + seconds
-    for number, start in enumerate(starts):
-        if results and asked():
+    left = math.inf if jobs == 1 else SERIAL_LOOKS - sum(r.looks for r in before)
+    begun: Result | None = None
+    for k, number in enumerate(numbers):
+        if (results or before) and (left <= 0 or asked()):
             break
-        last = number == len(starts) - 1  # a worker would do it no faster
-
-        def ask(last: bool = last) -> bool:
-            return asked() or (not last and time.monotonic() >= late)
-
-        found = search(number, problem, start, ask)
-        if found.ended == "time" and not asked():
-            return results, found
+        last = k == len(numbers) - 1  # a worker would do it no faster
+        own = settings.looks if last else min(left, settings.looks)
+        found = search(number, problem, starts[number], asked, own)
+        if found.ended == "looks" and own < settings.looks:
+            begun = found
+            break
         results.append(found)
-        if found.ended == "interrupted":
-            break
-    return results, None
+        left -= found.looks
+        if found.ended in CUT:
+            return results
+    rest = numbers[len(results) :]
+    if rest and not ((results or before or begun) and asked()):
+        results += in_processes(problem, starts, rest, asked, jobs, settings.looks)
+    if begun is not None and begun.start not in {r.start for r in results}:
+        results.append(replace(begun, ended="time"))
+    return results
 
 
 def ranked(results: list[Result]) -> list[Result]:
     """Feasible results by objective, then the others by violation; each told how many starts agree with the best."""
-    order = sorted(results, key=lambda r: (r.status == st.LIMIT_EXCEEDED, _rank(r), r.start))
+    order = sorted(with_basins(results), key=lambda r: (r.status == st.LIMIT_EXCEEDED, _rank(r), r.start))
     best = order[0]
     near = [r for r in order if _agrees(r, best)]
     return [replace(r, agree=len(near)) if _agrees(r, best) else r for r in order]
@@ -135,9 +218,3 @@ def _agrees(r: Result, best: Result) -> bool:
     if r.status == st.LIMIT_EXCEEDED or best.status == st.LIMIT_EXCEEDED:
         return r is best
     return abs(r.objective - best.objective) <= AGREE * max(abs(best.objective), 1e-300)
-
-
-def _deadline(seconds: float | None, stop: Callable[[], bool] | None) -> Callable[[], bool]:
-    """A question to ask often: is the time used up, or does the caller want to stop?"""
-    end = math.inf if seconds is None else time.monotonic() + seconds
-    return lambda: time.monotonic() >= end or (stop is not None and stop())

@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
 KEPT = 100_000  # best rows of a dataset that are looked at
 SCREENED = 256  # designs of a study's space per start where a dataset gives none
+ALIKE = 0.02  # of the average distance of two random designs: nearer designs of a sweep are one start
 
 
-def diverse(problem: Problem, designs: Array, merit: Array, count: int) -> Array:
+def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: float = 0.0) -> Array:
     """The best designs that keep a distance from each other, best first.
 
     The best one is taken, its neighbourhood left out, and so on; the distance (in variables scaled to their bounds) is
@@ -31,18 +32,20 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int) -> Array
     designs : (k, P)
     merit : (k,) the smaller the better; rows that are not finite are never taken
     count : how many at most
+    least : distance that is kept in any case, as a share of the average one of two random designs
     """
     order = np.argsort(merit, kind="stable")
     ranked = designs[order[np.isfinite(merit[order])]]
     others = [c for c in range(designs.shape[1]) if c not in problem.columns]
     _, kind = np.unique(ranked[:, others], axis=0, return_inverse=True)
-    return ranked[spread(problem.scaled(ranked), kind.reshape(-1), count)]
+    return ranked[spread(problem.scaled(ranked), kind.reshape(-1), count, least)]
 
 
-def spread(place: Array, kind: NDArray[np.intp], count: int) -> list[int]:
+def spread(place: Array, kind: NDArray[np.intp], count: int, least: float = 0.0) -> list[int]:
     """Numbers of at most ``count`` rows of ``place`` (k, n), ranked best first, that keep a distance from each other.
 
-    ``kind`` (k,): rows of different kinds are never neighbours.
+    ``kind`` (k,): rows of different kinds are never neighbours.  The distance is never less than ``least``, a share of
+    the average one of two random designs.
     """
     distance = 0.5 * np.sqrt(place.shape[1] / 6.0)  # half of what two random designs keep on average
     taken: list[int] = []
@@ -53,7 +56,7 @@ def spread(place: Array, kind: NDArray[np.intp], count: int) -> list[int]:
             taken.append(best)
             free &= ~((np.linalg.norm(place - place[best], axis=1) < distance) & (kind == kind[best]))
             free[best] = False
-        if len(taken) == count:
+        if len(taken) == count or 0.5 * distance < least * np.sqrt(place.shape[1] / 6.0):
             break
         distance *= 0.5
     return taken

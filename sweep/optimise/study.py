@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +19,18 @@ from sweep.families.base import Angles, Array, Parameter
 from sweep.optimise.candidates import ranking
 from sweep.optimise.certificate import Result
 from sweep.optimise.coordinates import LocusCoordinates
+from sweep.optimise.discrete import listed, with_neighbours
+from sweep.optimise.filling import filled, kinds
 from sweep.optimise.form import Program
+from sweep.optimise.linear import NEEDED, elimination
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
+from sweep.optimise.proportions import from_proportions, widened
+from sweep.optimise.robust import robust, yields
 from sweep.optimise.sensitivity import sensitivities
-from sweep.optimise.solve import minimise
-from sweep.optimise.starts import best_rows, diverse, drawn
+from sweep.optimise.solve import Tell, explore
+from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn
+from sweep.optimise.survey import CUT, Survey
 from sweep.optimise.tolerance import tolerance_rows
 from sweep.optimise.written import certificates, outputs, write
 
@@ -30,6 +38,7 @@ if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study
 
 POSES = 720
+SWEPT = 6  # of so many starts one comes from the sweep where there is a global search
 WHOLE_TURN = 2.0 * np.pi - 1e-9
 TAILS = (2.0, 98.0)  # percent; beyond are needles that hardly moved and were scaled up to the stroke
 
@@ -39,7 +48,7 @@ def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Pr
 
     Swept steady parameters vary between the ends of their axes, those that [locus] or [fit] sets or scales as far as
     ``designs`` (k, P) reach and half their size beyond; limits on parameters narrow both.  An angle swept over a whole
-    turn may go on for half a turn.
+    turn may go on for half a turn.  Parameters given as lists of values are not varied: each start keeps its own.
 
     On the locus, what it prescribes is varied instead of the links: fixed values hold by construction, axes are bounds,
     limits on links stay limits.  Otherwise what is prescribed becomes limits: equations where it is fixed.
@@ -61,14 +70,21 @@ def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Pr
         LocusCoordinates(study.locus) if study.locus and (_wanted(study) if on_locus is None else on_locus) else None
     )
     follows, given = ((), ()) if coordinates is None else (coordinates.made, coordinates.given)
-    bounds = {name: _bounds(study, name, designs) for name in (*study.family.parameter_names, *given)}
+    chosen = listed(study)
+    bounds = {
+        name: None if name in chosen else _bounds(study, name, designs)
+        for name in (*study.family.parameter_names, *given)
+    }
     varied = {name: ends for name, ends in bounds.items() if ends is not None and name not in follows}
     held = {name: ends[0] for name, ends in varied.items() if ends[0] == ends[1]}
     names = tuple(name for name in varied if name not in held)
     own = [name for name in (*study.family.parameter_names, *given) if name not in follows]
     fixed = {name: abs(x) if name in given else x for name, x in study.space.fixed.items() if name in own}
     limits = [limit for limit in study.output_limits if limit.output not in given]
-    limits += [limit for limit in study.parameter_limits if limit.output in follows]
+    limits += [limit for limit in study.parameter_limits if limit.output in (*follows, *chosen)]
+    if not names:
+        allowed = "a parameter that changes steadily beside the listed ones; the sweep has tried them all"
+        raise InputError("optimise", ", ".join(chosen), allowed, str(study.path))
     return Problem(
         study.family, names, np.array([varied[n][0] for n in names]), np.array([varied[n][1] for n in names]),
         fixed | held, study.objective.output, tuple(limits), study.window, study.accuracy, coordinates,
@@ -111,29 +127,63 @@ def _prescribed(study: Study) -> tuple[Parameter, ...]:
     return () if study.locus is None else study.locus.prescribed
 
 
-def problem_and_starts(study: Study, folder: Path) -> tuple[OptimiseSettings, Problem, Array]:
-    """Settings, problem and starts: the diverse best of the dataset, or of random designs where no row is feasible."""
+def problem_and_starts(
+    study: Study, folder: Path, stop: Callable[[], bool] = lambda: False
+) -> tuple[OptimiseSettings, Problem, Array]:
+    """Settings, problem and starts: the diverse best of the dataset, filled up from samples where they are too few.
+
+    Where no row of the dataset is feasible, the first starts are the best of random designs.  With
+    ``optimise.global = "proportions"`` five of six starts come from the search over proportions instead; ``stop`` ends
+    it early.
+    """
     if study.optimise is None or study.objective is None:
         raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
-    count = study.optimise.starts
+    settings = study.optimise
+    count, seed = settings.starts, settings.seed
     designs, merit = best_rows(study.family, study.objective.output, folder)
+    if settings.globally == "proportions":
+        known = designs if len(designs) else drawn(study, count, seed)
+        return settings, *_from_proportions(study, settings, known, merit, stop)
     if len(designs):
         problem = problem_of(study, designs)
-    else:
-        designs = drawn(study, count, study.optimise.seed)
-        if not len(designs):
-            raise InputError(
-                "design space",
-                study.space.count,
-                "at least one design that [locus] and [fit] can make",
-                str(study.path),
-            )
-        problem = problem_of(study, designs)
-        merit = ranking(problem, designs)
-    return study.optimise, problem, diverse(problem, designs, merit, count)
+        return settings, problem, filled(study, problem, diverse(problem, designs, merit, count, ALIKE), count, seed)
+    designs = drawn(study, count, seed)
+    if not len(designs):
+        allowed = "at least one design that [locus] and [fit] can make"
+        raise InputError("design space", study.space.count, allowed, str(study.path))
+    problem = problem_of(study, designs)
+    # Half of them from the space itself: a sample of the problem's variables may miss what [locus] or [fit] makes.
+    own = diverse(problem, designs, ranking(problem, designs), -(-count // 2), ALIKE)
+    return settings, problem, filled(study, problem, own, count, seed)
 
 
-def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | None = None, jobs: int = 1) -> Path:
+def _from_proportions(
+    study: Study, settings: OptimiseSettings, known: Array, merit: Array, stop: Callable[[], bool]
+) -> tuple[Problem, Array]:
+    """Problem and starts: those of the global search, before them a few of the sweep."""
+    count = settings.starts
+    problem = problem_of(study, known)
+    linear = elimination(problem)
+    if linear is None:
+        raise InputError("optimise.global", "proportions", NEEDED, str(study.path))
+    own = diverse(problem, known, merit, count // SWEPT, ALIKE) if len(merit) else known[:0]
+    found = from_proportions(linear, kinds(study, problem, own), count - len(own), settings.seed, stop)
+    starts = np.concatenate([own, found])
+    problem = widened(problem, found, [n for n in problem.variables if n in study.made])
+    if not len(starts):
+        raise InputError(
+            "design space", study.space.count, "proportions with which the mechanism turns", str(study.path)
+        )
+    return problem, starts
+
+
+def optimise_study(
+    study: Study,
+    folder: str | Path,
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+    tell: Tell | None = None,
+) -> Path:
     """Search from diverse best designs of the dataset and write the result beside it.
 
     Parameters
@@ -142,11 +192,13 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
     folder : its dataset; where it has no feasible row, the starts come from a sample of the same bounds
     stop : asked often; true ends the search as Ctrl-C does
     jobs : processes the starts are spread over; the result does not depend on it
+    tell : called with the number of starts that are done and the most there will be
 
     Returns
     -------
-    Path of ``_optimum.parquet``; ``_curves.parquet``, ``_sensitivity.parquet`` and, where the study has tolerances,
-    ``_tolerance.parquet`` stand beside it.  Each is written as a whole or not at all.
+    Path of ``_optimum.parquet``, whose metadata hold what the starts tell of the search (:func:`read_survey`);
+    ``_curves.parquet``, ``_sensitivity.parquet`` and, where the study has tolerances, ``_tolerance.parquet`` stand
+    beside it.  Each is written as a whole or not at all.
 
     Raises
     ------
@@ -158,35 +210,67 @@ def optimise_study(study: Study, folder: str | Path, stop: Callable[[], bool] | 
         if the search was stopped, after the best so far was written.
     """
     place = Path(folder)
-    settings, problem, starts = problem_and_starts(study, place)
-    results = minimise(problem, starts, settings, stop, jobs)
-    frame = _table(study, problem, results)
-    write(place / store.OPTIMUM, frame, study)
-    write(place / store.CURVES, _curves(study, frame), study)
-    write(place / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
+    settings, problem, starts = problem_and_starts(study, place, stop or (lambda: False))
+    results, found = explore(problem, starts, settings, stop, jobs, tell)
+    catalogue = listed(study)
+    if catalogue and found.ended not in CUT:
+        results = with_neighbours(problem, results, catalogue, settings, stop, jobs)
+    nominal = results[0]
+    if study.tolerance is not None and study.tolerance.robust is not None and found.ended not in CUT:
+        made = robust(problem, results, study.tolerance, settings, stop, jobs)
+        results = results if made is None else [made.result, *results]
+    side = store.beside(place)
+    frame = _table(study, problem, results, nominal)
+    about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}
+    write(side / store.OPTIMUM, frame, study, about=about)
+    write(side / store.CURVES, _curves(study, frame), study)
+    write(side / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
     if study.tolerance is None:
-        (place / store.TOLERANCE).unlink(missing_ok=True)
+        (side / store.TOLERANCE).unlink(missing_ok=True)
     else:
-        write(place / store.TOLERANCE, _by_role(study, frame, _tolerance), study)
-    if any(result.ended == "interrupted" for result in results) or (stop is not None and stop()):
+        write(side / store.TOLERANCE, _by_role(study, frame, _tolerance), study)
+    if found.ended == "interrupted" or (stop is not None and stop()):
         raise KeyboardInterrupt
-    return place / store.OPTIMUM
+    return side / store.OPTIMUM
 
 
-def _table(study: Study, problem: Problem, results: list[Result]) -> dict[str, Any]:
-    """One row per start, best first, then the reference."""
+def read_survey(path: Path) -> Survey | None:
+    """What the starts told of the search that a ``_optimum.parquet`` comes from; None where there is no such file."""
+    import pyarrow.parquet as pq
+
+    if not path.is_file():
+        return None
+    noted = (pq.read_schema(path).metadata or {}).get(b"search")
+    if noted is None:
+        return None
+    content = json.loads(noted)
+    return Survey(**content | {"kinds": tuple(tuple(kind) for kind in content["kinds"])})
+
+
+def _table(study: Study, problem: Problem, results: list[Result], nominal: Result) -> dict[str, Any]:
+    """One row per start, best first, then the reference; a robust design stands before the ``nominal`` best."""
     designs = np.array([r.design for r in results])
-    rows: dict[str, list[Any]] = {"role": ["optimum", *("start" for _ in results[1:])]}
+    roles = ["nominal" if r is nominal else "start" for r in results[1:]]
+    rows: dict[str, list[Any]] = {"role": ["optimum", *roles]}
     rows |= {"start": [r.start for r in results]} | certificates(results)
     if study.reference is not None:
         reference, violation = _reference(study, problem)
         designs = np.concatenate([designs, reference])
         status = st.OK if violation <= 1e-9 else st.LIMIT_EXCEEDED
-        last: tuple[Any, ...] = ("reference", -1, violation, np.nan, np.nan, "", "", 1, "", status)
+        last: tuple[Any, ...] = ("reference", -1, violation, np.nan, np.nan, "", "", 1, 0, "", 0, status)
         for name, value in zip(rows, last, strict=True):
             rows[name].append(value)
+    if study.tolerance is not None:
+        shown = [k for k, role in enumerate(rows["role"]) if role != "start"]
+        share = np.full(len(designs), np.nan)
+        share[shown] = yields(problem, designs[shown], study.tolerance, _seed(study))
+        rows["yield"] = share.tolist()
     columns: dict[str, Any] = {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}
     return {"role": rows.pop("role"), "start": rows.pop("start")} | columns | outputs(study, designs) | rows
+
+
+def _seed(study: Study) -> int:
+    return 0 if study.optimise is None else study.optimise.seed
 
 
 def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
@@ -218,7 +302,7 @@ def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Arra
     """Rows about the optimum and about the reference, one below the other."""
     rows: dict[str, list[Any]] = {"role": []}
     for k, role in enumerate(table["role"]):
-        if role in ("optimum", "reference"):
+        if role != "start":
             own = rows_of(study, np.array([table[name][k] for name in study.family.parameter_names], np.float64))
             rows["role"] += [role] * len(own["output"])
             for name, values in own.items():

@@ -18,6 +18,12 @@ SIGMAS = 3.0  # a tolerance of +-t is three standard deviations
 BAND = (2.5, 97.5)  # percent
 
 
+def touched(family: Family, tolerance: Tolerance) -> Array:
+    """Tolerance (P,) of every parameter: that of lengths, of angles, zero for all others."""
+    widths = {"length": tolerance.lengths, "angle": tolerance.angles}
+    return np.array([widths.get(p.unit, 0.0) if p.choices is None else 0.0 for p in family.parameters])
+
+
 def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, samples: int = SAMPLES) -> Array:
     """Designs (samples, P) about one, every length and angle normally distributed, independent of each other.
 
@@ -32,8 +38,7 @@ def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, sa
     from scipy.special import ndtri
     from scipy.stats import qmc
 
-    widths = {"length": tolerance.lengths, "angle": tolerance.angles}
-    sigma = np.array([widths.get(p.unit, 0.0) / SIGMAS if p.choices is None else 0.0 for p in family.parameters])
+    sigma = touched(family, tolerance) / SIGMAS
     varied = np.flatnonzero(sigma)
     uniform = qmc.Sobol(len(varied), seed=seed).random(samples)
     designs = np.repeat(design[None, :], samples, axis=0)
@@ -58,7 +63,7 @@ def tolerance_rows(
     ----------
     family, design : (P,) what is made
     outputs : names of design outputs
-    limits : those that ``within`` counts
+    limits : those that ``within`` counts; equations are left out, since nothing that is made keeps them
     tolerance, seed : see :func:`deviating`
     accuracy, window : as for ``summarise``
 
@@ -71,6 +76,7 @@ def tolerance_rows(
     from sweep.chunks.cascade import meets
     from sweep.evaluation.summaries import design_outputs
 
+    limits = [limit for limit in limits if limit.minimum is None or limit.minimum != limit.maximum]
     designs = np.concatenate([design[None, :], deviating(family, design, tolerance, seed)])
     columns: dict[str, Any] = design_outputs(family, designs, list(outputs), accuracy, window)
     rows: dict[str, list[Any]] = {

@@ -18,7 +18,11 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 TEXTS = {
-    "role": ("", "optimum (the best start's result), start (another start's), or reference"),
+    "role": (
+        "",
+        "optimum, nominal (best drawing where the optimum is robust), start (another one's), or reference",
+    ),
+    "yield": ("1", "share of toleranced mechanisms that keep all limits on outputs; nan for other starts"),
     "start": ("", "number of the start, best candidate first; -1 for the reference"),
     "violation": ("1", "largest violation of a limit, relative to the limit; for pressure angles of its sin^2"),
     "kkt_residual": ("1", "residual of the optimality conditions, variables scaled to their bounds"),
@@ -26,7 +30,9 @@ TEXTS = {
     "active": ("", "limits and bounds that hold the result back"),
     "relaxation": ("", "where infeasible: by how much each limit would have to give way, in its internal unit"),
     "agree": ("", "number of starts whose objective is within 1e-4 of the best; 1 for those that are not"),
-    "ended": ("", "converged, stalled, infeasible, time or interrupted"),
+    "basin": ("", "number of the value it ended at, 1 for the best, values within 1e-4 are one; 0 where infeasible"),
+    "ended": ("", "converged, stalled, infeasible, looks, left (after the first heat), time, interrupted"),
+    "looks": ("", "evaluations of designs by the search from this start"),
     "status": ("", "see kernels.status"),
     "parameter": ("", "dimension that changes"),
     "output": ("", "design output; its unit is that of _optimum.parquet"),
@@ -51,7 +57,9 @@ def certificates(results: list[Result]) -> dict[str, list[Any]]:
         "active": ["; ".join(r.active) for r in results],
         "relaxation": ["; ".join(f"{k} by {v:.6g}" for k, v in r.relaxation.items()) for r in results],
         "agree": [r.agree for r in results],
+        "basin": [r.basin for r in results],
         "ended": [r.ended for r in results],
+        "looks": [r.looks for r in results],
         "status": [r.status for r in results],
     }
 
@@ -101,7 +109,8 @@ def write(
     metadata = {"study": study.name, "fingerprint": study.fingerprint, "caveat": CAVEAT} | dict(about)
     schema = pa.schema(fields, metadata=metadata)
     sink = pa.BufferOutputStream()
-    pq.write_table(pa.Table.from_arrays(list(arrays.values()), schema=schema), sink, compression="zstd")
+    table = pa.Table.from_arrays(list(arrays.values()), schema=schema)
+    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     store.write_atomically(path, bytes(sink.getvalue()))
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sweep.dataset.layout import beside, is_older, located
+
 
 def write_report(folder: str | Path, out: str | Path | None = None) -> Path:
     """Write the report of a dataset.
@@ -11,7 +13,7 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Path:
     Parameters
     ----------
     folder : dataset that ``sweep.run`` left behind, complete
-    out : where to write; default ``FOLDER/_report``
+    out : where to write; default beside the chunks, ``results/<name>`` for ``results/<name>/designs``
 
     Returns
     -------
@@ -28,8 +30,12 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Path:
     """
     from sweep.report.page import write
 
-    folder = Path(folder)
-    return write(folder, folder / "_report" if out is None else Path(out))
+    place = located(folder)
+    return write(place, _default(place) if out is None else Path(out))
+
+
+def _default(folder: Path) -> Path:
+    return folder / "_report" if is_older(folder) else beside(folder)
 
 
 __all__ = ["write_report"]

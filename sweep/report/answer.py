@@ -29,7 +29,7 @@ def answer(data: Dataset, found: Scan) -> list[str]:
         stops = max(fates(data, found)[:-1], key=lambda fate: fate.count, default=None)
         most = [] if stops is None else [f"What stops most of them, {_count(stops.count)}: {stops.text}."]
         return [f"No design of the {_count(total)} in the sweep meets all limits.", *most]
-    sentences = []
+    sentences = search_warnings(data)
     who = "The optimum" if data.optimum is not None else "The best design of the sweep"
     if data.optimum is not None and int(data.optimum.get("status", 0)) == codes.LIMIT_EXCEEDED:
         sentences.append("No design was found that keeps all limits; what follows is the nearest one found.")
@@ -154,6 +154,13 @@ def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
     return [f"{text}; the best of them has {shown.symbol} = {shown.show(best)}, from where the optimiser went on."]
 
 
+def search_warnings(data: Dataset) -> list[str]:
+    """What a reader has to know before trusting the optimum: time that ran out, fewer starts than asked."""
+    found = [] if data.survey is None else [f"{text[0].upper()}{text[1:]}." for text in data.survey.warnings]
+    front = data.front_steps
+    return found if front is None else [*found, f"Time ran out: {front} steps of the front."]
+
+
 def _residual(value: float) -> str:
     return "its KKT residual does not exist" if math.isnan(value) else f"KKT residual {number(value, 3)}"
 
@@ -166,6 +173,8 @@ def _proof(data: Dataset, found: Scan) -> str:
     text = f"{NO_PROOF}: the optimiser started from {starts} {kind}design{'s' if starts != 1 else ''} of the sweep"
     if math.isfinite(agree):
         text += f", {number(agree)} of which ended at this value"
+    if data.survey is not None:
+        text += f"; {data.survey.words}"
     residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
     words = "" if math.isnan(residual) else f"{_residual(residual)}, "
     return f"{text}. {words}{'l' if words else 'L'}argest violation of a limit {number(violation, 3)}."

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from sweep.dataset import store
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
+from sweep.optimise import Survey, read_survey
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +27,8 @@ class Dataset:
 
     ``units`` and ``definitions`` come from the field metadata of the Parquet files; ``best`` is the best row of the
     sweep once it has been read, None if no design is feasible; ``computed_reference`` the reference where no optimiser
-    has left it in the folder.
+    has left it in the folder.  ``survey`` is what the starts tell of the search; ``front_steps`` says how far the front
+    came that time has cut short.
     """
 
     folder: Path
@@ -39,6 +41,8 @@ class Dataset:
     curves: pd.DataFrame | None
     front: pd.DataFrame | None
     runs: tuple[dict[str, Any], ...]
+    survey: Survey | None = None
+    front_steps: str | None = None
     best: Row | None = None
     computed_reference: Row | None = None
 
@@ -128,8 +132,6 @@ def read_dataset(folder: Path) -> Dataset:
     InputError
         if the folder is no complete dataset.
     """
-    import pandas as pd
-
     plan = store.read_plan(folder)
     if plan is None:
         allowed = f"a dataset folder, with a readable {store.PLAN} (sweep run makes one)"
@@ -140,7 +142,7 @@ def read_dataset(folder: Path) -> Dataset:
         counts, missed = store.totals(folder)
         plan |= {"counts": counts, "missed": missed}
     study = study_of(plan, folder)
-    optima, curves, front = folder / store.OPTIMUM, folder / store.CURVES, folder / store.PARETO
+    optima, curves, front = (store.beside(folder) / name for name in (store.OPTIMUM, store.CURVES, store.PARETO))
     parts = tuple(part.path for part in store.parts(folder))
     units, definitions = field_metadata([path for path in (*parts[:1], optima, curves, front) if path.exists()])
     return Dataset(
@@ -150,10 +152,12 @@ def read_dataset(folder: Path) -> Dataset:
         parts=parts,
         units={o.name: o.unit.replace("length", "mm") for o in study.family.pose_outputs} | units,
         definitions={o.name: o.text for o in study.family.pose_outputs} | definitions,
-        optima=pd.read_parquet(optima) if optima.exists() else None,
-        curves=pd.read_parquet(curves) if curves.exists() else None,
-        front=pd.read_parquet(front) if front.exists() else None,
+        optima=store.read_table(optima) if optima.exists() else None,
+        curves=store.read_table(curves) if curves.exists() else None,
+        front=store.read_table(front) if front.exists() else None,
         runs=tuple(store.read_runs(folder)),
+        survey=read_survey(optima),
+        front_steps=store.front_cut_short(front),
     )
 
 
@@ -162,7 +166,7 @@ def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
     from sweep.study.load import study_from_data
 
     about = plan.get("about", {"name": plan["name"]})
-    return study_from_data({**plan["data"], "study": about}, folder / store.PLAN)
+    return study_from_data({**plan["data"], "study": about}, store.beside(folder) / store.PLAN)
 
 
 def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str]]:

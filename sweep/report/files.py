@@ -6,11 +6,13 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from sweep.dataset.layout import beside
+
 
 def copy_tables(folder: Path, out: Path) -> None:
     """The optimum with its curves, sensitivities and tolerances, and the front, where the study has them."""
     for name in ("optimum.parquet", "curves.parquet", "sensitivity.parquet", "tolerance.parquet", "pareto.parquet"):
-        source, target = folder / f"_{name}", out / name
+        source, target = beside(folder) / f"_{name}", out / name
         if source.exists():
             shutil.copyfile(source, target)
         else:

@@ -77,7 +77,7 @@ def divided_axes(study: Study, feasible: int) -> list[Cells]:
     """
     signs = {p.name for p in study.family.parameters if p.choices is not None}
     left_out = signs.union(study.made, study.rescaled)
-    swept = [axis for axis in study.space.axes if axis.high > axis.low and axis.name not in left_out]
+    swept = [axis for axis in study.space.axes if axis.varies and axis.name not in left_out]
     most = CELLS_OF_PAIR if len(swept) <= 2 else CELLS_OF_MANY
     if study.space.kind == "sobol":
         # A power of two: a Sobol sequence puts equally many points into such cells.

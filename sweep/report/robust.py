@@ -92,10 +92,8 @@ def _percent(value: float) -> str:
 
 
 def _rows(data: Dataset, file: str) -> list[dict[str, Any]]:
-    import pandas as pd
-
-    path = data.folder / file
+    path = store.beside(data.folder) / file
     if not path.exists():
         return []
-    frame = pd.read_parquet(path)
+    frame = store.read_table(path)
     return [{str(k): v for k, v in row.items()} for row in frame[frame["role"] == "optimum"].to_dict("records")]

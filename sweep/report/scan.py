@@ -32,6 +32,9 @@ class Cells:
     def of_values(cls, name: str, values: Array, most: int) -> Cells:
         """Cells of a lattice axis; neighbouring values share a cell where there are more than ``most``."""
         ordered = np.unique(values)
+        if ordered.size == 1:
+            reach = 0.5 * abs(ordered[0]) or 0.5
+            return cls(name, np.array([ordered[0] - reach, ordered[0] + reach]), np.ones(1))
         boundaries = np.concatenate(
             [
                 [1.5 * ordered[0] - 0.5 * ordered[1]],

@@ -16,6 +16,7 @@ from sweep.study.sobol import DIMENSIONS
 from sweep.study.space import Axis, DesignSpace
 
 MOST_DESIGNS = 10**12
+LARGEST = 1e100  # number that may stand in a study
 
 Entry: TypeAlias = Axis | float
 
@@ -78,10 +79,11 @@ def read_space(
     return DesignSpace(names, axes, fixed, "sobol", sample.n or 0, sample.seed)
 
 
-def check_varied(family: Family, space: DesignSpace, faults: Faults) -> None:
-    """Report a space in which [optimise] finds nothing to vary: signs do not change steadily."""
+def check_varied(family: Family, space: DesignSpace, raw: Mapping[str, Any], faults: Faults) -> None:
+    """Report a space in which [optimise] finds nothing to vary: signs and listed values do not change steadily."""
     signs = [p.name for p in family.parameters if p.choices is not None]
-    if not any(axis.low < axis.high and axis.name not in signs for axis in space.axes):
+    lists = [name for name, entry in raw.items() if isinstance(entry, dict) and "values" in entry]
+    if not any(axis.low < axis.high and axis.name not in (*signs, *lists) for axis in space.axes):
         faults.value(("optimise",), "no swept parameter", "a study with a length, angle or number that is swept")
 
 
@@ -160,7 +162,9 @@ def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | 
         return None
     bare = raw if isinstance(raw, (int, float)) and not isinstance(raw, bool) else None
     if bare is None or internal != "1":
-        faults.value(key, raw, _forms(p, bare if bare is not None and math.isfinite(bare) else None))
+        # A whole number may have more digits than a float has room for.
+        shown = bare if bare is not None and abs(bare) <= LARGEST else None
+        faults.value(key, raw, _forms(p, shown))
         return None
     return _read_fixed(p, {"value": raw}, key, faults)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +45,8 @@ def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple
             if entry is not True:
                 faults.value(key, entry, "true")
             found.append(Limit(name, minimum=1.0))
+        elif isinstance(entry, str) and "+-" in entry:
+            found += _read_band(output, entry, key, faults)
         elif isinstance(entry, dict):
             found += _read_bounds(output, entry, key, faults)
         else:
@@ -83,6 +86,30 @@ def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Fault
         return []
     bounds = [None if bound is None else bound * factor for bound in (entry.min, entry.max)]
     return [Limit(output.name, *bounds)]
+
+
+def _read_band(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
+    """A value and how far it may be missed, as "40 +- 0.2 deg"."""
+    internal = units.internal_unit(output.unit)
+    middle, _, width = (part.strip() for part in text.partition("+-"))
+    try:
+        half, unit = units.split(width, internal) if internal != "1" else (float(width), "1")
+        factor = units.factor(unit, internal)
+        centre = float(middle)
+    except units.UnitFault as fault:
+        faults.value(key, text, str(fault))
+        return []
+    except ValueError:
+        faults.value(key, text, f"a value and its band, as {_band(internal)}")
+        return []
+    if not (half > 0.0 and math.isfinite(centre) and math.isfinite(half)):
+        faults.value(key, text, f"a finite value and a positive band, as {_band(internal)}")
+        return []
+    return [Limit(output.name, (centre - half) * factor, (centre + half) * factor)]
+
+
+def _band(internal: str) -> str:
+    return {"1": '"2 +- 0.1"', "rad": '"40 +- 0.2 deg"'}.get(internal, f'"24.5 +- 0.1 {internal}"')
 
 
 def _form(output: Output) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from sweep.errors import InputError, StudyError, closest, nearest
 from sweep.families import NAMES, Specification
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
+from sweep.families.chain import Chain
 from sweep.families.members import Machine
 from sweep.quantities.names import parts
 from sweep.reductions.catalogue import check_certifiable
@@ -42,7 +42,8 @@ from sweep.study.model import (
 )
 from sweep.study.pareto import read_pareto
 from sweep.study.prescribed import prescribed_limits, read_locus, read_prescribed
-from sweep.study.study import Budget, Objective, OptimiseSettings, OutputSettings, Study, Tolerance
+from sweep.study.study import Budget, Limit, Objective, OptimiseSettings, OutputSettings, Study, Tolerance
+from sweep.study.toml import read_toml
 
 if TYPE_CHECKING:
     from sweep.synthesis.fit import LineFit
@@ -65,10 +66,10 @@ def load_study(path: str | Path, smoke: bool = False) -> Study:
     """
     file = Path(path)
     file = file / "study.toml" if file.is_dir() else file
-    files = {file.name: _read_toml(file)}
+    files = {file.name: read_toml(file)}
     if smoke:
         beside = file.with_name("smoke.toml")
-        files[beside.name] = _read_toml(beside)
+        files[beside.name] = read_toml(beside)
         return _build(merged(files[file.name], files[beside.name]), file, files)
     return _build(files[file.name], file, files)
 
@@ -118,22 +119,6 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...
     return result
 
 
-def _read_toml(file: Path) -> dict[str, Any]:
-    try:
-        text = file.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise StudyError(str(file), [f"{file.name}: cannot be read: {error.strerror}"]) from None
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise StudyError(str(file), [f"{file.name}: line {line} is no UTF-8 text"]) from None
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        line, column = text.count("\n") + 1, len(text) - text.rfind("\n")
-        message = str(error).replace("at end of document", f"at line {line}, column {column}, the end of the file")
-        raise StudyError(str(file), [f"{file.name}: {message}"]) from None
-
-
 def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str, Any]]) -> Study:
     members = data.get("machine")
     data = flattened(data, members)
@@ -162,6 +147,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     speed = _quantity(scene.speed, "rad/s", ("scene", "speed"), faults)
     window = _window(scene, faults)
     time_budget = _quantity(search.time_budget, "s", ("optimise", "time_budget"), faults)
+    unseen = _share(search.unseen, ("optimise", "unseen"), faults)
     tolerance = _tolerance(_section(ToleranceSection, "tolerance", data, faults), data, faults)
     disk_bytes = _quantity(budget.disk, "B", ("budget", "disk"), faults)
     seconds = _quantity(budget.time, "s", ("budget", "time"), faults)
@@ -191,6 +177,9 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     for name in [name for name in bounds or () if name in prescribed]:
         faults.value(("limits", name), (bounds or {})[name], "nothing here: [locus] prescribes it")
     limits = (*prescribed_limits(prescribed), *read_limits(family, bounds or {}, faults))
+    chained = [stage.family.name for stage in bare.stages] if isinstance(bare, Chain) else []
+    if search.globally == "proportions" and chained != ["rssr", "guide"]:
+        faults.value(("optimise", "global"), "proportions", '"none", or the chain ["rssr", "guide"]')
     if goal is not None:
         read_output_name(family, goal, ("objective", "minimise"), faults)
     pareto = None
@@ -203,10 +192,12 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
     made = () if locus is None else locus.made
     space = None if design is None else read_space(family, design, faults, fitted, given, made, prescribed)
     if "optimise" in data and space is not None and fit is None and (locus is None or search.variables != "parameters"):
-        check_varied(family, space, faults)
+        check_varied(family, space, design or {}, faults)
     # The inputs of effects describe the scene: the reference design has the same unless it says otherwise.
     if space is not None:
         given |= {name: x for name, x in space.fixed.items() if name not in (*bare.parameter_names, *prescribed)}
+    if tolerance is not None:
+        _check_touched(family, tolerance, limits, faults)
     reference = None if reference_design is None else read_reference(family, reference_design, faults, given)
     _check_figures(report, faults)
     _check_curves(report, [*prescribed, *(name for name in design or () if name in family.parameter_names)], faults)
@@ -234,9 +225,7 @@ def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str,
         objective=Objective(goal) if goal else None,
         accuracy=accuracy,
         window=window,
-        optimise=OptimiseSettings(search.starts, search.seed, time_budget, search.variables)
-        if "optimise" in data
-        else None,
+        optimise=_search_settings(search, time_budget, unseen) if "optimise" in data else None,
         pareto=pareto,
         tolerance=tolerance,
         reference=reference,
@@ -279,6 +268,27 @@ def _quantity(text: str | None, internal: str, key: Key, faults: Faults) -> floa
     return value
 
 
+def _search_settings(search: OptimiseSection, time_budget: float | None, unseen: float) -> OptimiseSettings:
+    return OptimiseSettings(
+        starts=search.starts,
+        seed=search.seed,
+        time_budget=time_budget,
+        variables=search.variables,
+        unseen=unseen,
+        looks=search.looks,
+        globally=search.globally,
+        finalists=search.finalists,
+    )
+
+
+def _share(text: str, key: Key, faults: Faults) -> float:
+    """A text such as "2 %" as a share between 0 and 1, neither of them."""
+    share = _quantity(text, "1", key, faults)
+    if share is not None and not share < 1.0:
+        faults.value(key, text, 'a share below 100 %, as "2 %"')
+    return 0.5 if share is None else share
+
+
 def _tolerance(section: ToleranceSection, data: Mapping[str, Any], faults: Faults) -> Tolerance | None:
     if "tolerance" not in data:
         return None
@@ -288,7 +298,19 @@ def _tolerance(section: ToleranceSection, data: Mapping[str, Any], faults: Fault
         faults.missing(("tolerance", "lengths"), 'a length as "0.02 mm"; or angles, as "0.05 deg"', instead="angles")
     lengths = _quantity(section.lengths, "mm", ("tolerance", "lengths"), faults)
     angles = _quantity(section.angles, "rad", ("tolerance", "angles"), faults)
-    return Tolerance(lengths or 0.0, angles or 0.0)
+    share = None if section.robust is None else _share(section.robust, ("tolerance", "robust"), faults)
+    return Tolerance(lengths or 0.0, angles or 0.0, share)
+
+
+def _check_touched(family: Family, tolerance: Tolerance, limits: Sequence[Limit], faults: Faults) -> None:
+    """Report tolerances that change nothing, and a robust search for what no made mechanism can keep."""
+    for key, unit, size in (("lengths", "length", tolerance.lengths), ("angles", "angle", tolerance.angles)):
+        if size > 0.0 and not any(p.unit == unit and p.choices is None for p in family.parameters):
+            faults.value(("tolerance", key), size, f"nothing: {family.name} has no {key} that could deviate")
+    equal = [x.output for x in limits if x.minimum is not None and x.minimum == x.maximum]
+    if tolerance.robust is not None and equal:
+        words = 'limits with room, as swing = "40 +- 0.2 deg": no mechanism that is made keeps an equation'
+        faults.value(("tolerance", "robust"), ", ".join(equal), words)
 
 
 def _window(scene: SceneSection, faults: Faults) -> tuple[float, float] | None:
@@ -359,7 +381,7 @@ def _mechanism(data: Mapping[str, Any], faults: Faults) -> tuple[tuple[str, ...]
     """What [mechanism] or [machine] says, and the family, chain or machine; None with its faults."""
     if "machine" not in data:
         if "mechanism" not in data:
-            faults.missing(("mechanism",), "a table [mechanism], or [machine.NAME] for several mechanisms")
+            faults.missing(("mechanism",), "a table [mechanism]")
         if "relations" in data:
             faults.value(("relations",), data["relations"], "nothing here: relations are those of a [machine]")
         names = _families(_section(MechanismSection, "mechanism", data, faults), data, faults)

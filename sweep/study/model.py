@@ -136,8 +136,12 @@ class OptimiseSection(Section):
 
     starts: Annotated[int, Field(ge=1, le=100_000)] = Field(20, description="a whole number, 1 to 100000")
     seed: Seed = Field(0, description="a whole number, 0 or greater")
+    unseen: str = Field("2 %", description='a share as a text, as "2 %"')
+    looks: Annotated[int, Field(ge=100, le=10_000_000)] = Field(20_000, description="a whole number, 100 to 10000000")
+    finalists: Annotated[int, Field(ge=1, le=100_000)] | None = Field(None, description="a whole number, 1 to 100000")
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
     variables: Literal["parameters", "locus"] | None = Field(None, description='"parameters" or "locus"')
+    globally: Literal["none", "proportions"] = Field("none", alias="global", description='"none" or "proportions"')
 
 
 class ParetoSection(Section):
@@ -156,6 +160,7 @@ class ToleranceSection(Section):
 
     lengths: str | None = Field(None, description='a length as a text, as "0.02 mm"')
     angles: str | None = Field(None, description='an angle as a text, as "0.05 deg"')
+    robust: str | None = Field(None, description='a share as a text, as "95 %"')
 
 
 class ReferenceSection(Section):
@@ -177,7 +182,7 @@ class BudgetSection(Section):
     """[budget]"""
 
     disk: str = Field("20 GB", description='a size as a text, as "20 GB"')
-    time: str = Field("1 h", description='a time as a text, as "1 h"')
+    time: str = Field("1 h", description='a time as a text, as "60 s"')
 
 
 class CurveTable(Section):

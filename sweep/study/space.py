@@ -64,6 +64,11 @@ class Axis:
         """Number of values; 0 for a sampled axis, which has no list of them."""
         return 0 if self.values is None else len(self.values)
 
+    @property
+    def varies(self) -> bool:
+        """Whether designs differ in it: a lattice of one value has two ends all the same."""
+        return self.high > self.low and self.count != 1
+
     def at(self, fraction: Array) -> Array:
         """Value for numbers in (0, 1): the listed one whose equal share it falls in, or a point between the ends."""
         if self.values is not None:

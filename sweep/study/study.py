@@ -42,15 +42,24 @@ class Objective:
 
 @dataclass(frozen=True)
 class OptimiseSettings:
-    """Number of starts of the local search, seed of their choice, time allowed [s], and what is varied.
+    """The most starts of the local search, seed of their choice, what ends it earlier, and what is varied.
 
     ``variables`` is "locus" for what [locus] prescribes, "parameters" for the links, None for what suits the study.
+    ``unseen`` is the estimated share of unseen basins below which no more starts are made once the best basin was met
+    often enough; ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from
+    evolution strategies over what is not linear; ``finalists`` is the number of starts that go on after a first heat,
+    None for all.  ``time_budget`` [s] is an emergency brake: what it stops says so, and no result that was not stopped
+    depends on it.
     """
 
     starts: int = 20
     seed: int = 0
     time_budget: float | None = None
     variables: Literal["parameters", "locus"] | None = None
+    unseen: float = 0.02
+    looks: int = 20_000
+    globally: Literal["none", "proportions"] = "none"
+    finalists: int | None = None
 
 
 @dataclass(frozen=True)
@@ -58,7 +67,8 @@ class ParetoSettings:
     """Bounds on a second output for each of which the least objective is searched.
 
     ``bounds`` are upper ones, or with ``at_least`` lower ones; ``starts`` designs of the sweep within each bound are
-    searched besides the optimum and the result of the next looser bound; ``time_budget`` [s] is for the whole front.
+    searched besides the optimum and the result of the next looser bound; ``time_budget`` [s] for the whole front is an
+    emergency brake.
     """
 
     output: str
@@ -70,10 +80,14 @@ class ParetoSettings:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Manufacturing tolerances: +- of every length [mm] and of every angle [rad]; zero is exact."""
+    """Manufacturing tolerances: +- of every length [mm] and of every angle [rad]; zero is exact.
+
+    ``robust`` is the share of mechanisms within them that have to keep the limits; None asks it of the drawing alone.
+    """
 
     lengths: float = 0.0
     angles: float = 0.0
+    robust: float | None = None
 
 
 @dataclass(frozen=True)
@@ -182,17 +196,22 @@ class Study:
             "objective": self.objective and self.objective.output,
             "accuracy": {"samples": self.accuracy.samples, "target": self.accuracy.target},
             "window": self.window,
-            "optimise": self.optimise and _without_none(asdict(self.optimise), "variables"),
+            "optimise": self.optimise and _without_none(_counted(self.optimise), "variables"),
             "reference": self.reference,
             "output": asdict(self.output),
         }
         if self.pareto is not None:
-            content["pareto"] = asdict(self.pareto)
+            content["pareto"] = _counted(self.pareto)
         if self.accuracy.certify:
             content["certify"] = self.accuracy.proven or True
         if self.tolerance is not None:
-            content["tolerance"] = asdict(self.tolerance)
+            content["tolerance"] = _without_none(asdict(self.tolerance), "robust")
         return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
+def _counted(settings: OptimiseSettings | ParetoSettings) -> dict[str, Any]:
+    """Settings without the emergency brake, which decides no value."""
+    return {key: value for key, value in asdict(settings).items() if key != "time_budget"}
 
 
 def _without_none(content: dict[str, Any], name: str) -> dict[str, Any]:

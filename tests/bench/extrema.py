@@ -19,7 +19,7 @@ from studies.accuracy.regions import regions, rotatable
 from studies.accuracy.timing import seconds
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
-from sweep.reductions import extrema
+from sweep.reductions import extrema, search
 from sweep.reductions.extrema import Mode, Request
 from tests.bench.limits import limits
 from tests.climbing import climbed
@@ -65,7 +65,7 @@ def turning(family: Any, make: Any, n: int) -> Any:
 
 def exact(family: Any, designs: Any, name: str, window: tuple[float, float] | None) -> tuple[Any, Any]:
     """Values and bounds of their errors: climbed in twice the working precision, windowed ones searched again."""
-    with patch.object(extrema, "START", 8 * extrema.START):
+    with patch.object(search, "START", 8 * search.START):
         if window is not None:
             found = design_outputs(family, designs, [name], Accuracy(target=1e-13), window)
             return found[name], found[f"err_{name}"]

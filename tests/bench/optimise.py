@@ -1,4 +1,4 @@
-"""Random specifications of a spatial crank-rocker against a search fifty times larger: gap, residual, CPU time."""
+"""Random specifications of a spatial crank-rocker, three seeds each, against a larger search."""
 
 from __future__ import annotations
 
@@ -22,28 +22,40 @@ from sweep.optimise.certificate import AGREE, Result
 from sweep.optimise.descent import KKT
 from sweep.study import Limit, OptimiseSettings
 
-STARTS, LARGER, SEED = 6, 50, 1971
-CPU = 1.5  # seconds per specification
+STARTS, LARGER, SEED = 24, 8, 1971
+COUNT, SEEDS = 60, 3
+CPU = 8.0  # seconds per specification and seed
 RSSR = family("rssr")
-NAMES = ("a", "b", "e", "f", "g", "alpha")  # in units of c
-LOW, HIGH = np.array([0.1, 0.5, 0.0, -1.5, -1.5, 0.0]), np.array([0.9, 4.0, 2.5, 1.5, 1.5, math.pi / 2])
+NAMES = ("a", "b", "c", "e", "f", "g", "alpha")  # all seven dimensions in boxes
+LOW = np.array([0.1, 0.5, 0.5, 0.0, -1.5, -1.5, 0.0])
+HIGH = np.array([0.9, 4.0, 1.5, 2.5, 1.5, 1.5, math.pi / 2])
+PHI0, STEEP = (
+    math.radians(30.0),
+    (math.radians(35.0), math.radians(60.0)),
+)  # 180 -+ 30 deg; limits of the pressure angle
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One specification: the search, the larger one, CPU time of the first [s]."""
+    """One specification: the worst of the searches of all seeds, the best of all and the larger one, CPU time [s]."""
 
     problem: Problem
     ours: Result
     best: Result
     cpu: float
+    missed: int
 
     @property
     def gap(self) -> float:
-        """By how much the larger search is better, relative; infinite where ours is not feasible and it is."""
-        if self.ours.violation > 1e-9:
-            return math.inf if self.best.violation <= 1e-9 else 0.0
-        return max(0.0, self.ours.objective / self.best.objective - 1.0)
+        """By how much the best is better than the worst seed, relative; infinite where that one is not feasible."""
+        return behind(self.ours, self.best)
+
+
+def behind(ours: Result, best: Result) -> float:
+    """By how much another result is better, relative; infinite where ours is not feasible and it is."""
+    if ours.violation > 1e-9:
+        return math.inf if best.violation <= 1e-9 else 0.0
+    return max(0.0, ours.objective / best.objective - 1.0)
 
 
 def specifications(seed: int) -> Iterator[Problem]:
@@ -56,28 +68,29 @@ def specifications(seed: int) -> Iterator[Problem]:
         middle = LOW + rng.random(len(NAMES)) * (HIGH - LOW)
         lower, upper = LOW + 0.7 * rng.random() * (middle - LOW), HIGH - 0.7 * rng.random() * (HIGH - middle)
         names = ["swing", "phi0", "max_pressure_angle", "margin"]
-        design = [*middle[:2], 1.0, *middle[2:], rng.choice([-1.0, 1.0])]
+        design = [*middle, rng.choice([-1.0, 1.0])]
         found = design_outputs(RSSR, np.array([design]), names, Accuracy(target=1e-9))
         swing, phi0, pressure, margin = (float(found[name][0]) for name in names)
-        if not margin > 0.1 or not 0.35 < abs(swing) < 2.0 or not pressure < math.radians(60):
+        hard = abs(phi0 - math.pi) < PHI0 and pressure < STEEP[1]
+        if not margin > 0.1 or not 0.35 < abs(swing) < 2.0 or not hard:
             continue
-        limit = min(pressure + rng.random() * math.radians(15), math.radians(65))
+        limit = max(pressure, STEEP[0]) + rng.random() * (STEEP[1] - max(pressure, STEEP[0]))
         limits = (
             Limit("swing", abs(swing), abs(swing)),
             Limit("phi0", phi0, phi0),
             Limit("max_pressure_angle", None, limit),
         )
-        yield Problem(RSSR, NAMES, lower, upper, {"c": 1.0}, "max_abs_d2psi", limits)
+        yield Problem(RSSR, NAMES, lower, upper, {}, "max_abs_d2psi", limits)
 
 
-def solve(problem: Problem, starts: int, seed: int, jobs: int = 1) -> Result:
-    """Best result of a search from so many starts, both branches."""
-    settings = OptimiseSettings(starts=starts, seed=seed)
+def solve(problem: Problem, starts: int, seed: int, jobs: int = 1, unseen: float = 0.02) -> Result:
+    """Best result of a search from at most so many starts, both branches."""
+    settings = OptimiseSettings(starts=starts, seed=seed, unseen=unseen)
     return optimum(problem, [{"branch": 1.0}, {"branch": -1.0}], settings, jobs=jobs)[0]
 
 
 def measure(
-    count: int, larger: int = LARGER, starts: int = STARTS, jobs: int = 1, seed: int = SEED
+    count: int, larger: int = LARGER, starts: int = STARTS, jobs: int = 1, seed: int = SEED, seeds: int = SEEDS
 ) -> Iterator[Outcome]:
     """Outcomes of the first specifications, one after the other."""
     problems = specifications(seed)
@@ -85,13 +98,18 @@ def measure(
     for number in range(count):
         problem = next(problems)
         begin = time.process_time()
-        ours = solve(problem, starts, number)
-        cpu = time.process_time() - begin
-        # The larger search has another sample, of so many times the size, and counts only where it is better.
-        other = solve(problem, starts * larger, number + 1000, jobs)
-        feasible = other.violation <= 1e-9
-        better = feasible and (ours.violation > 1e-9 or other.objective < ours.objective)
-        yield Outcome(problem, ours, other if better else ours, cpu)
+        ours = [solve(problem, starts, number + 10_000 * k) for k in range(seeds)]
+        cpu = (time.process_time() - begin) / seeds
+        # The larger search has another sample, of so many times the size, and ends when its starts do.
+        other = solve(problem, starts * larger, number + 1000, jobs, unseen=0.0)
+        best = min([*ours, other], key=_order)
+        worst = max(ours, key=_order)
+        yield Outcome(problem, worst, best, cpu, sum(behind(result, best) > AGREE for result in ours))
+
+
+def _order(result: Result) -> tuple[bool, float]:
+    infeasible = result.violation > 1e-9
+    return infeasible, result.violation if infeasible else result.objective
 
 
 def candidate_cost(count: int = 1 << 20) -> dict[str, float]:
@@ -122,11 +140,11 @@ def page(outcomes: list[Outcome], larger: int, seed: int) -> str:
     n, cost = len(outcomes), candidate_cost()
     command = "make bench-optimise" if larger == LARGER else f"python -m tests.bench.optimise --larger {larger}"
     met = {
-        f"within {AGREE:g} of the best value of a search {larger} times larger": (
-            sum(o.gap <= AGREE for o in outcomes), n
+        f"every seed within {AGREE:g} of the best value of all and of a search {larger} times larger": (
+            sum(o.missed == 0 for o in outcomes), n
         ),
         f"KKT residual at most {KKT:g}": (sum(o.ours.kkt_residual <= KKT for o in outcomes), 18 * n // 20),
-        f"at most {CPU:g} s CPU": (sum(o.cpu <= CPU for o in outcomes), n),
+        f"at most {CPU:g} s CPU per seed": (sum(o.cpu <= CPU for o in outcomes), n),
     }  # fmt: skip
     lines = [
         "# The optimiser on random specifications",
@@ -144,15 +162,15 @@ def page(outcomes: list[Outcome], larger: int, seed: int) -> str:
         f"| candidate, per core: sample, mechanism, limits, objective [us] | 0.3 | {cost['all']:.2f} (sample "
         f"{cost['sample']:.2f}, mechanism {cost['locus']:.2f}) | {'yes' if cost['all'] <= 0.3 else '**no**'} |",
         "",
-        "| swing [deg] | phi0 [deg] | pressure angle <= [deg] | max abs d2psi | larger search better by | KKT residual "
-        "| CPU [s] | active |",
-        "|---|---|---|---|---|---|---|---|",
+        "| swing [deg] | phi0 [deg] | pressure angle <= [deg] | max abs d2psi of the worst seed | best better by "
+        "| seeds that missed | KKT residual | CPU [s] | active |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for o in outcomes:
         swing, phi0, pressure = (math.degrees(limit.maximum or 0.0) for limit in o.problem.limits)
         lines.append(
             f"| {swing:.1f} | {phi0:.1f} | {pressure:.1f} | {o.ours.objective:.9f} | {o.gap:.1e} "
-            f"| {o.ours.kkt_residual:.0e} | {o.cpu:.2f} | {', '.join(o.ours.active)} |"
+            f"| {o.missed} | {o.ours.kkt_residual:.0e} | {o.cpu:.2f} | {', '.join(o.ours.active)} |"
         )
     return "\n".join(lines) + "\n"
 
@@ -160,7 +178,7 @@ def page(outcomes: list[Outcome], larger: int, seed: int) -> str:
 def main() -> None:
     """Print the page, or write it."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--count", type=int, default=COUNT)
     parser.add_argument("--larger", type=int, default=LARGER)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=SEED)
@@ -169,7 +187,8 @@ def main() -> None:
     outcomes = []
     for outcome in measure(options.count, options.larger, jobs=options.jobs, seed=options.seed):
         outcomes.append(outcome)
-        print(f"{len(outcomes)} of {options.count}: gap {outcome.gap:.1e}, CPU {outcome.cpu:.2f} s", flush=True)
+        text = f"gap {outcome.gap:.1e}, {outcome.missed} seeds missed, CPU {outcome.cpu:.2f} s"
+        print(f"{len(outcomes)} of {options.count}: {text}", flush=True)
     text = page(outcomes, options.larger, options.seed)
     if options.out is None:
         print(text)

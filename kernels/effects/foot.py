@@ -1,0 +1,321 @@
+"""Presser foot on a rack: contact, flight, impacts and landing, marched over a path given at equal crank angles.
+
+Equations (4)-(12) of docs/foot.md.  The path stands between its nodes as quintic Hermite polynomials of height, slope
+and curvature; the foot flies on the closed solution of its spring, so only the events are searched.  Rates are by the
+crank angle; forces are divided by m omega^2 (a foot of mass m at the speed omega).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import inline, kernel  # long helpers are kernels: folded into one another they took 17 s to compile
+
+Array: TypeAlias = NDArray[np.float64]
+Status: TypeAlias = NDArray[np.uint8]
+
+TWO_PI = 2.0 * math.pi
+PLATE, RACK, FLIGHT = 0, 1, 2
+_PARTS = 4
+_MOST_EVENTS = 64
+_MOST_STEPS = 100
+
+# What a march returns of its last turn, in order.
+OUTPUTS = (
+    "flights", "phi_loss", "phi_land", "lost_angle", "lost_travel", "travel", "impact_speed", "impulse", "least_force",
+    "most_force", "settled",
+)  # fmt: skip
+
+
+class Foot(NamedTuple):
+    """A foot in units of the crank's turning: kappa = natural frequency/speed, g0 = preload/(m omega^2)."""
+
+    kappa: float
+    g0: float
+    restitution: float
+    still: float  # relative speeds below this one are none: bounces end
+
+
+class State(NamedTuple):
+    """What the foot does: resting on the plate, following the rack, or flying since ``since`` from y with speed v."""
+
+    mode: int
+    since: float
+    y: float
+    v: float
+    clear: float  # crank angle from which a new flight is surely above what it left
+
+
+@inline
+def _between(p0: float, p1: float, m0: float, m1: float, c0: float, c1: float, s: float) -> tuple[float, float, float]:
+    """Quintic with given ends, slopes and curvatures (by s) at the share s, and its first two derivatives; (4)."""
+    d, e, f = p1 - p0 - m0 - 0.5 * c0, m1 - m0 - c0, c1 - c0
+    a3, a4, a5 = 10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f
+    value = p0 + s * (m0 + s * (0.5 * c0 + s * (a3 + s * (a4 + s * a5))))
+    slope = m0 + s * (c0 + s * (3.0 * a3 + s * (4.0 * a4 + s * 5.0 * a5)))
+    return value, slope, c0 + s * (6.0 * a3 + s * (12.0 * a4 + s * 20.0 * a5))
+
+
+@inline
+def _height(path: Array, j: int, s: float) -> tuple[float, float, float]:
+    """Height of the rack above the plate in cell j at the share s, with derivatives by phi."""
+    n = path.shape[1]
+    h, j, k = TWO_PI / n, j % n, (j + 1) % n
+    y, y1, y2 = _between(
+        path[0, j], path[0, k], path[1, j] * h, path[1, k] * h, path[2, j] * h * h, path[2, k] * h * h, s
+    )
+    return y, y1 / h, y2 / (h * h)
+
+
+@inline
+def _along(path: Array, j: int, s: float) -> float:
+    """Place of the rack along the feed in cell j at the share s."""
+    n = path.shape[1]
+    h, j, k = TWO_PI / n, j % n, (j + 1) % n
+    x, _, _ = _between(
+        path[3, j], path[3, k], path[4, j] * h, path[4, k] * h, path[5, j] * h * h, path[5, k] * h * h, s
+    )
+    return x
+
+
+@inline
+def flown(foot: Foot, state: State, phi: float) -> tuple[float, float]:
+    """Height and speed of the flying foot at a crank angle; (6)."""
+    t = phi - state.since
+    half = 0.5 * foot.kappa * t
+    sinc = math.sin(half) / half if half != 0.0 else 1.0
+    cos, sine = math.cos(2.0 * half), t * sinc * math.cos(half)  # sin(kappa t)/kappa, good for no spring too
+    fall = 0.5 * t * t * sinc * sinc  # (1 - cos(kappa t))/kappa^2
+    y = state.y * cos + state.v * sine - foot.g0 * fall
+    v = state.v * cos - (foot.kappa * foot.kappa * state.y + foot.g0) * sine
+    return y, v
+
+
+@inline
+def _force(foot: Foot, y: float, bend: float) -> float:
+    """Contact force of a foot that follows the rack, divided by m omega^2; (5)."""
+    return foot.g0 + foot.kappa * foot.kappa * y + bend
+
+
+@inline
+def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int) -> float:
+    """What changes sign at an event: height of the rack (0), contact force (1), gap below the flying foot (2)."""
+    y, _, bend = _height(path, j, s)
+    if which == 0:
+        return y
+    if which == 1:
+        return _force(foot, y, bend)
+    return flown(foot, state, (j + s) * (TWO_PI / path.shape[1]))[0] - max(y, 0.0)
+
+
+@kernel
+def _root(path: Array, foot: Foot, state: State, j: int, low: float, high: float, which: int) -> float:
+    """Share of the cell at which a measure passes zero: false position, the end that stays halved (Illinois)."""
+    f_low, f_high = _measure(path, foot, state, j, low, which), _measure(path, foot, state, j, high, which)
+    for _ in range(_MOST_STEPS):
+        if f_low == f_high:
+            break
+        s = low - f_low * ((high - low) / (f_high - f_low))
+        if not low < s < high:
+            s = 0.5 * (low + high)
+        if s in (low, high):
+            break
+        f = _measure(path, foot, state, j, s, which)
+        if f == 0.0:
+            return s
+        if (f > 0.0) == (f_high > 0.0):
+            high, f_high, f_low = s, f, 0.5 * f_low
+        else:
+            low, f_low, f_high = s, f, 0.5 * f_high
+        if high - low <= 1e-15:
+            break
+    return high
+
+
+@kernel
+def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[State, float]:
+    """State after the foot meets rack or plate with a speed, and the relative speed; (7)-(9)."""
+    y, y1, bend = _height(path, j, s)
+    phi = (j + s) * (TWO_PI / path.shape[1])
+    on_rack = y > 0.0 or (y >= -1e-14 * abs(y1) and y1 > 0.0)
+    ground, surface = (max(y, 0.0), y1) if on_rack else (0.0, 0.0)
+    closing = surface - speed
+    push = _force(foot, ground, bend if on_rack else 0.0)
+    rebound = foot.restitution * max(closing, 0.0)
+    if rebound > foot.still:
+        # The hop is highest after rebound/push at a constant push; a longer one is seen by the parts of a cell.
+        part = TWO_PI / path.shape[1] / _PARTS
+        clear = phi + (min(rebound / push, part) if push > 0.0 else 0.0)
+        return State(FLIGHT, phi, ground, surface + rebound, clear), closing
+    if push < 0.0:
+        return State(FLIGHT, phi, ground, surface, phi), closing
+    return State(RACK if on_rack else PLATE, phi, ground, surface, phi), closing
+
+
+@kernel
+def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tuple[float, int]:
+    """Share of the cell at which the state ends, and by which measure; 2 and -1 if it lasts beyond the cell."""
+    if state.mode == PLATE:
+        if _measure(path, foot, state, j, 1.0, 0) > 0.0:
+            return _root(path, foot, state, j, s, 1.0, 0), 0
+        return 2.0, -1
+    before = s
+    if state.mode == FLIGHT:
+        before = max(s, state.clear * (path.shape[1] / TWO_PI) - j)
+    for k in range(1, _PARTS + 1):
+        after = k / _PARTS
+        if after <= before:
+            continue
+        if state.mode == RACK:
+            lost = _measure(path, foot, state, j, after, 1) < 0.0
+            sunk = _measure(path, foot, state, j, after, 0) < 0.0
+            first, which = 2.0, -1
+            if lost:
+                first, which = _root(path, foot, state, j, before, after, 1), 1
+            if sunk:
+                level = _root(path, foot, state, j, before, after, 0)
+                if level < first:
+                    first, which = level, 0
+            if which >= 0:
+                return first, which
+        elif _measure(path, foot, state, j, after, 2) < 0.0:
+            # A launch begins with no gap: halve towards it until there is one.  A hop that shows none ends here.
+            clear = before
+            for n in range(1, 30):
+                if _measure(path, foot, state, j, clear, 2) > 0.0:
+                    return _root(path, foot, state, j, clear, after, 2), 2
+                clear = before + (after - before) * 0.5**n
+            return after, 2
+        before = after
+    return 2.0, -1
+
+
+@inline
+def _above(path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> tuple[float, float]:
+    """Crank angle and way along the feed between two shares of a cell while the rack is above the plate."""
+    one, two = _height(path, j, low)[0], _height(path, j, high)[0]
+    if one <= 0.0 and two <= 0.0:
+        return 0.0, 0.0
+    if one < 0.0 < two:
+        low = _root(path, foot, state, j, low, high, 0)
+    elif two < 0.0 < one:
+        high = _root(path, foot, state, j, low, high, 0)
+    return (high - low) * (TWO_PI / path.shape[1]), _along(path, j, high) - _along(path, j, low)
+
+
+@inline
+def _record(tally: Array, path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> None:
+    """Add a piece of a cell to the sums of the turn: travel, and what is lost of it in flight."""
+    angle, way = _above(path, foot, state, j, low, high)
+    tally[5] += way
+    if state.mode == FLIGHT:
+        tally[3] += angle
+        tally[4] += way
+
+
+@kernel
+def _cell(path: Array, foot: Foot, state: State, j: int, tally: Array) -> tuple[State, bool]:
+    """March over one cell; the state at its end, false if the events did not come to an end."""
+    s, step = 0.0, TWO_PI / path.shape[1]
+    for _ in range(_MOST_EVENTS):
+        at, which = _next_event(path, foot, state, j, s)
+        if which < 0:
+            _record(tally, path, foot, state, j, s, 1.0)
+            return state, True
+        _record(tally, path, foot, state, j, s, at)
+        phi = (j + at) * step
+        y, y1, _ = _height(path, j, at)
+        if which == 1:
+            following = State(FLIGHT, phi, y, y1, phi)
+        else:
+            speed = 0.0 if state.mode == PLATE else (y1 if state.mode == RACK else flown(foot, state, phi)[1])
+            following, closing = _struck(path, foot, j, at, speed)
+            if closing > 0.0:
+                tally[6] = max(tally[6], closing)
+            if state.mode == FLIGHT and not math.isnan(tally[1]) and math.isnan(tally[2]):
+                tally[2] = phi
+        if following.mode == FLIGHT and (state.mode != FLIGHT or following.since > state.since):
+            tally[0] += 1.0
+            if math.isnan(tally[1]):
+                tally[1] = phi
+        state, s = following, at
+    return state, False
+
+
+@kernel
+def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, heights: Array, forces: Array) -> None:
+    """March feet over their racks for some turns and keep the last one; (4)-(12) of docs/foot.md.
+
+    Parameters
+    ----------
+    path : (n, 6, N) rack at N equal crank angles from 0: height above the plate, way along the feed as rows 0 and 3,
+        their first and second derivatives by phi in the rows behind each [length]
+    feet : (n, 5) mass, spring stiffness, preload (weight included), speed [rad per time], restitution
+    turns : how many turns are marched, from rest on the plate where the rack is lowest
+    status : (n,) out; OK, NO_EVENT (the rack never lies below the plate), NOT_CONVERGED (bounces without end) or
+        INVALID_INPUT
+    outputs : (11, n) out of the last turn in the order of :data:`OUTPUTS`; angles in [0, 2 pi), nan where there is none
+    heights, forces : (n, N) out; height of the foot and force between it and rack or plate at every node
+
+    Notes
+    -----
+    A bounce with less than 1e-9 of the greatest speed of the rack is taken for the last.
+    """
+    tally = np.empty(7)
+    for i in range(path.shape[0]):
+        rack, count = path[i], path.shape[2]
+        mass, stiffness, preload, speed, restitution = feet[i, 0], feet[i, 1], feet[i, 2], feet[i, 3], feet[i, 4]
+        for k in range(11):
+            outputs[k, i] = math.nan
+        heights[i, :] = math.nan
+        forces[i, :] = math.nan
+        valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and 0.0 <= restitution < 1.0
+        unit = mass * speed * speed
+        lowest, quickest = 0, 0.0
+        for j in range(count):
+            valid = valid and abs(rack[0, j]) < math.inf
+            quickest = max(quickest, abs(rack[1, j]))
+            if rack[0, j] < rack[0, lowest]:
+                lowest = j
+        status[i] = st.OK if valid and unit > 0.0 and unit < math.inf else st.INVALID_INPUT
+        if status[i] == st.OK and rack[0, lowest] > 0.0:
+            status[i] = st.NO_EVENT
+        if status[i] != st.OK:
+            continue
+        foot = Foot(math.sqrt(stiffness / mass) / speed, preload / unit, restitution, 1e-9 * quickest)
+        state = State(PLATE, 0.0, 0.0, 0.0, 0.0)
+        least, most, still_lying = math.inf, 0.0, True
+        for turn in range(turns):
+            tally[:] = 0.0
+            tally[1], tally[2] = math.nan, math.nan
+            still_lying = state.mode == PLATE
+            for k in range(count):
+                j = turn * count + lowest + k
+                node, phi = (lowest + k) % count, j * (TWO_PI / count)
+                if state.mode == FLIGHT:
+                    heights[i, node], forces[i, node] = flown(foot, state, phi)[0], 0.0
+                else:
+                    on_rack = state.mode == RACK
+                    heights[i, node] = rack[0, node] if on_rack else 0.0
+                    forces[i, node] = unit * _force(foot, heights[i, node], rack[2, node] if on_rack else 0.0)
+                state, ended = _cell(rack, foot, state, j, tally)
+                if not ended:
+                    status[i] = st.NOT_CONVERGED
+        if status[i] != st.OK:
+            heights[i, :] = math.nan
+            forces[i, :] = math.nan
+            continue
+        for j in range(count):
+            if rack[0, j] > 0.0:
+                least = min(least, unit * _force(foot, rack[0, j], rack[2, j]))
+            most = max(most, forces[i, j])
+        outputs[0, i], outputs[1, i], outputs[2, i] = tally[0], tally[1] % TWO_PI, tally[2] % TWO_PI
+        outputs[3, i], outputs[4, i], outputs[5, i] = tally[3], tally[4], tally[5]
+        outputs[6, i], outputs[7, i] = tally[6] * speed, mass * (1.0 + restitution) * tally[6] * speed
+        outputs[8, i], outputs[9, i] = least if least < math.inf else math.nan, most
+        outputs[10, i] = 1.0 if still_lying and state.mode == PLATE else 0.0

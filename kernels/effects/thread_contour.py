@@ -1,0 +1,113 @@
+"""T1: tension of a thread that is pulled over a contour of radius R; the law of the source, restored.
+
+Dynamics sheet, section 6.1; the equation numbers are those of docs/thread.md.  The two-term law of friction
+
+    dT/dtheta = beta (T + B/(R + r)^2) + alpha R,      r = 1/sqrt(pi gamma N)                                (1), (2)
+
+integrates to T2 = T1 e^x + (B/(R + r)^2) (e^x - 1) + alpha R theta (e^x - 1)/x with x = beta theta.          (3)
+With expm1 all limits are regular: beta = 0, R = 0, alpha = B = 0 (Euler).  All terms are positive: nothing cancels.
+The unit of angle is that of beta and alpha, whichever it is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+
+Array = NDArray[np.float64]
+Status = NDArray[np.uint8]
+
+# Columns of the data matrix: radius R, adhesion alpha, friction beta, bending B, metric count N, density gamma.
+COLUMNS = ("R", "alpha", "beta", "B", "N", "gamma")
+
+
+@inline
+def thread_radius(count: float, density: float) -> float:
+    """Radius of a round thread of metric count N [m/g] and density gamma [g/cm^3], in mm; (2)."""
+    return 1.0 / math.sqrt(math.pi * density * count)
+
+
+@inline
+def growth(x: float) -> float:
+    """(e^x - 1)/x, 1 at x = 0; relative error of some roundings for every x."""
+    return math.expm1(x) / x if x != 0.0 else 1.0
+
+
+@kernel
+def thread_contour(
+    before: Array,
+    theta: Array,
+    data: Array,
+    status: Status,
+    tension: Array | None,
+    capstan: Array | None,
+    bending: Array | None,
+    adhesion: Array | None,
+    radius: Array | None,
+) -> None:
+    """Tension behind a contour and its three parts; equations (1) to (3) of docs/thread.md.
+
+    Parameters
+    ----------
+    before : (n, m), tension T1 in front of the contour [force]
+    theta : (n, m), wrap angle, in the unit of angle that beta and alpha are given in
+    data : (n, 6), see COLUMNS; R and r in one unit of length
+    status : (n, m), in and out; INVALID_INPUT where a number is negative or not finite, N gamma = 0, or the result is
+        beyond float64: these give nan
+    tension, capstan, bending, adhesion : (n, m) or None; T2 and its parts T1 e^x, of B, of alpha
+    radius : (n, m) or None; thread radius r
+
+    Notes
+    -----
+    Measured on the oracle table: relative error below 8 * 2^-53.
+    """
+    for i in range(before.shape[0]):
+        r, alpha, beta, stiff = data[i, 0], data[i, 1], data[i, 2], data[i, 3]
+        valid = r >= 0.0 and alpha >= 0.0 and beta >= 0.0 and stiff >= 0.0 and data[i, 4] > 0.0 and data[i, 5] > 0.0
+        thick = thread_radius(data[i, 4], data[i, 5]) if valid else math.nan
+        curvature = 1.0 / (r + thick)
+        pressed = stiff * curvature * curvature
+        for j in range(before.shape[1]):
+            t1, angle = before[i, j], theta[i, j]
+            x = beta * angle
+            more = math.expm1(x)
+            euler, bent, stuck = t1 * math.exp(x), pressed * more, alpha * r * angle * growth(x)
+            t2 = euler + bent + stuck
+            if status[i, j] == st.OK and not (valid and t1 >= 0.0 and angle >= 0.0 and math.isfinite(t2)):
+                status[i, j] = st.INVALID_INPUT
+            good = 1.0 if status[i, j] == st.OK else math.nan
+            if tension is not None:
+                tension[i, j] = good * t2
+            if capstan is not None:
+                capstan[i, j] = good * euler
+            if bending is not None:
+                bending[i, j] = good * bent
+            if adhesion is not None:
+                adhesion[i, j] = good * stuck
+            if radius is not None:
+                radius[i, j] = good * thick
+
+
+@inline
+def least_radius(alpha: float, beta: float, stiff: float, thick: float) -> float:
+    """Radius of least tension, (2 B beta/alpha)^(1/3) - r, not below 0; inf without adhesion; (4)."""
+    if alpha == 0.0:
+        return math.inf if stiff * beta > 0.0 else math.nan
+    return max(math.pow(2.0 * stiff * beta / alpha, 1.0 / 3.0) - thick, 0.0)
+
+
+@kernel
+def contour_of_least_tension(data: Array, radius: Array) -> None:
+    """Radius of the contour behind which the tension is least, for every wrap angle and tension; (4).
+
+    Parameters
+    ----------
+    data : (n, 6), see COLUMNS, R not used;  radius : (n,) out, inf without adhesion, nan where every radius is as good
+    """
+    for i in range(data.shape[0]):
+        radius[i] = least_radius(data[i, 1], data[i, 2], data[i, 3], thread_radius(data[i, 4], data[i, 5]))

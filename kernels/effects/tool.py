@@ -1,0 +1,100 @@
+"""U3: a tool on the coupler, such as a needle bar: its inertia, weight and working force as a load of the coupler.
+
+Additions sheet 5; the equation numbers are those of docs/tool.md.  A rod of mass m moves along a fixed direction lam
+with the point M of the coupler that it hangs on.  Its momentum along lam gives the force of the rod on the coupler,
+
+    F_M = -(m (s'' omega^2 + s' eps - g . lam) - F) lam,      s' = v_M . lam, s'' = a_M . lam                 (1), (2)
+
+with F the working force on the rod along lam, of which a part may act while the rod pierces the fabric (5).  What the
+rod's own guide bears across lam is statically undetermined: the coupler guides the point already.  Its least value is
+zero, and zero is taken.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.effects.coupler import orientation
+from kernels.effects.kinetostatics import CHANGE, SPEED, pose_status
+from kernels.joints import Joints, read
+from kernels.vectors import Vector, add, cross, dot, mix, scale, spun
+
+Array = NDArray[np.float64]
+Status = NDArray[np.uint8]
+
+# Columns of the data matrix: mass; point M from B along the coupler, across it, along the rocker's axis; lam; gravity;
+# piercing force, place of the fabric along lam, sense in which it lies.
+COLUMNS = 13
+
+
+@inline
+def arm(j: Joints, data: Array) -> Vector:
+    """The point from B in fixed axes; ``across`` is k x s, so the finger of the ball joints does not matter."""
+    return add(mix(data[1], j.s, data[2], cross(j.k, j.s)), scale(data[3], j.k))
+
+
+@inline
+def piercing(force: float, fabric: float, sense: float, s: float, ds: float) -> float:
+    """Force on the tool along lam while it goes into the fabric: from entry to the turning point, not back."""
+    return -sense * force if sense * (s - fabric) > 0.0 and sense * ds > 0.0 else 0.0
+
+
+@kernel
+def tool_load(
+    poses: Array,
+    designs: Array,
+    data: Array,
+    drive: Array,
+    working: Array,
+    finger: Array,
+    status: Status,
+    wrench: Array | None,
+    inertia: Array | None,
+    along: Array | None,
+) -> None:
+    """Force of the tool on the coupler, its moment about B, and the inertia that the tool adds to the crank's.
+
+    Parameters
+    ----------
+    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.joints`
+    data : (n, COLUMNS), see COLUMNS; lam a unit vector
+    drive : (n, m or 1, 3), of which the crank speed and its rate are read
+    working : (n, m or 1), force F on the tool along lam; a resisting one opposes s'
+    finger : (n,) DRIVEN or DRIVING
+    status : (n, m), in and out, as of :func:`kernels.effects.kinetostatics.kinetostatics`; what is not OK gives nan
+    wrench : (n, m, 6) or None; force and moment about B on the coupler, fixed axes
+    inertia : (n, m, 2) or None; m s'^2 and its derivative by the crank angle
+    along : (n, m, 3) or None; force of the coupler on the tool along lam, s', s''
+    """
+    for i in range(poses.shape[0]):
+        mass, lam = data[i, 0], (data[i, 4], data[i, 5], data[i, 6])
+        weight = mass * dot((data[i, 7], data[i, 8], data[i, 9]), lam)
+        for k in range(poses.shape[1]):
+            j = read(poses[i, k], designs[i])
+            coupler = orientation(j, finger[i])
+            status[i, k] = pose_status(status[i, k], j, coupler)
+            good = 1.0 if status[i, k] == st.OK else math.nan
+            at = arm(j, data[i])
+            first = dot(add(coupler.v_b, cross(coupler.omega, at)), lam)
+            second = dot(add(coupler.a_b, spun(coupler.omega, coupler.eps, at)), lam)
+            now = k if drive.shape[1] > 1 else 0
+            speed, change = drive[i, now, SPEED], drive[i, now, CHANGE]
+            on_tool = mass * (second * speed * speed + first * change) - weight
+            on_tool -= working[i, k if working.shape[1] > 1 else 0]
+            if data[i, 10] != 0.0:
+                way = speed * first
+                on_tool -= piercing(data[i, 10], data[i, 11], data[i, 12], dot(add(j.B, at), lam), way)
+            if wrench is not None:
+                force = scale(-good * on_tool, lam)
+                moment = cross(at, force)
+                for x in range(3):
+                    wrench[i, k, x], wrench[i, k, 3 + x] = force[x], moment[x]
+            if inertia is not None:
+                inertia[i, k, 0], inertia[i, k, 1] = good * mass * first * first, good * 2.0 * mass * first * second
+            if along is not None:
+                along[i, k, 0], along[i, k, 1], along[i, k, 2] = good * on_tool, good * first, good * second

@@ -1,0 +1,215 @@
+"""Geometry and statics of the moving back-rest at one bracket angle and one beam radius.
+
+Equations (1)-(12) of docs/backrest.md.  Lengths are divided by a power of two near the radius of the back-rest, so no
+scale of the drawing costs a bit.  Designs and bracket angles may be complex128 (exact gradients by the complex step).
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels._jit import inline
+from kernels.complex_step import arctan2, hypotenuse
+
+Array: TypeAlias = NDArray[np.float64]
+Status: TypeAlias = NDArray[np.uint8]
+EPS = 2.0**-53
+
+
+class Mode(IntEnum):
+    """What fixes the bracket angle."""
+
+    LAW = 0  # the let-off regulator: phi is given over rho
+    TENSION = 1  # the tension K0 is held, slider reaction at the axis of the back-rest
+    COUPLE = 2  # the same, and the slider bears a couple
+    CLOSURE = 3  # the source's balance of moments f N2 H = f N1 r0
+
+
+class Design(NamedTuple):
+    """Columns of the design matrix: lengths, forces and stiffness in consistent units, angles in radians."""
+
+    a1: float
+    b1: float
+    a2: float
+    b2: float
+    H: float
+    r: float
+    r0: float
+    psi: float
+    xE: float
+    yE: float
+    f: float
+    P1: float
+    P2: float
+    lM: float
+    nu: float
+    x3: float
+    y3: float
+    cs: float
+    l0: float
+    F0: float
+    rg: float
+    nug: float
+    s1: float
+    s2: float
+    phi: float
+    turn: float
+    rho_full: float
+    rho_empty: float
+    K0: float
+    phi_lo: float
+    phi_hi: float
+    root: float
+
+
+LENGTHS = (0, 1, 2, 3, 4, 5, 6, 8, 9, 13, 15, 16, 18, 20, 26, 27)
+STIFFNESS = 17
+ANGLES = (7, 14, 21, 24, 25, 29, 30)
+
+
+class Place(NamedTuple):
+    """Geometry at one bracket angle; ``reach1``, ``reach2`` are squares of lengths, below zero where there is none."""
+
+    sin_d: Any  # of psi - phi
+    cos_d: Any
+    numerator: Any  # R1 sin(psi - phi)
+    R1: Any
+    x: Any
+    y: Any
+    reach1: Any
+    reach2: Any
+    theta: Any
+    gamma: Any
+    wrap: Any
+    defined: bool
+
+
+class Forces(NamedTuple):
+    """Tension and reactions, with the slider's reaction at the axis of the back-rest and with the slider's couple."""
+
+    K: Any
+    N1: Any
+    N2: Any
+    K_couple: Any
+    N1_couple: Any
+    N2_couple: Any
+
+
+@inline
+def scaled(designs: Array, i: int, row: Array) -> tuple[float, bool]:
+    """Write the columns of one design in units of a power of two near r into ``row``; the unit, and whether valid."""
+    _, exponent = math.frexp(designs[i, 5].real)
+    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    good = True
+    for k in range(designs.shape[1]):
+        row[k] = designs[i, k]
+        # 0 * x is nan exactly for what is not finite
+        good = good and (0.0 * designs[i, k]).real == 0.0
+    for k in LENGTHS:
+        row[k] = designs[i, k] * per_unit
+        good = good and abs(row[k].real) < 1e140
+    for k in ANGLES:
+        good = good and abs(designs[i, k].real) < 1e5
+    row[STIFFNESS] = designs[i, STIFFNESS] * unit
+    good = good and designs[i, 5].real > 0.0 and row[6].real >= 0.0 and row[13].real >= 0.0 and row[10].real >= 0.0
+    return unit, good
+
+
+@inline
+def place(d: Array, phi: Any, rho: float) -> Place:
+    """Axis of the back-rest, yarn branches, wrap angle; (1)-(5).  ``defined`` is false where a length is not real."""
+    sin_p, cos_p = np.sin(phi), np.cos(phi)
+    sin_g, cos_g = np.sin(d[7]), np.cos(d[7])
+    sin_d, cos_d = np.sin(d[7] - phi), np.cos(d[7] - phi)
+    numerator = d[6] + (d[2] - d[8]) * sin_g + (d[3] - d[9]) * cos_g + d[4] * cos_d
+    arm = numerator / sin_d
+    x = d[2] - arm * cos_p + d[4] * sin_p
+    y = d[3] + arm * sin_p + d[4] * cos_p
+    one, two = hypotenuse(x, y), hypotenuse(d[0] - x, d[1] - y)
+    excess = rho - d[5]
+    reach1, reach2 = (one - excess) * (one + excess), (two - d[5]) * (two + d[5])
+    defined = sin_d.real != 0.0 and reach1.real > 0.0 and reach2.real > 0.0
+    if not defined:
+        none = math.nan * arm
+        return Place(sin_d, cos_d, numerator, arm, x, y, reach1, reach2, none, none, none, False)
+    theta = arctan2(excess, np.sqrt(reach1)) + arctan2(x, y)
+    gamma = arctan2(d[5], np.sqrt(reach2)) - arctan2(d[1] - y, d[0] - x)
+    return Place(
+        sin_d, cos_d, numerator, arm, x, y, reach1, reach2, theta, gamma, 0.5 * math.pi - theta + gamma, True
+    )  # fmt: skip
+
+
+@inline
+def spring(d: Array, phi: Any) -> tuple[Any, Any, Any]:
+    """Length and force of the spring, and the moment about O2 that it and the brackets' weight exert; (6), (7)."""
+    px, py = -(d[13] * np.cos(phi + d[14])), d[13] * np.sin(phi + d[14])
+    qx, qy = d[15] - d[2], d[16] - d[3]
+    length = hypotenuse(qx - px, qy - py)
+    force = d[19] + d[17] * (length - d[18])
+    moment = force * ((py * qx - px * qy) / length) - d[12] * d[20] * np.cos(phi + d[21])
+    return length, force, moment
+
+
+@inline
+def directions(d: Array, phi: Any, at: Place, s1: Any, s2: Any) -> tuple[Any, Any, Any, Any, Any, Any, Any, Any]:
+    """Projections of both reactions on the yarn's resultant and across it; (8).
+
+    A, S, Q2, k1, k2, sin v, cos v and twice the sine of half the wrap angle, in the words of the page.
+    """
+    f1, f2 = s1 * d[10], s2 * d[10]
+    v = 0.5 * (0.5 * math.pi - at.theta - at.gamma)
+    sin_1, cos_1 = np.sin(d[7] + v), np.cos(d[7] + v)
+    sin_2, cos_2 = np.sin(phi + v), np.cos(phi + v)
+    a = at.sin_d * (1.0 - f1 * f2) + (f1 + f2) * at.cos_d
+    return (
+        a, sin_1 + f1 * cos_1, sin_2 - f2 * cos_2, cos_1 - f1 * sin_1, cos_2 + f2 * sin_2,
+        np.sin(v), np.cos(v), 2.0 * np.sin(0.5 * at.wrap),
+    )  # fmt: skip
+
+
+@inline
+def forces(d: Array, phi: Any, at: Place, moment: Any, s1: Any, s2: Any) -> Forces:
+    """Yarn tension and reactions of guide and bracket; (9), and (10), (11) with the slider's couple."""
+    a, s, q2, k1, k2, sin_v, cos_v, both = directions(d, phi, at, s1, s2)
+    weight = d[11]
+    n2 = moment * (at.sin_d / at.numerator)
+    n1 = (n2 * q2 - weight * sin_v) / s
+    tension = (n2 * a - weight * (np.sin(d[7]) + s1 * d[10] * np.cos(d[7]))) / (both * s)
+    arm = at.R1 - s2 * d[10] * d[4]
+    lever = s1 * d[10] * d[6]
+    det = s * arm + lever * q2
+    n2_couple = (s * moment + lever * weight * sin_v) / det
+    n1_couple = (q2 * moment - weight * sin_v * arm) / det
+    couple = (n2_couple * k2 - n1_couple * k1 - weight * cos_v) / both
+    return Forces(tension, n1, n2, couple, n1_couple, n2_couple)
+
+
+@inline
+def residual(d: Array, phi: Any, rho: float, mode: int) -> tuple[Any, bool]:
+    """Left side of the equation for the bracket angle with its poles multiplied out; (12).
+
+    False where the geometry is not defined or the slider would stand on the other side of the bracket's pivot.
+    """
+    at = place(d, phi, rho)
+    if not (at.defined and (at.numerator * at.sin_d).real > 0.0):
+        return math.nan * at.R1, False
+    _, _, moment = spring(d, phi)
+    s1, s2 = d[22], d[23]
+    a, s, q2, k1, k2, sin_v, cos_v, both = directions(d, phi, at, s1, s2)
+    weight = d[11]
+    if mode == Mode.CLOSURE:
+        return moment * at.sin_d * (d[4] * s - d[6] * q2) + d[6] * weight * sin_v * at.numerator, True
+    if mode == Mode.TENSION:
+        guide = weight * (np.sin(d[7]) + s1 * d[10] * np.cos(d[7]))
+        return moment * at.sin_d * a - at.numerator * (guide + d[28] * both * s), True
+    arm = at.numerator - s2 * d[10] * d[4] * at.sin_d
+    lever = s1 * d[10] * d[6]
+    det = s * arm + lever * q2 * at.sin_d
+    first = q2 * moment * at.sin_d - weight * sin_v * arm
+    second = (s * moment + lever * weight * sin_v) * at.sin_d
+    return second * k2 - first * k1 - (weight * cos_v + d[28] * both) * det, True

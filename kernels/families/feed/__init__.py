@@ -1,0 +1,13 @@
+"""Rack of a feed mechanism on two chains: rocker of a four-bar for the length, eccentric for the lift; planar rack.
+
+``closure`` brings a design to its constants and closes both chains, ``motion`` evaluates poses, ``events`` finds entry
+and leaving, ``triad`` is the rack on three leads.
+"""
+
+from kernels.families.feed.closure import Design as Design
+from kernels.families.feed.events import feeding as feeding
+from kernels.families.feed.motion import differences as differences
+from kernels.families.feed.motion import lift_rows as lift_rows
+from kernels.families.feed.motion import poses as poses
+from kernels.families.feed.triad import TriadDesign as TriadDesign
+from kernels.families.feed.triad import triad_poses as triad_poses

@@ -1,0 +1,256 @@
+"""Thread over the bare edge with friction: where it begins to slide along the edge, and the way it takes.
+
+The resultant of both tensions on the edge's point, T12 = T1 e1 + T2 e2, may lean by the angle of friction before the
+thread slides along the edge.  Between two limit points it sticks, so where it lies depends on where it lay before: a
+march in the order of phi.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.families.free_cam.contact import shortest
+from kernels.families.free_cam.edge import FINEST, HALVINGS, Cam, least_distances, reach, straight, turned_cam
+from kernels.thread_path import wrap_angle
+
+Array = NDArray[np.float64]
+Status = NDArray[np.uint8]
+
+# How far beyond the last extremum of the length limit points are looked for, in units of that reach.
+FAR = 64.0
+
+
+class Pull(NamedTuple):
+    """Ratio of the tensions T2/T1 = ratio e^(along wrap), sine of the angle of friction across the thread."""
+
+    ratio: float
+    along: float
+    sine: float
+
+
+@inline
+def pull_of(ratio: float, along: float, across: float) -> Pull:
+    """Numbers of one design: tension ratio, friction coefficients along and across the thread."""
+    return Pull(ratio, along, across / math.sqrt(1.0 + across * across))
+
+
+@inline
+def _usable(friction: Array) -> bool:
+    """Whether a tension ratio and two coefficients of friction can be meant."""
+    return bool(1e-6 < friction[0] < 1e6 and 0.0 <= friction[1] < 100.0 and 0.0 <= friction[2] < 1e6)
+
+
+@inline
+def lean(cam: Cam, pull: Pull, at: float) -> tuple[float, float]:
+    """T12 . tangent and |T12| at a point of the edge, in units of T1; (24)."""
+    x, tx = cam.a * at * at, 2.0 * cam.a * at
+    d1x, d1y, d2x, d2y = cam.x1 - x, cam.y1 - at, cam.x2 - x, cam.y2 - at
+    r1 = math.sqrt(d1x * d1x + d1y * d1y + cam.z1 * cam.z1)
+    r2 = math.sqrt(d2x * d2x + d2y * d2y + cam.z2 * cam.z2)
+    ratio = pull.ratio
+    if pull.along != 0.0:
+        wrap = wrap_angle((x, at, 0.0), (cam.x1, cam.y1, cam.z1), (cam.x2, cam.y2, cam.z2))
+        ratio = ratio * math.exp(pull.along * wrap)
+    fx, fy = d1x / r1 + ratio * d2x / r2, d1y / r1 + ratio * d2y / r2
+    fz = cam.z1 / r1 + ratio * cam.z2 / r2
+    return (fx * tx + fy) / math.sqrt(1.0 + tx * tx), math.sqrt(fx * fx + fy * fy + fz * fz)
+
+
+@inline
+def excess(cam: Cam, pull: Pull, side: float, at: float) -> float:
+    """T12 . tangent - side sin(rho) |T12|: zero at the limit point of that side, falling along the edge far out."""
+    along, whole = lean(cam, pull, at)
+    return along - side * pull.sine * whole
+
+
+@inline
+def steepest_excess(cam: Cam, pull: Pull, low: float, high: float) -> float:
+    """Upper bound of the slope of :func:`excess` between two points of the edge."""
+    first, second = least_distances(cam, low, high)
+    tangent = math.sqrt(1.0 + 4.0 * cam.a * cam.a * max(low * low, high * high))
+    near = max(max(low, -high), 0.0)
+    turning = 2.0 * cam.a / (1.0 + 4.0 * cam.a * cam.a * near * near)
+    most = pull.ratio * math.exp(math.pi * pull.along)
+    swing = tangent * (1.0 / first + most * (1.0 / second + pull.along * (1.0 / first + 1.0 / second)))
+    return (1.0 + pull.sine) * swing + (1.0 + most) * turning
+
+
+@inline
+def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, most: float) -> float:
+    """The first limit point of one side from ``start`` along the edge, within ``most``; nan if there is none."""
+    end = reach(cam) + 1e-3
+    at, value = start, excess(cam, pull, side, start)
+    if value == 0.0:
+        return start
+    while abs(at - start) < most:
+        span = 0.25 * max(end, abs(at))
+        bound = steepest_excess(cam, pull, min(at, at + sense * span), max(at, at + sense * span))
+        following = at + sense * min(span, max(abs(value) / bound, FINEST * end))
+        new = excess(cam, pull, side, following)
+        if (new < 0.0) != (value < 0.0):
+            return _bisected(cam, pull, side, at, following, value)
+        at, value = following, new
+    return math.nan
+
+
+@inline
+def _bisected(cam: Cam, pull: Pull, side: float, low: float, high: float, at_low: float) -> float:
+    """Zero of :func:`excess` between low and high by the Illinois method, at most HALVINGS steps."""
+    f_low, f_high = at_low, excess(cam, pull, side, high)
+    for _ in range(HALVINGS):
+        middle = high - f_high * (high - low) / (f_high - f_low)
+        value = excess(cam, pull, side, middle)
+        if value == 0.0:
+            return middle
+        if (value < 0.0) != (f_high < 0.0):
+            low, f_low = high, f_high
+        else:
+            f_low = 0.5 * f_low
+        high, f_high = middle, value
+        if abs(high - low) <= 2.0**-52 * abs(high):
+            break
+    return high
+
+
+@inline
+def nearest_limit(cam: Cam, pull: Pull, side: float, centre: float) -> float:
+    """The limit point of one side nearest to ``centre``; nan if there is none within FAR."""
+    most = FAR * (reach(cam) + 1e-3)
+    up = next_limit(cam, pull, side, centre, 1.0, most)
+    down = next_limit(cam, pull, side, centre, -1.0, abs(up - centre) if up == up else most)
+    if math.isnan(down):
+        return up
+    return down if math.isnan(up) or abs(down - centre) < abs(up - centre) else up
+
+
+@kernel
+def limit_points(
+    designs: Array, friction: Array, cos_phi: Array, sin_phi: Array, status: Status, plus: Array, minus: Array
+) -> None:
+    """Points of the edge where the thread begins to slide along it, nearest to the frictionless contact; (25).
+
+    Parameters
+    ----------
+    designs : (n, 8) columns of :class:`kernels.families.free_cam.motion.Design`
+    friction : (n, 3), tension ratio T2/T1; coefficients of friction along the thread and across it (along the edge)
+    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
+    status : (n, m) out; OK, INVALID_INPUT, or NOT_CONVERGED where a limit point lies far outside (friction near 1)
+    plus, minus : (n, m) out, y of the points where T12 leans by the angle of friction towards growing and falling y
+    """
+    for i in range(designs.shape[0]):
+        pull = pull_of(friction[i, 0], friction[i, 1], friction[i, 2])
+        fine = _usable(friction[i])
+        row = i if cos_phi.shape[0] > 1 else 0
+        for j in range(cos_phi.shape[1]):
+            cam = turned_cam(designs, i, cos_phi[row, j], sin_phi[row, j])
+            status[i, j] = cam.code if fine else st.INVALID_INPUT
+            plus[i, j], minus[i, j] = math.nan, math.nan
+            if status[i, j] == st.OK:
+                centre = shortest(cam).y
+                plus[i, j] = nearest_limit(cam, pull, 1.0, centre) * cam.unit
+                minus[i, j] = nearest_limit(cam, pull, -1.0, centre) * cam.unit
+                if not math.isfinite(plus[i, j] + minus[i, j]):
+                    status[i, j] = st.NOT_CONVERGED
+
+
+@inline
+def slid(cam: Cam, pull: Pull, before: float) -> float:
+    """Where the thread comes to rest that lay at ``before``: there, or slid to the next limit point that holds it."""
+    along, whole = lean(cam, pull, before)
+    most = FAR * (reach(cam) + 1e-3)
+    if along > pull.sine * whole:
+        return next_limit(cam, pull, 1.0, before, 1.0, most)
+    if along < -pull.sine * whole:
+        return next_limit(cam, pull, -1.0, before, -1.0, most)
+    return before
+
+
+@inline
+def landed(designs: Array, i: int, u0: float, v0: float, u1: float, v1: float) -> float:
+    """Where the thread first touches the edge between two poses, off and on: by bisection of the angle between them.
+
+    Taken at the pose before instead, the place would change with the steps of the march.
+    """
+    low, high, y = 0.0, 1.0, 0.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        u, v = u0 + middle * (u1 - u0), v0 + middle * (v1 - v0)
+        length = math.sqrt(u * u + v * v)
+        line = straight(turned_cam(designs, i, u / length, v / length))
+        y = line.y
+        if line.inside:
+            high = middle
+        else:
+            low = middle
+    return y
+
+
+@kernel
+def march(
+    designs: Array, friction: Array, cos_phi: Array, sin_phi: Array, turns: int, status: Status,
+    L: Array | None, wrap: Array | None, y_contact: Array | None, contact: Array | None, sticking: Array | None,
+) -> None:  # fmt: skip
+    """Way of the thread over an edge with friction, in the order of the given angles; docs/takeup.md, section 5.
+
+    The thread starts where it lies without friction and is led through the angles ``turns`` times; what is given is
+    the last time.
+
+    Parameters
+    ----------
+    designs : (n, 8) columns of :class:`kernels.families.free_cam.motion.Design`
+    friction : (n, 3), tension ratio T2/T1; coefficients of friction along the thread and across it (along the edge)
+    cos_phi, sin_phi : (n, m) or (1, m), angles of one turn in their order
+    turns : how often the angles are gone through
+    status : (n, m) out; OK, INVALID_INPUT, or NOT_CONVERGED where the thread slides off far outside; that and all that
+        follows of the design
+    L, wrap, y_contact : (n, m) out or None; thread length, wrap angle [rad], place along the edge's axis y [length]
+    contact, sticking : (n, m) out or None; 1 or 0: whether the thread lies on the edge, and whether it sticks there
+    """
+    for i in range(designs.shape[0]):
+        pull = pull_of(friction[i, 0], friction[i, 1], friction[i, 2])
+        fine = _usable(friction[i])
+        row, m = i if cos_phi.shape[0] > 1 else 0, cos_phi.shape[1]
+        at, code = math.nan, st.OK if fine else st.INVALID_INPUT
+        last, off = 0, False
+        for count in range(turns * m):
+            j = count % m
+            cam = turned_cam(designs, i, cos_phi[row, j], sin_phi[row, j])
+            code = cam.code if code == st.OK else code
+            line, touching, stuck = straight(cam), False, False
+            if code == st.OK:
+                touching = line.inside
+                if not touching:
+                    at, last, off = line.y, j, True
+                else:
+                    if off:
+                        at = landed(
+                            designs, i, cos_phi[row, last], sin_phi[row, last], cos_phi[row, j], sin_phi[row, j]
+                        )
+                    before = at if at == at else shortest(cam).y
+                    at, off = slid(cam, pull, before), False
+                    stuck = at == before
+                    code = st.OK if at == at else st.NOT_CONVERGED
+            if count < (turns - 1) * m:
+                continue
+            status[i, j] = code
+            good = 1.0 if code == st.OK else math.nan
+            x = cam.a * at * at if touching else line.x
+            n1, n2 = (cam.x1, cam.y1, cam.z1), (cam.x2, cam.y2, cam.z2)
+            if L is not None:
+                dx, dy, ex, ey = x - cam.x1, at - cam.y1, x - cam.x2, at - cam.y2
+                over = math.sqrt(dx * dx + dy * dy + cam.z1 * cam.z1) + math.sqrt(ex * ex + ey * ey + cam.z2 * cam.z2)
+                L[i, j] = good * (over if touching else line.length) * cam.unit
+            if wrap is not None:
+                wrap[i, j] = good * (wrap_angle((x, at, 0.0), n1, n2) if touching else 0.0)
+            if y_contact is not None:
+                y_contact[i, j] = good * at * cam.unit
+            if contact is not None:
+                contact[i, j] = good * (1.0 if touching else 0.0)
+            if sticking is not None:
+                sticking[i, j] = good * (1.0 if stuck else 0.0)

@@ -1,0 +1,174 @@
+"""Thread law, follower and cam profile at given cam angles.
+
+The cam is made for the thread: P(phi) is given as a Fourier series, the follower's displacement follows from it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.complex_step import arctan2, magnitude
+from kernels.families.guided_cam.follower import displacement, follow, reaches
+
+Array = NDArray[np.float64]
+Status = NDArray[np.uint8]
+
+# Harmonics of P(phi); columns of the design matrix: P_h, X1, Z1, e, R0, mu1, mu2, A1 ... A6, B1 ... B6.
+HARMONICS = 6
+FIRST = 7
+COLUMNS = FIRST + 2 * HARMONICS
+LOOKS = 64
+STEPS = 60
+
+
+class Reduced(NamedTuple):
+    """Per-design numbers in units of ``unit``: the thread's store, the guide's offsets, radius of the cam less S."""
+
+    store: float
+    across_z: float
+    across_x: float
+    radius: float  # cam radius at the least displacement
+    least: float  # least displacement over the turn
+    unit: float
+    valid: bool
+
+
+@inline
+def law(designs: Array, i: int, u: float, v: float) -> tuple[float, float, float]:
+    """P and its first two derivatives for u = cos(phi), v = sin(phi); (9)."""
+    zero = 0.0 * (designs[i, FIRST] + u)
+    value, first, second = zero, zero, zero
+    # Cosines and sines of the multiples by recursion.
+    c, s = u, v
+    for k in range(HARMONICS):
+        a, b, order = designs[i, FIRST + k], designs[i, FIRST + HARMONICS + k], k + 1.0
+        wave, turned = a * c + b * s, b * c - a * s
+        value, first, second = value + wave, first + order * turned, second - order * order * wave
+        c, s = c * u - s * v, s * u + c * v
+    return value, first, second
+
+
+@inline
+def lowest(designs: Array, i: int) -> tuple[float, float]:
+    """Cosine and sine of the cam angle where P is least: the best of some looks, then its slope's zero by bisection."""
+    best, where, step = math.inf, 0.0, 2.0 * math.pi / LOOKS
+    for j in range(LOOKS):
+        value = law(designs, i, math.cos(step * j), math.sin(step * j))[0].real
+        if value < best:
+            best, where = value, step * j
+    low, high = where - step, where + step
+    for _ in range(STEPS):
+        middle = 0.5 * (low + high)
+        if law(designs, i, math.cos(middle), math.sin(middle))[1].real < 0.0:
+            low = middle
+        else:
+            high = middle
+    middle = 0.5 * (low + high)
+    return math.cos(middle), math.sin(middle)
+
+
+@inline
+def reduce_design(designs: Array, i: int) -> Reduced:
+    """Constants of one design; its least displacement is a number of the whole turn."""
+    size = 0.0
+    for k in range(COLUMNS):
+        if k != 5 and k != 6:
+            size += abs(designs[i, k].real)
+    valid = 1e-140 < size < 1e140 and designs[i, 0].real > 0.0 and designs[i, 4].real >= 0.0
+    valid = valid and 0.0 <= designs[i, 5].real < 1e100 and 0.0 <= designs[i, 6].real < 1e100
+    valid = valid and designs[i, 0].real > 1e-140 * size
+    _, exponent = math.frexp(size if valid else 1.0)
+    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    u, v = lowest(designs, i)
+    thread = (designs[i, 0] + law(designs, i, u, v)[0]) * per_unit
+    across_z, across_x = designs[i, 2] * per_unit, (designs[i, 3] - designs[i, 1]) * per_unit
+    square = displacement(thread, across_z, across_x)
+    least = np.sqrt(square) if reaches(square.real, thread.real) == st.OK else math.nan * square
+    return Reduced(
+        designs[i, 0] * per_unit, across_z, across_x, designs[i, 4] * per_unit, least, unit, valid
+    )  # fmt: skip
+
+
+@kernel
+def poses(
+    designs: Array,
+    cos_phi: Array,
+    sin_phi: Array,
+    status: Status,
+    P: Array | None,
+    dP: Array | None,
+    d2P: Array | None,
+    L: Array | None,
+    S: Array | None,
+    dS: Array | None,
+    d2S: Array | None,
+    pressure_angle: Array | None,
+    X_P: Array | None,
+    Y_P: Array | None,
+    curvature: Array | None,
+) -> None:
+    """Thread law, follower and profile of the cam; (9) to (17) of docs/takeup.md.
+
+    Parameters
+    ----------
+    designs : (n, 19), see COLUMNS; complex128 for gradients by the complex step
+    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
+    status : (n, m) out; OK, NOT_ASSEMBLED where the thread is shorter than the way between the guides, DEAD_POINT where
+        it is just as long (S = 0), INVALID_INPUT
+    P, dP, d2P, L : (n, m) out or None; thread taken up, its derivatives, thread length [length]
+    S, dS, d2S : (n, m) out or None; displacement of the follower from the line of the guides, its derivatives [length]
+    pressure_angle : (n, m) out or None; between the normal of the profile and the way of the follower [rad]; nan with
+        NOT_ASSEMBLED if the thread does not reach somewhere else in the turn, and so for the profile
+    X_P, Y_P, curvature : (n, m) out or None; point of the profile in the cam's axes [length], its curvature [1/length],
+        positive where the profile is convex
+    """
+    for i in range(designs.shape[0]):
+        r = reduce_design(designs, i)
+        row = i if cos_phi.shape[0] > 1 else 0
+        whole = pressure_angle is not None or X_P is not None or Y_P is not None or curvature is not None
+        for j in range(cos_phi.shape[1]):
+            u, v = cos_phi[row, j], sin_phi[row, j]
+            value, first, second = law(designs, i, u, v)
+            value, first, second = value / r.unit, first / r.unit, second / r.unit
+            thread = r.store + value
+            square = displacement(thread, r.across_z, r.across_x)
+            code = reaches(square.real, thread.real) if r.valid else st.INVALID_INPUT
+            if code == st.OK and whole and r.least.real != r.least.real:
+                code = st.NOT_ASSEMBLED
+            status[i, j] = code
+            good = 1.0 if code == st.OK else math.nan
+            given = math.nan if code == st.INVALID_INPUT else 1.0
+            if P is not None:
+                P[i, j] = given * value * r.unit
+            if dP is not None:
+                dP[i, j] = given * first * r.unit
+            if d2P is not None:
+                d2P[i, j] = given * second * r.unit
+            if L is not None:
+                L[i, j] = given * thread * r.unit
+            s = np.sqrt(square) if code == st.OK else (0.0 if code == st.DEAD_POINT else math.nan) * square
+            ds, d2s = follow(good * s, thread, first, second)
+            if S is not None:
+                S[i, j] = s * r.unit
+            if dS is not None:
+                dS[i, j] = ds * r.unit
+            if d2S is not None:
+                d2S[i, j] = d2s * r.unit
+            if whole:
+                out = r.radius + (s - r.least)
+                if pressure_angle is not None:
+                    pressure_angle[i, j] = arctan2(magnitude(ds), out)
+                # The cam turns by phi against the follower: its profile is passed backwards.
+                if X_P is not None:
+                    X_P[i, j] = out * u * r.unit
+                if Y_P is not None:
+                    Y_P[i, j] = -out * v * r.unit
+                if curvature is not None:
+                    way = out * out + ds * ds
+                    curvature[i, j] = (way + ds * ds - out * d2s) / (way * np.sqrt(way)) / r.unit

@@ -1,0 +1,127 @@
+"""The chunks in a folder: what their names say, and whether it is true."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kernels import status as codes
+from sweep.dataset.files import read_plan, store_errors
+from sweep.errors import InputError, StoreError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+METADATA = b"linksweep"
+REMEDY = "run the study again to have it computed anew"
+
+_PART = re.compile(r"part-(\d{6,})-([0-9a-f]{12})-([0-9a-f]{16})\.parquet")
+
+STATUS_NAMES = {value: name for name, value in vars(codes).items() if name.isupper() and isinstance(value, int)}
+
+
+@dataclass(frozen=True)
+class Part:
+    """A chunk file by its name."""
+
+    path: Path
+    index: int
+    identity: str
+    digest: str
+
+    def read(self) -> bytes:
+        """Content of the file.
+
+        Raises
+        ------
+        StoreError
+            if it is damaged, or is another chunk than its name says.
+        """
+        with store_errors(self.path):
+            data = self.path.read_bytes()
+        if content_hash(data) != self.digest:
+            raise StoreError(f"{self.path}: damaged chunk; {REMEDY}")
+        about(self, data)
+        return data
+
+    def rows(self, columns: list[str] | None = None) -> pd.DataFrame:
+        """All columns or some, after the checks of `read`."""
+        import pandas as pd
+
+        return pd.read_parquet(io.BytesIO(self.read()), columns=columns)
+
+
+def about(part: Part, data: bytes | None = None) -> dict[str, Any]:
+    """What a chunk's metadata say of it: study, code, identity, index, range of designs, counts.
+
+    Parameters
+    ----------
+    part : the chunk
+    data : content of the file if it has been read already
+
+    Raises
+    ------
+    StoreError
+        if the metadata cannot be read, or are those of another chunk than the name says.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        with store_errors(part.path):
+            source = part.path if data is None else pa.BufferReader(data)
+            found = json.loads(pq.read_metadata(source).metadata[METADATA])
+        own = found["chunk"], found["identity"]
+        for key in ("start", "stop", "counts", "missed"):
+            found[key]
+    except (pa.ArrowException, ValueError, KeyError, TypeError) as error:
+        raise StoreError(f"{part.path}: damaged chunk; {REMEDY}") from error
+    if own != (part.index, part.identity):
+        names = f"chunk {own[0]} of {own[1]} under the name of chunk {part.index} of {part.identity}"
+        raise StoreError(f"{part.path}: {names}; {REMEDY}")
+    return dict(found)
+
+
+def content_hash(data: bytes) -> str:
+    """The hash that stands at the end of a chunk's name."""
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+def parts(folder: Path) -> list[Part]:
+    """The chunk files by their names, in design order.
+
+    Raises
+    ------
+    InputError
+        if the folder holds a Parquet file that is no chunk: other readers would take it for a part of the data.
+    """
+    found = []
+    for path in folder.glob("[!_.]*.parquet"):
+        match = _PART.fullmatch(path.name)
+        if match is None:
+            raise InputError("file", path.name, "chunks named part-<index>-<identity>-<hash>.parquet", str(folder))
+        found.append(Part(path, int(match[1]), match[2], match[3]))
+    return sorted(found, key=lambda part: (part.index, part.path.name))
+
+
+def is_whole(part: Part) -> bool:
+    """Whether the file is what its name says."""
+    try:
+        part.read()
+    except StoreError as error:
+        if isinstance(error.__cause__, OSError):  # the disk refuses: that says nothing of the chunk
+            raise
+        return False
+    return True
+
+
+def missing_chunks(folder: Path, chunks: list[Part]) -> list[int]:
+    """Indices of the chunks that the folder's chunks, or its plan, say there should be and that are not there."""
+    plan = read_plan(folder) or {}
+    count = about(chunks[0]).get("chunks") if chunks else None
+    return sorted(set(range(plan.get("chunks", 0) if count is None else count)) - {part.index for part in chunks})

@@ -1,0 +1,158 @@
+"""Entries of the effects on the thread over an eyelet: tension over the contour, with speed, and by Euler's law."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.effects.capstan import capstan
+from kernels.effects.thread_contour import thread_contour
+from kernels.effects.thread_speed import thread_speed
+from sweep.effects.base import Effect, Scene
+from sweep.effects.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY, EXPONENT, REFERENCE_SPEED, SHARE
+from sweep.families.base import Array, Columns, Output, Parameter
+from sweep.families.capabilities import ThreadPath
+
+MM_PER_M = 1e3
+
+# Under words of their own: a take-up has symbols such as alpha for its geometry.
+BEFORE = Parameter("thread_tension", "none", "tension in front of the eyelet, gf", not_negative=True)
+CONTOUR_INPUTS = (
+    BEFORE,
+    Parameter("eyelet_radius", "none", "radius of the eyelet's contour, mm; measured 0.125 to 7.5", not_negative=True),
+    Parameter("thread_adhesion", "none", ALPHA.text, not_negative=True, default=ALPHA.default),
+    Parameter("thread_friction", "none", BETA.text, not_negative=True, default=BETA.default),
+    Parameter("thread_bending", "none", BENDING.text, not_negative=True, default=BENDING.default),
+    Parameter("thread_count", "none", COUNT.text, positive=True, default=COUNT.default),
+    Parameter("thread_density", "none", DENSITY.text, positive=True, default=DENSITY.default),
+)  # fmt: skip
+SPEED_INPUTS = (
+    Parameter("speed", "speed", "speed of the crank"),
+    Parameter("thread_speed_ref", "none", "speed at which the tension is known, mm/s; reported 1230", positive=True,
+              default=MM_PER_M * float(REFERENCE_SPEED.default or 0.0)),
+    Parameter("thread_speed_share", "none", SHARE.text, default=SHARE.default),
+    Parameter("thread_speed_exponent", "none", EXPONENT.text, positive=True, default=EXPONENT.default),
+)  # fmt: skip
+CAPSTAN_INPUTS = (BEFORE, Parameter("mu_eyelet", "ratio", "coefficient of friction of the eyelet", not_negative=True))
+
+CONTOUR_EQUATION = "docs/thread.md (1) to (3)"
+CONTOUR_OUTPUTS = (
+    Output("tension", "1", "tension of the thread behind the eyelet, gf", CONTOUR_EQUATION),
+    Output("tension_euler", "1", "its part from the tension in front of the eyelet, gf", CONTOUR_EQUATION),
+    Output("tension_bending", "1", "its part from bending round the contour, gf", CONTOUR_EQUATION),
+    Output("tension_adhesion", "1", "its part from adhesion, gf", CONTOUR_EQUATION),
+)
+SPEED_EQUATION = "docs/thread.md (7), (8)"
+SPEED_OUTPUTS = (
+    Output("thread_speed", "length/s", "speed at which thread is taken up", SPEED_EQUATION),
+    Output("thread_acceleration", "length/s^2", "acceleration at which thread is taken up", SPEED_EQUATION),
+    Output("speed_ratio", "1", "tension at that speed over the tension at the reference speed", SPEED_EQUATION),
+)
+CAPSTAN_EQUATION = "docs/thread.md (5), (6)"
+CAPSTAN_OUTPUTS = (
+    Output("capstan_tension", "1", "tension behind the eyelet by Euler's law, gf", CAPSTAN_EQUATION),
+    Output("eyelet_force", "1", "force of the thread on the eyelet, gf", CAPSTAN_EQUATION),
+)
+
+
+def _path(scene: Scene) -> ThreadPath:
+    path = scene.family.find(ThreadPath)
+    assert path is not None
+    return path
+
+
+def _wrap(scene: Scene) -> tuple[Array, Columns]:
+    """Wrap angle [rad] and the poses' columns with their status."""
+    name = _path(scene).wrap
+    found = scene.family.poses(scene.designs, scene.angles, frozenset({name}))
+    return np.ascontiguousarray(found[name], dtype=np.float64), found
+
+
+def _per_pose(scene: Scene, name: str) -> Array:
+    return np.ascontiguousarray(np.broadcast_to(scene.inputs[name][:, None], scene.shape))
+
+
+def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Tension behind the eyelet and its parts."""
+    wrap, motion = _wrap(scene)
+    names = ("eyelet_radius", "thread_adhesion", "thread_friction", "thread_bending", "thread_count", "thread_density")
+    outputs = {o.name: np.empty(scene.shape) if o.name in wanted else None for o in CONTOUR_OUTPUTS}
+    whole, own, bending, adhesion = outputs.values()
+    status = np.array(motion["status"], np.uint8)
+    # The constants are per degree.
+    before, theta = _per_pose(scene, "thread_tension"), np.degrees(wrap)
+    thread_contour(before, theta, scene.table(names), status, whole, own, bending, adhesion, None)
+    return {name: out for name, out in outputs.items() if out is not None} | {"status": status}
+
+
+def euler(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Tension by Euler's law and force on the eyelet."""
+    wrap, motion = _wrap(scene)
+    outputs = {o.name: np.empty(scene.shape) if o.name in wanted else None for o in CAPSTAN_OUTPUTS}
+    status = np.array(motion["status"], np.uint8)
+    capstan(_per_pose(scene, "thread_tension"), wrap, scene.inputs["mu_eyelet"], status, *outputs.values())
+    return {name: out for name, out in outputs.items() if out is not None} | {"status": status}
+
+
+def speed(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Speed and acceleration of the thread, and the ratio of tensions that the speed makes."""
+    path = _path(scene)
+    found = scene.family.poses(scene.designs, scene.angles, frozenset({path.rate, path.rate2}))
+    first, second = (np.asarray(found[name], np.float64) for name in (path.rate, path.rate2))
+    turning, change = scene.crank()
+    status = np.array(found["status"], np.uint8)
+    of_thread = np.ascontiguousarray(first * turning)
+    columns: Columns = {"thread_speed": of_thread}
+    columns["thread_acceleration"] = second * turning * turning + first * change
+    if "speed_ratio" in wanted:
+        ratio = np.empty(scene.shape)
+        data = scene.table(("thread_speed_ref", "thread_speed_share", "thread_speed_exponent"))
+        thread_speed(of_thread, data, status, ratio)
+        columns["speed_ratio"] = ratio
+    return {name: columns[name] for name in wanted} | {"status": status}
+
+
+CONTOUR = Effect(
+    key="T1",
+    name="thread_contour",
+    title="tension of the thread behind the eyelet of a take-up",
+    equation=CONTOUR_EQUATION,
+    formulas=(
+        "T2 = T1 e^x + (B/(R + r)^2) (e^x - 1) + alpha R theta (e^x - 1)/x,  x = beta theta",
+        "r = 1/sqrt(pi gamma N)",
+    ),
+    needs=(),
+    inputs=CONTOUR_INPUTS,
+    outputs=CONTOUR_OUTPUTS,
+    compute=contour,
+    called_for="tension of the thread over the turn",
+    negligible="radius of the contour between 0.5 and 4 mm: within 13 % of the least tension, a constant will do",
+    requires=ThreadPath,
+)
+SPEED = Effect(
+    key="T2",
+    name="thread_speed",
+    title="speed of the thread at a take-up and what it makes of the tension",
+    equation=SPEED_EQUATION,
+    formulas=("v = P' omega,  a = P'' omega^2 + P' eps", "T(v)/T(v_ref) = 1 + K ((v/v_ref)^n - 1)"),
+    needs=(),
+    inputs=SPEED_INPUTS,
+    outputs=SPEED_OUTPUTS,
+    compute=speed,
+    called_for="wide range of the thread's speed",
+    negligible="speed within +-30 % of the reference: less than 3 %",
+    requires=ThreadPath,
+)
+CAPSTAN = Effect(
+    key="W1",
+    name="capstan",
+    title="Euler's law at the eyelet of a take-up, and the force on the eyelet",
+    equation=CAPSTAN_EQUATION,
+    formulas=("T2 = T1 e^(mu wrap)", "F = sqrt((T2 - T1)^2 + 4 T1 T2 sin^2(wrap/2))"),
+    needs=(),
+    inputs=CAPSTAN_INPUTS,
+    outputs=CAPSTAN_OUTPUTS,
+    compute=euler,
+    called_for="load of the thread on its take-up",
+    negligible="force of the thread below that of the take-up's inertia",
+    requires=ThreadPath,
+)

@@ -1,0 +1,143 @@
+"""The plan a run begins with: that of the folder if it is this study's, otherwise a new one; other data stay apart."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sweep.chunks.plan import NOT_IN_CHUNKS
+from sweep.dataset import store
+from sweep.dataset.layout import outside
+from sweep.engine.conflict import differences
+from sweep.errors import InputError
+
+if TYPE_CHECKING:
+    from sweep.chunks.plan import Plan
+    from sweep.study import Study
+
+# What concerns only these designs; the report about them as well.
+OWN_FILES = (
+    store.PLAN, store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO, "report.html",
+)  # fmt: skip
+
+
+def open_plan(study: Study, folder: Path, force: bool) -> Plan:
+    """The plan in the folder if it is this study's, otherwise a new one; foreign data only go with ``force``."""
+    from sweep.chunks.plan import make_plan
+
+    noted = store.read_plan(folder)
+    if noted is not None:
+        plan = make_plan(study, noted["chunk_size"])
+        if plan.identity == noted["identity"]:
+            # What the chunks say of the study stays as the first run said it, whatever units it is now written in.
+            plan = replace(plan, name=noted["name"], chunk_data=noted["chunk_data"])
+            if force:
+                _set_foreign_aside(folder, plan, ())
+            return plan
+        if _differs_in_limits_only(study, noted, plan):
+            return _with_other_limits(study, folder, plan)
+        if not force:
+            raise store.foreign(folder, _conflict(study, noted, plan), plan)
+    plan = make_plan(study)
+    if force:
+        _set_foreign_aside(folder, plan, OWN_FILES)
+    store.finished_chunks(folder, plan)  # refuses foreign chunks before the plan is written
+    store.write_plan(folder, plan_note(study, folder, plan))
+    return plan
+
+
+def _differs_in_limits_only(study: Study, noted: dict[str, Any], plan: Plan) -> bool:
+    """Whether the designs of a dataset can be sorted anew: every row and every bit of it has been kept."""
+    apart = ("limits", *NOT_IN_CHUNKS)
+    before, now = ({k: v for k, v in data.items() if k not in apart} for data in (noted.get("data") or {}, study.data))
+    kept = study.output.keep == "all" and study.output.dtype == "float64"
+    columns = [column.name for column in plan.columns]
+    same = before == now and [column["name"] for column in noted.get("columns", [])] == columns
+    return kept and same and noted.get("code") == plan.code
+
+
+def _with_other_limits(study: Study, folder: Path, plan: Plan) -> Plan:
+    """Set the chunks aside and note where: their designs are sorted by the new limits."""
+    where = old_name()
+    files = [store.beside(folder) / name for name in OWN_FILES]
+    store.set_aside(
+        folder, [*(part.path for part in store.parts(folder)), *(path for path in files if path.is_file())], where
+    )
+    store.write_plan(folder, plan_note(study, folder, plan) | {"known": where})
+    return plan
+
+
+def known_folder(folder: Path) -> Path | None:
+    """Where the chunks lie that this dataset's are made from."""
+    where = (store.read_plan(folder) or {}).get("known")
+    return store.beside(folder) / where if isinstance(where, str) else None
+
+
+def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
+    """In words what sets the data in the folder apart from what this run would compute."""
+    before, now = (
+        {key: value for key, value in data.items() if key not in NOT_IN_CHUNKS}
+        for data in (noted.get("data") or noted["chunk_data"], study.data)
+    )
+    found = [] if noted.get("study") == plan.study else differences(before, now)
+    if noted.get("code") != plan.code:
+        found.append("other sources or libraries")
+    name = noted["name"] if noted["name"] == study.name else f"{noted['name']}, not {study.name}"
+    return f"{name}: {'; '.join(found) or 'cut in another way'}"
+
+
+def _set_foreign_aside(folder: Path, plan: Plan, others: tuple[str, ...]) -> None:
+    place = store.beside(folder)
+    old = [part.path for part in store.parts(folder) if part.identity != plan.identity]
+    old += [place / name for name in others if (place / name).is_file()]
+    if old:
+        store.set_aside(folder, old, old_name())
+
+
+def old_name() -> str:
+    """Where data go that are set aside now."""
+    return f"{store.OLD}/{time.strftime('%Y%m%d-%H%M%S')}"
+
+
+def refuse_or_clear_older(folder: Path, force: bool) -> None:
+    """See that no dataset of an earlier version, with plan and optimum among its chunks, is in the folder.
+
+    Raises
+    ------
+    InputError
+        if there is one; with ``force`` it is set aside, every file of it.
+    """
+    if not store.is_older(folder):
+        return
+    if not force:
+        allowed = (
+            "a dataset of this version. sweep.load, sweep report and sweep compare read this one as it is; "
+            "choose another folder with --out, or set it aside with --force"
+        )
+        raise InputError("dataset", "one of an earlier version, with its plan among the chunks", allowed, str(folder))
+    with store.locked(folder), store.store_errors(folder):
+        target = outside(folder) / old_name()
+        target.mkdir(parents=True, exist_ok=True)
+        # The plan goes last: until then it is an older dataset, also for a run that begins after a kill.
+        for path in sorted(folder.iterdir(), key=lambda path: path.name == store.PLAN):
+            if path.name != store.LOCK:
+                path.replace(target / path.name)
+    (folder / store.LOCK).unlink(missing_ok=True)
+
+
+def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
+    """Content of ``_plan.json``, with what an earlier run noted of the optimum."""
+    noted = store.read_plan(folder) or {}
+    return plan.as_dict() | {
+        "about": {"name": study.name, "title": study.title, "question": study.question},
+        "data": study.data,
+        "optimise": study.optimise is not None,
+        "optimised": noted.get("optimised"),
+        "pareto": study.pareto is not None,
+        "counts": noted.get("counts"),
+        "missed": noted.get("missed"),
+        "known": noted.get("known"),
+        "complete": False,
+    }

@@ -1,0 +1,24 @@
+"""Thread tension and take-ups as plain functions of tables: one row in, one row out.
+
+Every function takes a DataFrame or a dict of columns (numbers are repeated) and returns a DataFrame with the index
+of the table.  Columns have the symbols of docs/thread.md and docs/takeup.md; a column with a default may be missing.
+``status`` is 0 where the row has a result (docs/nomenclature.md has the other numbers).  A missing or misspelt column,
+a value that is no number, or a sign that is not allowed raises :class:`sweep.InputError`, which names column and row.
+"""
+
+from sweep.errors import MeasuredRangeWarning as MeasuredRangeWarning
+from sweep.evaluation.thread.geometry import eyelet as eyelet
+from sweep.evaluation.thread.geometry import feed as feed
+from sweep.evaluation.thread.geometry import follower as follower
+from sweep.evaluation.thread.geometry import free_cam as free_cam
+from sweep.evaluation.thread.geometry import wrap as wrap
+from sweep.evaluation.thread.tension import capstan as capstan
+from sweep.evaluation.thread.tension import contour as contour
+from sweep.evaluation.thread.tension import least_tension_radius as least_tension_radius
+from sweep.evaluation.thread.tension import path as path
+from sweep.evaluation.thread.tension import speed as speed
+
+__all__ = [
+    "MeasuredRangeWarning", "capstan", "contour", "eyelet", "feed", "follower", "free_cam", "least_tension_radius",
+    "path", "speed", "wrap",
+]  # fmt: skip

@@ -1,0 +1,202 @@
+"""Wrap angle and length of the thread over eyelets and cams; the equation numbers are those of docs/takeup.md."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels.effects.wrap import guide_line, thread_over_point
+from kernels.families import eyelet as eyelet_kernels
+from kernels.families import free_cam as free_cam_kernels
+from kernels.families import guided_cam as guided_cam_kernels
+from kernels.status import OK, SINGULAR
+from sweep.evaluation.thread.rows import Sheet, columns_of, frame, side_by_side
+from sweep.families.base import Array, Parameter
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.evaluation.tables import Table
+
+
+def _lengths(names: str, text: str, default: float | None = None) -> tuple[Parameter, ...]:
+    return tuple(Parameter(name, "length", f"{text} {name}", default=default) for name in names.split())
+
+
+GUIDES = ("X1", "Y1", "Z1", "X2", "Y2", "Z2")
+POINT = ("X_E", "Y_E", "Z_E")
+FIRST = ("dX_E", "dY_E", "dZ_E")
+SECOND = ("d2X_E", "d2Y_E", "d2Z_E")
+_POINTS = (*_lengths(" ".join(GUIDES), "coordinate of a guide"), *_lengths(" ".join(POINT), "coordinate of the eyelet"))
+_RATES = (
+    *_lengths(" ".join(FIRST), "derivative of the eyelet's coordinate", 0.0),
+    *_lengths(" ".join(SECOND), "second derivative of the eyelet's coordinate", 0.0),
+)
+_WRAP, _FEED = Sheet("wrap", _POINTS), Sheet("feed", (*_POINTS, *_RATES))
+_EYELET = Sheet(
+    "eyelet",
+    (
+        Parameter("a", "length", "radius of the eyelet's circle", positive=True),
+        *_lengths("e f", "place of the crank axis:"),
+        Parameter("alpha", "angle", "angle between the crank axis and the line of the guides"),
+        *_lengths("Z1 Z2", "guide on the line x = e, y = 0:"),
+        Parameter("phi_h", "angle", "angle of the eyelet on the crank"),
+        Parameter("P_h", "length", "length of thread at P = 0", default=0.0),
+        Parameter("phi", "angle", "crank angle"),
+        Parameter("P", "length", "wanted P", default=0.0),
+    ),
+)
+_FOLLOWER = Sheet(
+    "follower",
+    (
+        Parameter("L", "length", "length of the thread between the guides", positive=True),
+        *_lengths("dL d2L", "derivative of the length:", 0.0),
+        *_lengths("Z1 e X1", "place of the guides:"),
+        Parameter("mu1", "ratio", "coefficient of friction on the cam", default=0.0, not_negative=True),
+        Parameter("mu2", "ratio", "coefficient of friction in the guide", default=0.0, not_negative=True),
+    ),
+)
+_FREE_CAM = Sheet(
+    "free_cam",
+    (
+        Parameter("a", "1/length", "bend of the edge x = a y^2", not_negative=True),
+        Parameter("phi", "angle", "cam angle"),
+        *_lengths(" ".join(GUIDES), "coordinate of a guide"),
+        Parameter("mu", "ratio", "coefficient of friction along the edge", default=0.0, not_negative=True),
+        Parameter("tension_ratio", "ratio", "T2/T1", default=1.0, positive=True),
+        Parameter("mu_thread", "ratio", "coefficient of friction along the thread", default=0.0, not_negative=True),
+    ),
+)
+
+
+def wrap(table: Table) -> pd.DataFrame:
+    """Wrap angle at an eyelet E between two guides, thread length, and the coordinates of (26) of the source; (1).
+
+    Parameters
+    ----------
+    table : columns X1 Y1 Z1 and X2 Y2 Z2 of the guides, X_E Y_E Z_E of the eyelet [length]
+
+    Returns
+    -------
+    DataFrame
+        L; wrap [rad], 0 for a straight thread; x, distance of the eyelet from the line of the guides; y, its place
+        along the line from the middle of the guides; half_distance_c of the guides; status: SINGULAR where the eyelet
+        is at a guide, or where both guides are at one place, so that x and y have no meaning (L and wrap stay)
+    """
+    given = columns_of(_WRAP, table)
+    guides, place = side_by_side(given, GUIDES), side_by_side(given, POINT)
+    n = len(place)
+    status, (total, angle) = np.zeros((n, 1), np.uint8), (np.empty((n, 1)) for _ in range(2))
+    thread_over_point(guides, place[:, None], None, None, status, total, None, None, angle)
+    off, along, half = (np.empty(n) for _ in range(3))
+    guide_line(guides, place, off, along, half)
+    status[np.isnan(off) & (status[:, 0] == OK)] = SINGULAR
+    columns = {"L": total, "wrap": angle, "x": off, "y": along, "half_distance_c": half}
+    return frame(table, columns | {"status": status})
+
+
+def feed(table: Table) -> pd.DataFrame:
+    """Length of the thread over a point of any link, and its derivatives from those of the point; (2) to (4).
+
+    Parameters
+    ----------
+    table : columns X1 Y1 Z1 and X2 Y2 Z2 of the guides, X_E Y_E Z_E of the point, its derivatives with respect to the
+        crank angle dX_E ... dZ_E, d2X_E ... d2Z_E (0 by default) [length]
+
+    Returns
+    -------
+    DataFrame
+        L, dL_dphi, d2L_dphi2 [length]; wrap [rad]; status: SINGULAR where the point is at a guide
+    """
+    given = columns_of(_FEED, table)
+    guides = side_by_side(given, GUIDES)
+    place, first, second = (side_by_side(given, names)[:, None] for names in (POINT, FIRST, SECOND))
+    n = len(place)
+    status, out = np.zeros((n, 1), np.uint8), [np.empty((n, 1)) for _ in range(4)]
+    thread_over_point(guides, place, first, second, status, *out)
+    names = ("L", "dL_dphi", "d2L_dphi2", "wrap")
+    return frame(table, dict(zip(names, out, strict=True)) | {"status": status})
+
+
+def eyelet(table: Table) -> pd.DataFrame:
+    """Eyelet on a crank against a wanted P: motion, thread, weighted difference (27) of the source; (5) to (8).
+
+    Parameters
+    ----------
+    table : columns a e f alpha Z1 Z2 phi_h P_h of the family `eyelet`, phi [rad], P wanted there (0 by default)
+
+    Returns
+    -------
+    DataFrame
+        X_E Y_E Z_E, L, dL_dphi, d2L_dphi2 [length]; wrap [rad]; length_error = P_h + P - L; dq [length^2] and weight
+        [length], with dq = weight * length_error to first order; status: INVALID_INPUT where P_h + P <= 0
+    """
+    given = columns_of(_EYELET, table)
+    parameters = side_by_side(given, ("a", "e", "f", "alpha", "Z1", "Z2", "phi_h", "P_h"))
+    n = len(parameters)
+    designs = np.hstack([parameters, np.zeros((n, 4))])
+    cos, sin = np.cos(given["phi"])[:, None], np.sin(given["phi"])[:, None]
+    status, judged = np.empty((n, 1), np.uint8), np.empty((n, 1), np.uint8)
+    names = ("dL_dphi", "d2L_dphi2", "L", "wrap", *POINT)
+    columns: dict[str, Array] = {name: np.empty((n, 1)) for name in names}
+    eyelet_kernels.poses(designs, cos, sin, status, None, *columns.values())
+    difference, weight = np.empty((n, 1)), np.empty((n, 1))
+    eyelet_kernels.weighted_difference(designs, cos, sin, given["P"][:, None], difference, weight, judged)
+    columns |= {"length_error": (given["P_h"] + given["P"])[:, None] - columns["L"], "dq": difference, "weight": weight}
+    return frame(table, columns | {"status": np.where(status == OK, judged, status)})
+
+
+def follower(table: Table) -> pd.DataFrame:
+    """Follower of a guided cam from the length of the thread, and the pressure angle at which it jams; (10) to (14).
+
+    Parameters
+    ----------
+    table : columns L, dL, d2L of the thread, Z1 e X1 of the guides [length]; mu1, mu2 (0 by default)
+
+    Returns
+    -------
+    DataFrame
+        S, dS, d2S [length]; theta_jam [rad], negative where the follower jams at every angle; tan_half_theta_jam;
+        status: NOT_ASSEMBLED where the thread is too short, DEAD_POINT where S = 0
+    """
+    given = columns_of(_FOLLOWER, table)
+    data = side_by_side(given, ("L", "dL", "d2L", "Z1", "e", "X1"))
+    n = len(data)
+    status, out = np.empty(n, np.uint8), [np.empty(n) for _ in range(5)]
+    guided_cam_kernels.follower(data, status, *out[:3])
+    guided_cam_kernels.jam_angles(side_by_side(given, ("mu1", "mu2")), out[3], out[4])
+    names = ("S", "dS", "d2S", "theta_jam", "tan_half_theta_jam")
+    return frame(table, dict(zip(names, out, strict=True)) | {"status": status})
+
+
+def free_cam(table: Table) -> pd.DataFrame:
+    """Thread over the bare edge of a turning cam: where it lies without friction, and between which points it sticks.
+
+    Equations (18) to (25).
+
+    Parameters
+    ----------
+    table : columns a [1/length], phi [rad], X1 Y1 Z1, X2 Y2 Z2 of the guides [length]; mu along the edge, tension_ratio
+        T2/T1 and mu_thread along the thread, by which the ratio becomes tension_ratio e^(mu_thread wrap)
+
+    Returns
+    -------
+    DataFrame
+        y_contact, X, Y, L [length]; wrap [rad]; contact, 1 on the edge; n_minima of the length along the edge;
+        y_limit_plus, y_limit_minus, where the resultant leans by the angle of friction towards growing and falling y,
+        nearest to the shortest thread; status: INVALID_INPUT where both guides are on one side, NOT_CONVERGED where a
+        limit point lies far outside
+    """
+    given = columns_of(_FREE_CAM, table)
+    n = len(given["a"])
+    designs = np.hstack([side_by_side(given, ("a", *GUIDES)), np.zeros((n, 1))])
+    cos, sin = np.cos(given["phi"])[:, None], np.sin(given["phi"])[:, None]
+    status, judged = np.empty((n, 1), np.uint8), np.empty((n, 1), np.uint8)
+    names = ("L", "wrap", "y_contact", "X", "Y", "contact", "n_minima")
+    columns: dict[str, Array] = {name: np.empty((n, 1)) for name in names}
+    free_cam_kernels.poses(designs, cos, sin, status, None, None, None, *columns.values())
+    friction = side_by_side(given, ("tension_ratio", "mu_thread", "mu"))
+    limits: dict[str, Array] = {name: np.empty((n, 1)) for name in ("y_limit_plus", "y_limit_minus")}
+    free_cam_kernels.limit_points(designs, friction, cos, sin, judged, *limits.values())
+    return frame(table, columns | limits | {"status": np.where(status == OK, judged, status)})

@@ -1,0 +1,68 @@
+"""From a table to the arrays of a thread kernel and back."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sweep.effects.thread_inputs import Range
+from sweep.errors import MeasuredRangeWarning
+from sweep.evaluation.tables import Parametrised, design_matrix
+from sweep.families.base import Array, Parameter
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.evaluation.tables import Table
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The columns that one function reads."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the columns in order."""
+        return tuple(p.name for p in self.parameters)
+
+
+def columns_of(sheet: Parametrised, table: Table) -> dict[str, Array]:
+    """The checked columns by name, each (n,) and contiguous."""
+    matrix, _ = design_matrix(sheet, table)
+    return {name: np.ascontiguousarray(matrix[:, k]) for k, name in enumerate(sheet.parameter_names)}
+
+
+def side_by_side(columns: Mapping[str, Array], names: tuple[str, ...]) -> Array:
+    """Some columns as a matrix (n, len(names))."""
+    return np.ascontiguousarray(np.column_stack([columns[name] for name in names]))
+
+
+def frame(table: Table, columns: Mapping[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]) -> pd.DataFrame:
+    """A DataFrame of columns (n,) or (n, 1) with the index of the table it answers."""
+    import pandas as pd
+
+    index = table.index if isinstance(table, pd.DataFrame) else None
+    return pd.DataFrame({name: np.asarray(x).reshape(len(x)) for name, x in columns.items()}, index=index)
+
+
+def warn_outside(values: Array, measured: Range, constants: tuple[Parameter, ...], table: Table) -> None:
+    """Warn once of values for which the reported constants were not measured.
+
+    Nothing is said where the table has constants of its own: their range is the user's to know.
+    """
+    if any(p.name in list(table) for p in constants):
+        return
+    outside = int(((values < measured.low) | (values > measured.high)).sum())
+    if outside:
+        text = (
+            f"{measured.name} = {values.min():g} to {values.max():g} {measured.unit}: {outside} of {values.size} values"
+        )
+        known = f"{measured.low:g} to {measured.high:g} {measured.unit}"
+        warnings.warn(f"{text} outside {known}, where the constants were measured", MeasuredRangeWarning, stacklevel=3)

@@ -1,0 +1,211 @@
+"""Tension over contours, with speed, and by Euler's law; the equation numbers are those of docs/thread.md."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels.effects.capstan import capstan as capstan_kernel
+from kernels.effects.thread_contour import COLUMNS, contour_of_least_tension, thread_contour
+from kernels.effects.thread_speed import COLUMNS as SPEED_COLUMNS
+from kernels.effects.thread_speed import thread_speed
+from kernels.status import SINGULAR
+from sweep.effects.thread_inputs import (
+    ALPHA,
+    BENDING,
+    BETA,
+    CONTOUR_CONSTANTS,
+    MEASURED_RADIUS,
+    MEASURED_SPEED,
+    RADIUS,
+    SPEED_CONSTANTS,
+)  # fmt: skip
+from sweep.errors import InputError
+from sweep.evaluation.tables import numbers
+from sweep.evaluation.thread.rows import Sheet, columns_of, frame, side_by_side, warn_outside
+from sweep.families.base import Parameter
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import ArrayLike
+
+    from sweep.evaluation.tables import Table
+
+TENSION = Parameter("T1", "none", "tension in front of the contour, gf", not_negative=True)
+ANGLE = Parameter("theta_deg", "none", "wrap angle, degrees", not_negative=True)
+FITTED = (ALPHA, BETA, BENDING)
+
+_CONTOUR = Sheet("contour", (TENSION, RADIUS, ANGLE, *CONTOUR_CONSTANTS))
+_CONTOURS = Sheet("contours", (RADIUS, *CONTOUR_CONSTANTS))
+_CONTOURS_WITH_ANGLES = Sheet("contours", (RADIUS, ANGLE, *CONTOUR_CONSTANTS))
+_CONSTANTS = Sheet("constants", CONTOUR_CONSTANTS)
+_SPEED = Sheet("speed", (Parameter("v", "none", "speed of the thread, m/s"), *SPEED_CONSTANTS))
+_CAPSTAN = Sheet(
+    "capstan",
+    (
+        Parameter("T1", "force", "tension in front of the eyelet", not_negative=True),
+        Parameter("wrap", "angle", "wrap angle, rad", not_negative=True),
+        Parameter("mu", "ratio", "coefficient of friction", not_negative=True),
+    ),
+)
+
+
+def contour(table: Table) -> pd.DataFrame:
+    """Tension of a thread behind one contour, with the parts of it; equations (1) to (3).
+
+    Parameters
+    ----------
+    table : columns T1 [gf], R [mm], theta_deg [degrees]; constants alpha [gf/(mm deg)], beta [1/deg], B [gf mm^2],
+        N [m/g], gamma [g/cm^3], by default those of the source
+
+    Returns
+    -------
+    DataFrame
+        T2 [gf] and its parts capstan, bending, adhesion; r_thread [mm]; status: INVALID_INPUT where T2 is beyond
+        float64
+
+    Warns
+    -----
+    MeasuredRangeWarning
+        where R is outside 0.125 to 7.5 mm and the reported constants are used
+
+    Notes
+    -----
+    Measured against the 25-digit table: relative error at most 4e-16.
+
+    Examples
+    --------
+    >>> sweep.thread.contour({"T1": 5.0, "R": 1.0, "theta_deg": 90.0})
+    """
+    given = columns_of(_CONTOUR, table)
+    warn_outside(given["R"], MEASURED_RADIUS, FITTED, table)
+    n = len(given["R"])
+    status, out = np.zeros((n, 1), np.uint8), [np.empty((n, 1)) for _ in range(5)]
+    data = side_by_side(given, COLUMNS)
+    thread_contour(given["T1"][:, None], given["theta_deg"][:, None], data, status, *out)
+    names = ("T2", "capstan", "bending", "adhesion", "r_thread")
+    return frame(table, dict(zip(names, out, strict=True)) | {"status": status})
+
+
+def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> pd.DataFrame:
+    """Tension along a thread that passes several contours in sequence, at one pose or at many.
+
+    The tension behind one contour is the tension in front of the next.
+
+    Parameters
+    ----------
+    T1 : tension in front of the first contour [gf], a number or one per pose
+    contours : one row per contour in the order of the thread: R [mm], theta_deg [degrees], constants as in `contour`
+    theta_deg : wrap angles that change over the turn, (number of contours, poses); the column is not needed then
+
+    Returns
+    -------
+    DataFrame
+        one row per pose: T1 in front of the first contour, T2 behind it, T3 behind the second, and so on [gf]; status
+
+    Raises
+    ------
+    InputError
+        if T1 and theta_deg do not fit each other or the contours, or are negative or no numbers
+
+    Warns
+    -----
+    MeasuredRangeWarning
+        as in `contour`
+    """
+    import pandas as pd
+
+    given = columns_of(_CONTOURS if theta_deg is not None else _CONTOURS_WITH_ANGLES, contours)
+    warn_outside(given["R"], MEASURED_RADIUS, FITTED, contours)
+    count = len(given["R"])
+    angles = given["theta_deg"][:, None] if theta_deg is None else numbers(theta_deg, "theta_deg", "theta_deg")
+    start = numbers(T1, "T1", "T1").reshape(-1)
+    if angles.ndim != 2 or len(angles) != count:
+        allowed = f"one row for each of the {count} contours"
+        raise InputError("theta_deg", f"shape {angles.shape}", allowed, "theta_deg")
+    if 1 not in (start.size, angles.shape[1]) and start.size != angles.shape[1]:
+        raise InputError("T1", f"{start.size} values", f"one, or one per pose of theta_deg, {angles.shape[1]}", "T1")
+    poses = max(start.size, angles.shape[1])
+    tension = np.ascontiguousarray(np.broadcast_to(start, poses))[None]
+    status = np.zeros((1, poses), np.uint8)
+    data = side_by_side(given, COLUMNS)
+    columns = {"T1": tension[0]}
+    for k in range(count):
+        behind, angle = np.empty((1, poses)), np.ascontiguousarray(np.broadcast_to(angles[k], (1, poses)))
+        thread_contour(tension, angle, data[k : k + 1], status, behind, None, None, None, None)
+        tension = behind
+        columns[f"T{k + 2}"] = behind[0]
+    return pd.DataFrame(columns | {"status": status[0]})
+
+
+def least_tension_radius(table: Table) -> pd.DataFrame:
+    """Radius of the contour behind which the tension is least, whatever the wrap angle and the tension; (4).
+
+    Parameters
+    ----------
+    table : constants alpha, beta, B, N, gamma as in `contour`, all with defaults
+
+    Returns
+    -------
+    DataFrame
+        R_least [mm]: inf without adhesion, 0 where a sharp edge is best; r_thread [mm]; status: SINGULAR where neither
+        bending nor adhesion counts and every radius is as good
+    """
+    given = columns_of(_CONSTANTS, table)
+    n = len(given["alpha"])
+    given["R"], zero = np.zeros(n), np.zeros((n, 1))
+    data, radius = side_by_side(given, COLUMNS), np.empty(n)
+    contour_of_least_tension(data, radius)
+    thread, status = np.empty((n, 1)), np.zeros((n, 1), np.uint8)
+    thread_contour(zero, zero, data, status, None, None, None, None, thread)
+    status[np.isnan(radius) & (status[:, 0] == 0)] = SINGULAR
+    return frame(table, {"R_least": radius, "r_thread": thread, "status": status})
+
+
+def speed(table: Table) -> pd.DataFrame:
+    """Tension behind the disc tensioner over its value at the reference speed, for a speed of the thread; (7).
+
+    Parameters
+    ----------
+    table : column v [m/s], its magnitude counts; constants v_ref [m/s], K, n, by default through the reported points
+
+    Returns
+    -------
+    DataFrame
+        ratio_to_ref; status
+
+    Warns
+    -----
+    MeasuredRangeWarning
+        where v is outside 0.08 to 7.4 m/s and the reported constants are used
+
+    Notes
+    -----
+    Measured against the 25-digit table: relative error at most 3e-16.
+    """
+    given = columns_of(_SPEED, table)
+    warn_outside(np.abs(given["v"]), MEASURED_SPEED, SPEED_CONSTANTS, table)
+    n = len(given["v"])
+    status, ratio = np.zeros((n, 1), np.uint8), np.empty((n, 1))
+    thread_speed(given["v"][:, None], side_by_side(given, SPEED_COLUMNS), status, ratio)
+    return frame(table, {"ratio_to_ref": ratio, "status": status})
+
+
+def capstan(table: Table) -> pd.DataFrame:
+    """Tension behind an eyelet by Euler's law, and the force of the thread on the eyelet; (5), (6).
+
+    Parameters
+    ----------
+    table : columns T1 [force], wrap [rad], mu
+
+    Returns
+    -------
+    DataFrame
+        T2 and force, in the unit of T1; status
+    """
+    given = columns_of(_CAPSTAN, table)
+    n = len(given["T1"])
+    status, out = np.zeros((n, 1), np.uint8), [np.empty((n, 1)) for _ in range(2)]
+    capstan_kernel(given["T1"][:, None], given["wrap"][:, None], given["mu"], status, *out)
+    return frame(table, {"T2": out[0], "force": out[1], "status": status})

@@ -1,0 +1,57 @@
+"""Registry entry of the thread take-up by an eyelet on a crank; as second stage of a chain, on a rocker."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.families import eyelet
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled
+from sweep.families.capabilities import Points, ThreadPath
+
+PARAMETERS = (
+    Parameter("a", "length", "radius of the circle of the eyelet", positive=True),
+    Parameter("e", "length", "distance of the line of the guides from the crank axis, along x"),
+    Parameter("f", "length", "place of the eyelet's circle along the crank axis"),
+    Parameter("alpha", "angle", "angle between the crank axis and the line of the guides"),
+    Parameter("Z1", "length", "place of guide 1 on the line of the guides"),
+    Parameter("Z2", "length", "place of guide 2 on the line of the guides"),
+    Parameter("phi_h", "angle", "angle of the eyelet at phi = 0", default=0.0),
+    Parameter("P_h", "length", "length of thread between the guides at P = 0", default=0.0),
+    Parameter("dX1", "length", "guide 1 off the line x = e, y = 0, along x", default=0.0),
+    Parameter("dY1", "length", "guide 1 off the line x = e, y = 0, along y", default=0.0),
+    Parameter("dX2", "length", "guide 2 off the line x = e, y = 0, along x", default=0.0),
+    Parameter("dY2", "length", "guide 2 off the line x = e, y = 0, along y", default=0.0),
+)
+
+POSE_OUTPUTS = (
+    Output("P", "length", "thread taken up, L - P_h", "(6)"),
+    Output("dP", "length", "thread taken up per radian, dP/dphi", "(3)"),
+    Output("d2P", "length", "second derivative of the thread taken up", "(4)"),
+    Output("L", "length", "length of thread between the guides, over the eyelet", "(2)"),
+    Output("wrap", "rad", "angle by which the thread turns at the eyelet", "(1)"),
+    Output("X_E", "length", "eyelet, along the common perpendicular of crank axis and line of the guides", "(5)"),
+    Output("Y_E", "length", "eyelet, across that and the line of the guides", "(5)"),
+    Output("Z_E", "length", "eyelet, along the line of the guides", "(5)"),
+)
+_NAMES = tuple(o.name for o in POSE_OUTPUTS)
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
+    dtype = np.result_type(designs, angles.cos)
+    return filled(eyelet.poses, (designs, angles.cos, angles.sin), _NAMES, wanted, status, dtype)
+
+
+FAMILY = Family(
+    name="eyelet",
+    title="thread take-up by an eyelet on a crank",
+    parameters=PARAMETERS,
+    position="P",
+    pose_outputs=POSE_OUTPUTS,
+    poses=poses,
+    derivative_of={"P": "dP", "dP": "d2P", "L": "dP"},
+    uses_phi=False,
+    example={"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "P_h": 8.0},
+    capabilities=(Points({"eyelet": ("X_E", "Y_E", "Z_E")}), ThreadPath("wrap", "dP", "d2P")),
+)

@@ -1,0 +1,136 @@
+"""Registry entry of the feed mechanism: rack on a horizontal chain and a lift chain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.families import feed
+from kernels.families.feed.events import OUTPUTS as _EVENTS
+from kernels.families.feed.motion import OUTPUTS as _POSES
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
+from sweep.families.capabilities import Points
+
+ROCKER = (
+    Parameter("h_a", "length", "horizontal chain: crank", positive=True),
+    Parameter("h_b", "length", "horizontal chain: coupler", positive=True),
+    Parameter("h_c", "length", "horizontal chain: rocker", positive=True),
+    Parameter("h_e", "length", "horizontal chain: from the crank axis to the rocker axis, along x"),
+    Parameter("h_f", "length", "horizontal chain: offset of the crank plane; 0 if planar", default=0.0),
+    Parameter("h_g", "length", "horizontal chain: offset of the rocker plane; 0 if planar", default=0.0),
+    Parameter("h_alpha", "angle", "horizontal chain: angle between the axes; 0 if planar", default=0.0),
+    Parameter("rh", "length", "arm of the rocker that carries the pin H of the rack"),
+    Parameter("dh", "angle", "from the rocker to that arm", default=0.0),
+)
+SIGMA = Parameter("h_sigma", "sign", "horizontal chain: assembly mode, sign of dF/dpsi", default=1.0,
+                  choices=(-1.0, 1.0))  # fmt: skip
+
+PARAMETERS = (
+    *ROCKER,
+    Parameter("xE", "length", "lift eccentric: centre of turning, along x"),
+    Parameter("yE", "length", "lift eccentric: centre of turning, along y"),
+    Parameter("rE", "length", "lift eccentric: eccentricity", not_negative=True),
+    Parameter("dE", "angle", "lift eccentric: ahead of the crank"),
+    Parameter("q", "length", "lift coupler", positive=True),
+    Parameter("fx", "length", "joint F of the lift coupler, along the rack from H"),
+    Parameter("fy", "length", "joint F of the lift coupler, across the rack from H"),
+    Parameter("tx", "length", "tooth number 0, along the rack from H"),
+    Parameter("ty", "length", "teeth, across the rack from H"),
+    Parameter("tooth", "count", "number of the tooth that is watched", default=0.0),
+    Parameter("pitch", "length", "distance of two teeth", default=0.0),
+    Parameter("y_plate", "length", "height of the needle plate", default=0.0),
+    SIGMA,
+    Parameter("bar_branch", "sign", "assembly mode of the rack: +1 if F lies to the right of the ray from H to E",
+              default=1.0, choices=(-1.0, 1.0)),
+)  # fmt: skip
+
+POSE_OUTPUTS = (
+    Output("psi_plus_dh", "rad", "direction of the arm to H", "(3)", wraps=True),
+    Output("dpsi", "1", "its first derivative by phi", "(3)"),
+    Output("d2psi", "1", "its second derivative", "(3)"),
+    Output("chi", "rad", "angle of the rack", "(7)", wraps=True),
+    Output("dchi", "1", "its first derivative by phi", "(8)"),
+    Output("d2chi", "1", "its second derivative", "(8)"),
+    Output("x_h", "length", "pin H of the rack, along x", "(4)"),
+    Output("y_h", "length", "pin H of the rack, along y", "(4)"),
+    Output("x_e", "length", "centre E of the lift eccentric, along x", "(5)"),
+    Output("y_e", "length", "centre E of the lift eccentric, along y", "(5)"),
+    Output("x_f", "length", "joint F of the lift coupler, along x", "(9)"),
+    Output("y_f", "length", "joint F of the lift coupler, along y", "(9)"),
+    Output("x_t", "length", "tooth, along the feed", "(9)"),
+    Output("y_t", "length", "tooth, upwards", "(9)"),
+    Output("dx_t", "length", "velocity analogue of the tooth along the feed", "(9)"),
+    Output("dy_t", "length", "velocity analogue of the tooth upwards", "(9)"),
+    Output("d2x_t", "length", "acceleration analogue of the tooth along the feed", "(9)"),
+    Output("d2y_t", "length", "acceleration analogue of the tooth upwards", "(9)"),
+)
+
+FEEDING_OUTPUTS = (
+    Output("phi_entry", "rad", "event: crank angle at which the tooth rises through the plate, in [0, 2 pi)", "(11)"),
+    Output("phi_leave", "rad", "event: crank angle at which it sinks through the plate, in [0, 2 pi)", "(11)"),
+    Output("feed_angle", "rad", "crank angle from entry to leaving: time in the fabric times the speed", "(11)"),
+    Output("entry_speed", "length", "dy_t at entry, per radian: times the speed it is that of the impact", "(12)"),
+    Output("leave_speed", "length", "dy_t at leaving, per radian", "(12)"),
+    Output("stitch_length", "length", "way of the tooth along the feed from entry to leaving, signed", "(13)"),
+    Output("rise", "length", "greatest height of the tooth above the plate", "(14)"),
+    Output("flatness", "1", "area under the path over rise times stitch length: 1 for a rectangle", "(14)"),
+    Output("crossings", "1", "passages of the plate per turn", "(11)", jumps=True),
+)
+
+EPS = 2.0**-53
+_LENGTHS = [k for k, p in enumerate(PARAMETERS) if p.unit == "length"]
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    shape = (len(designs), angles.cos.shape[1])
+    status = np.empty(shape, np.uint8)
+    outputs = np.empty((len(_POSES), *shape), np.result_type(designs, angles.cos))
+    feed.poses(designs, angles.cos, angles.sin, status, outputs)
+    return {name: x for name, x in zip(_POSES, outputs, strict=True) if name in wanted} | {"status": status}
+
+
+def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Entry, leaving and what lies between; the errors are estimates from the rounding of a tooth's height."""
+    status, values = np.empty(len(designs), np.uint8), np.empty((len(_EVENTS), len(designs)))
+    feed.feeding(designs, status, values)
+    columns: dict[str, Array] = dict(zip(_EVENTS, values, strict=True))
+    with np.errstate(all="ignore"):
+        height = 16.0 * EPS * np.abs(designs[:, _LENGTHS]).sum(axis=1)
+        angle = height * (1.0 / np.abs(columns["entry_speed"]) + 1.0 / np.abs(columns["leave_speed"]))
+        # accelerations of a tooth are of the size of the eccentricities: a shift of the event changes speeds by that
+        size = np.abs(designs[:, _LENGTHS]).sum(axis=1)
+        errors = {
+            "phi_entry": angle, "phi_leave": angle, "feed_angle": angle, "entry_speed": height + angle * size,
+            "leave_speed": height + angle * size, "stitch_length": height + angle * size, "rise": height,
+            "flatness": height / columns["rise"] + (height + angle * size) / np.abs(columns["stitch_length"]) + 1e-10,
+            "crossings": 0.0 * angle,
+        }  # fmt: skip
+    for name, error in errors.items():
+        columns[f"err_{name}"] = error
+    return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
+
+
+EXAMPLE = {
+    "h_a": 0.4, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "rh": 1.2, "dh": -0.3, "xE": 5.6, "yE": 0.7, "rE": 0.18, "dE": 0.8,
+    "q": 2.6, "fx": -1.7, "fy": 0.6, "tx": -0.3, "ty": 0.9, "y_plate": 1.5, "h_sigma": -1.0, "bar_branch": -1.0,
+}  # fmt: skip
+
+
+FAMILY = Family(
+    name="feed",
+    title="feed rack on a horizontal and a lift chain",
+    parameters=PARAMETERS,
+    position="x_t",
+    pose_outputs=POSE_OUTPUTS,
+    poses=poses,
+    steps=(Step("feeding", FEEDING_OUTPUTS, events, 150_000.0),),
+    example=EXAMPLE,
+    derivative_of={
+        "psi_plus_dh": "dpsi", "dpsi": "d2psi", "chi": "dchi", "dchi": "d2chi", "x_t": "dx_t", "dx_t": "d2x_t",
+        "y_t": "dy_t", "dy_t": "d2y_t",
+    },
+    uses_phi=False,
+    capabilities=(
+        Points({k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")}),
+    ),
+)  # fmt: skip

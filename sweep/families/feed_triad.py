@@ -1,0 +1,81 @@
+"""Registry entry of the feed rack on three leads: rocker pin and two eccentrics, each with a link to the rack."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.families import feed
+from kernels.families.feed import triad
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from sweep.families.capabilities import Points
+from sweep.families.feed import ROCKER, SIGMA
+
+
+def _eccentric(number: int) -> tuple[Parameter, ...]:
+    return (
+        Parameter(f"xE{number}", "length", f"eccentric {number}: centre of turning, along x"),
+        Parameter(f"yE{number}", "length", f"eccentric {number}: centre of turning, along y"),
+        Parameter(f"rE{number}", "length", f"eccentric {number}: eccentricity", not_negative=True),
+        Parameter(f"dE{number}", "angle", f"eccentric {number}: ahead of the crank"),
+    )
+
+
+PARAMETERS = (
+    *ROCKER,
+    *_eccentric(2),
+    *_eccentric(3),
+    *(
+        Parameter(f"f{k}{axis}", "length", f"joint of link {k}, {word} the rack from the tooth")
+        for k in (1, 2, 3)
+        for axis, word in (("x", "along"), ("y", "across"))
+    ),
+    *(Parameter(f"q{k}", "length", f"link {k}", positive=True) for k in (1, 2, 3)),
+    Parameter("x0", "length", "where the tooth is about at phi = 0, along x: it chooses the assembly"),
+    Parameter("y0", "length", "where the tooth is about at phi = 0, along y"),
+    Parameter("chi0", "angle", "angle of the rack at phi = 0, about"),
+    SIGMA,
+)
+
+POSE_OUTPUTS = (
+    Output("x_t", "length", "tooth, along the feed", "(15)"),
+    Output("y_t", "length", "tooth, upwards", "(15)"),
+    Output("chi", "rad", "angle of the rack", "(15)", wraps=True),
+    Output("dx_t", "length", "velocity analogue of the tooth along the feed", "(16)"),
+    Output("dy_t", "length", "velocity analogue of the tooth upwards", "(16)"),
+    Output("dchi", "1", "first derivative of chi by phi", "(16)"),
+    Output("d2x_t", "length", "acceleration analogue of the tooth along the feed", "(17)"),
+    Output("d2y_t", "length", "acceleration analogue of the tooth upwards", "(17)"),
+    Output("d2chi", "1", "second derivative of chi", "(17)"),
+    Output("determinant", "length^4", "of the closures: zero where the three leads lock", "(16)"),
+)
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    shape = (len(designs), angles.phi.shape[1])
+    status = np.empty(shape, np.uint8)
+    outputs = np.empty((len(triad.OUTPUTS), *shape), np.result_type(designs, angles.phi))
+    feed.triad_poses(designs, angles.phi, status, outputs)
+    return {name: x for name, x in zip(triad.OUTPUTS, outputs, strict=True) if name in wanted} | {"status": status}
+
+
+EXAMPLE = {
+    "h_a": 0.5, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "rh": 1.2, "xE2": 2.0, "yE2": -2.5, "rE2": 0.15, "dE2": 0.3,
+    "xE3": 5.5, "yE3": -2.5, "rE3": 0.15, "dE3": 0.5, "f1x": -1.0, "f1y": -0.5, "f2x": -0.8, "f2y": -0.6, "f3x": 1.2,
+    "f3y": -0.6, "q1": 1.5, "q2": 2.5, "q3": 2.5, "x0": 4.0, "y0": 1.0, "chi0": 0.0, "h_sigma": -1.0,
+}  # fmt: skip
+
+
+FAMILY = Family(
+    name="feed_triad",
+    title="feed rack on three leads",
+    parameters=PARAMETERS,
+    position="x_t",
+    pose_outputs=POSE_OUTPUTS,
+    poses=poses,
+    example=EXAMPLE,
+    derivative_of={
+        "x_t": "dx_t", "dx_t": "d2x_t", "y_t": "dy_t", "dy_t": "d2y_t", "chi": "dchi", "dchi": "d2chi",
+    },
+    capabilities=(Points({"t": ("x_t", "y_t", None)}),),
+)  # fmt: skip

@@ -1,0 +1,61 @@
+"""Registry entry of the thread take-up by the bare edge of a turning cam on which the thread sticks and slides."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.families import free_cam
+from sweep.families import free_cam as frictionless
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, optional_outputs
+from sweep.families.domain import March
+
+PARAMETERS = (
+    *frictionless.PARAMETERS,
+    Parameter("mu", "ratio", "coefficient of friction along the edge, across the thread", not_negative=True),
+    Parameter("tension_ratio", "ratio", "tension at guide 2 over tension at guide 1", default=1.0, positive=True),
+    Parameter("mu_thread", "ratio", "friction along the thread; the ratio grows by e^(mu_thread wrap)", default=0.0,
+              not_negative=True),
+)  # fmt: skip
+
+POSE_OUTPUTS = (
+    Output("P", "length", "thread taken up, L - P_h", "(6)"),
+    Output("L", "length", "length of thread between the guides", "(18)"),
+    Output("wrap", "rad", "angle by which the thread turns at the edge, 0 without contact", "(1)"),
+    Output("y_contact", "length", "place where the thread passes the plane of the cam, along the edge's y", "(25)"),
+    Output(
+        "contact", "1", "1 where the thread lies on the edge, 0 where it runs straight beside it", "(18)", jumps=True
+    ),
+    Output("sticking", "1", "1 where it lies where it lay before, 0 where it slides or is off", "(25)", jumps=True),
+)
+_KERNEL = ("L", "wrap", "y_contact", "contact", "sticking")
+_OWN = len(frictionless.PARAMETERS)
+DOMAIN = March(text="cam angle")
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status, each (n, m), of the last of the turns that are marched."""
+    needed = wanted | {"L"} if "P" in wanted else wanted
+    shape = (len(designs), angles.cos.shape[1])
+    outputs, status = optional_outputs(_KERNEL, needed, shape), np.empty(shape, np.uint8)
+    own, friction = (
+        np.ascontiguousarray(designs[:, :_OWN]),
+        np.ascontiguousarray(designs[:, [_OWN + 1, _OWN + 2, _OWN]]),
+    )
+    free_cam.march(own, friction, angles.cos, angles.sin, DOMAIN.turns, status, *outputs)
+    found: Columns = {name: out for name, out in zip(_KERNEL, outputs, strict=True) if out is not None}
+    if "P" in wanted:
+        found["P"] = np.asarray(found["L"], np.float64) - designs[:, _OWN - 1 : _OWN]
+    return {name: found[name] for name in found if name in wanted} | {"status": status}
+
+
+FAMILY = Family(
+    name="free_cam_friction",
+    title="thread take-up by the bare edge of a turning cam, with friction",
+    parameters=PARAMETERS,
+    position="P",
+    pose_outputs=POSE_OUTPUTS,
+    poses=poses,
+    domain=DOMAIN,
+    analytic=False,
+    example={**frictionless.FAMILY.example, "mu": 0.3, "tension_ratio": 1.5},
+)

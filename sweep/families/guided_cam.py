@@ -1,0 +1,84 @@
+"""Registry entry of the thread take-up by a cam whose follower moves in a guide."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.families import guided_cam
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled
+from sweep.families.capabilities import Points
+
+_ORDERS = range(1, guided_cam.HARMONICS + 1)
+PARAMETERS = (
+    Parameter("P_h", "length", "length of thread between the guides at P = 0", positive=True),
+    Parameter("X1", "length", "place of the guides along the cam axis's perpendicular"),
+    Parameter("Z1", "length", "half the distance of the guides, which stand symmetrically to the plane of the cam"),
+    Parameter("e", "length", "place of the follower's way along the same perpendicular"),
+    Parameter("R0", "length", "radius of the cam at the least displacement", default=0.0, not_negative=True),
+    Parameter("mu1", "ratio", "coefficient of friction on the cam", default=0.1, not_negative=True),
+    Parameter("mu2", "ratio", "coefficient of friction in the guide", default=0.1, not_negative=True),
+    *(Parameter(f"A{k}", "length", f"coefficient of cos({k} phi) in P", default=0.0) for k in _ORDERS),
+    *(Parameter(f"B{k}", "length", f"coefficient of sin({k} phi) in P", default=0.0) for k in _ORDERS),
+)
+
+POSE_OUTPUTS = (
+    Output("P", "length", "thread taken up", "(9)"),
+    Output("dP", "length", "thread taken up per radian, dP/dphi", "(9)"),
+    Output("d2P", "length", "second derivative of the thread taken up", "(9)"),
+    Output("L", "length", "length of thread between the guides, P_h + P", "(6)"),
+    Output("S", "length", "displacement of the follower from the line of the guides", "(10)"),
+    Output("dS", "length", "velocity analogue of the follower", "(11)"),
+    Output("d2S", "length", "acceleration analogue of the follower", "(12)"),
+    Output("pressure_angle", "rad", "between the normal of the profile and the way of the follower", "(15)"),
+    Output("X_P", "length", "profile of the cam in its own axes, along its zero", "(17)"),
+    Output("Y_P", "length", "profile of the cam in its own axes, across its zero", "(17)"),
+    Output("curvature", "1/length", "curvature of the profile, positive where it is convex", "(17)"),
+)
+
+DESIGN_OUTPUTS = (
+    Output("least_radius", "length", "least R0 at which the follower nowhere jams in its guide", "(16)"),
+    Output("phi_least_radius", "rad", "cam angle that asks for it, -pi to pi", "(16)"),
+    Output("jam_angle", "rad", "pressure angle at which the follower jams", "(13)"),
+    Output("least_displacement", "length", "least displacement of the follower over the turn", "(10)"),
+)
+_NAMES = tuple(o.name for o in POSE_OUTPUTS)
+ROUNDING = 2.0**-53
+
+
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its cam angles, each (n, m)."""
+    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
+    dtype = np.result_type(designs, angles.cos)
+    return filled(guided_cam.poses, (designs, angles.cos, angles.sin), _NAMES, wanted, status, dtype)
+
+
+def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Least radius and what it is made of; maxima of smooth functions found to rounding, whatever the accuracy asked.
+
+    The errors are bounds of those measured against 10^5 samples: a maximum to 64 roundings of the lengths it is made
+    of, its place to the root of them.
+    """
+    n = len(designs)
+    status, columns = np.empty(n, np.uint8), {o.name: np.empty(n) for o in DESIGN_OUTPUTS}
+    guided_cam.least_radius(np.ascontiguousarray(designs), status, *columns.values())
+    found: Columns = {name: columns[name] for name in columns if name in wanted}
+    if accuracy.target is not None:
+        length = 64.0 * ROUNDING * (np.abs(columns["least_radius"]) + designs[:, 0])
+        errors = {"phi_least_radius": np.full(n, 1e-7), "jam_angle": np.full(n, 4.0 * ROUNDING)}
+        found |= {f"err_{name}": errors.get(name, length) for name in list(found)}
+    return found | {"status": status}
+
+
+FAMILY = Family(
+    name="guided_cam",
+    title="thread take-up by a cam with a guided follower",
+    parameters=PARAMETERS,
+    position="S",
+    pose_outputs=POSE_OUTPUTS,
+    poses=poses,
+    steps=(Step("size", DESIGN_OUTPUTS, size, 40_000.0),),
+    derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},
+    uses_phi=False,
+    example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
+    capabilities=(Points({"profile": ("X_P", "Y_P", None)}),),
+)

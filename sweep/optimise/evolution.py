@@ -1,0 +1,88 @@
+"""Evolution strategies side by side: covariance matrix adaptation from many places at once, deterministic by its seed.
+
+Hansen and Ostermeier 2001, with the weights and rates of Hansen's tutorial (arXiv 1604.00772); all strategies advance
+together, so that their candidates are looked at in one call.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from sweep.families.base import Array
+
+OUTSIDE = 10.0  # price of a unit beyond the bounds, in values of the best
+
+
+def evolved(
+    function: Callable[[Array], Array],
+    places: Array,
+    radius: float,
+    generations: int,
+    rng: np.random.Generator,
+    stop: Callable[[], bool] = lambda: False,
+) -> tuple[Array, Array]:
+    """The best place of each strategy and its value.
+
+    Parameters
+    ----------
+    function : (k, n) places between 0 and 1 to (k,) values, the smaller the better
+    places : (m, n) where the strategies begin
+    radius : first standard deviation
+    generations : steps of every strategy
+    rng : source of its random numbers
+    stop : asked before every generation; true ends all strategies
+    """
+    m, n = places.shape
+    count = 4 + int(3.0 * math.log(n))
+    half = count // 2
+    weights = math.log(half + 0.5) - np.log(np.arange(1, half + 1))
+    weights /= weights.sum()
+    effective = 1.0 / float((weights**2).sum())
+    c_sigma = (effective + 2.0) / (n + effective + 5.0)
+    damping = 1.0 + 2.0 * max(0.0, math.sqrt((effective - 1.0) / (n + 1.0)) - 1.0) + c_sigma
+    c_path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n)
+    c_one = 2.0 / ((n + 1.3) ** 2 + effective)
+    c_mu = min(1.0 - c_one, 2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0) ** 2 + effective))
+    normal = math.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n))
+    mean, sigma = places.copy(), np.full(m, radius)
+    covariance = np.repeat(np.eye(n)[None], m, axis=0)
+    path, step_path = np.zeros((m, n)), np.zeros((m, n))
+    best, value = places.copy(), function(places)
+    row = np.arange(m)[:, None]
+    for generation in range(generations):
+        if stop():
+            break
+        sizes, axes = np.linalg.eigh(covariance)
+        sizes = np.sqrt(np.maximum(sizes, 1e-20))
+        drawn = rng.standard_normal((m, count, n))
+        steps = np.einsum("kij,kj,kcj->kci", axes, sizes, drawn)
+        wanted = mean[:, None] + sigma[:, None, None] * steps
+        inside = np.clip(wanted, 0.0, 1.0)
+        beyond = ((wanted - inside) ** 2).sum(axis=2)
+        found = function(inside.reshape(-1, n)).reshape(m, count)
+        order = np.argsort(found + OUTSIDE * np.abs(value)[:, None] * beyond, axis=1, kind="stable")
+        first = np.argmin(found, axis=1)
+        better = found[row[:, 0], first] < value
+        best[better], value[better] = inside[row[:, 0], first][better], found[row[:, 0], first][better]
+        chosen = steps[row, order[:, :half]]
+        move = np.einsum("h,khn->kn", weights, chosen)
+        mean = mean + sigma[:, None] * move
+        white = np.einsum("kij,kj,klj,kl->ki", axes, 1.0 / sizes, axes, move)
+        step_path = (1.0 - c_sigma) * step_path + math.sqrt(c_sigma * (2.0 - c_sigma) * effective) * white
+        length = np.linalg.norm(step_path, axis=1)
+        fading = math.sqrt(1.0 - (1.0 - c_sigma) ** (2 * (generation + 1)))
+        moving = length / fading < (1.4 + 2.0 / (n + 1.0)) * normal
+        path = (1.0 - c_path) * path
+        path += (moving * math.sqrt(c_path * (2.0 - c_path) * effective))[:, None] * move
+        late = (~moving * c_one * c_path * (2.0 - c_path))[:, None, None]
+        covariance = (
+            (1.0 - c_one - c_mu + late) * covariance
+            + c_one * path[:, :, None] * path[:, None, :]
+            + c_mu * np.einsum("h,khi,khj->kij", weights, chosen, chosen)
+        )
+        sigma *= np.exp(np.clip(c_sigma / damping * (length / normal - 1.0), -1.0, 1.0))
+        sigma = np.minimum(sigma, 1.0)
+    return best, value

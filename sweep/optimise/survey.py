@@ -1,0 +1,181 @@
+"""How far a search can be relied upon: the basins its starts ended in, and the estimated share of unseen ones."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels import status as st
+from sweep.families.base import Array
+from sweep.optimise.certificate import AGREE, Result
+from sweep.optimise.problem import Problem
+
+if TYPE_CHECKING:
+    from sweep.study import OptimiseSettings
+
+MET = 3  # starts from distinct valleys that have to end in the best basin
+DISTINCT = 0.05  # of the average distance of two random designs: nearer starts stand in one valley
+CUT = ("time", "interrupted")  # how a start ends that was not searched to its end
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What the starts of a search tell of it.
+
+    Parameters
+    ----------
+    starts : starts that were searched to their end
+    asked : the most starts that the study allows
+    offered : starts that there were
+    basins : different values the feasible ones ended at; values within 1e-4 count as one basin
+    best : starts from distinct valleys that ended in the best basin
+    unseen : estimated share of basins, by their volume, that no start has met; 1 where no start became feasible
+    wanted : what ``unseen`` should fall below
+    ended : "enough" where the rule was fulfilled, "starts" where none was left, "time" or "interrupted"
+    kinds : starts and basins for each combination of signs, as ``(("branch = 1", 7, 3), ...)``
+    """
+
+    starts: int
+    asked: int
+    offered: int
+    basins: int
+    best: int
+    unseen: float
+    wanted: float
+    ended: str
+    kinds: tuple[tuple[str, int, int], ...] = ()
+
+    @property
+    def enough(self) -> bool:
+        """Whether the best basin was met often enough and few basins are likely to be unseen."""
+        return self.best >= MET and self.unseen <= self.wanted
+
+    @property
+    def words(self) -> str:
+        """``14 basins met, the best 5 times, estimated unseen 1 %``."""
+        if self.basins == 0:
+            return f"none of {started(self.starts)} became feasible"
+        basins = f"{self.basins} basin{'s' if self.basins > 1 else ''} met"
+        times = {1: "once", 2: "twice"}.get(self.best, f"{self.best} times")
+        return f"{basins}, the best {times}, estimated unseen {_percent(self.unseen)}"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader has to know before trusting the result."""
+        found = []
+        if self.ended in CUT:
+            why = "time ran out" if self.ended == "time" else "interrupted"
+            found.append(f"{why}: {self.starts} of {started(min(self.asked, self.offered))}")
+        elif self.starts < self.asked and not self.enough:
+            found.append(
+                f"only {started(self.starts)} of the {self.asked} asked: no more were found in the design space"
+            )
+        if self.ended == "starts" and self.basins and not self.enough:
+            rare = f"the best basin was met from {self.best} of the {MET} distinct valleys wanted"
+            parts = [rare] if self.best < MET else []
+            if self.unseen > self.wanted:
+                parts.append(f"the share of unseen basins is estimated at {_percent(self.unseen)}, not the "
+                             f"{_percent(self.wanted)} asked")  # fmt: skip
+            found.append(f"{' and '.join(parts)}: more starts may find a better one")
+        return tuple(found)
+
+
+def survey(
+    problem: Problem, starts: Array, results: Sequence[Result], settings: OptimiseSettings, ended: str
+) -> Survey:
+    """What the results of a search tell of it.
+
+    Parameters
+    ----------
+    problem : whose variables tell how far two starts are apart
+    starts : (k, P) all starts that were offered
+    results : of those that were begun, in any order
+    settings : the number of starts asked, and the share of unseen basins that is allowed
+    ended : how the search ended
+
+    Notes
+    -----
+    The unseen share is the larger of two estimates for n starts that met w basins, s of them once: s / n (Good and
+    Turing) and w (w + 1) / (n (n - 1)) (Boender and Rinnooy Kan 1987, for unknown volumes).  Both suppose that starts
+    are drawn at random; ours are the best of samples, so the estimate says how much to expect from more of their kind.
+    """
+    whole = [r for r in results if r.ended not in CUT]
+    # What was left after the first heat has not reached the bottom of any basin.
+    numbered = with_basins([r for r in whole if r.ended != "left"])
+    met = Counter(r.basin for r in numbered if r.basin)
+    n, w = sum(met.values()), len(met)
+    best = _distinct(problem, starts, [r.start for r in numbered if r.basin == 1])
+    return Survey(
+        len(whole), settings.starts, len(starts), w, best, _unseen(n, met), settings.unseen, ended,
+        _kinds(problem, starts, numbered),
+    )  # fmt: skip
+
+
+def with_basins(results: Sequence[Result]) -> list[Result]:
+    """Results, ranked by their objective, with the number of their basin: 1 for the best, 0 where infeasible."""
+    order = sorted(results, key=lambda r: (r.status == st.LIMIT_EXCEEDED, _objective(r), r.start))
+    number, first, found = 0, math.nan, []
+    for r in order:
+        if r.status == st.LIMIT_EXCEEDED or not math.isfinite(r.objective):
+            found.append(replace(r, basin=0))
+            continue
+        if not abs(r.objective - first) <= AGREE * max(abs(first), 1e-300):
+            number, first = number + 1, r.objective
+        found.append(replace(r, basin=number))
+    return found
+
+
+def _objective(r: Result) -> float:
+    return math.inf if math.isnan(r.objective) else r.objective
+
+
+def _unseen(n: int, met: Counter[int]) -> float:
+    w, once = len(met), sum(1 for count in met.values() if count == 1)
+    if n < 2:
+        return 1.0
+    return min(1.0, max(once / n, w * (w + 1) / (n * (n - 1))))
+
+
+def _distinct(problem: Problem, starts: Array, numbers: list[int]) -> int:
+    """How many of some starts stand in distinct valleys."""
+    place = problem.scaled(starts)
+    others = [c for c in range(starts.shape[1]) if c not in problem.columns]
+    least = DISTINCT * math.sqrt(place.shape[1] / 6.0)
+    taken: list[int] = []
+    for k in sorted(numbers):
+        near = (
+            np.linalg.norm(place[k] - place[j]) < least and np.array_equal(starts[k, others], starts[j, others])
+            for j in taken
+        )
+        if not any(near):
+            taken.append(k)
+    return len(taken)
+
+
+def _kinds(problem: Problem, starts: Array, results: Sequence[Result]) -> tuple[tuple[str, int, int], ...]:
+    """Starts and basins for each combination of the parameters that are chosen, not varied."""
+    others = [c for c in range(starts.shape[1]) if c not in problem.columns]
+    differ = [c for c in others if len(np.unique(starts[:, c])) > 1]
+    names = problem.family.parameter_names
+    count: Counter[str] = Counter()
+    basins: dict[str, set[int]] = {}
+    for r in results:
+        words = ", ".join(f"{names[c]} = {starts[r.start, c]:.6g}" for c in differ)
+        count[words] += 1
+        basins.setdefault(words, set()).update({r.basin} - {0})
+    return tuple((words, count[words], len(basins[words])) for words in sorted(count)) if differ else ()
+
+
+def started(count: int) -> str:
+    """A number of starts in words."""
+    return f"{count} start{'' if count == 1 else 's'}"
+
+
+def _percent(share: float) -> str:
+    value = 100.0 * share
+    return f"{value:.0f} %" if value >= 9.95 or value == round(value) else f"{value:.2g} %"

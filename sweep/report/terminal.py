@@ -1,0 +1,171 @@
+"""What ``sweep run`` ends with in the terminal: the answer in a few lines, and what to do next."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels import status as codes
+from sweep.chunks.cascade import compared
+from sweep.dataset import store
+from sweep.optimise import read_survey
+from sweep.optimise.survey import started
+from sweep.report.dataset import Dataset, read_dataset
+from sweep.report.limits import bound_words, limit_states, limited
+from sweep.report.quantities import quantity
+
+if TYPE_CHECKING:
+    from sweep.study import Limit, Study
+
+OK, INFEASIBLE = 0, 4
+LOOKED_AT = 1024  # designs of a space among which the nearest miss is sought where no optimiser has looked for it
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Lines to print, and the exit code: 0, or 4 where no design keeps all limits."""
+
+    lines: tuple[str, ...]
+    exit_code: int
+
+
+def ending(folder: Path) -> Ending:
+    """The answer of a complete dataset in a few lines.
+
+    Parameters
+    ----------
+    folder : dataset with its optimum, if the study asks for one
+
+    Raises
+    ------
+    InputError
+        if the folder is no complete dataset.
+    """
+    data = read_dataset(folder)
+    feasible = data.counts.get(codes.OK, 0)
+    lines = [f"{data.study.name}: {data.designs} designs, {feasible} within all limits{_best_of_sweep(data, feasible)}"]
+    best = data.optimum
+    if best is not None:
+        missed = int(best.get("status", 0)) == codes.LIMIT_EXCEEDED
+        lines += _nearest(data) if missed else _optimum(data)
+        found = read_survey(store.beside(folder) / store.OPTIMUM)
+        if found is not None:
+            lines.append(f"search: {started(found.starts)}, {found.words}")
+            kinds = [f"{words}: {started(n)}, {b} basin{'' if b == 1 else 's'}" for words, n, b in found.kinds]
+            lines += [f"signs: {'; '.join(kinds)}"] if kinds else []
+            lines += [f"warning: {text}" for text in found.warnings]
+    else:
+        missed = feasible == 0
+        lines += _nearest_of_space(data.study, data) if missed else []
+    if data.front_steps is not None:
+        lines.append(f"warning: time ran out: {data.front_steps} steps of the front")
+    lines.append(f"next: sweep report {shlex.quote(str(folder))}")
+    # No-break spaces keep values with their units on a page; a shell's tools look for plain ones.
+    lines = [line.replace("\u00a0", " ") for line in lines]
+    return Ending(tuple(lines), INFEASIBLE if missed else OK)
+
+
+def _best_of_sweep(data: Dataset, feasible: int) -> str:
+    objective = data.study.objective
+    if objective is None or not feasible:
+        return ""
+    best = math.inf
+    for path in data.parts:
+        values = _column(path, objective.output)
+        best = min(best, float(np.min(compared(objective.output, values), initial=math.inf)))
+    if not math.isfinite(best):
+        return ""
+    shown = quantity(objective.output, data.units.get(objective.output, ""))
+    return f", the best with {shown.words} {shown.show(best)}"
+
+
+def _column(path: Path, name: str) -> Any:
+    """Finite values of a column where the status is OK."""
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(path, columns=[name, "status"])
+    values = table[name].to_numpy().astype(np.float64)
+    return values[(table["status"].to_numpy() == codes.OK) & np.isfinite(values)]
+
+
+def _optimum(data: Dataset) -> list[str]:
+    objective = data.study.objective
+    assert objective is not None and data.optimum is not None
+    shown = quantity(objective.output, data.units.get(objective.output, ""))
+    value = float(data.optimum[objective.output])
+    fast = shown.at_speed(value, data.study.speed)
+    active = [s for s in limit_states(data) if s.state == "active"]
+    held = [f"{s.shown.words} ({s.bound})" for s in active]
+    words = [w.strip() for w in str(data.optimum.get("active") or "").split(";")]
+    held += [w for w in words if w.endswith(" bound") and w.split()[0] not in {s.shown.name for s in active}]
+    made = float(data.optimum.get("yield", math.nan))
+    asked = None if data.study.tolerance is None else data.study.tolerance.robust
+    wanted = f", {100.0 * asked:g} % asked" if asked is not None else ""
+    return [
+        f"optimum: {shown.words} {shown.show(value)}{f' ({fast})' if fast else ''}",
+        f"held back by: {'; '.join(held) or 'nothing: an optimum in the open'}",
+        *([f"as it is made: {100.0 * made:.1f} % within all limits{wanted}"] if math.isfinite(made) else []),
+    ]
+
+
+def _nearest(data: Dataset) -> list[str]:
+    """Which limits the nearest design found misses, by how much."""
+    assert data.optimum is not None
+    return ["no design keeps all limits", *_give_way(data, data.optimum, "the nearest design found")]
+
+
+def _nearest_of_space(study: Study, data: Dataset) -> list[str]:
+    """The nearest miss among some designs of the space."""
+    from sweep.chunks.plan import spread_designs
+    from sweep.evaluation.summaries import design_outputs
+    from sweep.synthesis.fit import fit_line
+
+    designs = spread_designs(study, LOOKED_AT)
+    if study.fit is not None and len(designs):
+        designs, made = fit_line(study.family, designs, study.fit, study.window)
+        designs = designs[made == codes.OK]
+    if not len(designs):
+        return ["no design keeps all limits, and none of a sample could be made at all"]
+    names = study.family.parameter_names
+    outputs = [limit.output for limit in study.limits if limit.output not in names]
+    columns: dict[str, Any] = design_outputs(study.family, designs, outputs, study.accuracy, study.window)
+    columns |= {name: designs[:, k] for k, name in enumerate(names)}
+    worst = np.max([_shortfall(limit, columns[limit.output])[1] for limit in study.limits], axis=0)
+    row = {name: values[int(np.argmin(worst))] for name, values in columns.items()}
+    return ["no design keeps all limits", *_give_way(data, row, f"the nearest of {len(designs)} designs of the space")]
+
+
+def _give_way(data: Dataset, row: Mapping[str, Any], who: str) -> list[str]:
+    lines = []
+    for limit in data.study.limits:
+        shown = limited(data, limit.output)
+        if limit.output not in row:
+            continue
+        short, share = (float(x[0]) for x in _shortfall(limit, np.array([row[limit.output]], np.float64)))
+        if share <= 1e-9:
+            continue
+        bound = bound_words(limit, shown)
+        if math.isnan(short) or shown.words.startswith("rotatable"):
+            lines.append(
+                f"  {shown.words} ({bound}): it has none" if math.isnan(short) else f"  {shown.words}: {bound}"
+            )
+        else:
+            value = shown.show(float(compared(limit.output, float(row[limit.output]))))
+            lines.append(f"  {shown.words} must give way by {shown.show(short, 3)}: {value} instead of {bound}")
+    return [f"{who} misses", *lines] if lines else []
+
+
+def _shortfall(limit: Limit, values: Any) -> tuple[Any, Any]:
+    """By how much values miss a limit, in their unit and relative to the bound; what does not exist misses by far."""
+    x = compared(limit.output, np.asarray(values, np.float64))
+    low = -math.inf if limit.minimum is None else limit.minimum
+    high = math.inf if limit.maximum is None else limit.maximum
+    short = np.maximum(np.maximum(low - x, x - high), 0.0)
+    size = max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)) or 1.0
+    return short, np.nan_to_num(short / size, nan=1e6)

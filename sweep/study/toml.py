@@ -1,0 +1,110 @@
+"""The text of a study file as tables; what is no TOML is refused with the line where it stands."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from sweep.errors import StudyError
+
+DEEPEST = 16  # tables within tables; a study needs four
+_DIGITS = re.compile(r"\d[\d_]{4000,}")
+_PLACE = re.compile(r"\(at line (\d+), column \d+[^)]*\)")
+_KEY = re.compile(r"""\s*([\w."'-]+)\s*=""")
+_TABLE = re.compile(r"\s*\[+([^\[\]]+)\]+\s*(?:#.*)?")
+# What tomllib says where a key or a table comes a second time.
+_TWICE = ("Cannot overwrite", "Cannot declare", "Duplicate inline")
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """The tables of a file.
+
+    Raises
+    ------
+    StudyError
+        if it cannot be read, is no TOML, or is nested too deeply.
+    """
+    try:
+        text = file.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise _fault(file, f"cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise _fault(file, f"line {line} is no UTF-8 text") from None
+    except ValueError as error:  # a path with a null byte
+        raise _fault(file, f"cannot be read: {error}") from None
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _fault(file, _said(text, str(error))) from None
+    except ValueError:  # Python refuses to read an integer of thousands of digits
+        found = _DIGITS.search(text)
+        line = text.count("\n", 0, found.start() if found else 0) + 1
+        raise _fault(file, f"line {line}: a number of thousands of digits; allowed: numbers up to 1e100") from None
+    except RecursionError:
+        raise _fault(file, f"tables or lists within each other too often; allowed: {DEEPEST} levels") from None
+    key = _too_deep(data)
+    if key is not None:
+        raise _fault(file, f"{key}: tables or lists within each other too often; allowed: {DEEPEST} levels")
+    return data
+
+
+def _fault(file: Path, text: str) -> StudyError:
+    return StudyError(str(file), [f"{file.name}: {text}"])
+
+
+def _said(text: str, message: str) -> str:
+    """What tomllib says, with the line of the other place where something stands twice."""
+    line, column = text.count("\n") + 1, len(text) - text.rfind("\n")
+    message = message.replace("at end of document", f"at line {line}, column {column}, the end of the file")
+    place = _PLACE.search(message)
+    if place is None or not message.startswith(_TWICE):
+        return message
+    lines = text.splitlines()[: int(place[1])]
+    table = _TABLE.fullmatch(lines[-1]) if lines else None
+    if table is not None:
+        earlier = _earlier(lines[:-1], lambda above, own: own is not None and own[1].strip() == table[1].strip())
+        return f"the table [{table[1].strip()}] stands twice {place[0]}{earlier}"
+    number = next((k for k in range(len(lines), 0, -1) if _KEY.match(lines[k - 1])), None)
+    if number is None or message.startswith("Duplicate inline"):
+        return message
+    key, here = _name(lines[number - 1]), _heading(lines[:number])
+    earlier = _earlier(lines[: number - 1], lambda above, own: _name(above[-1]) == key and _heading(above) == here)
+    return f"{f'{here}.' if here else ''}{key} is given twice {place[0]}{earlier}"
+
+
+def _earlier(lines: list[str], is_it: Any) -> str:
+    for k in range(1, len(lines) + 1):
+        if is_it(lines[:k], _TABLE.fullmatch(lines[k - 1])):
+            return f", first in line {k}"
+    return ""
+
+
+def _name(line: str) -> str | None:
+    found = _KEY.match(line)
+    return None if found is None else found[1].strip("\"'")
+
+
+def _heading(lines: list[str]) -> str:
+    """The table that the last line stands in."""
+    found = [match[1].strip() for match in map(_TABLE.fullmatch, lines) if match is not None]
+    return found[-1] if found else ""
+
+
+def _too_deep(data: dict[str, Any]) -> str | None:
+    """The first key under which tables and lists are nested too deeply."""
+    for key, value in data.items():
+        level = [value]
+        for _ in range(DEEPEST):
+            level = [
+                inner
+                for outer in level
+                if isinstance(outer, (dict, list))
+                for inner in (outer.values() if isinstance(outer, dict) else outer)
+                if isinstance(inner, (dict, list))
+            ]
+        if level:
+            return key
+    return None

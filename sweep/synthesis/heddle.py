@@ -1,0 +1,253 @@
+"""Synthesis of a heddle drive: from the strokes of the shafts to levers and rods; docs/heddle.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from kernels import status as st
+from kernels.synthesis import heddle as kernels
+from sweep.errors import InputError
+from sweep.evaluation.tables import design_matrix
+from sweep.families.base import Array, Parameter
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.evaluation.tables import Table
+
+Mode = Literal["exact", "printed"]
+
+_SIDE = Parameter("side_B", "sign", "side of B: +1 left of the ray O2-C", default=1.0, choices=(-1.0, 1.0))
+_FRAME = (
+    Parameter("stroke", "length", "wanted stroke of the shaft", positive=True),
+    Parameter("O4E", "length", "arm of the shaft lever", positive=True),
+    Parameter("O1O2", "length", "from the camshaft to the pivot of the cam lever", positive=True),
+    Parameter("O1O3", "length", "from the camshaft to the pivot of the bell crank", positive=True),
+    Parameter("O3C", "length", "upper arm of the bell crank", positive=True),
+    Parameter("kappa", "angle", "rigid angle C-O3-D of the bell crank"),
+)
+
+
+@dataclass(frozen=True)
+class _Requirement:
+    """Columns of one requirement, for the checks of tables."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.parameters)
+
+    def read(self, table: Table) -> Array:
+        """The checked columns, (n, P)."""
+        return design_matrix(self, table)[0]
+
+
+_EXTREMES = _Requirement("extremes of a heddle drive", _FRAME)
+_LEVER = _Requirement(
+    "lever of a heddle drive",
+    (
+        *_FRAME,
+        Parameter("O2B", "length", "arm of the cam lever", positive=True),
+        Parameter("BC", "length", "rod", positive=True),
+        _SIDE,
+    ),
+)
+_RODS = _Requirement(
+    "rod of a heddle drive",
+    (
+        *_FRAME,
+        Parameter("O2B", "length", "arm of the cam lever", positive=True),
+        Parameter("swing", "angle", "wanted swing of the cam lever", positive=True),
+        _SIDE,
+    ),
+)
+_SHED = _Requirement(
+    "shed",
+    (
+        Parameter("shaft", "count", "number of the shaft, 1 next to the fell", positive=True),
+        Parameter("d1", "length", "distance from the fell to shaft 1", positive=True),
+        Parameter("t", "length", "distance between two shafts", positive=True),
+        Parameter("stroke", "length", "stroke of the shaft named by ``reference``", positive=True),
+        Parameter("reference", "count", "number of the shaft with the given stroke", default=4.0, positive=True),
+    ),
+)
+_ARMS = _Requirement(
+    "arms of the shafts",
+    (
+        Parameter("stroke", "length", "stroke of the shaft", positive=True),
+        Parameter("O4E", "length", "arm of the shaft lever to the heddle rod", positive=True),
+        Parameter("O4F", "length", "arm of the shaft lever to the link", positive=True),
+        Parameter("O3O4", "length", "distance of the pivots of bell crank and shaft lever", positive=True),
+        Parameter("mu_3", "angle", "half swing of the bell crank, common to all shafts", positive=True),
+    ),
+)
+
+
+def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
+    """Both extreme positions of a heddle drive for a wanted stroke, one row per row of the table.
+
+    Equations (1), (2) and, where the table has the columns O2B and BC, (10) of docs/heddle.md.
+
+    Parameters
+    ----------
+    table : DataFrame or mapping with ``stroke O4E O1O2 O1O3 O3C`` [one length unit] and ``kappa`` [rad]; with ``O2B``,
+        ``BC`` and ``side_B`` (+1 if missing) the angles of the cam lever follow as well
+    mode : "exact" takes the half swing mu from the chord of the lever's end; "printed" from the arc tangent that the
+        source prints, which makes the travel of E shorter than the stroke
+
+    Returns
+    -------
+    DataFrame
+        ``mu xi_1 xi_2`` [rad; xi is the angle O2-O3-C, between 0 and pi], ``O2C_1 O2C_2 vertical_travel`` [length];
+        with a rod ``lever_angle_1 lever_angle_2 lever_swing`` [rad from the line O1O3; signed].  ``status`` is
+        NOT_ASSEMBLED where the lever is too short for the stroke or the rod does not reach; its own columns are nan.
+
+    Raises
+    ------
+    InputError
+        for a missing or misspelt column, a bad number, an unknown mode, O1O3 not longer than O1O2.
+    """
+    import pandas as pd
+
+    with_rod = "BC" in table or "O2B" in table
+    matrix = (_LEVER if with_rod else _EXTREMES).read(table)
+    found, status = _positions(matrix, mode)
+    turn = 2.0 * np.pi
+    xi = [np.abs(found[:, k] - turn * np.rint(found[:, k] / turn)) for k in (1, 2)]
+    columns: dict[str, Array] = {"mu": found[:, 0], "xi_1": xi[0], "xi_2": xi[1]}
+    columns |= {"O2C_1": found[:, 3], "O2C_2": found[:, 4], "vertical_travel": found[:, 5]}
+    if with_rod:
+        angles, closed = np.empty((len(matrix), 3)), np.empty(len(matrix), np.uint8)
+        kernels.heddle_lever_angles(_closure(matrix, found, matrix[:, 6:9]), angles, closed)
+        columns |= dict(zip(("lever_angle_1", "lever_angle_2", "lever_swing"), angles.T, strict=True))
+        status = np.where(status == st.OK, closed, status)
+    return pd.DataFrame(columns | {"status": status}, index=_index(table, len(matrix)))
+
+
+def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
+    """All rods BC that give the cam lever a wanted swing, one row per rod; (11) of docs/heddle.md.
+
+    Parameters
+    ----------
+    table : the columns of :func:`extremes` and ``O2B swing side_B``; ``swing`` is the magnitude [rad], below pi
+    mode : as in :func:`extremes`
+
+    Returns
+    -------
+    DataFrame
+        ``rod`` (1, 2, ... by length), ``BC``, the angles ``lever_angle_1 lever_angle_2 lever_swing`` and ``status``,
+        indexed like the table.  A row without any rod stays once, with nan and the status NOT_ADMISSIBLE.
+
+    Raises
+    ------
+    InputError
+        as :func:`extremes`, and for a swing of pi or more.
+    """
+    import pandas as pd
+
+    matrix = _RODS.read(table)
+    _refuse(matrix[:, 7] >= np.pi, matrix[:, 7], "swing", "an angle below pi")
+    found, status = _positions(matrix, mode)
+    lengths, count = np.empty((len(matrix), 4)), np.empty(len(matrix), np.uint8)
+    code = np.empty(len(matrix), np.uint8)
+    kernels.heddle_rods(_closure(matrix, found, matrix[:, 6:9]), lengths, count, code)
+    code = np.where(status == st.OK, code, status)
+    shown = np.maximum(count, 1).astype(np.int64)
+    which = np.repeat(np.arange(len(matrix)), shown)
+    number = np.arange(len(which)) - (np.cumsum(shown) - shown)[which]
+    rod = lengths[which, number]
+    angles, closed = np.empty((len(which), 3)), np.empty(len(which), np.uint8)
+    lever = np.column_stack([matrix[which, 6], np.where(np.isnan(rod), 1.0, rod), matrix[which, 8]])
+    kernels.heddle_lever_angles(_closure(matrix[which], found[which], lever), angles, closed)
+    angles[np.isnan(rod)] = np.nan
+    columns = {"rod": number + 1, "BC": rod}
+    columns |= dict(zip(("lever_angle_1", "lever_angle_2", "lever_swing"), angles.T, strict=True))
+    return pd.DataFrame(columns | {"status": code[which]}, index=_index(table, len(matrix))[which])
+
+
+def shed(table: Table) -> pd.DataFrame:
+    """Strokes of the shafts for a clear shed: proportional to the distance from the fell; (14) of docs/heddle.md.
+
+    Parameters
+    ----------
+    table : ``shaft`` (its number, 1 next to the fell), ``d1`` (fell to shaft 1), ``t`` (between shafts), ``stroke`` of
+        the shaft ``reference`` (4 if missing)
+
+    Returns
+    -------
+    DataFrame
+        ``stroke`` of every row's shaft, indexed like the table
+
+    Raises
+    ------
+    InputError
+        for a missing or misspelt column, a bad number.
+    """
+    import pandas as pd
+
+    number, d1, t, stroke, reference = _SHED.read(table).T
+    strokes = stroke * (d1 + (number - 1.0) * t) / (d1 + (reference - 1.0) * t)
+    return pd.DataFrame({"stroke": strokes}, index=_index(table, len(strokes)))
+
+
+def arms(table: Table) -> pd.DataFrame:
+    """Arm O3D of every shaft, the other lengths being common to all shafts; (12), (13) of docs/heddle.md.
+
+    Parameters
+    ----------
+    table : ``stroke O4E O4F O3O4`` [one length unit] and ``mu_3``, the common half swing of the bell crank [rad]
+
+    Returns
+    -------
+    DataFrame
+        ``O3D DF``, ``y_high`` and ``y_low`` of E against mid-stroke, ``asymmetry`` = y_high + y_low, and ``status``;
+        NOT_ADMISSIBLE where no arm gives the stroke.  Indexed like the table.
+
+    Raises
+    ------
+    InputError
+        for a missing or misspelt column, a bad number, mu_3 of a right angle or more.
+    """
+    import pandas as pd
+
+    matrix = _ARMS.read(table)
+    _refuse(matrix[:, 4] >= 0.5 * np.pi, matrix[:, 4], "mu_3", "an angle below pi/2")
+    found, status = np.empty((len(matrix), 4)), np.empty(len(matrix), np.uint8)
+    kernels.heddle_shaft_arms(matrix, found, status)
+    columns = dict(zip(("O3D", "DF", "y_high", "y_low"), found.T, strict=True))
+    columns |= {"asymmetry": found[:, 2] + found[:, 3]}
+    return pd.DataFrame(columns | {"status": status}, index=_index(table, len(matrix)))
+
+
+def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
+    """Columns of the extreme positions by one of the two half angles, and their status."""
+    if mode not in ("exact", "printed"):
+        raise InputError("mode", mode, "exact or printed", "synthesis of a heddle drive")
+    _refuse(matrix[:, 3] <= matrix[:, 2], matrix[:, 3], "O1O3", "a length above O1O2")
+    both, status = np.empty((len(matrix), 12)), np.empty(len(matrix), np.uint8)
+    kernels.heddle_extremes(np.ascontiguousarray(matrix[:, :6]), both, status)
+    if mode == "exact":
+        return both[:, :6], status
+    return both[:, 6:], np.where(status == st.NOT_ASSEMBLED, st.OK, status).astype(np.uint8)
+
+
+def _closure(matrix: Array, found: Array, lever: Array) -> Array:
+    """Rows for the kernels: O2O3, O3C, both angles xi, and what is given of the cam lever."""
+    return np.column_stack([matrix[:, 3] - matrix[:, 2], matrix[:, 4], found[:, 1], found[:, 2], lever])
+
+
+def _index(table: Table, rows: int) -> pd.Index:
+    import pandas as pd
+
+    return table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(rows)
+
+
+def _refuse(bad: np.ndarray, values: Array, name: str, allowed: str) -> None:
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InputError(name, float(values[row]), allowed, f"column {name}, row {row}")

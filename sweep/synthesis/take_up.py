@@ -1,0 +1,163 @@
+"""Eyelet of a take-up for a wanted P(phi): least squares with the analytic Jacobian; docs/takeup.md, section 6.
+
+The length over the store, P_h, is linear: it is the weighted mean of what is left and leaves the problem.  What the
+wanted points do not determine is named: the parameters that share in a direction along which nothing changes.  One such
+direction there always is, for guides on the line x = e, y = 0: the squared distances of the eyelet from them hold seven
+parameters in six combinations, (28) of docs/takeup.md.  Fix e, a or alpha to be rid of it; at alpha = 0 fix f and e.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels.families import eyelet
+from sweep.errors import InputError
+from sweep.evaluation.tables import design_matrix, numbers
+from sweep.families import family
+from sweep.families.base import Array
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import ArrayLike
+
+    from sweep.evaluation.tables import Table
+
+# The columns of kernels.families.eyelet.length_sensitivities, which are those of the design matrix in this order.
+SOUGHT = ("a", "e", "f", "alpha", "Z1", "Z2", "phi_h")
+LENGTHS = ("a", "e", "f", "Z1", "Z2")
+STORE = 7
+# A direction whose singular value is below this share of the largest changes P by less than its rounding can show.
+LEAST_RANK = 1e-7
+SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class TakeUpFit:
+    """An eyelet fitted to a wanted P(phi).
+
+    ``designs`` has a row per start, the best first: the parameters of the family `eyelet`, ``rms`` and ``largest``
+    error of P [length], ``undetermined``: the parameters that the wanted points do not tell apart, comma-separated.
+    """
+
+    designs: pd.DataFrame
+
+    @property
+    def best(self) -> dict[str, float]:
+        """The parameters of the best eyelet."""
+        row = self.designs.iloc[0]
+        return {name: float(row[name]) for name in family("eyelet").parameter_names}
+
+
+def fit_eyelet(
+    phi: ArrayLike, P: ArrayLike, starts: Table, weights: ArrayLike | None = None, fixed: tuple[str, ...] = ()
+) -> TakeUpFit:
+    """Find the eyelet on a crank that takes up the wanted thread, with the least squares of the errors of P.
+
+    Parameters
+    ----------
+    phi, P : wanted points, crank angle [rad] and thread taken up [length]; a constant in P means nothing
+    starts : table of eyelets to start from, one per row
+    weights : of the squared errors, one per point, 1 by default
+    fixed : parameters that keep their value: of a, e, f, alpha, Z1, Z2, phi_h
+
+    Returns
+    -------
+    TakeUpFit
+
+    Raises
+    ------
+    InputError
+        for a bad table, points that do not fit each other, an unknown fixed parameter, or fewer points than unknowns.
+
+    Notes
+    -----
+    The length itself is fitted, not the weighted difference (27) of the source, which over-weights the points where
+    both parts of the thread are long.  A mirror image, or the guides exchanged, is as good an answer.
+    """
+    import pandas as pd
+
+    angles, wanted = numbers(phi, "phi", "phi").ravel(), numbers(P, "P", "P").ravel()
+    share = np.ones(angles.size) if weights is None else numbers(weights, "weights", "weights").ravel()
+    if not angles.size == wanted.size == share.size:
+        allowed = f"as many values as phi, {angles.size}"
+        raise InputError("P", f"{wanted.size} and {share.size} weights", allowed, "wanted points")
+    for name in fixed:
+        if name not in SOUGHT:
+            raise InputError("fixed", name, f"of {', '.join(SOUGHT)}", "fit_eyelet")
+    sought = [k for k, name in enumerate(SOUGHT) if name not in fixed]
+    if angles.size <= len(sought):
+        raise InputError("phi", f"{angles.size} points", f"more than the {len(sought)} unknowns", "wanted points")
+    if not (np.isfinite(share).all() and (share >= 0.0).all() and share.sum() > 0.0):
+        raise InputError("weights", share.min(), "numbers that are not negative, one of them positive", "weights")
+    matrix, _ = design_matrix(family("eyelet"), starts)
+    problem = _Problem(np.cos(angles)[None], np.sin(angles)[None], wanted, share / share.sum(), sought)
+    rows = [problem.solved(start) for start in matrix]
+    frame = pd.DataFrame(rows).sort_values("rms", kind="stable", ignore_index=True)
+    return TakeUpFit(frame)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    cos: Array
+    sin: Array
+    wanted: Array
+    weights: Array
+    sought: list[int]
+
+    def solved(self, start: Array) -> dict[str, float | str]:
+        """The eyelet reached from one start."""
+        from scipy.optimize import least_squares
+
+        unit = float(np.abs(start[[SOUGHT.index(name) for name in LENGTHS]]).max())
+        scale = np.array([unit if SOUGHT[k] in LENGTHS else 1.0 for k in self.sought])
+        low = np.array([1e-9 * unit if SOUGHT[k] == "a" else -np.inf for k in self.sought])
+
+        def errors(x: Array) -> Array:
+            return self.errors(start, x)
+
+        def slopes(x: Array) -> Array:
+            return self.slopes(start, x)
+
+        found = least_squares(
+            errors, start[self.sought], slopes, x_scale=scale, bounds=(low, np.inf),
+            xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=500,
+        )  # fmt: skip
+        design = self.design(start, found.x)
+        left = self.lengths(design) - self.wanted
+        design[0, STORE] = self.weights @ left
+        left = left - design[0, STORE]
+        _, size, right = np.linalg.svd(self.slopes(start, found.x) * scale, full_matrices=False)
+        weak = right[size <= LEAST_RANK * size[0]]
+        names = [SOUGHT[k] for i, k in enumerate(self.sought) if (np.abs(weak[:, i]) > SHARE).any()]
+        values: dict[str, float | str] = dict(zip(family("eyelet").parameter_names, design[0], strict=True))
+        rms = float(np.sqrt(self.weights @ left**2))
+        return values | {"rms": rms, "largest": float(np.abs(left).max()), "undetermined": ",".join(names)}
+
+    def design(self, start: Array, x: Array) -> Array:
+        design = start[None].copy()
+        design[0, self.sought] = x
+        return design
+
+    def lengths(self, design: Array) -> Array:
+        status, length = np.empty(self.cos.shape, np.uint8), np.empty(self.cos.shape)
+        eyelet.poses(design, self.cos, self.sin, status, None, None, None, length, None, None, None, None)
+        whole: Array = length[0]
+        return whole
+
+    def errors(self, start: Array, x: Array) -> Array:
+        """Errors of P, weighted, with the best P_h."""
+        left = self.lengths(self.design(start, x)) - self.wanted
+        errors: Array = np.sqrt(self.weights) * (left - self.weights @ left)
+        return errors
+
+    def slopes(self, start: Array, x: Array) -> Array:
+        jacobian = np.empty((len(SOUGHT), *self.cos.shape))
+        eyelet.length_sensitivities(
+            self.design(start, x), self.cos, self.sin, jacobian, np.empty(self.cos.shape, np.uint8)
+        )
+        rates = jacobian[self.sought, 0].T
+        slopes: Array = np.sqrt(self.weights)[:, None] * (rates - self.weights @ rates)
+        return slopes

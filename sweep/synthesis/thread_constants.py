@@ -1,0 +1,183 @@
+"""Constants of a thread from measured tensions: least squares with confidence intervals; docs/thread.md, section 4."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sweep.effects.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY, RADIUS, REFERENCE_SPEED
+from sweep.errors import InputError
+from sweep.evaluation.thread.rows import Sheet, columns_of
+from sweep.families.base import Array, Parameter
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.evaluation.tables import Table
+
+CONTOUR = ("alpha", "beta", "B")
+SPEED = ("K", "n")
+# Singular values of the scaled Jacobian below this share of the largest: the measurements do not tell the constants
+# apart.  Tensions are measured to some per cent, never to a millionth.
+LEAST_RANK = 1e-6
+
+_MEASURED = Sheet(
+    "measured tensions",
+    (
+        Parameter("T1", "none", "tension in front of the contour, gf", positive=True),
+        Parameter("T2", "none", "tension behind the contour, gf", positive=True),
+        RADIUS,
+        Parameter("theta_deg", "none", "wrap angle, degrees", positive=True),
+        COUNT,
+        DENSITY,
+    ),
+)
+_SPEEDS = Sheet(
+    "measured speed ratios",
+    (
+        Parameter("v", "none", "speed of the thread, m/s", positive=True),
+        Parameter("ratio_to_ref", "none", "tension over its value at the reference speed", positive=True),
+        REFERENCE_SPEED,
+    ),
+)
+
+
+@dataclass(frozen=True)
+class ConstantsFit:
+    """Constants that fit measurements best, and how well the measurements determine them.
+
+    ``constants`` has a row per constant: value, standard_error, low and high of its confidence interval at
+    ``confidence``.  ``residual`` is the root mean square of the relative errors that are left.  ``undetermined`` names
+    the constants that the measurements do not tell apart: their intervals are infinite.
+    """
+
+    constants: pd.DataFrame
+    residual: float
+    confidence: float
+    undetermined: tuple[str, ...]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The constants by name, as columns for `sweep.thread.contour` or `sweep.thread.speed`."""
+        return {str(name): float(x) for name, x in self.constants["value"].items()}
+
+
+def fit_contour(table: Table, confidence: float = 0.95) -> ConstantsFit:
+    """Find alpha, beta and B from measured pairs of tensions over contours of several radii or wrap angles.
+
+    Parameters
+    ----------
+    table : columns T1, T2 [gf], R [mm], theta_deg [degrees]; N and gamma of the thread as in `sweep.thread.contour`
+    confidence : of the intervals
+
+    Returns
+    -------
+    ConstantsFit
+        Relative errors of T2 are minimised, with no constant below 0.
+
+    Raises
+    ------
+    InputError
+        for a bad table, or fewer measurements than constants.
+    """
+    given = columns_of(_MEASURED, table)
+    t1, t2, radius, theta = (given[name] for name in ("T1", "T2", "R", "theta_deg"))
+    pressed = 1.0 / (radius + 1.0 / np.sqrt(np.pi * given["gamma"] * given["N"])) ** 2
+
+    def law(x: Array) -> Array:
+        alpha, beta, b = x
+        way = beta * theta
+        model: Array = t1 * np.exp(way) + b * pressed * np.expm1(way) + alpha * radius * theta * _growth(way)
+        return model / t2 - 1.0
+
+    def slopes(x: Array) -> Array:
+        alpha, beta, b = x
+        way = beta * theta
+        rise = theta * np.exp(way)
+        by_beta = t1 * rise + b * pressed * rise + alpha * radius * theta * theta * _growth_slope(way)
+        columns = (radius * theta * _growth(way), by_beta, pressed * np.expm1(way))
+        return np.column_stack([column / t2 for column in columns])
+
+    start = np.array([float(p.default or 0.0) for p in (ALPHA, BETA, BENDING)])
+    return _fitted(CONTOUR, law, slopes, start, len(t1), np.full(3, np.inf), confidence)
+
+
+def fit_speed(table: Table, confidence: float = 0.95) -> ConstantsFit:
+    """Find K and n of the law of speed from measured ratios of tensions.
+
+    Parameters
+    ----------
+    table : columns v [m/s], ratio_to_ref, v_ref [m/s] (1.23 by default)
+    confidence : of the intervals
+
+    Returns
+    -------
+    ConstantsFit
+        K between 0 and 1, n positive.
+
+    Raises
+    ------
+    InputError
+        for a bad table, or fewer measurements than constants.
+    """
+    given = columns_of(_SPEEDS, table)
+    relative, measured = np.log(given["v"] / given["v_ref"]), given["ratio_to_ref"]
+
+    def law(x: Array) -> Array:
+        found: Array = (1.0 + x[0] * np.expm1(x[1] * relative)) / measured - 1.0
+        return found
+
+    def slopes(x: Array) -> Array:
+        power = np.exp(x[1] * relative)
+        return np.column_stack([np.expm1(x[1] * relative) / measured, x[0] * relative * power / measured])
+
+    return _fitted(SPEED, law, slopes, np.array([0.4, 0.2]), len(measured), np.array([1.0, np.inf]), confidence)
+
+
+def _growth(x: Array) -> Array:
+    """(e^x - 1)/x."""
+    return np.where(x > 0.0, np.expm1(x) / np.where(x > 0.0, x, 1.0), 1.0)
+
+
+def _growth_slope(x: Array) -> Array:
+    """Derivative of (e^x - 1)/x, by its series where the quotient would cancel."""
+    small = x < 0.05
+    safe = np.where(small, 1.0, x)
+    series = 0.5 + x * (1.0 / 3.0 + x * (1.0 / 8.0 + x * (1.0 / 30.0 + x * (1.0 / 144.0 + x / 840.0))))
+    return np.where(small, series, (np.exp(safe) * (safe - 1.0) + 1.0) / (safe * safe))
+
+
+def _fitted(
+    names: tuple[str, ...], law: Callable[[Array], Array], slopes: Callable[[Array], Array], start: Array, count: int,
+    most: Array, confidence: float,
+) -> ConstantsFit:  # fmt: skip
+    import pandas as pd
+    from scipy.optimize import least_squares
+    from scipy.stats import t as student
+
+    if count < len(names):
+        raise InputError("table", f"{count} rows", f"at least {len(names)}, one per constant", "measurements")
+    if not 0.0 < confidence < 1.0:
+        raise InputError("confidence", confidence, "a number between 0 and 1", "measurements")
+    found = least_squares(law, start, slopes, bounds=(0.0, most), x_scale=start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    values, free = found.x, count - len(names)
+    scaled = slopes(values) * start
+    _, size, right = np.linalg.svd(scaled, full_matrices=False)
+    weak = size <= LEAST_RANK * size[0]
+    # A constant that has a share in a weak direction is not determined.
+    lost = (np.abs(right[weak]) > 1e-3).any(axis=0) if weak.any() else np.zeros(len(names), np.bool_)
+    square = float(found.fun @ found.fun)
+    variance = square / free if free > 0 else np.nan
+    spread = np.sqrt(variance * ((right[~weak].T / size[~weak]) ** 2).sum(axis=1)) * start
+    spread = np.where(lost, np.inf, spread)
+    half = float(student.ppf(0.5 + 0.5 * confidence, free)) * spread if free > 0 else np.full(len(names), np.inf)
+    columns = {"value": values, "standard_error": spread, "low": values - half, "high": values + half}
+    return ConstantsFit(
+        pd.DataFrame(columns, index=pd.Index(names, name="constant")),
+        float(np.sqrt(square / count)),
+        confidence,
+        tuple(name for name, gone in zip(names, lost, strict=True) if gone),
+    )

@@ -1,0 +1,92 @@
+"""Feed mechanism from points, circles and plain root finding, 40 digits; imports nothing from kernels or sweep."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mpmath import mp
+
+
+def rocker(p: dict[str, Any], phi: Any) -> Any:
+    """Angle of the rocker: the zero of |BC|^2 - b^2 with slope of the sign h_sigma."""
+    a, b, c, e, f, g = (p[k] for k in ("h_a", "h_b", "h_c", "h_e", "h_f", "h_g"))
+    sa, ca = mp.sin(p["h_alpha"]), mp.cos(p["h_alpha"])
+    pin = [a * mp.cos(phi), f * sa + a * ca * mp.sin(phi), f * ca - a * sa * mp.sin(phi)]
+    flat = mp.mpc(pin[0] - e, pin[1])
+    reach2 = b**2 - (g - pin[2]) ** 2
+    cos = (abs(flat) ** 2 + c**2 - reach2) / (2 * c * abs(flat))
+    # C on the circle about D seen from D: towards the pin, turned by the angle of the triangle to either side
+    one = mp.arg(flat) + p["h_sigma"] * mp.acos(cos)
+    return mp.arg(mp.expj(one))
+
+
+def points(p: dict[str, Any], phi: Any) -> dict[str, Any]:
+    """Pins, rack angle and tooth at one crank angle (complex plane)."""
+    psi = rocker(p, phi) + p["dh"]
+    h = p["h_e"] + p["rh"] * mp.expj(psi)
+    e = mp.mpc(p["xE"], p["yE"]) + p["rE"] * mp.expj(phi + p["dE"])
+    f = mp.mpc(p["fx"], p["fy"])
+    # triangle H E F: at H between HE and HF
+    to_e = e - h
+    cos = (abs(to_e) ** 2 + abs(f) ** 2 - p["q"] ** 2) / (2 * abs(to_e) * abs(f))
+    chi = mp.arg(to_e / f) - p["bar_branch"] * mp.acos(cos)
+    tooth = mp.mpc(p["tx"] + p["tooth"] * p["pitch"], p["ty"])
+    return {"psi_plus_dh": psi, "chi": chi, "H": h, "E": e, "F": h + mp.expj(chi) * f, "T": h + mp.expj(chi) * tooth}
+
+
+def tooth(p: dict[str, Any], phi: Any) -> Any:
+    """Tooth as a complex number."""
+    return points(p, phi)["T"]
+
+
+def feeding(p: dict[str, Any], phi_entry: float, phi_leave: float) -> dict[str, Any]:
+    """Events polished from rough crank angles, and what lies between them."""
+    with mp.workdps(30):
+
+        def height(x: Any) -> Any:
+            return tooth(p, x).imag - p["y_plate"]
+
+        entry, leave = mp.findroot(height, mp.mpf(phi_entry)), mp.findroot(height, mp.mpf(phi_leave))
+        if leave < entry:
+            leave += 2 * mp.pi
+        xs = [entry + (leave - entry) * k / 400 for k in range(401)]
+        top = max(xs, key=height)
+        top = mp.findroot(lambda x: mp.diff(height, x), top)
+        stitch = tooth(p, leave).real - tooth(p, entry).real
+        # the x-derivative by a central difference of 1e-10: 1e-20 of the path
+        step = mp.mpf(10) ** -10
+
+        def strip(x: Any) -> Any:
+            return height(x) * (tooth(p, x + step).real - tooth(p, x - step).real) / (2 * step)
+
+        cuts = [entry + (leave - entry) * k / 8 for k in range(9)]
+        area = mp.quad(strip, cuts, maxdegree=4)
+        return {
+            "phi_entry": entry % (2 * mp.pi), "phi_leave": leave % (2 * mp.pi), "feed_angle": leave - entry,
+            "entry_speed": mp.diff(height, entry), "leave_speed": mp.diff(height, leave), "stitch_length": stitch,
+            "rise": height(top), "flatness": area / (height(top) * stitch),
+        }  # fmt: skip
+
+
+def triad(p: dict[str, Any], phi: Any, start: tuple[float, float, float]) -> list[Any]:
+    """Tooth and rack angle of the rack on three leads, by plain root finding from a start nearby."""
+    leads = [p["h_e"] + p["rh"] * mp.expj(rocker(p, phi) + p["dh"])]
+    leads += [mp.mpc(p[f"xE{k}"], p[f"yE{k}"]) + p[f"rE{k}"] * mp.expj(phi + p[f"dE{k}"]) for k in (2, 3)]
+    arms = [mp.mpc(p[f"f{k}x"], p[f"f{k}y"]) for k in (1, 2, 3)]
+
+    def closures(place: Any) -> Any:
+        x, y, chi = place
+        return mp.matrix([
+            abs(mp.mpc(x, y) + mp.expj(chi) * arm - lead) - p[f"q{k}"]
+            for k, (arm, lead) in enumerate(zip(arms, leads, strict=True), 1)
+        ])  # fmt: skip
+
+    place, step = mp.matrix([mp.mpf(float(v)) for v in start]), mp.mpf(10) ** -25
+    for _ in range(6):
+        slopes = mp.matrix(3, 3)
+        for k in range(3):
+            moved = place.copy()
+            moved[k] += step
+            slopes[:, k] = (closures(moved) - closures(place)) / step
+        place -= mp.lu_solve(slopes, closures(place))
+    return list(place)

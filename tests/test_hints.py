@@ -1,0 +1,62 @@
+"""Which name is meant by a word that is none: the hint in messages."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sweep.cli.tables import write_table
+from sweep.errors import StoreError, closest, edits
+from sweep.study.units import SYMBOLS
+
+OUTPUTS = [
+    "psi", "eps_y", "dpsi", "d2psi", "swing", "margin", "max_abs_d2psi", "max_crank_acceleration", "max_pressure_angle",
+]  # fmt: skip
+PARAMETERS = ["a", "b", "c", "e", "f", "g", "alpha", "branch"]
+
+
+@pytest.mark.parametrize(
+    ("word", "known", "meant"),
+    [
+        ("psy", OUTPUTS, "psi"),
+        ("crank", PARAMETERS, "a"),
+        ("coupler", PARAMETERS, "b"),
+        ("max_acceleration", OUTPUTS, "max_abs_d2psi"),
+        ("transmission angle", OUTPUTS, "max_pressure_angle"),
+        ("max_abs_dspi", OUTPUTS, "max_abs_d2psi"),
+        ("arcmin", SYMBOLS, "deg"),
+        ("inches", SYMBOLS, "in"),
+        ("thread", ["threading", "loky"], "threading"),
+        ("rmp", SYMBOLS, "rpm"),
+        ("E1", ["e1", "f1", "g1"], "e1"),
+        ("alhpa", PARAMETERS, "alpha"),
+        ("crosshead", ["branch"], None),
+        ("zzz", OUTPUTS, None),
+        ("", OUTPUTS, None),
+    ],
+)
+def test_hint_is_what_is_meant_or_nothing(word: str, known: list[str], meant: str | None) -> None:
+    assert closest(word, known) == meant
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "count"),
+    [("", "", 0), ("abc", "abc", 0), ("abc", "", 3), ("abc", "acb", 1), ("psy", "psi", 1), ("kitten", "sitting", 3)],
+)
+def test_edits_are_counted_both_ways(one: str, other: str, count: int) -> None:
+    assert edits(one, other) == edits(other, one) == count
+
+
+def test_a_disk_that_can_only_be_read_is_an_error_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such a disk refuses to delete the file that it has refused to make, too."""
+
+    def refuse(*given: object, **more: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(pd.DataFrame, "to_csv", refuse)
+    monkeypatch.setattr(Path, "unlink", refuse)
+    with pytest.raises(StoreError, match="Read-only file system"):
+        write_table(pd.DataFrame({"a": [1.0]}), tmp_path / "out.csv")

@@ -1,0 +1,114 @@
+"""What the starts of a search tell: basins, the best from distinct valleys, unseen share, when enough is enough."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kernels import status as st
+from sweep.optimise import Problem, Result, Survey, explore
+from sweep.optimise.solve import BATCH
+from sweep.optimise.survey import survey, with_basins
+from sweep.study import OptimiseSettings, load_study
+from tests.optimise_family import FAMILY
+from tests.test_optimise_study import STUDY
+
+ASKED = OptimiseSettings(starts=20)
+
+
+def bowl() -> Problem:
+    return Problem(FAMILY, ("p", "q"), -4 * np.ones(2), 4 * np.ones(2), {}, "max_abs_bowl")
+
+
+def result(start: int, objective: float, status: int = st.OK, ended: str = "converged") -> Result:
+    return Result(
+        start, np.zeros(4), objective, 0.0, 0.0, 0.0, (), {}, {}, {}, status, ended
+    )  # fmt: skip
+
+
+def starts(count: int) -> np.ndarray:
+    rng = np.random.default_rng(1)
+    return np.column_stack([rng.uniform(-4, 4, (count, 2)), np.zeros(count), np.ones(count)])
+
+
+def test_values_within_a_ten_thousandth_are_one_basin_and_infeasible_ends_are_none() -> None:
+    ends = [result(0, 2.0), result(1, 1.0), result(2, 1.00005), result(3, 0.5, st.LIMIT_EXCEEDED), result(4, 1.001)]
+    assert {r.start: r.basin for r in with_basins(ends)} == {0: 3, 1: 1, 2: 1, 3: 0, 4: 2}
+
+
+def test_unseen_share_is_the_larger_of_good_turing_and_boender_rinnooy_kan() -> None:
+    values = [1.0] * 6 + [2.0] * 3 + [3.0]
+    found = survey(bowl(), starts(10), [result(k, x) for k, x in enumerate(values)], ASKED, "starts")
+    # One of ten was met once; 3 * 4 / (10 * 9) is larger.
+    assert (found.basins, found.best) == (3, 6) and found.unseen == pytest.approx(12 / 90)
+    assert found.words == "3 basins met, the best 6 times, estimated unseen 13 %"
+    singles = [result(k, 1.0 if k < 8 else float(k)) for k in range(12)]
+    assert survey(bowl(), starts(12), singles, ASKED, "starts").unseen == pytest.approx(4 / 12)
+
+
+def test_starts_beside_each_other_count_once() -> None:
+    close = np.repeat(starts(1), 12, axis=0) + np.linspace(0.0, 1e-3, 12)[:, None] * [1, 1, 0, 0]
+    ends = [result(k, 1.0) for k in range(12)]
+    assert survey(bowl(), close, ends, ASKED, "starts").best == 1
+    assert not survey(bowl(), close, ends, ASKED, "starts").enough
+    assert survey(bowl(), starts(12), ends, ASKED, "starts").enough
+
+
+def test_one_start_or_none_feasible_says_nothing_of_the_rest() -> None:
+    assert survey(bowl(), starts(1), [result(0, 1.0)], ASKED, "starts").unseen == 1.0
+    nothing = survey(bowl(), starts(2), [result(k, 1.0, st.LIMIT_EXCEEDED) for k in range(2)], ASKED, "starts")
+    assert nothing.unseen == 1.0 and nothing.basins == 0 and "none of 2 starts became feasible" in nothing.words
+
+
+def test_search_ends_when_enough_is_known() -> None:
+    many = starts(50)
+    results, found = explore(bowl(), many, replace(ASKED, starts=50))
+    # One basin, met by 12 starts: 2 / (12 * 11) is below 2 %, 2 / (6 * 5) is not.
+    assert found.ended == "enough" and len(results) == found.starts == 12 == 2 * BATCH
+    assert found.warnings == ()
+    _, more = explore(bowl(), many, replace(ASKED, starts=50, unseen=1e-3))
+    assert more.starts == 48 and more.unseen == pytest.approx(2 / (48 * 47))
+
+
+def test_number_of_starts_does_not_depend_on_jobs() -> None:
+    many, asked = starts(30), OptimiseSettings(starts=30)
+    alone, one = explore(bowl(), many, asked)
+    together, two = explore(bowl(), many, asked, jobs=2)
+    assert one == two and [r.objective for r in alone] == [r.objective for r in together]
+
+
+def test_warnings_name_what_was_not_reached() -> None:
+    found = Survey(4, 20, 4, 2, 1, 0.5, 0.02, "starts")
+    assert found.warnings[0] == "only 4 starts of the 20 asked: no more were found in the design space"
+    assert "1 of the 3 distinct valleys" in found.warnings[1] and "estimated at 50 %, not the 2 %" in found.warnings[1]
+    late = replace(found, offered=12, ended="time", starts=5, asked=12)
+    assert late.warnings == ("time ran out: 5 of 12 starts",)
+
+
+def test_signs_have_basins_of_their_own() -> None:
+    both = starts(6)
+    both[3:, 3] = -1.0
+    ends = [result(k, 1.0 if k < 4 else 2.0) for k in range(6)]
+    found = survey(bowl(), both, ends, ASKED, "starts")
+    assert found.kinds == (("branch = -1", 3, 2), ("branch = 1", 3, 1))
+    assert math.isclose(found.unseen, 6 / 30)
+
+
+def test_only_the_finalists_go_on_after_the_first_heat(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.optimise.solve.TRIAL", 12)
+    many, asked = starts(8), OptimiseSettings(starts=8, finalists=3)
+    alone, found = explore(bowl(), many, asked)
+    assert sorted(r.ended for r in alone).count("left") == 5 and found.starts == 8 and found.basins == 1
+    assert alone[0].ended == "converged" and alone[0].objective == pytest.approx(1.0, rel=1e-9)
+    together, _ = explore(bowl(), many, asked, jobs=2)
+    assert [(r.objective, r.looks) for r in together] == [(r.objective, r.looks) for r in alone]
+
+
+def test_every_key_of_the_search_arrives(tmp_path: Path) -> None:
+    keys = 'starts = 7\nseed = 3\nunseen = "5 %"\nlooks = 900\nfinalists = 4\ntime_budget = "2 s"\nglobal = "none"\n'
+    (tmp_path / "study.toml").write_text(STUDY.format(swing=40).replace("starts = 3\nseed = 1\n", keys))
+    assert load_study(tmp_path).optimise == OptimiseSettings(7, 3, 2.0, None, 0.05, 900, "none", 4)
