@@ -29,7 +29,7 @@ def test_answer_names_the_optimum_what_holds_it_back_and_the_next_command(tmp_pa
     assert f"optimum: largest acceleration {best['max_abs_d2psi'][0]:.5g} rad/rad²" in text
     assert "held back by: " in text and "swing (at least 40°)" in text
     assert "search: 3 starts, " in text and "estimated unseen" in text
-    assert f"next: sweep report {tmp_path / "designs"}" in text
+    assert f"next: sweep report {tmp_path / 'designs'}" in text
 
 
 def test_no_feasible_design_ends_with_4_and_says_which_limit_gives_way(tmp_path: Path) -> None:
