@@ -88,7 +88,9 @@ def test_every_numbered_equation_has_a_row(mark: str, last: int) -> None:
 
 def test_every_task_has_a_row() -> None:
     items = [row["item"] for row in rows(COMPUTED)]
-    assert all(f"P task {number}" in items for number in range(1, 9)) and "P engineering method" in items
+    assert all(f"P task {number}" in items for number in range(1, 9)) and any(
+        item.startswith("P engineering method") for item in items
+    )
 
 
 def test_every_source_has_rows() -> None:

@@ -14,6 +14,7 @@ from sweep.cli.effects import effects
 from sweep.cli.listing import cache, families
 from sweep.cli.studies import check, compare, report, run
 from sweep.cli.tables import evaluate_table, summarise_table
+from sweep.cli.task import task
 from sweep.errors import LinksweepError, LinksweepWarning, StoreError
 from sweep.jobs.signals import leaving_within
 
@@ -77,11 +78,11 @@ def main() -> None:
     STUDY is a study.toml or the folder that holds one, FOLDER a dataset that `sweep run` left behind, FAMILY a name
     from `sweep families` or a chain of them such as rssr+guide.
 
-    Exit codes: 0 ok, 2 bad input, 3 over budget, 4 no design within the limits (run), 10 values changed, 11 rows
+    Exit codes: 0 ok, 2 bad input, 3 over budget, 4 no design within the limits (run, task), 10 values changed, 11 rows
     changed, 12 slower (compare), 70 worker died, 74 I/O or disk full, 75 folder locked, 124 time budget used up (run
     again to resume), 130 and 143 stopped by a signal.
     """
 
 
-for verb in (run, check, evaluate_table, summarise_table, families, effects, report, compare, cache):
+for verb in (run, check, task, evaluate_table, summarise_table, families, effects, report, compare, cache):
     main.add_command(verb)
