@@ -1,6 +1,6 @@
 """Slotted links beside crank-rockers: least acceleration for the same swing and the same times forward and back.
 
-``python studies/looper-slotted/figure.py FOLDER`` reads the front of the slotted links from FOLDER/designs, searches
+``python studies/looper-slotted/figure.py FOLDER`` reads the front of the slotted links from FOLDER, searches
 the best crank-rocker for each of its stroke ratios and writes FOLDER/drives.parquet and FOLDER/figures/drives.svg.
 """
 
@@ -111,7 +111,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
     folder: Path = parser.parse_args().folder
-    front = pd.read_parquet(folder / "designs" / "_pareto.parquet")
+    front = pd.read_parquet(folder / "_pareto.parquet")
     small = len(front) < 4  # smoke
     drives = table(front, 2 if small else 60, 1.0 if small else 25.0)
     drives.to_parquet(folder / "drives.parquet", index=False)

@@ -1,6 +1,6 @@
 """What the distance h of the two revolutes buys: least acceleration of the five-links of the study for given h.
 
-``python studies/looper1097/figure.py FOLDER`` starts from the optimum in FOLDER/designs, follows it to other h and
+``python studies/looper1097/figure.py FOLDER`` starts from the optimum in FOLDER, follows it to other h and
 writes FOLDER/joint.parquet and FOLDER/figures/joint.svg.
 """
 
@@ -65,7 +65,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
     folder: Path = parser.parse_args().folder
-    best = pd.read_parquet(folder / "designs" / "_optimum.parquet").iloc[0]
+    best = pd.read_parquet(folder / "_optimum.parquet").iloc[0]
     small = best["status"] != 0  # smoke
     joint = along_h(best, [0.0, 5.0] if small else [0.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0], 3.0 if small else 30.0)
     joint.to_parquet(folder / "joint.parquet", index=False)
