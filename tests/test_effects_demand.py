@@ -94,12 +94,12 @@ def test_unwanted_outputs_leave_no_instruction(kept):
 def test_unwanted_acceleration_leaves_no_instruction():
     poses, fixed, status = pose_arguments()
     point, out = np.zeros((5, 3)), np.empty((*status.shape, 3))
-    names = ["position", "velocity", "acceleration", "orientation_n", "omega", "eps"]
+    names = ["position", "velocity", "acceleration", "orientation_n", "omega", "eps", "euler"]
     arguments = [poses, fixed, point, np.zeros(5), status]
-    with_none = instructions(twin(coupler.coupler_point, []), [*arguments, out, *[None] * 5])
+    with_none = instructions(twin(coupler.coupler_point, []), [*arguments, out, *[None] * 6])
     never_knew = instructions(twin(coupler.coupler_point, names[1:]), [*arguments, out])
     assert abs(len(with_none) - len(never_knew)) <= 0.02 * len(never_knew)
-    assert len(instructions(twin(coupler.coupler_point, []), [*arguments, *[out] * 6])) > 1.3 * len(with_none)
+    assert len(instructions(twin(coupler.coupler_point, []), [*arguments, *[out] * 7])) > 1.3 * len(with_none)
 
 
 def test_an_effect_that_is_not_wanted_is_not_there():

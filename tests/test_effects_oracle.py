@@ -8,6 +8,8 @@ linear solve is iterated, so they get 64 units of the largest force of the pose.
 
 from __future__ import annotations
 
+import math
+
 import mpmath as mp
 import numpy as np
 import pytest
@@ -132,7 +134,7 @@ def test_coupler_point_equals_oracle():
         poses, fixed, status = joint_records(designs, phi)
         point = np.array([[r["x"], r["y"], r["z"]] for r in table])
         out = {name: np.empty((*status.shape, 3)) for name in ("P", "dP", "ddP")}
-        coupler_point(poses, fixed, point, np.full(len(table), code), status, *out.values(), None, None, None)
+        coupler_point(poses, fixed, point, np.full(len(table), code), status, *out.values(), None, None, None, None)
         assert len(table) > 40
         for i, row in enumerate(table):
             assert status[i, 0] == st.OK, row["kind"]
@@ -141,6 +143,25 @@ def test_coupler_point_equals_oracle():
                 # The tolerance of order n takes the largest condition of the lower orders (theory section 12).
                 scale = max(scale, *(mp.mpf(c) for c in row["cond"][name]), *(abs(mp.mpf(x)) for x in row[name]))
                 assert factor(values[i, 0], row[name], scale) < 16, (i, row["kind"], name)
+
+
+def test_euler_angles_of_the_coupler_equal_oracle():
+    for construction, code in CONSTRUCTIONS.items():
+        table = [r for r in rows("coupler") if r["construction"] == construction]
+        designs, phi = geometry(table)
+        poses, fixed, status = joint_records(designs, phi)
+        euler, n = np.empty((*status.shape, 2)), np.empty((*status.shape, 3))
+        nothing = np.zeros((len(table), 3))
+        coupler_point(poses, fixed, nothing, np.full(len(table), code), status, None, None, None, n, None, None, euler)
+        for i, row in enumerate(table):
+            # The table gives no condition for the angles: that of the point, over its distance from the pin, stands
+            # for it; close to a dead point, and where coupler and finger axis nearly meet, it is large.
+            arm = max(abs(row[x]) for x in ("x", "y", "z"))
+            size = 1.0 + max(mp.mpf(c) for c in row["cond"]["P"]) / arm
+            for k, name in enumerate(("Theta", "Phi")):
+                off = float(mp.mpf(euler[i, 0, k]) - mp.mpf(row[name]))
+                off = math.remainder(off, 2.0 * math.pi)
+                assert abs(off) < 16 * 2.0**-53 * float(size), (i, row["kind"], construction, name, off)
 
 
 def test_pressure_directions_equal_oracle():
@@ -251,3 +272,24 @@ def test_speed_fluctuation_equals_oracle():
             # delta is a difference of two speeds: its digits are those of the speeds.
             scale = float(expected["omega_max"]) / i["omega_mean"] if name == "delta" else abs(float(expected[name]))
             assert float(values[0]) == pytest.approx(float(expected[name]), abs=1e-13 * scale)
+
+
+def test_euler_angles_turn_the_axes_onto_those_of_the_coupler():
+    """Rz(psi) Rx(Theta) Rz(Phi) brings z to n, for both assembly modes, through the public functions."""
+    import sweep
+
+    design = {"a": 1.0, "b": 3.9, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "finger": 0.0}
+    for branch in (1.0, -1.0):
+        want = ["psi", "euler_theta", "euler_phi", "n_x", "n_y", "n_z", "x_b", "y_b", "z_b", "x_c", "y_c", "z_c"]
+        found = sweep.evaluate("rssr", design | {"branch": branch}, want, phi=np.linspace(0.0, 6.0, 9))
+        for row in found.itertuples():
+            (cp, sp), (ct, sn), (cf, sf) = (
+                (math.cos(x), math.sin(x)) for x in (row.psi, row.euler_theta, row.euler_phi)
+            )
+            z_turn = np.array([[cp, -sp, 0.0], [sp, cp, 0.0], [0.0, 0.0, 1.0]])
+            x_turn = np.array([[1.0, 0.0, 0.0], [0.0, ct, -sn], [0.0, sn, ct]])
+            turn = z_turn @ x_turn @ np.array([[cf, -sf, 0.0], [sf, cf, 0.0], [0.0, 0.0, 1.0]])
+            along = np.array([row.x_c - row.x_b, row.y_c - row.y_b, row.z_c - row.z_b]) / design["b"]
+            # A few roundings of numbers of order one, times the inverse sine of the transmission angle.
+            np.testing.assert_allclose(turn[:, 0], along, atol=1e-14)
+            np.testing.assert_allclose(turn[:, 2], [row.n_x, row.n_y, row.n_z], atol=1e-14)

@@ -75,6 +75,21 @@ def orientation(j: Joints, construction: float) -> Coupler:
     return Coupler(w, n, across, omega, eps, v_b, a_b, sine)
 
 
+@inline
+def euler_angles(j: Joints, body: Coupler, construction: float) -> tuple[float, float]:
+    """Euler angles of the coupler but for its precession (sheet 4.3), in all quadrants.
+
+    Finger on C: Rz(psi) Rx(Theta) Rz(Phi) turns x to s and z to n.  Finger on B: the precession is 90 deg - alpha about
+    x, which brings z to u; Theta turns about u, Phi about the new x, and y becomes s.
+    """
+    if construction == DRIVEN:
+        theta = math.atan2(-dot(body.n, j.tau), dot(body.n, cross(j.rho, j.tau)))
+        return theta, j.branch * math.atan2(body.sine, dot(j.rho, j.s))
+    # e1 is x and e2 = u x e1: the crank axis has no component along the common perpendicular.
+    across = j.u[2] * j.s[1] - j.u[1] * j.s[2]
+    return math.atan2(j.s[0], -across), math.atan2(-dot(j.u, j.s), body.sine)
+
+
 @kernel
 def coupler_point(
     poses: Array,
@@ -88,6 +103,7 @@ def coupler_point(
     orientation_n: Array | None,
     omega: Array | None,
     eps: Array | None,
+    euler: Array | None,
 ) -> None:
     """Motion of a point of the coupler and the coupler's orientation and rates.
 
@@ -99,6 +115,7 @@ def coupler_point(
     status : (n, m), in and out; poses that are not OK give nan, SINGULAR where the finger axis meets the coupler
     position, velocity, acceleration : (n, m, 3) or None, with respect to the crank angle [length]
     orientation_n, omega, eps : (n, m, 3) or None; unit vector n, angular velocity and acceleration per unit crank speed
+    euler : (n, m, 2) or None; nutation and rotation about the coupler's own axis, `euler_angles` [rad]
     """
     for i in range(poses.shape[0]):
         p = (point[i, 0], point[i, 1], point[i, 2])
@@ -121,6 +138,9 @@ def coupler_point(
                 _store(omega, i, j, good, body.omega)
             if eps is not None:
                 _store(eps, i, j, good, body.eps)
+            if euler is not None:
+                theta, turn = euler_angles(joints, body, finger[i])
+                euler[i, j, 0], euler[i, j, 1] = good * theta, good * turn
 
 
 @inline

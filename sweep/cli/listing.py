@@ -99,10 +99,12 @@ def main_outputs(family: Family) -> list[str]:
     from sweep.families.capabilities import Assembly
     from sweep.families.members import Machine
     from sweep.quantities.reduction import prefixes
+    from sweep.reductions.events import event_names
 
     if isinstance(family, Machine):
         members = [f"{m.name}.{name}" for m in family.members for name in main_outputs(m.family)]
         between = [f"min_{r.outputs[0].name}" for r in family.relations] + [t.name for t in family.timings]
+        between += [name for event in family.events for name in event_names(family, event)]
         return [*members, *between]
     general = {f"{prefix}{name}" for prefix in prefixes(family.domain) for name in family.pose_names}
     first = {f"max_abs_{name}" for name in family.derivative_of.values()}

@@ -18,6 +18,7 @@ from sweep.cli.nightly import nightly
 from sweep.cli.parts import merge, split
 from sweep.cli.studies import check, compare, report, run
 from sweep.cli.tables import evaluate_table, summarise_table
+from sweep.cli.task import task
 from sweep.cli.verify import verify
 from sweep.errors import LinksweepError, LinksweepWarning, StoreError
 from sweep.jobs.signals import leaving_within
@@ -105,5 +106,6 @@ for verb in (
     points,
     export,
     draw,
+    task,
 ):
     main.add_command(verb)

@@ -8,11 +8,13 @@ from kernels.effects.coupler import coupler_point
 from sweep.effects.base import Advice, Effect, Scene
 from sweep.families.base import Columns, Output, Parameter
 
-EQUATION = "C0 (1)-(3)"
+EQUATION = "C0 (1)-(4)"
 FORMULAS = (
     "(1) m = w x s (times the branch for a driven finger), n = m/|m|; w = rho (driven) or u (driving)",
     "(2) P = B + x s + y (n x s) + z n",
     "(3) omega = s x s' + q s, q = -m' . (n x s)/|m|; P' = B' + omega x p, P'' = B'' + eps x p + omega x (omega x p)",
+    "(4) finger at C: Rz(psi) Rx(euler_theta) Rz(euler_phi) turns x to s, z to n",
+    "    finger at B: euler_theta = atan2(s . e1, -s . e2) about u, euler_phi = atan2(-s . u, |u x s|)",
 )
 
 CONSTRUCTION = Parameter(
@@ -35,7 +37,13 @@ _GROUPS = {
     "omega": ("omega_{axis}", "1", "angular velocity of the coupler along {axis} per unit crank speed"),
     "eps": ("eps_{axis}", "1", "angular acceleration of the coupler along {axis} per unit crank speed squared"),
 }
-OUTPUTS = tuple(
+_EULER = (
+    Output(
+        "euler_theta", "rad", "nutation of the coupler: about the node line, after the precession", EQUATION, wraps=True
+    ),
+    Output("euler_phi", "rad", "rotation of the coupler about its own third axis", EQUATION, wraps=True),
+)
+OUTPUTS = _EULER + tuple(
     Output(name.format(axis=axis), unit, text.format(axis=axis), EQUATION)
     for name, unit, text in _GROUPS.values()
     for axis in "xyz"
@@ -49,13 +57,16 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     status = scene.status()
     groups = [[name.format(axis=axis) for axis in "xyz"] for name, _, _ in _GROUPS.values()]
     out = [None if wanted.isdisjoint(names) else np.empty((*scene.shape, 3)) for names in groups]
-    coupler_point(*scene.records, scene.table(_POINT), scene.inputs["finger"], status, *out)
+    angles = None if wanted.isdisjoint(o.name for o in _EULER) else np.empty((*scene.shape, 2))
+    coupler_point(*scene.records, scene.table(_POINT), scene.inputs["finger"], status, *[*out, angles])
     columns: Columns = {
         name: values[:, :, k]
         for names, values in zip(groups, out, strict=True)
         for k, name in enumerate(names)
         if values is not None and name in wanted
     }
+    if angles is not None:
+        columns |= {o.name: angles[:, :, k] for k, o in enumerate(_EULER) if o.name in wanted}
     return columns | {"status": status}
 
 

@@ -17,7 +17,8 @@ from sweep.families import family as find_family
 from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import Link, OutputLink, Points, Skeleton
 from sweep.families.chain import Chain, drive, driving_names, stages_of
-from sweep.families.members import TIP, Machine, Member
+from sweep.families.located import TIP
+from sweep.families.members import Machine, Member
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -95,14 +95,16 @@ def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = No
         ``place`` (``at``, ``axis``, ``zero``: origin, z and x of the member's frame, for a chain the last stage's, in
         the machine's frame) and ``tip`` (a point fixed to the output link: along it, across it, along its axis)
     relations : by name, each one of ``{"distance": [point, point]}``, ``{"timing": [crank angle, crank angle]}``,
-        ``{"torque": [member, ...]}``, ``{"shaking": [member, ...]}``
+        ``{"speed": [point]}`` or of the second of two points relative to the first, ``{"torque": [member, ...]}``,
+        ``{"shaking": [member, ...]}``, ``{"event": pose output, "level": number, "rising": true or false}``
 
     Returns
     -------
     Machine
         parameters and outputs carry the member's name: ``needle.a1``, ``looper.swing``.  ``offset``, ``x_at`` ... and
         ``x_tip`` ... are parameters with what is given here as default.  Relations are outputs: of a distance
-        ``clearance`` there are ``min_clearance``, ``phi_min_clearance`` ...
+        ``clearance`` there are ``min_clearance``, ``phi_min_clearance`` ...; of an event ``arrive``, where a pose
+        output passes a level, there are ``phi_arrive`` and ``count_arrive``
 
     Raises
     ------

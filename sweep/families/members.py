@@ -11,12 +11,11 @@ import numpy as np
 
 from kernels.chain import chain_rule
 from kernels.status import OK
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, OutputLink, Points
+from sweep.families.base import Angles, Array, Columns, Event, Family, Output, Parameter
+from sweep.families.capabilities import Assembly, Points
+from sweep.families.located import TIP, coordinates, velocity
 from sweep.families.placing import AXES, Place
 from sweep.families.relations import Relation, Timing
-
-TIP = "tip"
 
 
 @dataclass(frozen=True)
@@ -80,13 +79,26 @@ class Member:
         named = [name for points in self.family.every(Points) for name in points.at]
         return (*named, TIP) if self.tip is not None else tuple(named)
 
+    @cached_property
+    def moving(self) -> Mapping[str, tuple[str | None, ...]]:
+        """Of the points whose velocity the family's outputs give, the outputs that it is made of."""
+        found: dict[str, tuple[str | None, ...]] = {}
+        rates = self.family.derivative_of
+        for name, at in ((n, at) for points in self.family.every(Points) for n, at in points.at.items()):
+            if all(x is None or x in rates for x in at):
+                found[name] = tuple(x and rates[x] for x in at)
+        if self.tip is not None and self.family.position in rates:
+            found[TIP] = (rates[self.family.position],)
+        return found
+
 
 @dataclass(frozen=True)
 class Machine(Family):
     """A family made of members.
 
     Pose outputs of a member carry its name, derivatives are with respect to the angle of the main shaft.  A point
-    ``point`` of a member gives ``point_x``, ``point_y``, ``point_z`` in the machine's frame.
+    ``point`` of a member gives ``point_x``, ``point_y``, ``point_z`` in the machine's frame, and ``dpoint_x`` ... where
+    the member's outputs give its velocity.
     """
 
     members: tuple[Member, ...] = ()
@@ -122,11 +134,12 @@ class Machine(Family):
         return _built(self, tuple(replace(m, family=families.get(m.name, m.family)) for m in self.members))
 
 
-def assemble(name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing, ...]) -> Machine:
+def assemble(name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | Event, ...]) -> Machine:
     """The machine of these members; each may be driven by one that stands before it."""
     timings = tuple(r for r in relations if isinstance(r, Timing))
-    others = tuple(r for r in relations if not isinstance(r, Timing))
-    bare = Machine(name, "", (), "", (), _no_poses, relations=others, timings=timings)
+    events = tuple(r for r in relations if isinstance(r, Event))
+    others = tuple(r for r in relations if not isinstance(r, Timing | Event))
+    bare = Machine(name, "", (), "", (), _no_poses, relations=others, timings=timings, events=events)
     return _built(bare, members)
 
 
@@ -150,6 +163,16 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         outputs += [
             Output(f"{m.name}.{point}_{axis}", "length", f"{m.name}: {axis} of {point}, machine's frame", "ours")
             for point in m.points
+            for axis in AXES
+        ]
+        outputs += [
+            Output(
+                f"{m.name}.d{point}_{axis}",
+                "length",
+                f"{m.name}: velocity analogue of {point} along {axis}, machine's frame",
+                "ours",
+            )
+            for point in m.moving
             for axis in AXES
         ]
     derivative_of = {
@@ -246,14 +269,16 @@ def _member(m: Member, designs: Array, angles: Angles, own: set[str], found: Map
         rows = rows[:1]
     own_designs, phase = np.ascontiguousarray(rows[:, :-1]), rows[:, -1]
     motion = {name for name in own if name in m.family.pose_output}
-    motion |= {x for point in m.points for x in _coordinates(m, point, own)}
+    motion |= {x for point in m.points for x in _made_of(m, point, own)}
     motion |= {name for derivative in motion for name in _orders(m.family, derivative)}
     turned = _turned(m, phase, angles, found)
     result: dict[str, Any] = dict(m.family.poses(own_designs, turned, frozenset(motion)))
     _with_respect_to_shaft(m, result, found)
     for point in m.points:
         if any(f"{point}_{axis}" in own for axis in AXES):
-            result |= _point(m, point, designs, own_designs, result)
+            result |= coordinates(m, point, designs, own_designs, result)
+        if any(f"d{point}_{axis}" in own for axis in AXES):
+            result |= velocity(m, point, designs, result)
     return {name: result[name] for name in (*own, "status")}
 
 
@@ -286,28 +311,10 @@ def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str
         chain_rule(np.full(len(outer[0]), float(m.ratio)), *given, *missing, *outer, *missing)
 
 
-def _coordinates(m: Member, point: str, own: set[str]) -> set[str]:
-    """Pose outputs that a point's coordinates in the machine's frame are made of, where they are wanted."""
-    if not any(f"{point}_{axis}" in own for axis in AXES):
-        return set()
+def _made_of(m: Member, point: str, own: set[str]) -> set[str]:
+    """Pose outputs that a point's coordinates and velocity are made of, as far as they are wanted."""
+    at, moves = (any(f"{of}{point}_{axis}" in own for axis in AXES) for of in ("", "d"))
+    found = {name for name in m.moving.get(point, ()) if name} if moves else set()
     if point == TIP:
-        return {m.family.position}
-    return {name for points in m.family.every(Points) for name in points.at.get(point, ()) if name}
-
-
-def _point(m: Member, point: str, designs: Array, own_designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
-    """Coordinates of a point in the machine's frame, (n, m)."""
-    start = m.columns.stop + 1
-    at = designs[:, start : start + 3]
-    if point == TIP:
-        link = m.family.find(OutputLink)
-        assert link is not None
-        x, y, z = (designs[:, [start + k]] for k in range(3, 6))
-        angle = result[m.family.position]
-        cos, sin, origin = np.cos(angle), np.sin(angle), link.origin(own_designs)
-        local = [origin[:, [0]] + x * cos - y * sin, origin[:, [1]] + x * sin + y * cos, origin[:, [2]] + z + 0.0 * cos]
-    else:
-        names = next(points.at[point] for points in m.family.every(Points) if point in points.at)
-        local = [result[name] if name else 0.0 for name in names]
-    turn = m.place.rotation
-    return {f"{point}_{axis}": at[:, [k]] + sum(turn[k, j] * local[j] for j in range(3)) for k, axis in enumerate(AXES)}
+        return found | ({m.family.position} if at or moves else set())
+    return found | {name for points in m.family.every(Points) for name in points.at.get(point, ()) if name and at}

@@ -78,6 +78,42 @@ class Distance:
 
 
 @dataclass(frozen=True)
+class Speed:
+    """Speed of a point in the machine's frame, or of a second point as the first one sees it.
+
+    ``points`` are one or two dotted names such as "looper.tip".
+    """
+
+    name: str
+    points: tuple[str, ...]
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """The speed, per radian of the main shaft."""
+        text = f"speed of {self.points[-1]}" + (f" relative to {self.points[0]}" if len(self.points) == 2 else "")
+        return (Output(self.name, "length", f"{text}, per radian of the main shaft", "ours"),)
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Velocities of the points."""
+        return frozenset(velocity for point in self.points for velocity in _velocities(point))
+
+    def compute(
+        self, found: Mapping[str, Any], rotations: Mapping[str, Array], wanted: frozenset[str]
+    ) -> dict[str, Any]:
+        """The speed, (n, m)."""
+        parts = [found[name] for name in _velocities(self.points[-1])]
+        if len(self.points) == 2:
+            parts = [part - found[name] for part, name in zip(parts, _velocities(self.points[0]), strict=True)]
+        return {self.name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)}
+
+
+def _velocities(point: str) -> tuple[str, ...]:
+    member, _, own = point.partition(".")
+    return tuple(f"{member}.d{own}_{axis}" for axis in AXES)
+
+
+@dataclass(frozen=True)
 class ShaftTorque:
     """Torque that the main shaft has to give: drive torques of members, times their ratios.
 

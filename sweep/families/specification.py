@@ -9,15 +9,16 @@ from typing import Any
 
 from sweep.errors import InputError, nearest
 from sweep.families import Specification
-from sweep.families.base import Family
+from sweep.families.base import Event, Family
 from sweep.families.capabilities import OutputLink
 from sweep.families.domain import Turn
 from sweep.families.members import Machine, Member, assemble
 from sweep.families.placing import place, vector
-from sweep.families.relations import Distance, Relation, ShaftTorque, Shaking, Timing
+from sweep.families.relations import Distance, Relation, ShaftTorque, Shaking, Speed, Timing
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip")
-RELATION_KINDS = ("distance", "timing", "torque", "shaking")
+RELATION_KINDS = ("distance", "speed", "timing", "event", "torque", "shaking")
+EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
 
@@ -76,7 +77,14 @@ def built(given: Specification, find: FindFamily) -> Machine:
         if not _WORD.fullmatch(name) or name in members:
             raise InputError("member", name, "a plain word, each once", "machine")
         members[name] = _member(name, dict(table), members, find)
-    relations = tuple(_relation(name, dict(table), members) for name, table in given.relations)
+    plain = {name: dict(table) for name, table in given.relations if "event" not in dict(table)}
+    known = {name: _relation(name, table, members) for name, table in plain.items()}
+    events = {
+        name: _event(name, dict(table), members, tuple(known.values()))
+        for name, table in given.relations
+        if name not in plain
+    }
+    relations = tuple(known[name] if name in known else events[name] for name, _ in given.relations)
     for relation in relations:
         if not _WORD.fullmatch(relation.name) or _ENDS_IN_DIGIT.fullmatch(relation.name) or relation.name in members:
             allowed = "a plain word without a digit at its end that is no member"
@@ -124,16 +132,40 @@ def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[s
     return member, output
 
 
+def _event(name: str, table: dict[str, Any], members: Mapping[str, Member], others: tuple[Any, ...]) -> Event:
+    """The event where a pose output of the machine, a relation's or a member's, passes a level."""
+    where = f"machine.relations.{name}"
+    for key in table:
+        if key not in EVENT_KEYS:
+            raise InputError(key, table[key], f"{', '.join(EVENT_KEYS)}{nearest(key, EVENT_KEYS)}", where)
+    relations = tuple(r for r in others if not isinstance(r, Timing))
+    outputs = assemble("", tuple(members.values()), relations).pose_output
+    of, level, rising = table["event"], table.get("level", 0.0), table.get("rising", True)
+    if of not in outputs:
+        raise InputError("event", of, f"a pose output of the machine{nearest(str(of), outputs)}", where)
+    if isinstance(level, bool) or not isinstance(level, int | float) or not math.isfinite(level):
+        raise InputError("level", level, f"a number, in the unit of {of}", where)
+    if not isinstance(rising, bool):
+        raise InputError("rising", rising, "true or false", where)
+    text = f"{of} passes {level:g} {'upwards' if rising else 'downwards'}"
+    return Event(name, of, text, float(level), rising)
+
+
 def _relation(name: str, table: dict[str, Any], members: Mapping[str, Member]) -> Relation | Timing:
     where = f"machine.relations.{name}"
     if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
-        raise InputError(name, dict(table), f"one of {', '.join(RELATION_KINDS)} = [...]", where)
+        raise InputError(name, dict(table), f"one of {', '.join(RELATION_KINDS)}", where)
     kind, given = next(iter(table.items()))
     if not isinstance(given, tuple) or not all(isinstance(part, str) for part in given):
         raise InputError(kind, given, "a list of names", where)
     if kind == "distance":
         points = [f"{m.name}.{point}" for m in members.values() for point in m.points]
         return Distance(name, _two(given, points, "points", where))
+    if kind == "speed":
+        moving = [f"{m.name}.{point}" for m in members.values() for point in m.moving]
+        if len(given) == 1:
+            return Speed(name, _each(given, moving, "points whose velocity is known", where))
+        return Speed(name, _two(given, moving, "points whose velocity is known", where))
     if kind == "timing":
         return Timing(name, _two(given, None, "crank angles", where))
     known = {f"{m.name}{number}": (m.name, number) for m in members.values() for number in _stages(m.family)}
@@ -156,7 +188,12 @@ def _stages(family: Family) -> list[str]:
 def _two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
     if len(given) != 2:
         raise InputError(what, given, f"two {what}", where)
-    for part in given if known is not None else ():
-        if part not in known:  # type: ignore[operator]
-            raise InputError(what, part, f"{', '.join(known or ())}{nearest(part, known or ())}", where)
-    return given[0], given[1]
+    first, second = given if known is None else _each(given, known, what, where)
+    return first, second
+
+
+def _each(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
+    for part in given:
+        if part not in known:
+            raise InputError(what, part, f"{what}: {', '.join(known)}{nearest(part, known)}", where)
+    return given

@@ -98,7 +98,7 @@ def quantity(family: Family, name: str) -> Quantity | None:
         member = family.split(name)
         if member is not None:
             return _of_member(member[0], quantity(member[0].family, member[1])) or _of_point(family, *member)
-        return _margin(family, name) or _reduction(family, name)
+        return _margin(family, name) or _event(family, name) or _reduction(family, name)
     if name == STAY.name and isinstance(family.domain, Turn):
         return Quantity(STAY, "limits", STAY.name, family.position)
     return _margin(family, name) or _limit(family, name) or _event(family, name) or _reduction(family, name)
@@ -186,7 +186,8 @@ def output_names(family: Family) -> tuple[str, ...]:
         dotted = [f"{m.name}.{name}" for m in family.members for name in output_names(m.family)]
         own = [o.name for relation in family.relations for o in relation.outputs]
         reductions = [f"{prefix}{name}" for name in own for prefix in prefixes(family.domain)]
-        return (*dotted, *MARGIN_TEXTS, *(t.name for t in family.timings), *reductions)
+        events = [name for event in family.events for name in event_names(family, event)]
+        return (*dotted, *MARGIN_TEXTS, *(t.name for t in family.timings), *events, *reductions)
     names = [o.name for step in family.steps for o in step.provides]
     assemblies = family.every(Assembly)
     if assemblies:

@@ -99,9 +99,14 @@ def curve(family: Family, output: str, window: tuple[float, float] | None = None
 
 
 def margins(family: Family, stage: str = "") -> tuple[Series, ...]:
-    """Delta/b^2 of the stage of that number; without a number of every stage.  Empty where nothing can lock."""
-    loops = family.every(Assembly)
-    return tuple(Series(o.discriminant, pressure=o.pressure_angle) for o in loops if not stage or o.stage == stage)
+    """Delta/b^2 of the stage of that number; without a number of every stage.  Empty where nothing can lock.
+
+    In a machine "needle.2" is a stage, "needle." every stage of the member.
+    """
+    of_member = stage.endswith(".")
+    loops = [o for o in family.every(Assembly) if o.stage == stage or (of_member and o.stage.startswith(stage))]
+    found = loops if stage else family.every(Assembly)
+    return tuple(Series(o.discriminant, pressure=o.pressure_angle) for o in found)
 
 
 def measure(family: Family, name: str, window: tuple[float, float] | None = None) -> Measure:
@@ -124,6 +129,8 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     timing = next((t for t in family.timings if t.name == name), None) if isinstance(family, Machine) else None
     if timing is not None:
         ends = tuple(measure(family, place, window) for place in timing.places)
+        if not all(end.is_angle for end in ends):  # an event is found as a root, not followed as an extremum
+            return Measure(name, "scalar", (), numbers=(name,))
         return Measure(name, "difference", tuple(s for end in ends for s in end.series), parts=ends)
     asked = quantity(family, name)
     if asked is not None and asked.route == "margin":

@@ -51,6 +51,10 @@ class RelationSection(Section):
 
     distance: Names | None = Field(None, description='two points, as ["needle.point", "looper.tip"]')
     timing: Names | None = Field(None, description='two crank angles, as ["needle.phi_ext", "phi_min_clearance"]')
+    speed: Names | None = Field(None, description='one or two points, as ["looper.tip"]')
+    event: str | None = Field(None, description='a pose output, as "clearance" or "looper.tip_x"')
+    level: str | Number | None = Field(None, description='what it passes, in its unit, as "1 mm"; 0 if left out')
+    rising: bool | None = Field(None, description="true or false: whether it passes upwards; true if left out")
     torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
     shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
 
@@ -94,6 +98,13 @@ def read_machine(data: Mapping[str, Any], faults: Faults) -> tuple[Specification
     if len(faults.lines) > before:
         return None
     try:
+        plain = {name: table for name, table in relations.items() if "event" not in table}
+        outputs = find_family(specification(members, plain)).pose_output if len(plain) < len(relations) else {}
+        for name, table in relations.items():
+            if "level" in table and (of := outputs.get(table.get("event", ""))) is not None:
+                table["level"] = _level(table["level"], units.internal_unit(of.unit), name, faults)
+        if len(faults.lines) > before:
+            return None
         given = specification(members, relations)
         return given, find_family(given)
     except InputError as error:
@@ -101,6 +112,16 @@ def read_machine(data: Mapping[str, Any], faults: Faults) -> tuple[Specification
         key: Key = place if place[:1] == ("relations",) else ("machine", *place)
         faults.value(key if place[:1] == ("relations",) else (*key, error.name), error.value, error.allowed)
         return None
+
+
+def _level(given: str | float, internal: str, name: str, faults: Faults) -> float:
+    """The level of an event in the internal unit of its output; a bare number only where there is no unit."""
+    key: Key = ("relations", name, "level")
+    if isinstance(given, str):
+        return _number(given, internal, key, faults)
+    if internal != "1":
+        faults.value(key, given, f"a text with number and unit: {units.example(internal)}")
+    return given
 
 
 def _tables(data: Mapping[str, Any], name: str, faults: Faults) -> dict[str, Any]:

@@ -1,0 +1,124 @@
+"""Slotted links beside crank-rockers: least acceleration for the same swing and the same times forward and back.
+
+``python studies/looper-slotted/figure.py FOLDER`` reads the front of the slotted links from FOLDER, searches
+the best crank-rocker for each of its stroke ratios and writes FOLDER/drives.parquet and FOLDER/figures/drives.svg.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from kernels.status import LIMIT_EXCEEDED
+from sweep.evaluation.summaries import design_outputs
+from sweep.families import family
+from sweep.families.base import Accuracy
+from sweep.optimise import minimise
+from sweep.optimise.starts import drawn
+from sweep.optimise.study import problem_of
+from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, house_style, new_figure, save
+from sweep.study import OptimiseSettings, study_from_data
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from sweep.families.base import Array
+    from sweep.optimise import Result
+
+# The crank-rockers that are compared: room and pressure angle as in study.toml, the swing of its lower limit.
+CRANK_ROCKER: dict[str, Any] = {
+    "study": {"name": "crank-rocker"},
+    "mechanism": {"family": "rssr"},
+    "scene": {"want": ["swing", "stroke_ratio", "max_abs_d2psi", "max_pressure_angle"]},
+    "locus": {"swing": "50 deg", "phi_ext": {"from": 0, "to": 360, "unit": "deg"}},
+    "design": {
+        "sample": {"kind": "sobol", "n": 4096, "seed": 56},
+        "e": {"from": 0, "to": 40, "unit": "mm"},
+        "f": {"from": -40, "to": 40, "unit": "mm"},
+        "g": {"from": -20, "to": 20, "unit": "mm"},
+        "alpha": {"from": 0, "to": 180, "unit": "deg"},
+    },
+    "limits": {
+        "rotatable": True,
+        "max_pressure_angle": {"max": 45, "unit": "deg"},
+        "a": {"max": 15, "unit": "mm"},
+        "b": {"max": 60, "unit": "mm"},
+        "c": {"min": 8, "max": 45, "unit": "mm"},
+    },
+    "objective": {"minimise": "max_abs_d2psi"},
+    "accuracy": {"target": 1e-6},
+}
+OUTPUTS = ["max_abs_d2psi", "max_pressure_angle", "swing", "stroke_ratio"]
+
+
+def crank_rocker(ratio: float, known: list[Array], starts: int, seconds: float) -> Result:
+    """The crank-rocker of least acceleration found for a stroke ratio, from drawn and from known designs."""
+    locus = CRANK_ROCKER["locus"] | {"phi0": f"{360.0 * ratio / (1.0 + ratio)!r} deg"}
+    study = study_from_data(CRANK_ROCKER | {"locus": locus}, Path("crank-rocker"))
+    designs = np.array([*known, *drawn(study, starts, 56)])
+    settings = OptimiseSettings(starts=len(designs), time_budget=seconds)
+    return minimise(problem_of(study, designs), designs, settings)[0]
+
+
+def crank_rockers(ratios: list[float], starts: int, seconds: float) -> pd.DataFrame:
+    """One row per stroke ratio, searched upwards and then downwards again, each also from its neighbour's answer."""
+    best: dict[float, Result] = {}
+    for ratio in (*ratios, *ratios[-2::-1]):
+        known = [best[other].design for other in ratios if other in best]
+        now = crank_rocker(ratio, known, 0 if ratio in best else starts, seconds)
+        if ratio not in best or merit(now) < merit(best[ratio]):
+            best[ratio] = now
+    designs = np.array([best[ratio].design for ratio in ratios])
+    found = design_outputs(family("rssr"), designs, OUTPUTS, Accuracy(target=1e-6))
+    links = dict(zip(family("rssr").parameter_names, designs.T, strict=True))
+    status = [best[ratio].status for ratio in ratios]
+    return pd.DataFrame(links | {name: found[name] for name in OUTPUTS} | {"status": status, "ratio": ratios})
+
+
+def merit(result: Result) -> tuple[bool, float]:
+    """Designs that miss a limit after those that keep all, settled or not."""
+    return result.status == LIMIT_EXCEEDED, result.objective
+
+
+def table(front: pd.DataFrame, starts: int, seconds: float) -> pd.DataFrame:
+    """One row per stroke ratio and mechanism; one that misses a limit has status LIMIT_EXCEEDED."""
+    slotted = front.sort_values("bound").assign(mechanism="slotted link", ratio=lambda rows: rows["bound"])
+    others = crank_rockers(slotted["ratio"].tolist(), starts, seconds).assign(mechanism="crank-rocker")
+    both = pd.concat([slotted, others], ignore_index=True)
+    return both[["mechanism", "ratio", *OUTPUTS, "status", "a", "b", "c", "e", "f", "g", "alpha", "s", "branch"]]
+
+
+def chart(drives: pd.DataFrame) -> Figure:
+    """Acceleration against the stroke ratio."""
+    figure = new_figure(WIDTH, 4.6)
+    axes = figure.subplots()
+    for name, colour in (("slotted link", OPTIMUM), ("crank-rocker", REFERENCE)):
+        rows = drives[(drives["mechanism"] == name) & (drives["status"] != LIMIT_EXCEEDED)]
+        axes.plot(rows["ratio"], rows["max_abs_d2psi"], "o-", color=colour, label=name)
+    axes.axhline(np.radians(25.0), color="#8a8f98", linewidth=1.0, linestyle="--", label="sine of 50° swing")
+    axes.set_xlabel("time forward / time back")
+    axes.set_ylabel("least max |ψ″| for 50° of swing [1/rad]")
+    axes.legend()
+    return figure
+
+
+def main() -> None:
+    """Read the front of a run, search the crank-rockers, write table and chart."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
+    folder: Path = parser.parse_args().folder
+    front = pd.read_parquet(folder / "_pareto.parquet")
+    small = len(front) < 4  # smoke
+    drives = table(front, 2 if small else 60, 1.0 if small else 25.0)
+    drives.to_parquet(folder / "drives.parquet", index=False)
+    print(drives.to_string(index=False, float_format="{:.4g}".format))  # noqa: T201
+    with house_style():
+        print(save(chart(drives), folder / "figures" / "drives.svg").path)  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()

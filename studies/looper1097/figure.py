@@ -1,0 +1,78 @@
+"""What the distance h of the two revolutes buys: least acceleration of the five-links of the study for given h.
+
+``python studies/looper1097/figure.py FOLDER`` starts from the optimum in FOLDER, follows it to other h and
+writes FOLDER/joint.parquet and FOLDER/figures/joint.svg.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
+from sweep.optimise import minimise
+from sweep.optimise.study import problem_of
+from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, house_style, new_figure, save
+from sweep.study import OptimiseSettings, load_study, study_from_data
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FOLDER = Path(__file__).parent
+OUTPUTS = ["max_abs_d2psi", "max_abs_beta", "max_pressure_angle", "swing", "stroke_ratio"]
+LINKS = ["a", "b", "c", "e", "f", "g", "h", "branch"]
+
+
+def along_h(optimum: pd.Series, lengths: list[float], seconds: float) -> pd.DataFrame:
+    """Best five-links for every h [mm], each started from its neighbour, beginning at the h next to the optimum's."""
+    data = load_study(FOLDER).data
+    rows = []
+    start = pd.DataFrame([optimum])
+    for h in sorted(lengths, key=lambda x: abs(x - float(optimum["h"]))):
+        study = study_from_data(data | {"design": data["design"] | {"h": f"{h!r} mm"}}, FOLDER)
+        names = study.family.parameter_names
+        designs, _ = design_matrix(study.family, {name: start[name] for name in names} | {"h": np.array([h])})
+        best = minimise(problem_of(study, designs), designs, OptimiseSettings(starts=1, time_budget=seconds))[0]
+        found = design_outputs(study.family, best.design[None, :], OUTPUTS, study.accuracy)
+        start = pd.DataFrame([dict(zip(names, best.design.tolist(), strict=True))])
+        rows.append(
+            start.iloc[0][LINKS].to_dict() | {name: found[name][0] for name in OUTPUTS} | {"status": best.status}
+        )
+    return pd.DataFrame(rows).sort_values("h", ignore_index=True)
+
+
+def chart(joint: pd.DataFrame) -> Figure:
+    """Acceleration and tilt of the coupler against h."""
+    figure = new_figure(WIDTH, 4.6)
+    left, right = figure.subplots(1, 2)
+    rows = joint[joint["status"] == 0]
+    left.plot(rows["h"], rows["max_abs_d2psi"], "o-", color=OPTIMUM)
+    left.set_ylabel("least max |ψ″| [1/rad]")
+    right.plot(rows["h"], np.degrees(rows["max_abs_beta"]), "o-", color=REFERENCE)
+    right.set_ylabel("largest tilt of the coupler [°]")
+    for axes in (left, right):
+        axes.set_xlabel("distance h of the revolutes [mm]")
+    return figure
+
+
+def main() -> None:
+    """Read the optimum of a run, follow it along h, write table and chart."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
+    folder: Path = parser.parse_args().folder
+    best = pd.read_parquet(folder / "_optimum.parquet").iloc[0]
+    small = best["status"] != 0  # smoke
+    joint = along_h(best, [0.0, 5.0] if small else [0.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0], 3.0 if small else 30.0)
+    joint.to_parquet(folder / "joint.parquet", index=False)
+    print(joint.to_string(index=False, float_format="{:.5g}".format))  # noqa: T201
+    with house_style():
+        print(save(chart(joint), folder / "figures" / "joint.svg").path)  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()
