@@ -20,7 +20,7 @@ from sweep.optimise.candidates import from_sample, ranking
 from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.study import Limit, OptimiseSettings, load_study
-from tests.bench.optimise import specifications
+from tests.specifications import specifications
 
 RSSR, RSSP = family("rssr"), family("rssp")
 BRANCHES = ({"branch": 1.0}, {"branch": -1.0})
