@@ -249,9 +249,10 @@ def guarded(poses: PoseFunction) -> PoseFunction:
             columns = poses(designs, angles, wanted)
         status = np.array(columns["status"], np.uint8)
         bad = np.zeros(status.shape, np.bool_)
-        bad[~np.all(np.isfinite(designs), axis=1)] = True
         for name in wanted:
             bad |= ~np.isfinite(columns[name])
+        bad &= status == OK  # any other status explains its nan
+        bad[~np.all(np.isfinite(designs), axis=1)] = True
         status[bad & (status == OK)] = INVALID_INPUT
         found: Columns = {name: np.where(bad, np.nan, columns[name]) for name in wanted}
         return found | {"status": status}
