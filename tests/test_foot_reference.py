@@ -27,7 +27,7 @@ HEAVY = {"m": 0.05, "k": 3000.0, "F0": 6.0, "omega": 400.0, "Y": 1.5e-3, "p": 0.
 def test_foot_matches_oracle_on_every_row():
     names = list(ROWS[0]["expected"])
     got = sweep.summarise("foot", TABLE, names)
-    assert (got.status == st.OK).all()
+    assert got.status.tolist() == [st.OK if "t_recontact" in row["expected"] else st.NO_EVENT for row in ROWS]
     for k, row in enumerate(ROWS):
         for name, expected in row["expected"].items():
             # N at entry and at the top are differences of forces of the size of m omega^2 Y: 8 roundings of that
@@ -42,7 +42,7 @@ def test_foot_matches_oracle_on_every_row():
 def test_foot_flies_and_lands_where_steps_through_time_say(omega, restitution):
     p = HEAVY | {"omega": omega, "restitution": restitution}
     got = sweep.summarise("foot", p, ["flights", "phi_loss", "phi_land", "impact_speed", "settled"]).iloc[0]
-    assert got.status == st.OK
+    assert got.status == (st.OK if got.flights else st.NO_EVENT)
     start = -0.5 * math.pi
     steps = naive.flights(p, TURNS, 2000)
     last = [f for f in steps if f[0] >= start + (TURNS - 1) * 2.0 * math.pi]
@@ -171,7 +171,7 @@ def test_foot_on_the_rack_of_a_feed_mechanism_loses_contact_where_the_force_vani
     limit = math.sqrt(float(((p["F0"] + p["k"] * (path.y_t - plate))[above] / -slope[above].where(slope < 0)).min()))
     table = p | {"omega": [0.5 * limit, 0.999 * limit, 1.02 * limit, 1.5 * limit]}
     got = sweep.summarise("feed_foot", table, ["flights", "lost_angle", "stitch_error", "least_force", "phi_loss"])
-    assert (got.status == st.OK).all()
+    assert got.status.tolist() == [st.NO_EVENT, st.NO_EVENT, st.OK, st.OK]
     assert (got.flights[:2] == 0.0).all() and (got.flights[2:] > 0.0).all()
     assert got.stitch_error[:2].tolist() == [0.0, 0.0] and 0.0 < got.stitch_error[2] < got.stitch_error[3]
     assert force[above].min() > 0.0

@@ -48,7 +48,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
         "force": forces[:, ::apart],
     }  # fmt: skip
     status = np.repeat(np.asarray(columns["status"], np.uint8)[:, None], angles.phi.shape[1], axis=1)
-    return chosen(found, wanted) | {"status": status}
+    return {name: x for name, x in found.items() if name in wanted} | {"status": status}
 
 
 def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:

@@ -8,6 +8,7 @@ from kernels.effects.foot import OUTPUTS as _EVENTS
 from kernels.effects.foot import march
 from kernels.families import foot
 from kernels.families.foot.harmonic import OUTPUTS as _CLOSED
+from kernels.status import NO_EVENT, OK
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, guarded
 from sweep.families.domain import March
 
@@ -87,8 +88,12 @@ def nodes_for(poses: int) -> tuple[int, int]:
 
 
 def chosen(columns: Columns, wanted: frozenset[str]) -> Columns:
-    """The wanted columns and the status."""
-    return {name: x for name, x in columns.items() if name in wanted or name == "status"}
+    """The wanted columns and the status: NO_EVENT where one of them is about an event that does not happen."""
+    found = {name: x for name, x in columns.items() if name in wanted}
+    status = np.array(columns["status"], np.uint8)
+    for values in found.values():
+        status[(status == OK) & np.isnan(values)] = NO_EVENT
+    return found | {"status": status}
 
 
 def path_of(designs: Array, nodes: int) -> Array:
@@ -105,7 +110,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     columns, heights, forces = marched(path, designs[:, [0, 1, 2, 3, 6]])
     found: Columns = {"y_rack": path[:, 0, ::apart], "y_foot": heights[:, ::apart], "force": forces[:, ::apart]}
     status = np.repeat(np.asarray(columns["status"], np.uint8)[:, None], angles.phi.shape[1], axis=1)
-    return chosen(found, wanted) | {"status": status}
+    return {name: x for name, x in found.items() if name in wanted} | {"status": status}
 
 
 def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
