@@ -47,9 +47,8 @@ def run(
     Parameters
     ----------
     study : study file, its folder, or a loaded study
-    out : folder of the chunks; default ``results/<name>/designs`` (``results/smoke/<name>/designs``).  Plan, log,
-        optimum and front lie beside it: in the parent of a folder called ``designs``, in ``<out>.meta`` next to any
-        other
+    out : folder of the chunks; default ``results/<name>/designs`` (``results/smoke/<name>/designs``).  The rest lies
+        beside it: in the parent of a folder called ``designs``, in ``<out>.meta`` next to any other
     jobs : workers
     backend : "threading" (the kernels release the lock), "loky" (processes), or another of
         ``sweep.jobs.executors.EXECUTORS``
