@@ -30,16 +30,16 @@ def test_answer_has_a_listed_value_and_no_neighbour_is_better(tmp_path: Path) ->
     (tmp_path / "study.toml").write_text(LISTED)
     study = load_study(tmp_path)
     assert listed(study)["e"].tolist() == [80.0, 100.0, 130.0, 160.0]
-    folder = run(study, tmp_path / "out", jobs=1)
-    table = pq.read_table(folder / "_optimum.parquet").to_pydict()
+    folder = run(study, tmp_path / "designs", jobs=1)
+    table = pq.read_table(folder.parent / "_optimum.parquet").to_pydict()
     ends = [k for k, role in enumerate(table["role"]) if role != "reference"]
     assert {table["e"][k] for k in ends} <= {80.0, 100.0, 130.0, 160.0}
     assert table["status"][0] == 0 and table["kkt_residual"][0] <= 1e-6
     alone = []
     for e in (80, 100, 130, 160):
         (tmp_path / "study.toml").write_text(LISTED.replace("[80, 100, 130, 160]", f"[{e}]"))
-        single = run(load_study(tmp_path), tmp_path / f"out{e}", jobs=1)
-        best = pq.read_table(single / "_optimum.parquet").to_pydict()
+        single = run(load_study(tmp_path), tmp_path / f"e{e}" / "designs", jobs=1)
+        best = pq.read_table(single.parent / "_optimum.parquet").to_pydict()
         alone.append(best["max_abs_d2psi"][0] if best["status"][0] == 0 else math.inf)
     assert table["max_abs_d2psi"][0] <= min(alone) * (1.0 + 1e-9)
 

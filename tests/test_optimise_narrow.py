@@ -48,19 +48,19 @@ BEST = 1.23899
 def test_narrow_basin_is_found_though_the_sweep_leaves_few_rows(tmp_path: Path, seed: int) -> None:
     (tmp_path / "study.toml").write_text(NARROW + f"seed = {seed}\n")
     study = load_study(tmp_path)
-    folder = run(study, tmp_path / "out", jobs=1)
+    folder = run(study, tmp_path / "designs", jobs=1)
     assert sum(pq.ParquetFile(path).metadata.num_rows for path in folder.glob("part-*")) < 4
-    table = pq.read_table(folder / "_optimum.parquet").to_pydict()
+    table = pq.read_table(folder.parent / "_optimum.parquet").to_pydict()
     assert table["max_abs_d2psi"][0] == pytest.approx(BEST, rel=5e-6)
     assert table["status"][0] == 0 and table["kkt_residual"][0] <= 1e-6
-    found = read_survey(folder / "_optimum.parquet")
+    found = read_survey(folder.parent / "_optimum.parquet")
     assert found is not None and found.starts == 20 and found.basins >= 2
 
 
 def test_starts_are_filled_up_to_the_number_asked_with_both_signs(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(NARROW.replace("starts = 20", "starts = 8"))
     study = load_study(tmp_path)
-    folder = run(replace(study, optimise=None, objective=study.objective), tmp_path / "out", jobs=1)
+    folder = run(replace(study, optimise=None, objective=study.objective), tmp_path / "designs", jobs=1)
     _, problem, starts = problem_and_starts(study, folder)
     assert len(starts) == 8
     assert set(starts[:, problem.family.parameter_names.index("branch")]) == {-1.0, 1.0}

@@ -24,8 +24,8 @@ ROBUST = STUDY.format(swing=40).replace("samples = 64", "target = 1e-6").replace
 def result(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     folder = tmp_path_factory.mktemp("robust")
     (folder / "study.toml").write_text(ROBUST)
-    out = sweep.run(folder, folder / "out", jobs=1)
-    return pd.read_parquet(out / "_optimum.parquet").set_index("role", drop=False)
+    out = sweep.run(folder, folder / "designs", jobs=1)
+    return pd.read_parquet(out.parent / "_optimum.parquet").set_index("role", drop=False)
 
 
 def made(row: pd.Series, count: int) -> float:

@@ -41,6 +41,7 @@ def run(
     same, bit for bit, with any number of workers.  The answer comes last; where no design keeps all limits, it says
     which of them have to give way, and the exit code is 4.
     """
+    from sweep.engine.opening import is_part
     from sweep.engine.run import run as run_study
     from sweep.errors import SearchCutShort
     from sweep.report.terminal import ending
@@ -53,6 +54,9 @@ def run(
         )
     except SearchCutShort as error:
         late, folder = error, error.folder
+    if is_part(folder):  # the answer is for the whole, once the parts are merged
+        click.echo(f"part: {folder}")
+        return
     found = ending(folder)
     for line in found.lines:
         click.echo(line)
