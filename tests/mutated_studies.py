@@ -35,7 +35,7 @@ target = 1e-6
 [optimise]
 starts = 1
 seed = 3
-time_budget = "0.2 s"
+looks = 200
 [tolerance]
 lengths = "0.02 mm"
 angles = "0.05 deg"
@@ -98,12 +98,11 @@ minimise = "max_abs_d2psi"
 target = 1e-6
 [optimise]
 starts = 1
-time_budget = "0.2 s"
+looks = 200
 [pareto]
 output = "max_pressure_angle"
 at_most = { values = [40, 50], unit = "deg" }
 starts = 1
-time_budget = "0.2 s"
 [budget]
 time = "2 s"
 """
