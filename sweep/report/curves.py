@@ -29,9 +29,9 @@ def style_of(role: str) -> dict[str, Any]:
     return {"color": REFERENCE, "linestyle": (0, (4, 2))} if role == "reference" else {"color": OPTIMUM}
 
 
-def shown_curves(columns: list[str]) -> list[str]:
-    """Columns that get a panel, in the order in which they were written."""
-    return [name for name in columns if name not in NOT_CURVES and coordinate(name) is None]
+def shown_curves(columns: list[str], position: str) -> list[str]:
+    """Columns that get a panel, in the order in which they were written: the position, and all that are no coordinates."""
+    return [name for name in columns if name not in NOT_CURVES and (name == position or coordinate(name) is None)]
 
 
 def motion_figure(
@@ -47,7 +47,7 @@ def motion_figure(
 
     ``names`` are the curves that get a panel, all that are none of coordinates if left out.
     """
-    names = shown_curves(list(curves.columns)) if names is None else names
+    names = shown_curves(list(curves.columns), position) if names is None else names
     turns = {str(role): turn for role, turn in curves.groupby("role", sort=False)}
     label = "crank angle [°]" if turning(curves, position) else "crank angle from the lowest position [°]"
     figure = new_figure(WIDTH, 2.1 * -(-len(names) // 2) + 0.5)
