@@ -16,6 +16,7 @@ from sweep.errors import InputError
 from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Angles, Array, Parameter
+from sweep.families.domain import Interval
 from sweep.optimise.candidates import ranking
 from sweep.optimise.certificate import Result
 from sweep.optimise.coordinates import LocusCoordinates
@@ -287,7 +288,7 @@ def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
     family = study.family
     wanted = [*motion_curves(family), *joint_curves(family)]
     shown = [k for k, role in enumerate(table["role"]) if role in ("optimum", "reference")]
-    if study.output.curves == "none":
+    if study.output.curves == "none" or isinstance(family.domain, Interval):  # there is no turn over an interval
         shown = []
     designs = np.array([[table[name][k] for name in family.parameter_names] for k in shown])
     phi: Array = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)

@@ -30,7 +30,7 @@ def style_of(role: str) -> dict[str, Any]:
 
 
 def shown_curves(columns: list[str], position: str) -> list[str]:
-    """Columns that get a panel, in the order in which they were written: the position, and all that are no coordinates."""
+    """Columns that get a panel, in the order in which they stand: the position, and all that are no coordinates."""
     return [name for name in columns if name not in NOT_CURVES and (name == position or coordinate(name) is None)]
 
 

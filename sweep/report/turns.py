@@ -9,6 +9,7 @@ import numpy as np
 
 from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.families.base import Angles
+from sweep.families.domain import Interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +37,9 @@ def curves(study: Study, rows: Mapping[str, Mapping[str, Any] | None]) -> pd.Dat
     import pandas as pd
 
     family = study.family
-    known = {role: row for role, row in rows.items() if row is not None}
+    # Over an interval there is no turn to draw.
+    over_turn = not isinstance(family.domain, Interval)
+    known = {role: row for role, row in rows.items() if row is not None and over_turn}
     names = [*motion_curves(family), *joint_curves(family)]
     matrix = np.array([[float(row[p]) for p in family.parameter_names] for row in known.values()])
     phi = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
