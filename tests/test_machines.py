@@ -185,3 +185,25 @@ def test_an_entry_that_breaks_rules_is_refused_with_every_remedy() -> None:
         check_family(broken)
     for word in ("use a-z", "column of every table", "position 'x'", "give its unit", "say in words"):
         assert word in str(caught.value)
+
+
+def test_accepted_machine_of_stitch208_has_its_figures_and_keeps_the_limits() -> None:
+    """The study's own words: clearance 0.05 to 0.1 mm, 35 to 40 degrees after the needle's lowest point, 40 of swing."""
+    import json
+    from pathlib import Path
+
+    from sweep.chunks.cascade import meets
+    from sweep.study import load_study
+
+    folder = Path(__file__).parents[1] / "studies" / "stitch208"
+    study, accepted = load_study(folder), json.loads((folder / "expected.json").read_text())["optimum"]
+    found = sweep.summarise(study.family, accepted["design"], list(accepted["outputs"]), accuracy=1e-10)
+    assert found["status"][0] == 0
+    for name, value in accepted["outputs"].items():
+        # Places and distances of the accepted dimensions, to the accuracy of the study.
+        assert found[name][0] == pytest.approx(value, rel=1e-7), name
+    for limit in study.output_limits:
+        if limit.output in found:
+            slack = 1e-8  # the optimiser keeps limits to 1e-9 of their size
+            value = found[limit.output].to_numpy() * np.array([1.0 - slack, 1.0 + slack])
+            assert meets(limit, value).any(), limit.output
