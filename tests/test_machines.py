@@ -188,7 +188,7 @@ def test_an_entry_that_breaks_rules_is_refused_with_every_remedy() -> None:
 
 
 def test_accepted_machine_of_stitch208_has_its_figures_and_keeps_the_limits() -> None:
-    """The study's own words: clearance 0.05 to 0.1 mm, 35 to 40 degrees after the needle's lowest point, 40 of swing."""
+    """Clearance 0.05 to 0.1 mm, 35 to 40 degrees after the lowest point of the needle, at least 40 degrees of swing."""
     import json
     from pathlib import Path
 
