@@ -62,4 +62,6 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     if out is None:
         out = beside(folder) / "export" / f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
         out.parent.mkdir(exist_ok=True)
-    click.echo(f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed)}")
+    click.echo(
+        f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed, angles='rad')}"
+    )

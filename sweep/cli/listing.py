@@ -12,6 +12,13 @@ if TYPE_CHECKING:
     from sweep.families.base import Family
 
 
+ANGLES = click.option(
+    "--angles",
+    type=click.Choice(["rad", "deg"]),
+    help="Unit of the angles in TABLE; a header such as `alpha [deg]` says it of one column. Default: rad.",
+)
+
+
 def family_names(text: str) -> str | list[str]:
     """``rssr`` is a family, ``rssr+guide`` or ``rssr,guide`` a chain of two."""
     names = [name.strip() for name in text.replace("+", ",").split(",")]

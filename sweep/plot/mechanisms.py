@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.errors import InputError
+from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.joints import parts
 from sweep.evaluation.poses import evaluate, pose_wants
@@ -35,6 +36,7 @@ def motion(
     *,
     unit: str = "mm",
     speed: float | None = None,
+    angles: AngleUnit | None = None,
 ) -> NDArray[Any]:
     """Curves over one turn, one panel for each.
 
@@ -45,6 +47,7 @@ def motion(
         and pressure angles
     unit : the length unit of the design, for the axes
     speed : of the driving shaft [rad/s]: adds scales of velocity, acceleration and jerk in time
+    angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
@@ -59,7 +62,8 @@ def motion(
         list(dict.fromkeys(motion_curves(family))) if asked is None else pose_wants(family, [n.strip() for n in asked])
     )
     phi = np.arange(POSES) * (2.0 * math.pi / POSES)
-    found = evaluate(mechanism, design, list(dict.fromkeys([*names, family.position])), phi=phi)
+    design = in_radians(family, design, angles)
+    found = evaluate(mechanism, design, list(dict.fromkeys([*names, family.position])), phi=phi, angles="rad")
     if found["design"].iloc[-1] != 0:
         raise InputError("design", "several rows", "the parameters of one design", f"table of {family.name}")
     curves = pd.DataFrame(found.assign(role="design"))
@@ -70,7 +74,13 @@ def motion(
 
 
 def mechanism(
-    mechanism: Mechanism, design: Table, phi: float = 0.0, *, view: str | None = None, unit: str = "mm"
+    mechanism: Mechanism,
+    design: Table,
+    phi: float = 0.0,
+    *,
+    view: str | None = None,
+    unit: str = "mm",
+    angles: AngleUnit | None = None,
 ) -> NDArray[Any]:
     """The mechanism in one position with the paths of its joints, axes and senses; a panel for each frame.
 
@@ -80,6 +90,7 @@ def mechanism(
     phi : angle of the driving shaft [rad]
     view : "space", from a corner with z upwards, or "xy", "zy", "xz"; if left out "space" for what is spatial
     unit : the length unit of the design, for the axes
+    angles : the unit of the angles of ``design`` and ``phi``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
@@ -88,7 +99,9 @@ def mechanism(
     """
     if view is not None and view != "space" and view not in VIEWS:
         raise InputError("view", view, f"space, {', '.join(VIEWS)}", "plot")
-    found = parts(mechanism, design, phi + np.linspace(0.0, 2.0 * math.pi, 181))
+    design = in_radians(find_family(mechanism), design, angles)
+    start = np.asarray(grid_in_radians("phi", "rad", phi, angles), np.float64)
+    found = parts(mechanism, design, start + np.linspace(0.0, 2.0 * math.pi, 181))
     frames = list(dict.fromkeys(part.frame for part in found))
     with house_style():
         figure = new_figure(5.4 * len(frames), 4.6)
@@ -108,7 +121,15 @@ def mechanism(
     return np.array(panels, dtype=object)
 
 
-def polar_load(mechanism: Mechanism, design: Table, joint: str = "a", *, member: str = "", stage: str = "") -> Axes:
+def polar_load(
+    mechanism: Mechanism,
+    design: Table,
+    joint: str = "a",
+    *,
+    member: str = "",
+    stage: str = "",
+    angles: AngleUnit | None = None,
+) -> Axes:
     """The force on a link at a fixed axis over one turn, its direction as the angle and its size as the radius.
 
     Parameters
@@ -117,6 +138,7 @@ def polar_load(mechanism: Mechanism, design: Table, joint: str = "a", *, member:
     design : its parameters with masses, inertias and ``speed`` of the load effects, docs/effects.md
     joint : "a", the frame's force on the crank, or "d", that on the rocker
     member, stage : name of the member of a machine, number of the stage of a chain
+    angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
@@ -129,6 +151,7 @@ def polar_load(mechanism: Mechanism, design: Table, joint: str = "a", *, member:
     InputError
         for a joint that has no axis, a family without joint loads, a missing mass or speed.
     """
+    design = in_radians(find_family(mechanism), design, angles)
     found = [
         part
         for part in parts(mechanism, _plain(mechanism, design), 0.0)
@@ -145,7 +168,7 @@ def polar_load(mechanism: Mechanism, design: Table, joint: str = "a", *, member:
     prefix = f"{member}." if member else ""
     names = [f"{prefix}force_{joint}_{letter}{stage}" for letter in "xyz"]
     phi = np.arange(POSES) * (2.0 * math.pi / POSES)
-    force = evaluate(mechanism, design, names, phi=phi)[names].to_numpy(np.float64)
+    force = evaluate(mechanism, design, names, phi=phi, angles="rad")[names].to_numpy(np.float64)
     along, across = force @ first, force @ np.cross(axis, first)
     with house_style():
         figure = new_figure(5.0, 5.0)
