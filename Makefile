@@ -77,8 +77,9 @@ bench: $(VENV)/ready  ## ns per sample against numpy and C, one run; what each e
 	$(BIN)/python -m tests.bench.kernels
 	$(BIN)/python -m tests.bench.effects --dry
 
-docs: $(VENV)/ready  ## make docs/effects.md from the register
+docs: $(VENV)/ready  ## make docs/effects.md and docs/study.schema.json from the register
 	$(SWEEP) effects --markdown > docs/effects.md
+	$(SWEEP) schema --out docs/study.schema.json
 
 frames: $(VENV)/ready  ## draw the frames of all families for docs/frames.md
 	$(BIN)/python docs/frames.py

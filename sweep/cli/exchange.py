@@ -6,11 +6,13 @@ from pathlib import Path
 
 import click
 
+from sweep.cli import completion
+
 FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 
 
 @click.command()
-@click.argument("family")
+@click.argument("family", shell_complete=completion.families)
 @FILE
 @click.option("--tolerance", type=float, help="Largest residual as a part of the drawing's size; default 1e-4.")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A table for `sweep eval`: one design.")

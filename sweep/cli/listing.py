@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sweep.cli import completion
+
 if TYPE_CHECKING:
     from sweep.families.base import Family
 
@@ -26,7 +28,7 @@ def family_names(text: str) -> str | list[str]:
 
 
 @click.command()
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=completion.families)
 def families(name: str | None) -> None:
     """List the mechanism families, or the parameters and outputs of one (or of a chain: rssr+guide)."""
     from sweep.families import NAMES, family

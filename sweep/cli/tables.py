@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sweep.cli import completion
 from sweep.cli.listing import ANGLES, family_names
 from sweep.errors import InputError, StoreError
 
@@ -18,10 +19,14 @@ if TYPE_CHECKING:
     from sweep.evaluation.angles import AngleUnit
 
 FORMATS = (".parquet", ".csv")
-FAMILY = click.argument("family")
+FAMILY = click.argument("family", shell_complete=completion.families)
 TABLE = click.argument("table", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 WANT = click.option(
-    "--want", multiple=True, required=True, help="Outputs, separated by commas; see `sweep families FAMILY`."
+    "--want",
+    multiple=True,
+    required=True,
+    shell_complete=completion.outputs,
+    help="Outputs, separated by commas; see `sweep families FAMILY`.",
 )
 OUT = click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), help="A .parquet or .csv file; default: CSV to stdout."

@@ -19,7 +19,7 @@ def _proofs(value: object) -> object:
     raise ValueError("neither a truth value nor names")
 
 
-Proofs = Annotated[bool | list[str], PlainValidator(_proofs)]
+Proofs = Annotated[bool | list[str], PlainValidator(_proofs, json_schema_input_type=bool | list[str])]
 
 
 class Section(BaseModel):
