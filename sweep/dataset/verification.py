@@ -98,6 +98,13 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
         if the folder is no dataset, or ``designs`` is negative
     StoreError
         if the disk refuses to read.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> found = sweep.verify("results/press/designs", designs=4)
+    >>> found.exit_code, found.lines()[1]
+    (0, '4 designs computed again')
     """
     if isinstance(designs, bool) or not isinstance(designs, int) or designs < 0:
         raise InputError("designs", designs, "a whole number from 0", "verify")

@@ -72,6 +72,13 @@ def run(
     WorkerDied, StoreError, LockedError, TimeUsedUp, Interrupted
         worker killed (70), disk full or forbidden (74), folder in use (75), the budget's time or that of the optimiser
         over (124), signal (130, 143); finished chunks and what was found of the optimum stay.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> folder = sweep.run("press", out="results/small/designs", smoke=True, jobs=1)
+    >>> len(sweep.load(folder))
+    4
     """
     executor(backend, jobs)  # refuses what there is not
     model = _model(study, smoke, accuracy, certify)

@@ -66,6 +66,14 @@ def export(
         that is not installed (``pip install 'linksweep[cad]'``).
     StoreError
         if the file cannot be written.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> design = {"a": 20.0, "b": 70.0, "e": 5.0}
+    >>> file = sweep.export("slider_crank", design, "drive.csv", phi=0.0)
+    >>> print(file.read_text().splitlines()[2])
+    ,,slider_crank,D,0.0,5.0,0.0,mm
     """
     target = Path(path)
     kind = _format(target, format)

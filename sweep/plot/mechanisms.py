@@ -53,6 +53,13 @@ def motion(
     -------
     array of Axes
         in the order of ``want``.  Crank angles count from the lowest position where the follower has one
+
+    Examples
+    --------
+    >>> import sweep
+    >>> axes = sweep.plot.motion("slider_crank", {"a": 20.0, "b": 70.0, "e": 5.0}, "s, d2s")
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['displacement s [mm]', 'acceleration s″ [mm/rad²]']
     """
     import pandas as pd
 
@@ -96,6 +103,13 @@ def mechanism(
     -------
     array of Axes
         one for each frame: stages of a chain have their own, placed members of a machine one in common
+
+    Examples
+    --------
+    >>> import sweep
+    >>> (axes,) = sweep.plot.mechanism("slider_crank", {"a": 20.0, "b": 70.0, "e": 5.0}, phi=0.8)
+    >>> axes.get_xlabel()
+    'x [mm]'
     """
     if view is not None and view != "space" and view not in VIEWS:
         raise InputError("view", view, f"space, {', '.join(VIEWS)}", "plot")
@@ -150,6 +164,14 @@ def polar_load(
     ------
     InputError
         for a joint that has no axis, a family without joint loads, a missing mass or speed.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> design = {"a": 10.0, "b": 40.0, "c": 25.0, "e": 35.0, "f": 5.0, "g": -3.0, "alpha": 1.0}
+    >>> masses = {"m_crank": 1e-4, "m_coupler": 2e-4, "m_rocker": 1.5e-4, "speed": 100.0}  # t, rad/s
+    >>> sweep.plot.polar_load("rssr", design | masses, "a").get_title(loc="left")
+    'force at A [N], marks: crank angle'
     """
     design = in_radians(find_family(mechanism), design, angles)
     found = [

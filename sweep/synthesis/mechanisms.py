@@ -55,6 +55,15 @@ def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = 
     ------
     InputError
         for a missing or misspelt column, a bad number, a swing or stroke of zero, angles outside one turn.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> task = {"swing": [0.785, 1.047], "phi0": 3.403, "phi1": 0.0, "e": 100.0, "f": 0.0, "g": 10.0, "alpha": 1.047}
+    >>> sweep.synthesise("rssr", task)[["a", "b", "c", "branch", "failed", "status"]].round(2)
+           a       b       c  branch failed  status
+    0  12.59  246.56  159.28    -1.0              0
+    1  18.51  173.10   92.09    -1.0              0
     """
     import pandas as pd
 
