@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-effects bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-effects bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -80,6 +80,13 @@ bench: $(VENV)/ready  ## ns per sample against numpy and C, one run; what each e
 docs: $(VENV)/ready  ## make docs/effects.md and docs/study.schema.json from the register
 	$(SWEEP) effects --markdown > docs/effects.md
 	$(SWEEP) schema --out docs/study.schema.json
+
+site: $(VENV)/ready  ## the docs as a site, into build/site; no network
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+	$(BIN)/python docs/site/links.py build/site
+
+notebooks: $(VENV)/ready  ## run the notebooks of docs/notebooks in place
+	$(BIN)/python docs/site/notebooks.py
 
 frames: $(VENV)/ready  ## draw the frames of all families for docs/frames.md
 	$(BIN)/python docs/frames.py

@@ -66,7 +66,8 @@ def evaluate(
     Examples
     --------
     >>> import sweep
-    >>> crank_rocker = {"a": [10.0, 12.0], "b": 40.0, "c": 25.0, "e": 35.0, "f": 5.0, "g": -3.0, "alpha [deg]": 60.0}
+    >>> crank_rocker = {"a": [10.0, 12.0], "b": 40.0, "c": 25.0, "e": 35.0, "f": 5.0, "g": -3.0}
+    >>> crank_rocker |= {"alpha [deg]": 60.0}
     >>> sweep.evaluate("rssr", crank_rocker, "psi, dpsi", phi=[0.0, 90.0], angles="deg").round(4)
        design     phi     psi    dpsi  status
     0       0  0.0000 -1.5027 -0.1602       0

@@ -101,7 +101,8 @@ def summarise(
     Examples
     --------
     >>> import sweep
-    >>> crank_rocker = {"a": [10.0, 12.0], "b": 40.0, "c": 25.0, "e": 35.0, "f": 5.0, "g": -3.0, "alpha [deg]": 60.0}
+    >>> crank_rocker = {"a": [10.0, 12.0], "b": 40.0, "c": 25.0, "e": 35.0, "f": 5.0, "g": -3.0}
+    >>> crank_rocker |= {"alpha [deg]": 60.0}
     >>> found = sweep.summarise("rssr", crank_rocker, "margin, max_abs_d2psi")
     >>> found[["margin", "max_abs_d2psi", "status"]].round(4)
        margin  max_abs_d2psi  status
