@@ -95,6 +95,24 @@ def test_header_that_cannot_be_is_refused(table, words):
         sweep.evaluate("rssr", table, "psi", phi=0.0)
 
 
+def test_offset_of_a_member_in_degrees_is_refused():
+    with pytest.raises(sweep.InputError, match="offset = 180"):
+        sweep.machine({"looper": {"family": "rssr", "offset": 180}})
+    assert sweep.machine({"looper": {"family": "rssr", "offset": 6.98}}).parameters
+
+
+def test_requirements_in_degrees_give_the_same_mechanisms():
+    given = {"swing": 45.0, "phi0": 195.0, "phi1": 0.0, "e": 100.0, "f": 0.0, "g": 10.0, "alpha": 60.0}
+    angles = ("swing", "phi0", "phi1", "alpha")
+    rad = given | {name: math.radians(given[name]) for name in angles}
+    headed = {f"{name} [deg]" if name in angles else name: value for name, value in given.items()}
+    plain = sweep.synthesise("rssr", rad, max_pressure_angle=math.radians(60.0))
+    pd.testing.assert_frame_equal(plain, sweep.synthesise("rssr", given, max_pressure_angle=60.0, angles="deg"))
+    pd.testing.assert_frame_equal(plain, sweep.synthesise("rssr", headed, max_pressure_angle=math.radians(60.0)))
+    with pytest.raises(sweep.InputError, match="for degrees say"):
+        sweep.synthesise("rssr", given)
+
+
 def test_unknown_unit_is_refused():
     with pytest.raises(sweep.InputError, match='"rad" or "deg"'):
         sweep.summarise("rssr", RADIANS, "swing", angles="grad")
@@ -135,6 +153,8 @@ def test_verbs_take_degrees_by_option_and_by_header(tmp_path):
     assert one.exit_code == 0 and float(one.output.splitlines()[1].split(",")[0]) == pytest.approx(-2.0241, abs=1e-4)
     turn = ["eval", "rssr", str(tmp_path / "deg.csv"), "--want", "psi", "--poses", "4", "--angles", "deg"]
     assert float(run(main, turn).output.splitlines()[2].split(",")[2]) == pytest.approx(-2.0241, abs=1e-4)
+    phi = ["draw", "mechanism", "rssr", str(tmp_path / "rad.csv"), "--phi", "180", "--out", str(tmp_path / "x.svg")]
+    assert run(main, phi).exit_code == 2
     out = tmp_path / "motion.svg"
     done = run(main, ["draw", "motion", "rssr", str(tmp_path / "deg.csv"), "--angles", "deg", "--out", str(out)])
     assert done.exit_code == 0 and out.exists(), done.output

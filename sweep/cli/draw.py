@@ -50,6 +50,7 @@ def draw(
     """
     import sweep.plot as plot
     from sweep.errors import InputError
+    from sweep.evaluation.angles import grid_in_radians
 
     if out.suffix.lower() not in ENDINGS:
         raise InputError("--out", str(out), f"a file name ending in {' or '.join(ENDINGS)}", "command line")
@@ -62,6 +63,8 @@ def draw(
         unit: AngleUnit | None = "rad" if table is None else angles
         known: dict[str, dict[str, Any]] = {"motion": {"want": want}, "mechanism": {"phi": phi, "view": view}}
         options = known.get(what, {}) | {"angles": unit}
+        if table is None:
+            grid_in_radians("phi", "rad", phi, None)  # a design out of a folder is in rad, --phi may not be
         drawn = getattr(plot, what)(mechanism, columns, **options)
     axes = drawn if what in ("front", "tolerance", "sensitivity", "polar_load") else drawn[0]
     out.parent.mkdir(parents=True, exist_ok=True)

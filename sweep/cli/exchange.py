@@ -56,10 +56,12 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     law: the motion over one turn with units, .csv or .parquet.  dxf needs `pip install 'linksweep[cad]'`.
     """
     from sweep.dataset.store import beside
+    from sweep.evaluation.angles import grid_in_radians
     from sweep.exchange.export import FORMATS
     from sweep.exchange.export import export as write
     from sweep.exchange.folder import chosen
 
+    grid_in_radians("phi", "rad", phi, None)  # --phi is in rad, whatever the design is
     found = chosen(folder, design)
     if out is None:
         out = beside(folder) / "export" / f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"

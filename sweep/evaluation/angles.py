@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sweep.errors import InputError
-from sweep.evaluation.tables import numbers
-from sweep.families.base import Array, Family
-from sweep.families.domain import TWO_PI
+from sweep.evaluation.tables import Parametrised, numbers
+from sweep.families.base import Array
+from sweep.families.domain import TWO_PI, Domain, reads_as_degrees
 from sweep.quantities.names import stem
 
 if TYPE_CHECKING:
@@ -27,25 +27,28 @@ REMEDY = (
 )
 
 # Most parameters are angles between two directions, so one turn is all of them; the slack is for rounding.
+# `reads_as_degrees` tells crank angles, and the offset of a member, which is added to one.
 MOST = TWO_PI * (1.0 + 1e-9)
-# Crank angles may run on over many turns, and the offset of a member is added to one.  Between two turns in rad and two
-# turns in degrees a grid whose largest value is a whole or half number was written in degrees: one in rad ends at a
-# multiple of pi.
-TWO_TURNS, TWO_TURNS_DEG = 2.0 * MOST, 720.0
-
 OFFSET = "offset"
 _HEADER = re.compile(r"(\S+?)\s*\[\s*([^\]]*?)\s*\]\s*")
 
 
-def in_radians(family: Family, table: Table, angles: AngleUnit | None = None, others: Iterable[str] = ()) -> Table:
+def in_radians(
+    family: Parametrised,
+    table: Table,
+    angles: AngleUnit | None = None,
+    others: Iterable[str] = (),
+    domain: Domain | None = None,
+) -> Table:
     """The table with its angles in rad, under the plain names of their columns.
 
     Parameters
     ----------
-    family : whose parameters and variable are looked for
+    family : whose parameters are looked for
     table : as the user gave it; a header such as ``alpha [deg]`` says the unit of its column
     angles : the unit of all angles without one in their header; None for rad that must be plausible
     others : names of further inputs, none of them an angle
+    domain : whose variable may be a column too
 
     Returns
     -------
@@ -60,7 +63,9 @@ def in_radians(family: Family, table: Table, angles: AngleUnit | None = None, ot
     """
     _check_unit(angles)
     known = {p.name: p.unit == "angle" for p in family.parameters} | dict.fromkeys(others, False)
-    known[family.domain.name] = family.domain.unit == "rad"
+    variable = "" if domain is None else domain.name
+    if domain is not None:
+        known[variable] = domain.unit == "rad"
     if not (isinstance(table, Mapping) or hasattr(table, "columns")):
         return table  # no table: whoever reads it says so
     renamed, changed = {}, {}
@@ -75,12 +80,17 @@ def in_radians(family: Family, table: Table, angles: AngleUnit | None = None, ot
         if (unit or angles) == "deg":
             changed[name] = numbers(columns[key], name, f"column {key}, row") * FACTORS["deg"]
         elif unit is None and angles is None:
-            _check_plausible(name, columns[key], name == family.domain.name or stem(name) == OFFSET)
+            _check_plausible(name, columns[key], name == variable or stem(name) == OFFSET)
     if not renamed and not changed:
         return table
     if isinstance(table, Mapping):
         return {renamed.get(key, key): changed.get(str(renamed.get(key, key)), columns[key]) for key in columns}
     return table.rename(columns=renamed).assign(**changed)
+
+
+def plain_names(table: Iterable[Any]) -> tuple[str, ...]:
+    """The names of the columns without the units in their headers."""
+    return tuple(found[1] if (found := _HEADER.fullmatch(str(key))) else str(key) for key in table)
 
 
 def grid_in_radians(name: str, unit: str, phi: ArrayLike, angles: AngleUnit | None) -> ArrayLike:
@@ -120,7 +130,7 @@ def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
         return  # whoever reads it says so, with the right row
     if found.size == 0 or not (largest := float(np.max(found, initial=0.0, where=np.isfinite(found)))) > MOST:
         return
-    if turns_on and not (TWO_TURNS < largest <= TWO_TURNS_DEG and (2.0 * largest).is_integer()):
+    if turns_on and not reads_as_degrees(largest):
         return
     row = int(np.argmax(np.where(np.isfinite(found), found, 0.0)))
     raise InputError(

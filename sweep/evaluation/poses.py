@@ -80,7 +80,7 @@ def evaluate(
     bare = find_family(family).precise()
     mechanism = extended(bare, wanted_names(want, f"pose outputs of {bare.name}"))
     wanted = pose_wants(mechanism, want)
-    table = in_radians(mechanism, given := table, angles, input_names(bare))
+    table = in_radians(mechanism, given := table, angles, input_names(bare), mechanism.domain)
     phi = None if phi is None else grid_in_radians(mechanism.domain.name, mechanism.domain.unit, phi, angles)
     variable = mechanism.domain.name
     extra = () if phi is not None else (variable,)
