@@ -29,7 +29,13 @@ def executed(path: Path) -> Any:
     book = nbformat.read(path, as_version=4)
     os.environ["PYTHONPATH"] = str(ROOT)
     with tempfile.TemporaryDirectory() as place:
-        client = NotebookClient(book, timeout=SECONDS, resources={"metadata": {"path": place}}, record_timing=False)
+        client = NotebookClient(
+            book,
+            timeout=SECONDS,
+            record_timing=False,
+            coalesce_streams=True,  # what is printed comes in pieces as chance has it
+            resources={"metadata": {"path": place}},
+        )
         client.execute()
     for cell in book.cells:
         cell.metadata = {}
