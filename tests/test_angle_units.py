@@ -113,6 +113,14 @@ def test_requirements_in_degrees_give_the_same_mechanisms():
         sweep.synthesise("rssr", given)
 
 
+def test_angles_of_threads_say_their_unit_too():
+    plain = sweep.thread.capstan({"T1": 5.0, "wrap": math.pi / 2, "mu": 0.2})
+    pd.testing.assert_frame_equal(plain, sweep.thread.capstan({"T1": 5.0, "wrap [deg]": 90.0, "mu": 0.2}))
+    with pytest.raises(sweep.InputError, match="does not look like"):
+        sweep.thread.capstan({"T1": 5.0, "wrap": 90.0, "mu": 0.2})
+    assert sweep.thread.capstan({"T1": 5.0, "wrap": 6 * math.pi, "mu": 0.2})["status"][0] == 0  # three windings
+
+
 def test_unknown_unit_is_refused():
     with pytest.raises(sweep.InputError, match='"rad" or "deg"'):
         sweep.summarise("rssr", RADIANS, "swing", angles="grad")

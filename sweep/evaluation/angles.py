@@ -27,9 +27,9 @@ REMEDY = (
 )
 
 # Most parameters are angles between two directions, so one turn is all of them; the slack is for rounding.
-# `reads_as_degrees` tells crank angles, and the offset of a member, which is added to one.
+# `reads_as_degrees` tells crank angles, the offset of a member, which is added to one, and the wrap of a thread.
 MOST = TWO_PI * (1.0 + 1e-9)
-OFFSET = "offset"
+TURNING = ("offset", "phi", "wrap")
 _HEADER = re.compile(r"(\S+?)\s*\[\s*([^\]]*?)\s*\]\s*")
 
 
@@ -80,7 +80,7 @@ def in_radians(
         if (unit or angles) == "deg":
             changed[name] = numbers(columns[key], name, f"column {key}, row") * FACTORS["deg"]
         elif unit is None and angles is None:
-            _check_plausible(name, columns[key], name == variable or stem(name) == OFFSET)
+            _check_plausible(name, columns[key], name == variable or stem(name) in TURNING)
     if not renamed and not changed:
         return table
     if isinstance(table, Mapping):
