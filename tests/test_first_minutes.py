@@ -19,7 +19,7 @@ from sweep.cli import main
 from sweep.cli.begin import schema_text
 from sweep.families import NAMES
 from sweep.study import load_study
-from sweep.study.schema import PLAIN, WORDS, study_schema
+from sweep.study.schema import described, models, study_schema
 from sweep.study.tables import TABLES
 
 ROOT = Path(__file__).parents[1]
@@ -110,8 +110,11 @@ def test_schema_in_docs_is_current(tmp_path):
 
 
 def test_schema_has_every_table_and_every_key_of_its_model():
-    assert tuple(WORDS) == TABLES == tuple(study_schema()["properties"])
-    for name, model in PLAIN.items():
+    assert tuple(study_schema()["properties"]) == TABLES
+    assert all(described(name)[0].isupper() and described(name).endswith(".") for name in TABLES)
+    found = models()
+    assert {"study", "mechanism", "scene", "accuracy", "optimise", "pareto", "report"} <= set(found) <= set(TABLES)
+    for name, model in found.items():
         keys = {field.alias or key for key, field in model.model_fields.items()}
         assert set(study_schema()["properties"][name]["properties"]) == keys
 

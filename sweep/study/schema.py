@@ -6,83 +6,30 @@ parameters of every family; what one table asks of another, `sweep check` says.
 
 from __future__ import annotations
 
+import re
+import sys
 from typing import Any, TypeAlias
 
 from sweep.effects import input_names
 from sweep.families import NAMES, family
 from sweep.families.base import Family, Parameter
-from sweep.study.machine import MemberSection, RelationSection
-from sweep.study.model import (
-    AccuracySection,
-    BudgetSection,
-    FitSection,
-    FixedEntry,
-    LimitEntry,
-    ListEntry,
-    MechanismSection,
-    ObjectiveSection,
-    OptimiseSection,
-    OutputSection,
-    ParetoSection,
-    RangeEntry,
-    ReferenceSection,
-    ReportSection,
-    SampleTable,
-    SceneSection,
-    Section,
-    StudySection,
-    ToleranceSection,
-)
+from sweep.study.model import FixedEntry, LimitEntry, ListEntry, RangeEntry, SampleTable, Section
 from sweep.study.tables import REQUIRED_TABLES, TABLES
 from sweep.study.units import example, internal_unit
 
 Schema: TypeAlias = dict[str, Any]
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # the newest that editors for TOML know
-PLAIN: dict[str, type[Section]] = {
-    "study": StudySection,
-    "mechanism": MechanismSection,
-    "scene": SceneSection,
-    "fit": FitSection,
-    "objective": ObjectiveSection,
-    "accuracy": AccuracySection,
-    "optimise": OptimiseSection,
-    "pareto": ParetoSection,
-    "tolerance": ToleranceSection,
-    "reference": ReferenceSection,
-    "output": OutputSection,
-    "budget": BudgetSection,
-    "report": ReportSection,
-}
-WORDS = {
-    "study": "Name, title and question in words.",
-    "mechanism": "The family of the mechanism, or a chain of families.",
-    "machine": "Several mechanisms on one main shaft, a table for each member.",
-    "relations": "What members of a machine are to each other: distances, timings, speeds, events, torques.",
-    "scene": "Speed and wanted outputs; only these and what they need are computed.",
-    "design": "Every parameter of the mechanism: fixed, listed, a range, or drawn by a sample.",
-    "locus": "Limit positions of the first stage, from which its links follow.",
-    "fit": "Coupler point and line of a guide, fitted to its path.",
-    "limits": "What a design must keep, by output or parameter.",
-    "objective": "The design output to be made small.",
-    "accuracy": "Relative error of extrema, or crank angles of a dense grid.",
-    "optimise": "How the optimum is searched; without this table nothing is optimised.",
-    "pareto": "A second output and bounds on it, for each of which the objective is made small.",
-    "tolerance": "Manufacturing tolerances at the optimum.",
-    "reference": "One design to compare with.",
-    "output": "Which designs become rows, and how they are stored.",
-    "budget": "What a run may cost before it must be forced.",
-    "report": "Figures and known curves of the report.",
-}
+# How the docstring of a model says which table it is: of the whole file, or of each name within one.
+_TABLE, _EACH = re.compile(r"\[(\w+)\](?!\w)"), re.compile(r"(\w+)\.<\w+>")
 ENTRY = {"$ref": "#/definitions/entry"}
 
 
 def study_schema() -> Schema:
     """The schema as a plain dict, the same at every call."""
     definitions: Schema = {"entry": _entry()}
-    tables: Schema = {name: _model(model, definitions) for name, model in PLAIN.items()}
-    tables["machine"] = _each(_model(MemberSection, definitions))
-    tables["relations"] = _each(_model(RelationSection, definitions))
+    tables: Schema = {name: _model(model, definitions) for name, model in models(_TABLE).items()}
+    tables |= {name: _each(_model(model, definitions)) for name, model in models(_EACH).items()}
     tables["locus"] = _each(ENTRY)
     tables["design"] = _each({"anyOf": [ENTRY, _each(ENTRY)]}) | {
         "properties": {"sample": _model(SampleTable, definitions)}
@@ -97,13 +44,29 @@ def study_schema() -> Schema:
         "$schema": DRAFT,
         "title": "linksweep study",
         "type": "object",
-        "properties": {name: {"description": WORDS[name]} | tables[name] for name in TABLES},
+        "properties": {
+            name: {"description": described(name)} | tables.get(name, {"type": "object"}) for name in TABLES
+        },
         "additionalProperties": False,
         "required": list(REQUIRED_TABLES),
         "anyOf": [{"required": ["mechanism"]}, {"required": ["machine"]}],
         "allOf": [_of_family(family(name)) for name in NAMES],
         "definitions": definitions,
     }
+
+
+def models(kind: re.Pattern[str] = _TABLE) -> dict[str, type[Section]]:
+    """The models of the tables, by name: of whole tables, or of what stands under each name of one."""
+    found = ((kind.match(model.__doc__ or ""), model) for model in Section.__subclasses__())
+    return {match[1]: model for match, model in found if match is not None}
+
+
+def described(table: str) -> str:
+    """What a table is about, as the docstring of its reader says it; of several the one that is about least else."""
+    docstrings = [(module.__doc__ or "") for name, module in sys.modules.items() if name.startswith("sweep.study.")]
+    heads = [text.split("\n")[0].partition(": ") for text in docstrings if text.startswith("[")]
+    _, _, words = min((head for head in heads if f"[{table}]" in head[0]), key=lambda head: (len(head[0]), head))
+    return words[0].upper() + words[1:]
 
 
 def _each(schema: Schema) -> Schema:
