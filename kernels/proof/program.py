@@ -46,7 +46,13 @@ def _row(number: int, rows: Array, count: int, objective: NDArray[np.uint8], hal
 
 @kernel
 def multipliers(
-    rows: Array, count: int, objective: NDArray[np.uint8], half: Array, work: Array, basis: NDArray[np.int64], out: Array
+    rows: Array,
+    count: int,
+    objective: NDArray[np.uint8],
+    half: Array,
+    work: Array,
+    basis: NDArray[np.int64],
+    out: Array,
 ) -> int:
     """Multipliers of the rows of (1).
 

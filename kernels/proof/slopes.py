@@ -88,7 +88,7 @@ def variable(at: Array, out: int, centre: float, half: Array, k: int) -> None:
 
 @kernel
 def combine(at: Array, out: int, p: float, a: int, q: float, b: int, half: Array) -> None:
-    """p a + q b for two numbers p, q."""
+    """P a + q b for two numbers p, q."""
     for j in range(0, at.shape[1], 2):
         first, second = times(p, p, at[a, j], at[a, j + 1])
         third, fourth = times(q, q, at[b, j], at[b, j + 1])

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from sweep.dataset import store
 from sweep.engine.log import circumstances, command
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
+from sweep.engine.proving import prove
 from sweep.errors import Interrupted, SearchCutShort, StoreError, TimeUsedUp, WorkerDied
 from sweep.jobs.executors import Here, executor
 from sweep.jobs.signals import Stop, stop_on_signal
@@ -84,6 +85,7 @@ def run(
         if not is_part(folder):
             if model.optimise is not None:
                 _optimise(replace(model, pareto=None), folder, jobs, progress)
+            prove(model, folder, jobs, backend, progress)
             _front(model, folder, jobs)
             _raise_if_cut_short(folder)
         end.append(f"{computed} chunks computed")
