@@ -4,7 +4,7 @@ A row is a function of the design, enclosed over a box as a form (:mod:`kernels.
 are at most the value t of a design; rows of limits are at least 0 in a feasible one.  With multipliers that are not
 negative, l_j for the first and m_i for the others,
 
-    t >= t sum l_j >= sum l_j a_j(x) - sum m_i b_i(x),   sum l_j <= 1                                                  (1)
+    t >= t sum l_j >= sum l_j a_j(x) - sum m_i b_i(x),   sum l_j <= 1                                                (1)
 
 for every feasible design of the box.  Without rows of the objective the right side can only be positive where there is
 no feasible design.  A family writes the loop around its own rows; the pieces are here.

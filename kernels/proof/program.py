@@ -1,6 +1,6 @@
 """The multipliers that make the best bound of linear enclosures over a box: a small linear program.
 
-    minimise t   subject to   a_j + g_j d <= t,   b_i + h_i d >= 0,   |d_k| <= half_k,   t >= 0                        (1)
+    minimise t   subject to   a_j + g_j d <= t,   b_i + h_i d >= 0,   |d_k| <= half_k,   t >= 0                      (1)
 
 with rows a_j that the objective exceeds and rows b_i that a feasible design keeps.  Dual simplex from the corner where
 every d_k is at its lower end: it has one row per unknown and needs no start of its own.  Where (1) has no solution, the

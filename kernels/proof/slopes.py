@@ -3,7 +3,7 @@
 Of a function F over the box |x_k - c_k| <= h_k a *form* holds three kinds of intervals: its value at the centre c, its
 range over the box, and for every variable a slope s_k with
 
-    F(x) = F(c) + sum_k s_k (x_k - c_k)   for every x in the box and some s_k in their intervals                      (1)
+    F(x) = F(c) + sum_k s_k (x_k - c_k)   for every x in the box and some s_k in their intervals                    (1)
 
 (R. Krawczyk and A. Neumaier, Interval slopes for rational functions and associated centered forms, SIAM J. Numer. Anal.
 22, 1985).  Slopes are narrower than derivatives over the box, and every rule below is exact algebra on (1).

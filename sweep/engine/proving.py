@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from sweep.dataset import store
 from sweep.errors import Interrupted
-from sweep.jobs.executors import Here, executor
+from sweep.jobs.executors import Executor, Here, executor
 from sweep.jobs.signals import stop_on_signal
 
 if TYPE_CHECKING:
@@ -28,15 +28,16 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
     from sweep.jobs.progress import Progress
     from sweep.proof import prove_study
     from sweep.proof.certificate import PROOF
+    from sweep.proof.rounds import Cores
 
     if study.optimise is None or study.optimise.prove is None:
         (store.beside(folder) / PROOF).unlink(missing_ok=True)
         return
     boxes = study.optimise.prove.boxes
     with stop_on_signal() as stop, Progress("proof", boxes, 0, progress, unit="boxes") as shown:
-        place = Here() if jobs == 1 else executor(backend, jobs)
+        place: Executor = Here() if jobs == 1 else executor(backend, jobs)
         try:
-            prove_study(study, folder, place, jobs, stop, lambda judged: shown.advance(judged - shown.done))
+            prove_study(study, folder, Cores(place, jobs, stop), lambda judged: shown.advance(judged - shown.done))
         except KeyboardInterrupt:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while proving; run again to continue"

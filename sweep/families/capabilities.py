@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sweep.families.base import Angles, Columns
 
 Array: TypeAlias = NDArray[np.float64]
+Numbers: TypeAlias = NDArray[Any]
 DesignMap: TypeAlias = Callable[[Array], Array]
 FillFunction: TypeAlias = "Callable[[Array, Angles, Columns, Array, Array], None]"
 Coordinates: TypeAlias = tuple[str | None, str | None, str | None]
@@ -123,16 +124,16 @@ class ProvableLocus:
     """Bounds of an output can be proven for whole boxes of designs on the locus of limit positions.
 
     ``coordinates`` are what a box is made of, the swing first; ``links`` the lengths that follow and may have limits.
-    ``objectives`` has the outputs that can be proven, with the numbers by which the kernels know them; ``rows`` says for
-    each kind of row what it is about.  ``explore(searched, leaves)`` fills arrays (low, high, outcome, bound, kinds,
-    theta, factors) with the boxes that were not halved; it gives their number and that of the boxes judged.
+    ``objectives`` has the outputs that can be proven, with the numbers by which the kernels know them; ``rows`` says
+    for each kind of row what it is about.  ``explore(searched, leaves)`` fills arrays (low, high, outcome, bound,
+    kinds, theta, factors) with the boxes that were not halved; it gives their number and that of the boxes judged.
     """
 
     coordinates: tuple[str, ...]
     links: tuple[str, ...]
     objectives: Mapping[str, int]
     rows: tuple[str, ...]
-    explore: Callable[[Searched, tuple[Array, ...]], tuple[int, int]]
+    explore: Callable[[Searched, tuple[Numbers, ...]], tuple[int, int]]
 
 
 @dataclass(frozen=True)

@@ -5,18 +5,18 @@ from __future__ import annotations
 from functools import cache
 
 from kernels.families.rssr import box_by_axes, box_by_rocker, proof
+from kernels.families.rssr.box_rows import Problem
 from kernels.families.rssr.box_turn import Formulas
-from sweep.families.base import Array
-from sweep.families.capabilities import ProvableLocus, Searched
+from sweep.families.capabilities import Numbers, ProvableLocus, Searched
 
 _by_axes = cache(box_by_axes.recorded)
 _by_rocker = cache(box_by_rocker.recorded)
 
 
-def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Array, ...]) -> tuple[int, int]:
+def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
     """Leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
     s = searched
-    problem = proof.Problem(s.branch, s.objective, s.cos2, s.links, s.target)
+    problem = Problem(s.branch, s.objective, s.cos2, s.links, s.target)
     found = proof.explore(
         problem, formulas, s.starts, s.whole, s.free, s.given, s.smallest, s.most, proof.Leaves(*leaves)
     )

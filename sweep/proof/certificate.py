@@ -125,7 +125,7 @@ def write(path: Path, question: Question, leaves: Leaves, proof: Proof, target: 
         rows = getattr(leaves, name)
         offsets = np.concatenate([[0], np.cumsum(used.sum(axis=1))]).astype(np.int32)
         columns[name] = pa.ListArray.from_arrays(pa.array(offsets), pa.array(rows[used]))
-    asked = described(question) | {"target": target, "rows": list(question.provable.rows)}
+    asked = {**described(question), "target": target, "rows": list(question.provable.rows)}
     table = pa.table(columns).replace_schema_metadata(
         {"question": json.dumps(asked), "proof": json.dumps(asdict(proof)), "key": key}
     )

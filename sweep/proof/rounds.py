@@ -11,18 +11,23 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.dataset import store
 from sweep.families.base import Array
-from sweep.families.capabilities import Searched
+from sweep.families.capabilities import Numbers, Searched
+from sweep.jobs.executors import Executor
+from sweep.jobs.signals import Stop
 from sweep.proof.question import Question
+
+if TYPE_CHECKING:
+    from sweep.study import ProveSettings
 
 UNITS = 64
 SHARES = (0.1, 0.15, 0.25, 0.5)  # of all boxes, round by round: later ones know better where to look
-SMALLEST = 1e-7  # of the width of the space; a box below that is not halved again
 COMBINED = 5
 OPEN, TOO_SMALL, BOUND, EMPTY = range(4)
 OUTCOMES = ("open", "too small", "bound", "empty")
@@ -34,19 +39,19 @@ class Leaves:
 
     low: Array  # (m, n)
     high: Array
-    outcome: Array  # (m,) of OUTCOMES
+    outcome: Numbers  # (m,) of OUTCOMES
     bound: Array  # (m,)
-    kinds: Array  # (m, COMBINED), -1 where fewer rows are combined
+    kinds: Numbers  # (m, COMBINED), -1 where fewer rows are combined
     theta: Array
     factors: Array
 
     @property
-    def open(self) -> Array:
+    def open(self) -> NDArray[np.bool_]:
         """Which of them the next round goes on with."""
-        found: Array = self.outcome == OPEN
+        found: NDArray[np.bool_] = self.outcome == OPEN
         return found
 
-    def taken(self, which: Array) -> Leaves:
+    def taken(self, which: Numbers) -> Leaves:
         """Some of them, by index or mask."""
         return Leaves(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
@@ -65,6 +70,15 @@ def joined(parts: list[Leaves]) -> Leaves:
 
 
 @dataclass(frozen=True)
+class Cores:
+    """Where work units run: the executor, its workers, and the flag that stops them."""
+
+    place: Executor
+    jobs: int
+    stop: Stop
+
+
+@dataclass(frozen=True)
 class Unit:
     """Judge the boxes of one unit of a round and write what is left of them."""
 
@@ -72,6 +86,7 @@ class Unit:
     target: float  # in the unit of the proof's rows
     boxes: Leaves
     most: int
+    smallest: float
     folder: Path
     round: int
 
@@ -88,7 +103,8 @@ class Unit:
         leaves = empty(len(mine.bound) + self.most, mine.low.shape[1])
         searched = Searched(
             asked.branch, provable.objectives[asked.objective], asked.cos2, asked.links, self.target,
-            (mine.low, mine.high, mine.bound), asked.high - asked.low, asked.free, asked.given, SMALLEST, self.most,
+            (mine.low, mine.high, mine.bound), asked.high - asked.low, asked.free, asked.given, self.smallest,
+            self.most,
         )  # fmt: skip
         filled, judged = provable.explore(searched, tuple(getattr(leaves, n) for n in Leaves.__dataclass_fields__))
         _write(self.path(number), leaves.taken(np.arange(filled)), judged)
@@ -109,25 +125,22 @@ def _read(path: Path) -> tuple[Leaves, int]:
 
 
 def explored(
-    question: Question, target: float, boxes: int, seconds: float | None, folder: Path, place: Any, jobs: int, stop: Any,
-    tell: Callable[[int], None],
-) -> tuple[Leaves, int, bool]:  # fmt: skip
-    """Halve boxes until all is proven or ``boxes`` were judged.
+    question: Question, target: float, asked: ProveSettings, folder: Path, cores: Cores, tell: Callable[[int], None]
+) -> tuple[Leaves, int, bool]:
+    """Halve boxes until all is proven or as many as asked were judged.
 
     Parameters
     ----------
     question : the space
     target : in the unit of the proof's rows
-    boxes : how many to judge
-    seconds : emergency brake; no round begins after it
+    asked : how many boxes to judge, and how small they may become
     folder : where finished units are kept; the same question must find the same folder
-    place, jobs : executor and its workers
-    stop : a ``Stop``; true ends it
+    cores : where units run, and what stops them
     tell : called with the number of boxes judged so far
 
     Returns
     -------
-    All leaves, the number of boxes judged, and whether ``seconds`` or ``stop`` cut it short.
+    All leaves, the number of boxes judged, and whether time or a signal cut it short.
     """
     done: list[Leaves] = []
     start = empty(1, len(question.names))
@@ -136,12 +149,13 @@ def explored(
     for number, share in enumerate(SHARES):
         if not len(todo.bound):
             break
-        if stop or (seconds is not None and time.monotonic() - begin > seconds):
+        if cores.stop or (asked.seconds is not None and time.monotonic() - begin > asked.seconds):
             return joined([*done, todo]), judged, True
-        unit = Unit(question, target, _split(todo, question), max(int(boxes * share) // UNITS, 1), folder, number)
-        for _ in _run(unit, place, jobs, stop):
+        most = max(int(asked.boxes * share) // UNITS, 1)
+        unit = Unit(question, target, _split(todo, question), most, asked.smallest, folder, number)
+        for _ in _run(unit, cores):
             tell(judged + sum(_read(p)[1] for p in _finished(unit)))
-        if stop:
+        if cores.stop:
             return joined([*done, todo]), judged, True
         results = [_read(path) for path in _finished(unit)]
         judged += sum(count for _, count in results)
@@ -171,6 +185,6 @@ def _finished(unit: Unit) -> list[Path]:
     return [path for path in map(unit.path, range(UNITS)) if path.is_file()]
 
 
-def _run(unit: Unit, place: Any, jobs: int, stop: Any) -> Iterator[tuple[int, int]]:
+def _run(unit: Unit, cores: Cores) -> Iterator[tuple[int, int]]:
     missing = (number for number in range(UNITS) if not unit.path(number).is_file())
-    yield from place.outcomes(unit, missing, jobs, stop)
+    yield from cores.place.outcomes(unit, missing, cores.jobs, cores.stop)

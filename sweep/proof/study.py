@@ -8,7 +8,7 @@ import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,25 +18,22 @@ from sweep.dataset import store
 from sweep.errors import InputError
 from sweep.proof.certificate import PROOF, Proof, concluded, read_proof, write
 from sweep.proof.question import Question, described, question_of
-from sweep.proof.rounds import SHARES, SMALLEST, UNITS, explored
+from sweep.proof.rounds import SHARES, UNITS, Cores, explored
 
 if TYPE_CHECKING:
-    from sweep.study import Study
+    from sweep.study import ProveSettings, Study
 
 NEVER = 1e300  # the target where no feasible design is known: then only emptiness can be proven
 
 
-def prove_study(
-    study: Study, folder: str | Path, place: Any, jobs: int, stop: Any, tell: Callable[[int], None] = lambda _: None
-) -> Proof:
+def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Callable[[int], None] = lambda _: None) -> Proof:
     """Prove that no design of the study's space is better than its optimum by more than the gap it asks for.
 
     Parameters
     ----------
     study : with ``optimise.prove``
     folder : its dataset, with the optimum beside it
-    place, jobs : executor of the boxes and its workers; the certificate does not depend on them
-    stop : a ``Stop``; true ends it, and the next run goes on
+    cores : where the boxes are judged; the certificate does not depend on it.  A stopped proof goes on in the next run
     tell : called with the number of boxes judged so far
 
     Returns
@@ -56,18 +53,16 @@ def prove_study(
     question, side = question_of(study), store.beside(Path(folder))
     best = _best(side / store.OPTIMUM, question)
     target = question.in_kernel(best / (1.0 + asked.gap)) if np.isfinite(best) else NEVER
-    key = _key(question, target, asked.boxes)
+    key = _key(question, target, asked)
     known = read_proof(side / PROOF)
     if known is not None and not known.cut_short and _known_key(side / PROOF) == key:
         return known
     parts = side / "_proof" / key
     begin = time.monotonic()
-    leaves, judged, cut_short = explored(
-        question, target, asked.boxes, asked.seconds, parts, place, jobs, stop, tell
-    )  # fmt: skip
+    leaves, judged, cut_short = explored(question, target, asked, parts, cores, tell)
     proof = concluded(question, leaves, best, asked.gap, judged, time.monotonic() - begin, cut_short)
     write(side / PROOF, question, leaves, proof, target, key)
-    if stop:
+    if cores.stop:
         raise KeyboardInterrupt
     if not cut_short:
         shutil.rmtree(side / "_proof", ignore_errors=True)
@@ -83,9 +78,9 @@ def _best(path: Path, question: Question) -> float:
     return float(first[question.objective]) if first["status"] != st.LIMIT_EXCEEDED else float("nan")
 
 
-def _key(question: Question, target: float, boxes: int) -> str:
+def _key(question: Question, target: float, asked: ProveSettings) -> str:
     """What the certificate depends on."""
-    what = [described(question), target, boxes, UNITS, SHARES, SMALLEST, source_hash()]
+    what = [described(question), target, asked.gap, asked.boxes, asked.smallest, UNITS, SHARES, source_hash()]
     return hashlib.sha256(json.dumps(what, default=str, sort_keys=True).encode()).hexdigest()[:16]
 
 

@@ -137,6 +137,7 @@ class ProveTable(Section):
     required = ("gap",)
     gap: str | None = Field(None, description='a share as a text, as "1 %"')
     boxes: Annotated[int, Field(ge=64, le=10**9)] = Field(1_000_000, description="a whole number, 64 to 10^9")
+    smallest: str = Field("0.00001 %", description='a share of every range as a text, as "0.1 %"')
     time: str | None = Field(None, description='a time as a text, as "60 s"')
 
 

@@ -44,11 +44,14 @@ class Objective:
 class ProveSettings:
     """The gap between optimum and proven bound that is wanted, and the boxes of designs that may be judged for it.
 
-    ``seconds`` is an emergency brake: no round of boxes begins after it, and the answer says so.
+    A box is not halved once its widest side is below the share ``smallest`` of its range; what it holds stays open, as
+    an exception that the answer names.  ``seconds`` is an emergency brake: no round of boxes begins after it, and the
+    answer says so.
     """
 
     gap: float
     boxes: int = 1_000_000
+    smallest: float = 1e-7
     seconds: float | None = None
 
 

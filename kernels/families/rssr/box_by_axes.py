@@ -1,4 +1,4 @@
-"""Boxes of crank-rockers on the locus whose axes are given: e, f, g, alpha and the crank angle of the extended position.
+"""Boxes of crank-rockers on the locus whose axes are given, by e, f, g, alpha and phi_ext.
 
 docs/synthesis.md, (1)-(7).  What vanishes where a design ceases to exist stands in numerators, so a box across such a
 place can still be told to hold no mechanism: rho1 = n1/det, X1 = nx/det, Y1 = ny/det, a = crank/total.

@@ -2,7 +2,7 @@
 
 In both limit positions the ball lies in the plane of crank axis and crank (docs/synthesis.md, section 1):
 
-    v1 (e + X1) = u1 (ca Y1 - h),   v2 (e + X2) = u2 (ca Y2 - h),   h = g sa                                           (1)
+    v1 (e + X1) = u1 (ca Y1 - h),   v2 (e + X2) = u2 (ca Y2 - h),   h = g sa                                         (1)
 
 Solved for e and h the determinant is -sin(phi0), so no place of this locus is singular but phi0 = 180 degrees.
 """
@@ -39,7 +39,7 @@ def recorded() -> Formulas:
     crank = sin_half.times(2.0) * c * (e * mid_sin + fs * mid_cos)
     g = h * sa.inverse()
     acceptance = (
-        rho1, rho2, crank * total,
+        rho1, rho2, crank,
         sense(tape, total, crank, e, fs, ca, u1, v1, x1, y1), sense(tape, total, crank, e, fs, ca, u2, v2, x2, y2),
     )  # fmt: skip
     limits = [within(tape, 0, crank, total), within(tape, 1, e, one), within(tape, 2, g, one)]

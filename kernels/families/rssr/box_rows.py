@@ -21,7 +21,7 @@ from kernels.proof.branching import (
     looseness,
     surely_negative,
 )  # fmt: skip
-from kernels.proof.slopes import CENTRE, RANGE, ULP, Array, constant, down, up, variable
+from kernels.proof.slopes import CENTRE, RANGE, SLOPES, ULP, Array, constant, variable
 from kernels.proof.tape import run
 from kernels.sincos import sincos
 
@@ -202,6 +202,22 @@ def _single(rows: Rows, start: int, count: int) -> int:
 
 
 @inline
+def _doubtful(rows: Rows, count: int, half: Array) -> int:
+    """The row of limits that is nearest to being negative on the whole box, in units of its spread."""
+    found, lowest = -1, math.inf
+    for j in range(count):
+        if not rows.objective[j]:
+            spread = 0.0
+            for k in range(half.shape[0]):
+                low, high = rows.forms[j, SLOPES + 2 * k], rows.forms[j, SLOPES + 2 * k + 1]
+                spread += max(abs(low), abs(high)) * half[k]
+            height = (rows.forms[j, CENTRE] + rows.forms[j, CENTRE + 1]) / max(spread, 1e-300)
+            if height < lowest:
+                found, lowest = j, height
+    return found
+
+
+@inline
 def _lengths(f: Formulas, at: Array, half: Array) -> bool:
     """The lengths of the designs; false where a divisor may vanish, or the crank."""
     if f.slots[bt.SIGN] >= 0:
@@ -214,8 +230,8 @@ def _lengths(f: Formulas, at: Array, half: Array) -> bool:
 
 @kernel
 def judge(
-    p: Problem, f: Formulas, low: Array, high: Array, varied: Array, given: Array, at: Array, rows: Rows, scratch: Array,
-    used: Flags,
+    p: Problem, f: Formulas, low: Array, high: Array, varied: Array, given: Array, at: Array, rows: Rows,
+    scratch: Array, used: Flags,
 ) -> tuple[int, int, float]:  # fmt: skip
     """What can be said of one box: outcome, number of rows, and the bound of the objective.
 
@@ -229,14 +245,14 @@ def judge(
     rows.loose[:] = -1.0
     if not run(f.operations, f.factors, f.ends, bt.PLACE, at, half):
         return OPEN, 0, 0.0
-    count, whole = 0, False
+    count = 0
     for kind in range(LIMITED):
         count = _take(rows, count, at, f.slots[bt.ACCEPTANCE + kind], kind, 0.0, 1.0)
     count = _limit_rows(p, f, rows, count, at, 0, f.early)
     empty = _single(rows, 0, count)
     if empty < 0:
-        start, whole = count, _lengths(f, at, half)
-        if whole:
+        start = count
+        if _lengths(f, at, half):
             count = _limit_rows(p, f, rows, count, at, f.early, bt.MOST_LIMITED)
             count = _turn_rows(p, f, rows, count, at, half, height, neck, used)
             empty = _single(rows, start, count)
@@ -246,17 +262,20 @@ def judge(
     bound, limits_alone = best_bound(
         rows.forms, count, rows.objective, half, rows.work, rows.basis, rows.linear, rows.sizes, rows.factors
     )
-    if limits_alone:
-        if bound > 0.0:
-            return EMPTY, count, math.inf
-        return OPEN, count, 0.0
+    if limits_alone and bound > 0.0:
+        return EMPTY, count, math.inf
     best = -1
+    if limits_alone:
+        bound = 0.0
     for j in range(count):
         if rows.objective[j] and rows.forms[j, RANGE] > bound:
             best, bound = j, rows.forms[j, RANGE]
     if best >= 0:
         rows.factors[:] = 0.0
         rows.factors[best] = 1.0
-    if whole:
-        looseness(rows.forms, rows.factors, count, half, rows.loose)
+    if bound <= 0.0:  # nothing was proven: halve what keeps a limit from emptying the box
+        doubtful = _doubtful(rows, count, half)
+        rows.factors[:] = 0.0
+        rows.factors[doubtful] = 1.0
+    looseness(rows.forms, rows.factors, count, half, rows.loose)
     return (BOUND if bound >= p.target else OPEN), count, max(bound, 0.0)

@@ -16,6 +16,7 @@ from kernels.families.rssr.box_turn import Formulas
 from kernels.proof.branching import COMBINED, MOST_ROWS, Flags, Indices, pop, push
 from kernels.proof.slopes import SLOPES, Array
 
+
 class Leaves(NamedTuple):
     """Boxes that were not halved: where they are and what was proven of them."""
 
@@ -59,8 +60,8 @@ def _to_halve(low: Array, high: Array, whole: Array, loose: Array) -> int:
 
 @kernel
 def explore(
-    p: Problem, f: Formulas, starts: tuple[Array, Array, Array], whole: Array, varied: Array, given: Array, smallest: float,
-    most: int, leaves: Leaves,
+    p: Problem, f: Formulas, starts: tuple[Array, Array, Array], whole: Array, varied: Array, given: Array,
+    smallest: float, most: int, leaves: Leaves,
 ) -> tuple[int, int]:  # fmt: skip
     """Halve boxes until every part is proven not to reach the target, or so many parts were judged; worst parts first.
 
@@ -76,8 +77,8 @@ def explore(
 
     Returns
     -------
-    Leaves that were filled, and parts that were judged.  Leaves of outcome OPEN or TOO_SMALL are not proven; their bound
-    is what is known of them.
+    Leaves that were filled, and parts that were judged.  Leaves of outcome OPEN or TOO_SMALL are not proven; their
+    bound is what is known of them.
     """
     boxes, n = starts[0].shape
     at = np.zeros((f.forms, SLOPES + 2 * n))

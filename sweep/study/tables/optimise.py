@@ -34,7 +34,8 @@ def _prove(reading: Reading, table: ProveTable | None) -> ProveSettings | None:
     if table is None:
         return None
     gap = reading.share(table.gap or "1 %", ("optimise", "prove", "gap"))
-    return ProveSettings(gap, table.boxes, reading.quantity(table.time, "s", ("optimise", "prove", "time")))
+    smallest = reading.share(table.smallest, ("optimise", "prove", "smallest"))
+    return ProveSettings(gap, table.boxes, smallest, reading.quantity(table.time, "s", ("optimise", "prove", "time")))
 
 
 def check_objective(reading: Reading) -> None:
