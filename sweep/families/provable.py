@@ -23,6 +23,14 @@ def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...
     return int(found[0]), int(found[1])
 
 
+def _explored_by_axes(searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
+    return _explored(_by_axes(), searched, leaves)
+
+
+def _explored_by_rocker(searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
+    return _explored(_by_rocker(), searched, leaves)
+
+
 def _tests(lengths: tuple[str, ...]) -> tuple[str, ...]:
     """What each kind of row says where it fails."""
     room = 5 - len(lengths)
@@ -41,7 +49,7 @@ CRANK_ROCKER_BY_AXES = ProvableLocus(
     links=("a", "c", "b"),
     objectives=OBJECTIVES,
     rows=_tests(("a", "c", "b")),
-    explore=lambda searched, leaves: _explored(_by_axes(), searched, leaves),
+    explore=_explored_by_axes,
 )
 
 CRANK_ROCKER_BY_ROCKER = ProvableLocus(
@@ -49,5 +57,5 @@ CRANK_ROCKER_BY_ROCKER = ProvableLocus(
     links=("a", "e", "g", "b"),
     objectives=OBJECTIVES,
     rows=_tests(("a", "e", "g", "b")),
-    explore=lambda searched, leaves: _explored(_by_rocker(), searched, leaves),
+    explore=_explored_by_rocker,
 )

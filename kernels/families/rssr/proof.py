@@ -47,14 +47,18 @@ def _record(
 
 
 @inline
-def _to_halve(low: Array, high: Array, whole: Array, loose: Array) -> int:
-    """The variable whose width costs the bound most; where that is not known, the one of the widest share."""
-    best = 0
+def _to_halve(low: Array, high: Array, whole: Array, smallest: float, loose: Array) -> int:
+    """The variable whose width costs the bound most, of those that are not too narrow; -1 where all are.
+
+    Where nothing is known of the costs it is the one of the widest share.
+    """
+    best, most = -1, 0.0
     known = loose.max() > 0.0
-    for k in range(1, low.shape[0]):
-        share, lead = (high[k] - low[k]) / whole[k], (high[best] - low[best]) / whole[best]
-        if (loose[k] > loose[best]) if known else (share > lead):
-            best = k
+    for k in range(low.shape[0]):
+        share = (high[k] - low[k]) / whole[k]
+        cost = loose[k] if known else share
+        if share >= smallest and low[k] < 0.5 * (low[k] + high[k]) < high[k] and (best < 0 or cost > most):
+            best, most = k, cost
     return best
 
 
@@ -71,7 +75,7 @@ def explore(
     starts : low and high ends of the boxes, (m, n) with n <= 4, and the bounds (m,) known of them; 0 for nothing
     whole : (n,) width of the whole space, by which widths are compared
     varied, given : (n,) which of the seven coordinates vary, and all seven
-    smallest : share of ``whole`` below which a part is not halved again
+    smallest : share of ``whole`` below which a side is not halved again
     most : parts to judge
     leaves : out, of at least m + most rows
 
@@ -105,11 +109,11 @@ def explore(
         if outcome != OPEN:
             filled = _record(leaves, filled, lo, hi, outcome, bound, rows, count)
             continue
-        k = _to_halve(lo, hi, whole, rows.loose)
-        middle = 0.5 * (lo[k] + hi[k])
-        if hi[k] - lo[k] < smallest * whole[k] or not lo[k] < middle < hi[k]:
+        k = _to_halve(lo, hi, whole, smallest, rows.loose)
+        if k < 0:
             filled = _record(leaves, filled, lo, hi, TOO_SMALL, bounds[box], rows, 0)
             continue
+        middle = 0.5 * (lo[k] + hi[k])
         lows[boxes], highs[boxes], bounds[boxes] = lo, hi, bounds[box]
         lows[boxes, k], highs[box, k] = middle, middle
         depths[box] += 1
