@@ -44,6 +44,24 @@ def _row(number: int, rows: Array, count: int, objective: NDArray[np.uint8], hal
     return -float(half[number % n])
 
 
+@inline
+def _most_violated(
+    rows: Array, count: int, objective: NDArray[np.uint8], half: Array, scale: float, z: Array, row: Array
+) -> int:
+    """Number of the constraint that z misses most, each in the unit of what it may cost; -1 where all are kept."""
+    n = half.shape[0]
+    entering, worst = -1, ROUNDING * scale
+    for number in range(count + 2 * n + 1):
+        missing = _row(number, rows, count, objective, half, row)
+        for k in range(n + 1):
+            missing -= row[k] * z[k]
+        if count <= number < count + 2 * n:
+            missing *= scale / half[(number - count) % n]
+        if missing > worst:
+            entering, worst = number, missing
+    return entering
+
+
 @kernel
 def multipliers(
     rows: Array,
@@ -88,15 +106,7 @@ def multipliers(
             for j in range(size):
                 value += inverse[k, j] * b[j]
             z[k], y[k] = value, max(inverse[n, k], 0.0)
-        entering, worst = -1, ROUNDING * scale
-        for number in range(count + 2 * n + 1):
-            missing = _row(number, rows, count, objective, half, row)
-            for k in range(size):
-                missing -= row[k] * z[k]
-            if number >= count:  # in the unit of what it may cost, not in that of the variable
-                missing *= 1.0 if number == count + 2 * n else scale / half[(number - count) % n]
-            if missing > worst:
-                entering, worst = number, missing
+        entering = _most_violated(rows, count, objective, half, scale, z, row)
         if entering < 0:
             result = SOLVED
             break

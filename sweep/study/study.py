@@ -45,8 +45,8 @@ class ProveSettings:
     """The gap between optimum and proven bound that is wanted, and the boxes of designs that may be judged for it.
 
     A box is not halved once all its sides are below the share ``smallest`` of their ranges; what it holds stays open,
-    as an exception that the answer names.  ``seconds`` is an emergency brake: no round of boxes begins after it, and the
-    answer says so.
+    as an exception that the answer names.  ``seconds`` is an emergency brake: no round of boxes begins after it, and
+    the answer says so.
     """
 
     gap: float
