@@ -60,6 +60,7 @@ def capability_words(family: Family) -> list[str]:
         OutputLink,
         Points,
         PressureEllipse,
+        ProvableLocus,
     )
 
     words = [
@@ -68,6 +69,7 @@ def capability_words(family: Family) -> list[str]:
         (PressureEllipse, "pressure extrema"),
         (CrankRockerLoop, "proofs"),
         (LimitLocus, "limit locus"),
+        (ProvableLocus, "proven optimum"),
         (GuidedPoint, "line fit"),
         (Points, "points"),
         (OutputLink, "tip"),

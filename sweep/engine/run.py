@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from sweep.dataset import store
 from sweep.engine.log import circumstances, command
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
+from sweep.engine.proving import prove
 from sweep.errors import Interrupted, SearchCutShort, StoreError, TimeUsedUp, WorkerDied
 from sweep.jobs.executors import Here, executor
 from sweep.jobs.signals import Stop, stop_on_signal
@@ -89,12 +90,18 @@ def run(
     with store.locked(folder), _logged(folder, command(model, folder, smoke, accuracy, certify), jobs, backend) as end:
         computed = _sweep(model, folder, jobs, backend, force, progress)
         if not is_part(folder):
-            if model.optimise is not None:
-                _optimise(replace(model, pareto=None), folder, jobs, progress)
-            _front(model, folder, jobs)
-            _raise_if_cut_short(folder)
+            _search(model, folder, jobs, backend, progress)
         end.append(f"{computed} chunks computed")
     return folder
+
+
+def _search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> None:
+    """Optimum, proof and front, as far as the study asks for them."""
+    if study.optimise is not None:
+        _optimise(replace(study, pareto=None), folder, jobs, progress)
+    prove(study, folder, jobs, backend, progress)
+    _front(study, folder, jobs)
+    _raise_if_cut_short(folder)
 
 
 @contextmanager

@@ -33,6 +33,7 @@ from sweep.families.capabilities import (
     Skeleton,
 )
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
+from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, crank_axis, standing
 
 PARAMETERS = (
@@ -326,6 +327,8 @@ FAMILY = Family(
         PressureEllipse(ellipse),
         CrankRockerLoop(np.ascontiguousarray),
         LimitLocus("swing", sized=("c", "e", "g")),
+        CRANK_ROCKER_BY_AXES,
+        CRANK_ROCKER_BY_ROCKER,
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(rocker_origin),
         CRANK_ROCKER_POINTS,
