@@ -1,7 +1,8 @@
-"""Designs through the outputs of a study, cheapest first; only those within every limit so far go on.
+"""Designs through the outputs of a study, quick routes first; only those within every limit so far go on.
 
 Few designs survive the first limits, and the dear routes cost a millisecond or more however few they are given.  So
-survivors wait before each route until there are enough of them, or until no more come.
+survivors wait before each route until there are enough of them, or until no more come.  Measured times say how many
+are enough, and nothing else: a design's row does not depend on them.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as codes
+from sweep.costs import nanoseconds
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array, Columns
 from sweep.families.chain import stages_of
 from sweep.quantities.names import by_magnitude, error_of, parts
-from sweep.synthesis.fit import NS_FIT, fit_line
+from sweep.synthesis.fit import fit_line
 
 if TYPE_CHECKING:
     from sweep.study import Limit, Study
@@ -238,16 +240,16 @@ class Recalled(Cascade):
 
 
 def levels(study: Study) -> tuple[Level, ...]:
-    """The cascade of a study: its routes, cheapest first, those that must wait for [fit] behind it."""
+    """The cascade of a study: its routes in the order of `Work`, those that must wait for [fit] behind it."""
     found = [Level(route, route.ns_per_design) for route in ordered_routes(study)]
     if study.fit is not None or study.parameter_limits:
         before = sum(_before_fit(study, route) for route in ordered_routes(study))
-        found.insert(before, Level(None, NS_FIT if study.fit is not None else 0.0))
+        found.insert(before, Level(None, nanoseconds("work", "fit") if study.fit is not None else 0.0))
     return tuple(found)
 
 
 def ordered_routes(study: Study) -> tuple[Route, ...]:
-    """The routes of a study, cheapest first, those that must wait for [fit] behind the others."""
+    """The routes of a study in the order of `Work`, those that must wait for [fit] behind the others."""
     found = routes(study.family, study.want, study.accuracy)
     return tuple(sorted(found, key=lambda route: not _before_fit(study, route)))
 

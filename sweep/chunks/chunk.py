@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kernels.status import OK
 from sweep.chunks.cascade import BLOCK, Batch, Cascade, Recalled, levels
+from sweep.costs import nanoseconds
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
@@ -22,12 +23,6 @@ from sweep.synthesis.fit import fit_line
 
 if TYPE_CHECKING:
     from sweep.study import Study
-
-# Measured on one core of a Zen 4 [ns per design]: per parameter, per swept one of a lattice and of a sample (more where
-# its scale is logarithmic), and for what [locus] makes.
-NS_PARAMETER = 6.0
-NS_LATTICE, NS_SAMPLE, NS_SAMPLE_LOG = 3.0, 12.0, 130.0
-NS_LOCUS = 140.0
 
 
 @dataclass(frozen=True)
@@ -75,10 +70,12 @@ def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArra
 
 def parameter_ns(study: Study) -> float:
     """Estimated cost of the parameters of a design [ns]."""
-    own = NS_PARAMETER * len(study.family.parameters) + (NS_LOCUS if study.locus is not None else 0.0)
+    own = nanoseconds("work", "parameter") * len(study.family.parameters)
+    own += nanoseconds("work", "locus") if study.locus is not None else 0.0
     if study.space.kind == "product":
-        return own + NS_LATTICE * len(study.space.axes)
-    return own + sum(NS_SAMPLE_LOG if axis.scale == "log" else NS_SAMPLE for axis in study.space.axes)
+        return own + nanoseconds("work", "axis of a lattice") * len(study.space.axes)
+    plain, log = nanoseconds("work", "axis of a sample"), nanoseconds("work", "axis of a sample, log")
+    return own + sum(log if axis.scale == "log" else plain for axis in study.space.axes)
 
 
 def warm(study: Study) -> None:

@@ -15,7 +15,7 @@ from importlib import import_module
 from sweep.effects.base import Effect
 from sweep.effects.evaluation import effect_poses, on_own_columns, run_design
 from sweep.effects.placing import Placed, stages_of
-from sweep.families.base import Family, Output, Parameter, Step
+from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work
 from sweep.families.chain import Chain
 from sweep.families.members import Machine
 from sweep.quantities.names import stem
@@ -165,7 +165,8 @@ def with_effects(family: Family, effects: tuple[Placed, ...]) -> Family:
             name=placed.name,
             provides=placed.design_outputs,
             run=partial(run_design, family, placed, added, own),
-            ns_per_design=placed.entry.ns_per_design,
+            work=Work.EFFECT,
+            cost=partial(_design_ns, placed.entry),
         )
         for placed in effects
         if placed.design_outputs
@@ -179,6 +180,10 @@ def with_effects(family: Family, effects: tuple[Placed, ...]) -> Family:
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
         dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )
+
+
+def _design_ns(entry: Effect, accuracy: Accuracy) -> float:
+    return entry.ns_per_design
 
 
 def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.families import epicyclic_dwell
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, Work, filled
 from sweep.families.capabilities import Link, Made, Points, Skeleton
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
@@ -70,7 +70,7 @@ FAMILY = Family(
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
     example={"k": 1.3, "a": 0.2, "n": 3.0},
-    steps=(Step("dwell", DWELL_OUTPUTS, dwell, 20000.0),),
+    steps=(Step("dwell", DWELL_OUTPUTS, dwell, work=Work.LONG),),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     uses_phi=False,
     capabilities=(

@@ -190,7 +190,7 @@ FAMILY = Family(
     poses=poses,
     example={"r": 1.0, "l": 6.0, "h": 3.2, "a": 2.9, "b": 4.0, "branch": -1.0},
     steps=(
-        Step("swing", SWING_OUTPUTS, swing, 700.0),
+        Step("swing", SWING_OUTPUTS, swing),
         *(_as_ours(step) for step in crank_rocker.FAMILY.steps if step.name != "limit positions"),
     ),
     derivative_of={"alpha": "dalpha", "dalpha": "d2alpha", "d2alpha": "d3alpha"},

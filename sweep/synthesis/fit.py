@@ -28,8 +28,6 @@ SCALED = ("a", "b", "c", "e", "xi", "eta", "h")
 # whole turn 4e-4 at most (48: up to 2e-2), which is far below what the optimiser moves afterwards.
 SWING_SAMPLES, TURN_SAMPLES = 48, 256
 SWING_ACCURACY = Accuracy(target=1e-6)
-# Measured on one core of a Zen 4 [ns per design], the limit positions of the driving stage included.
-NS_FIT = 7000.0
 
 
 @dataclass(frozen=True)
