@@ -42,7 +42,7 @@ class JointRecords:
     """Positions, directions and their rates at the joints, from which the effects of loads work.
 
     ``fill(designs, angles, motion, per_pose, per_design)`` writes the records that :mod:`kernels.joints` describes,
-    from the pose outputs ``needs`` in ``motion``.  ``follower`` is what the coupler drives.
+    from the pose outputs ``needs`` in ``motion``, in the frame of the family.  ``follower`` is what the coupler drives.
     """
 
     fill: FillFunction
