@@ -1,4 +1,4 @@
-"""One chunk of a sweep: a run of consecutive designs, their parameters, and the rows that come of them."""
+"""One chunk of a sweep: consecutive designs of the space, their parameters, and the rows computed from them."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ChunkResult:
-    """Rows of a chunk, how many of its designs ended with which status (dropped rows included), and on which limit.
+    """Rows of a chunk, and the number of its designs by status and by missed limit; designs without a row count too.
 
-    A design counts with the first limit it misses, in the order in which they are tested.
+    A design counts with the first limit that it misses, in the order in which limits are tested.
     """
 
     columns: Columns
@@ -99,9 +99,9 @@ def compute_chunk(
     should_stop: Callable[[], bool] = lambda: False,
     known: Columns | None = None,
 ) -> ChunkResult:
-    """Rows of the designs start, ..., stop - 1: index, parameters, wanted outputs, status.
+    """Compute the rows of the designs start, ..., stop - 1: index, parameters, wanted outputs, status.
 
-    The work goes block by block, so memory is a few blocks and the rows that are kept.
+    Designs are made and worked on in blocks, so memory holds a few blocks and the rows that are kept.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def compute_chunk(
 
 
 def _result(study: Study, cascades: Sequence[Cascade]) -> ChunkResult:
-    """The rows and counts of cascades that have been fed all designs of a chunk."""
+    """Collect rows and counts from cascades that have been fed all designs of a chunk."""
     types = output_columns(study)
     found = Batch.joined([cascade.end(tuple(types)) for cascade in cascades]).ordered()
     columns: Columns = {"design": found.index}

@@ -290,6 +290,17 @@ def filled(
     return columns | {"status": status}
 
 
+def poses_of(kernel: Callable[..., object], names: tuple[str, ...]) -> PoseFunction:
+    """The poses of a kernel(designs, cos, sin, status, one array or None per output)."""
+
+    def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+        status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
+        dtype = np.result_type(designs, angles.cos)
+        return filled(kernel, (designs, angles.cos, angles.sin), names, wanted, status, dtype)
+
+    return poses
+
+
 def filled_with_places(
     kernel: Callable[..., object],
     designs: Array,
