@@ -21,6 +21,7 @@ from sweep.families.base import Accuracy, Family
 from sweep.reductions.margins import margin_suffixes, own_step
 from sweep.reductions.steps import own_steps, steps_of
 from sweep.study import OutputSettings, load_study
+from tests.bench.costs import PAGE, REASONS, page
 
 ROOT = Path(__file__).resolve().parents[1]
 STUDIES = sorted(path.parent for path in (ROOT / "studies").glob("*/study.toml"))
@@ -44,6 +45,12 @@ def test_table_has_a_row_for_everything_that_is_asked_for_and_no_other():
     assert rows.pop("work") == set(re.findall(r'nanoseconds\("work", "([^"]+)"\)', text))
     assert not rows
     assert all(ns >= 0.0 for found in sweep.costs.table().values() for ns in found.values())
+
+
+def test_page_shows_the_table_and_says_why_a_pose_is_dear():
+    poses = sweep.costs.table()["poses"]
+    assert PAGE.read_text() == page(poses)
+    assert {name for name, ns in poses.items() if ns > 3.0 * poses["rssr"]} == set(REASONS)
 
 
 def test_what_is_not_measured_yet_has_a_cost(monkeypatch):
