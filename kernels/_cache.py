@@ -177,7 +177,7 @@ class _Place(UserProvidedCacheLocator):
         return place
 
     def get_source_stamp(self) -> str:
-        """What the code is of; the folder's name says it already."""
+        """Nothing: the folder's name is made of the sources' hash already, so numba need not compare them."""
         return CACHE_DIR.name
 
 
@@ -186,7 +186,7 @@ _said: set[str] = set()
 
 @contextmanager
 def _locked() -> Iterator[None]:
-    """One process at a time; where there are no locks nothing is kept, and that is said once."""
+    """Let one process at a time write.  Where the file system has no locks nothing is kept, and one warning says so."""
     try:
         with FileLock(CACHE_DIR / "_lock", fallback_to_soft=False):
             yield

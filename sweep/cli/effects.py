@@ -117,7 +117,7 @@ def page() -> str:
         "dwells have no effects, sliders no shaft bearings.",
         "",
         "Units are any consistent set; in studies and datasets mm, t, s, hence N, N mm, MPa. Costs are measured on one",
-        "core (`make bench-effects`), each effect alone with all its outputs, the motion it needs not counted.",
+        "core (`make bench`), each effect alone with all its outputs, the motion it needs not counted.",
         "",
         "| effect | key | families | what | needs | cost |",
         "|---|---|---|---|---|---|",

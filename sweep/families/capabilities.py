@@ -43,7 +43,7 @@ class JointRecords:
     """Positions, directions and their rates at the joints, from which the effects of loads work.
 
     ``fill(designs, angles, motion, per_pose, per_design)`` writes the records that :mod:`kernels.joints` describes,
-    from the pose outputs ``needs`` in ``motion``.  ``follower`` is what the coupler drives.
+    from the pose outputs ``needs`` in ``motion``, in the frame of the family.  ``follower`` is what the coupler drives.
     """
 
     fill: FillFunction
@@ -73,8 +73,9 @@ class GuidedPoint:
     """A coupler point that runs along a line: its position is linear in the directions of crank, coupler and rocker.
 
     ``shares(designs)``, (n, 6), are the factors that the proof of its maxima takes (:mod:`sweep.reductions.travel`).
-    The coupler point, the line and the scale can be fitted: ``fitted`` are the parameters of point and line, ``scaled``
-    the lengths that grow with the stroke, ``direction`` the parameter of the line's direction.
+    The coupler point, the line and the scale can be fitted: ``fitted`` are the parameters of the point along and across
+    the coupler, of the line's direction and of its distance from the origin, ``scaled`` the lengths that grow with the
+    stroke, ``direction`` the third of the fitted ones.
     """
 
     shares: DesignMap

@@ -181,7 +181,10 @@ def _relation(name: str, table: dict[str, Any], members: Mapping[str, Member]) -
         return ShaftTorque(
             name, tuple((f"{known[x][0]}.drive_torque{known[x][1]}", members[known[x][0]].ratio) for x in given)
         )
-    return Shaking(name, tuple(known[part] for part in given))
+    placed = [known[part] for part in given]
+    if len({member for member, _ in placed}) < len(placed):
+        raise InputError(kind, given, "each member once: the stages of a chain have different frames", where)
+    return Shaking(name, tuple(placed))
 
 
 def _stages(family: Family) -> list[str]:

@@ -1,4 +1,4 @@
-"""Starts spread over processes (the search is Python at heart, threads would wait for each other)."""
+"""Starts spread over processes: most of a search runs in Python, where threads would wait for each other."""
 
 from __future__ import annotations
 

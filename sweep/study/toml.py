@@ -67,7 +67,7 @@ def _fault(file: Path, text: str) -> StudyError:
 
 
 def _said(text: str, message: str) -> str:
-    """What tomllib says, with the line of the other place where something stands twice."""
+    """Repeat what tomllib says; for a key that stands twice, add the line of the first one."""
     line, column = text.count("\n") + 1, len(text) - text.rfind("\n")
     message = message.replace("at end of document", f"at line {line}, column {column}, the end of the file")
     place = _PLACE.search(message)
