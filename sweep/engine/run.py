@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from sweep.jobs.flow import Executor
     from sweep.study import Study
 
+# What is written together with the optimum.
+OF_OPTIMUM = (store.CURVES, store.SENSITIVITY)
+
 # So often chunks are computed that somebody removes or damages while the run goes on.
 ROUNDS = 3
 
@@ -229,9 +232,11 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
 
     note = store.read_plan(folder) or {}
     key = optimum_key(study, note)
-    place = store.beside(folder) / store.OPTIMUM
-    found = read_survey(place)
-    if note.get("optimised") == key and place.is_file() and (found is None or found.ended != "time"):
+    place = store.beside(folder)
+    found = read_survey(place / store.OPTIMUM)
+    tables = [store.OPTIMUM, *(OF_OPTIMUM if study.tolerance is None else (*OF_OPTIMUM, store.TOLERANCE))]
+    whole = all((place / name).is_file() for name in tables)
+    if note.get("optimised") == key and whole and (found is None or found.ended != "time"):
         return
     assert study.optimise is not None
     store.write_plan(folder, note | {"optimised": None})

@@ -88,6 +88,9 @@ class Dask:
                     self._cluster = LocalCluster(n_workers=jobs, threads_per_worker=1, dashboard_address="127.0.0.1:0")
                 self._client = Client(self._cluster or self.address, timeout=CONNECT_SECONDS)
                 self._client.wait_for_workers(1, timeout=FIRST_WORKER_SECONDS)
+            except RuntimeError as error:
+                self.__exit__(None, None, None)
+                raise WorkerDied(f"the processes of a Dask cluster did not come up ({error})") from error
             except (OSError, ValueError, TimeoutError) as error:
                 self.__exit__(None, None, None)
                 where = self.address or "this machine"

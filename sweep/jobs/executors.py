@@ -8,6 +8,7 @@ parent dies, is the affair of its executor.
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -25,6 +26,7 @@ T = TypeVar("T")
 
 GRACE = 1.0  # for processes to hand back what they have once they are to stop [s]
 MOST_JOBS = 1024
+UNTRACKED = "ignore:resource_tracker:UserWarning"
 
 
 class Here:
@@ -78,7 +80,12 @@ def worker_processes(jobs: int) -> Any:
     from joblib.externals.loky import get_reusable_executor
     from joblib.externals.loky.backend import resource_tracker
 
-    resource_tracker.ensure_running()  # it would unblock signals in the middle
+    # A program that leaves at once leaves semaphores behind; the tracker removes them and need not warn of it.
+    sys.warnoptions.append(UNTRACKED)
+    try:
+        resource_tracker.ensure_running()  # it would unblock signals in the middle
+    finally:
+        sys.warnoptions.remove(UNTRACKED)
     with unheard():
         return get_reusable_executor(max_workers=jobs, initializer=depend_on_parent, initargs=(os.getpid(),))
 
