@@ -69,7 +69,8 @@ class Processes:
             try:
                 yield from flow(submit, numbers, lambda: jobs, stop, GRACE)
             except BrokenProcessPool as error:
-                raise WorkerDied(f"a worker process died ({error})") from error
+                reason = str(error).partition("\n")[0]  # the rest is about the exit codes of all of them
+                raise WorkerDied(f"a worker process died ({reason.rstrip('.')})") from error
             finally:
                 if stop:  # whoever is still at work, or still starting up, does not listen
                     pool.shutdown(wait=False, kill_workers=True)

@@ -1,4 +1,4 @@
-"""The command line in a process to which faults happen: small chunks, a slow disk, and marks of the stage it is in.
+"""The command line in a process to which faults happen: small chunks, and marks of the stage it is in.
 
 ``python -m tests.faults.child MARKS FAULT VERB ...``; FAULT is ``none`` or one of `FAULTS`.
 """
@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import functools
-import os
-import stat
 import sys
 import time
 from collections.abc import Callable
@@ -21,9 +19,7 @@ import sweep.optimise.solve
 import sweep.optimise.study
 import sweep.report
 from sweep.__main__ import main
-from tests.engine_study import SMALL, SMALL_CHUNKS
-
-PAUSE = 0.03  # of every write of a chunk or table [s]
+from tests.engine_study import SMALL_CHUNKS
 
 
 def marked(module: Any, name: str, stage: str, marks: Path) -> None:
@@ -37,18 +33,6 @@ def marked(module: Any, name: str, stage: str, marks: Path) -> None:
         return function(*arguments, **options)
 
     setattr(module, name, wrapper)
-
-
-def slow_disk() -> None:
-    sync = os.fsync
-
-    def slow(descriptor: int) -> None:
-        about = os.fstat(descriptor)
-        if stat.S_ISREG(about.st_mode) and about.st_size > SMALL:
-            time.sleep(PAUSE)
-        sync(descriptor)
-
-    os.fsync = slow  # type: ignore[assignment]
 
 
 def clock_back() -> None:
@@ -93,7 +77,6 @@ if __name__ == "__main__":
     marked(sweep.report, "write_report", "report", place)
     vars(sweep.chunks.plan).update(SMALL_CHUNKS)
     sweep.optimise.solve.SERIAL_LOOKS = 0  # every start goes to a process
-    slow_disk()
     FAULTS[sys.argv[2]]()
     del sys.argv[1:3]
     main()

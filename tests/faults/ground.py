@@ -26,6 +26,8 @@ from tests.test_optimise_study import STUDY
 
 TABLES = (OPTIMUM, CURVES, SENSITIVITY, TOLERANCE, PARETO)
 ROBUST = '\n[tolerance]\nlengths = "0.3 mm"\nangles = "0.2 deg"\nrobust = "95 %"\n'
+SLOW_DISK = Path(__file__).parent / "slow_disk"
+PAUSE = 0.05  # of every write of a chunk or table [s]
 SECONDS = 120.0  # for any one program
 STAGES = ("sweep", "optimiser", "tolerance", "front", "report")
 
@@ -84,12 +86,16 @@ class Ground:
                 patch.setattr(sweep.chunks.plan, name, value)
             run(study, designs, jobs=1)
 
-    def begin(self, marks: Path, *words: object, fault: str = "none", **options: Any) -> subprocess.Popen[str]:
+    def begin(
+        self, marks: Path, *words: object, fault: str = "none", pause: float = PAUSE, env: dict[str, str] | None = None,
+        **options: Any,
+    ) -> subprocess.Popen[str]:  # fmt: skip
         """The command line in a process and a session of its own."""
         command = [sys.executable, "-m", "tests.faults.child", str(marks), fault, *map(str, words)]
+        slow = {"PYTHONPATH": f"{SLOW_DISK}{os.pathsep}{ROOT}", "FAULTS_PAUSE": str(pause)}
         return subprocess.Popen(
-            command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
-            **options,
+            command, cwd=ROOT, env=os.environ | slow | (env or {}), text=True, start_new_session=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **options,
         )  # fmt: skip
 
     def swept(self, study: Path, folder: Path, *, without: tuple[str, ...] = ()) -> Path:

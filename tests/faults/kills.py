@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from sweep.dataset.store import PARETO, beside
-from tests.faults.ground import SECONDS, TABLES, Ground, Kind, Outcome, alone, files, last_line, session
+from tests.faults.ground import PAUSE, SECONDS, TABLES, Ground, Kind, Outcome, alone, files, last_line, session
 
 LEAVE_SECONDS = 2.0 + 1.5  # promised, and what a busy machine may take beyond
 
@@ -34,6 +34,11 @@ def reached(process: subprocess.Popen[str], marks: Path, stage: str) -> bool:
         assert time.monotonic() < deadline, f"no {stage} after {SECONDS:g} s"
         time.sleep(0.005)
     return True
+
+
+def _await_chunk(process: subprocess.Popen[str], designs: Path) -> None:
+    while process.poll() is None and not list(designs.glob("part-*")):
+        time.sleep(0.005)
 
 
 def strike(process: subprocess.Popen[str], whom: str, number: int) -> None:
@@ -69,8 +74,9 @@ def struck(
     marks = folder / "marks"
     verb = ("report", designs) if stage == "report" else ("run", study, "--out", designs, "--backend", backend)
     process = ground.begin(marks, *verb)
-    reached(process, marks, stage)
-    time.sleep(moments.uniform(0.0, ground.seconds[stage]))
+    if reached(process, marks, stage) and backend == "dask":  # its processes come up meanwhile
+        _await_chunk(process, designs)
+    time.sleep(moments.uniform(0.0, ground.seconds[stage] if backend != "dask" else 2.0 * PAUSE))
     before = files(designs)
     begin = time.monotonic()
     strike(process, whom, number)

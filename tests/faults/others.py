@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import random
 import shutil
 import time
@@ -14,13 +13,16 @@ from tests.faults.damage import Damage, cut, delete, empty, flip
 from tests.faults.ground import SECONDS, Ground, Kind, Outcome, files, last_line
 from tests.faults.kills import reached
 
+# A pause of every write that lets another program start meanwhile [s].
+LONG = 2.0
+
 
 def two_runs(ground: Ground, folder: Path, moments: random.Random) -> Outcome:
     """The second one is refused; the first one goes on."""
     designs = folder / "designs"
-    first = ground.begin(folder / "marks", "run", ground.plain, "--out", designs)
+    first = ground.begin(folder / "marks", "run", ground.plain, "--out", designs, pause=LONG)
     reached(first, folder / "marks", "sweep")
-    time.sleep(moments.uniform(0.0, 0.2 * ground.seconds["sweep"]))
+    time.sleep(moments.uniform(0.0, LONG))
     second = ground.begin(folder / "second", "run", ground.plain, "--out", designs)
     text, _ = second.communicate(timeout=SECONDS)
     rest, _ = first.communicate(timeout=SECONDS)
@@ -44,7 +46,7 @@ def damaged_cache(damage: Damage, ground: Ground, folder: Path, moments: random.
         damage([path], moments)
     process = ground.begin(
         folder / "marks", "run", ground.plain, "--out", folder / "designs",
-        env=os.environ | {"XDG_CACHE_HOME": str(folder / "cache")},
+        env={"XDG_CACHE_HOME": str(folder / "cache")},
     )  # fmt: skip
     text, _ = process.communicate(timeout=SECONDS)
     found = Outcome(process.returncode, last_line(text))
