@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sweep.dataset import store
+from sweep.dataset.tables import TABLES, altered, digests, metadata
 from sweep.engine.log import circumstances, command
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
 from sweep.errors import Interrupted, SearchCutShort, StoreError, TimeUsedUp, WorkerDied
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 # What is written together with the optimum.
-OF_OPTIMUM = (store.CURVES, store.SENSITIVITY)
+OF_OPTIMUM = (store.CURVES, store.SENSITIVITY, store.TOLERANCE)
 
 # So often chunks are computed that somebody removes or damages while the run goes on.
 ROUNDS = 3
@@ -234,8 +235,8 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     key = optimum_key(study, note)
     place = store.beside(folder)
     found = read_survey(place / store.OPTIMUM)
-    tables = [store.OPTIMUM, *(OF_OPTIMUM if study.tolerance is None else (*OF_OPTIMUM, store.TOLERANCE))]
-    whole = all((place / name).is_file() for name in tables)
+    noted = [name for name in OF_OPTIMUM if name in (note.get(TABLES) or {})]
+    whole = not altered(place, note, [store.OPTIMUM, *noted])
     if note.get("optimised") == key and whole and (found is None or found.ended != "time"):
         return
     assert study.optimise is not None
@@ -247,7 +248,7 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
             raise Interrupted(number, text) from None
-    store.write_plan(folder, note | {"optimised": key})
+    store.write_plan(folder, note | {"optimised": key, TABLES: digests(place, [store.OPTIMUM, *OF_OPTIMUM])})
 
 
 def _raise_if_cut_short(folder: Path) -> None:
@@ -269,6 +270,13 @@ def _front(study: Study, folder: Path, jobs: int) -> None:
 
     note = store.read_plan(folder) or {}
     key = optimum_key(study, note)
+    place, known = store.beside(folder), dict(note.get(TABLES) or {})
+    damaged = altered(place, note, [store.PARETO])
+    if damaged:
+        (place / store.PARETO).unlink(missing_ok=True)
+    if store.PARETO in known and (damaged or metadata(place / store.PARETO).get(b"key") != key.encode()):
+        del known[store.PARETO]  # of a front that is over: the new one grows step by step
+        store.write_plan(folder, note | {TABLES: known})
     with stop_on_signal() as stop:
         try:
             front_study(study, folder, key, lambda: bool(stop), jobs)
@@ -276,6 +284,8 @@ def _front(study: Study, folder: Path, jobs: int) -> None:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while searching the front; run again to continue"
             raise Interrupted(number, text) from None
+    if digests(place, [store.PARETO]).items() - known.items():
+        store.write_plan(folder, note | {TABLES: known | digests(place, [store.PARETO])})
 
 
 def _end(begin: float, outcome: str, text: str) -> dict[str, Any]:

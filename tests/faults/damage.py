@@ -78,21 +78,15 @@ def damaged_chunk(damage: Damage, ground: Ground, folder: Path, moments: random.
 
 
 def damaged_table(damage: Damage, ground: Ground, folder: Path, moments: random.Random) -> Outcome:
-    """A table beside the chunks is damaged; whoever has deleted it, as the message says, gets it anew."""
+    """A table beside the chunks is damaged, or gone: verify says so, and the next run makes it anew."""
     designs = ground.swept(ground.rich, folder)
     table = beside(designs) / moments.choice(TABLES)
     damage([table], moments)
-    found = Outcome()
-    if table.is_file():
-        names = [str(one) for one in sweep.verify(designs, designs=0).findings if one.path == table]
-        found.said = names[0] if names else ""
-        found.wrong += [] if names else [f"verify finds nothing in {table.name}"]
-        table.unlink()
-        try:
-            ground.resume(ground.rich, designs)
-        except LinksweepError as error:
-            found.wrong.append(f"the next run ended with {error}")
-    return ground.settled(ground.rich, designs, {}, found)
+    names = [str(one) for one in sweep.verify(designs, designs=0).findings if one.path == table]
+    found = Outcome(said=names[0] if names else "")
+    found.wrong += [] if names else [f"verify finds nothing in {table.name}"]
+    sound = {name: data for name, data in files(designs).items() if name != table.name}
+    return ground.settled(ground.rich, designs, sound, found, damaged=True)
 
 
 def damaged_note(name: str, damage: Damage, ground: Ground, folder: Path, moments: random.Random) -> Outcome:
