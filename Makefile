@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -27,6 +27,9 @@ test: $(VENV)/ready  ## run the tests
 
 test-long: $(VENV)/ready  ## the tests that take minutes: thousands of hostile tables
 	$(BIN)/python -m pytest -m long
+
+test-faults: $(VENV)/ready  ## kills, signals, full disks, damage: 150 kills and 170 other faults, a table; about 15 minutes
+	$(BIN)/python -m tests.faults
 
 lint: $(VENV)/ready  ## ruff
 	$(BIN)/ruff check .
@@ -69,6 +72,12 @@ bench-peers: $(VENV)/ready  ## the planar case next to pylinkage, which gets an 
 	$(PYTHON) -m venv .venv-peers
 	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable . 'pylinkage[numba]'
 	.venv-peers/bin/python -m studies.accuracy.peers --out results/accuracy
+
+bench-object-store: $(VENV)/ready  ## a dataset by way of an object store; its server gets an environment of its own
+	$(PYTHON) -m venv .venv-store
+	.venv-store/bin/python -m pip install --quiet 'moto[server]'
+	.venv-store/bin/moto_server -H 127.0.0.1 -p 5005 & server=$$!; trap "kill $$server" EXIT; sleep 5; \
+	$(BIN)/python -m tests.bench.object_store 127.0.0.1:5005
 
 search-worse: $(VENV)/ready  ## look for poses with larger errors than any known; appends to tests/oracle/worst_found.json
 	$(BIN)/python -m tests.search.worse

@@ -60,6 +60,7 @@ from sweep.dataset.parts import (
     part_of,
     parts,
 )
+from sweep.dataset.tables import metadata
 from sweep.errors import IncompleteWarning, InputError, StoreError
 
 if TYPE_CHECKING:
@@ -243,21 +244,13 @@ def is_complete(folder: str | Path) -> bool:
 
 def front_is_complete(path: Path) -> bool:
     """Whether the search of the front in this file has ended."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        about = (pq.read_schema(path).metadata or {}) if path.is_file() else {}
-    except pa.ArrowException:
-        return False
+    about = metadata(path)
     return about.get(b"complete") == b"true" or about.get(b"ended") == b"time"
 
 
 def front_cut_short(path: Path) -> str | None:
     """``5 of 28`` steps of a front whose search time has cut short; None for a whole one, or where there is none."""
-    import pyarrow.parquet as pq
-
-    about = (pq.read_schema(path).metadata or {}) if path.is_file() else {}
+    about = metadata(path)
     return None if about.get(b"complete") != b"false" else about.get(b"steps", b"").decode() or None
 
 
