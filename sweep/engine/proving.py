@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from sweep.dataset import store
 from sweep.errors import Interrupted
-from sweep.jobs.executors import Executor, Here, executor
+from sweep.jobs.executors import Here, executor
+from sweep.jobs.flow import Executor
 from sweep.jobs.signals import stop_on_signal
 
 if TYPE_CHECKING:

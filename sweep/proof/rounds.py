@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sweep.dataset import store
 from sweep.families.base import Array
 from sweep.families.capabilities import Numbers, Searched
-from sweep.jobs.executors import Executor
+from sweep.jobs.flow import Executor
 from sweep.jobs.signals import Stop
 from sweep.proof.question import Question
 
