@@ -56,7 +56,7 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     from sweep.dataset.store import beside
     from sweep.exchange.export import FORMATS
     from sweep.exchange.export import export as write
-    from sweep.exchange.folder import chosen
+    from sweep.report.chosen import chosen
 
     found = chosen(folder, design)
     if out is None:
