@@ -70,6 +70,7 @@ function startMotion(data) {
   if (data.size > 0 && hasWebGL()) {
     document.body.classList.add("spatial");
     view = new MechanismView(find(".view"), data);
+    host.view = view; // for whoever looks in from the console
   }
   find(".designs").addEventListener("change", (event) => choose(Number(event.target.value)));
   slider.addEventListener("input", () => { rest(); set(Number(slider.value)); });
