@@ -12,16 +12,13 @@ import pytest
 import trimesh
 
 import sweep
-from sweep.evaluation.joints import parts
-from sweep.exchange.scene import shown_name
-from sweep.families import NAMES, family
-from sweep.families.capabilities import Skeleton
+from sweep.exchange.scene import over, shown_name
+from sweep.families import NAMES
 from tests.browser import DRAWS, launcher, opened, pixels
 from tests.test_export import scaled
 
 pytestmark = pytest.mark.browser
 POSES = 36
-LINKED = [name for name in NAMES if family(name).find(Skeleton) is not None]
 LOAD = """(data) => new Promise((done, fail) => {
     const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
     new THREE.GLTFLoader().parse(bytes.buffer, '', (gltf) => {
@@ -74,11 +71,10 @@ def browser():
         found.close()
 
 
-@pytest.mark.parametrize("name", LINKED)
+@pytest.mark.parametrize("name", NAMES)
 def test_model_opens_and_turns_as_the_joints_do(name, viewer, browser, tmp_path):
     file = sweep.export(name, scaled(name), tmp_path / "model.glb", poses=POSES, speed=math.pi)
-    angles = np.linspace(0.0, 2.0 * math.pi, POSES + 1)
-    (part,) = parts(name, scaled(name), angles)
+    (part,) = over(name, scaled(name), 0.0, POSES)
     with opened(browser, viewer) as page:
         assert page.evaluate(LOAD, base64.b64encode(file.read_bytes()).decode()) == pytest.approx([2.0], abs=1e-6)
         for pose in (0, 7, 30):
@@ -86,6 +82,7 @@ def test_model_opens_and_turns_as_the_joints_do(name, viewer, browser, tmp_path)
             for joint, path in part.joints.items():
                 x, y, z = path[pose]
                 # metres, y upwards; float32 of 300 mm
-                np.testing.assert_allclose(shown[shown_name(joint)], [1e-3 * x, 1e-3 * z, -1e-3 * y], atol=2e-7)
+                expected = [1e-3 * x, 1e-3 * z, -1e-3 * y]
+                np.testing.assert_allclose(shown[shown_name(joint)], expected, atol=2e-7, err_msg=joint)
         page.evaluate(SHOW)
         assert (pixels(page.locator("canvas")).min(axis=2) < 0.9).mean() > 0.002

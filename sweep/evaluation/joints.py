@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kernels.status import OK
 from sweep.errors import InputError
+from sweep.evaluation.poses import check_march
 from sweep.evaluation.tables import design_matrix, numbers
 from sweep.families import Mechanism
 from sweep.families import family as find_family
@@ -91,7 +92,8 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike) -> pd.DataFrame:
     ----------
     mechanism : a family's name, a list of them for a chain, a table of members for a machine
     design : the parameters of one design, in one length unit and rad
-    phi : angles of the driving shaft [rad], one or a plain list
+    phi : angles of the driving shaft [rad], one or a plain list; over an interval values of its variable, of a march
+        equal steps of one turn from 0
 
     Returns
     -------
@@ -153,6 +155,7 @@ def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
     angles = np.atleast_1d(numbers(phi, "phi", "phi, position"))
     if angles.ndim != 1 or not np.isfinite(angles).all():
         raise InputError("phi", phi, "finite angles [rad], one or a plain list", "phi")
+    check_march(family, angles)
     given = Angles.of(np.ascontiguousarray(angles[None, :]))
     if isinstance(family, Machine):
         return [part for member in family.members for part in _of_member(family, member, matrix, given)]

@@ -13,7 +13,7 @@ from sweep.errors import InputError
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.joints import parts
 from sweep.evaluation.poses import evaluate, pose_wants
-from sweep.exchange.scene import shown_name
+from sweep.exchange.scene import over, shown_name
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.plot.space import VIEWS, draw_frame, is_spatial, projection
@@ -88,7 +88,7 @@ def mechanism(
     """
     if view is not None and view != "space" and view not in VIEWS:
         raise InputError("view", view, f"space, {', '.join(VIEWS)}", "plot")
-    found = parts(mechanism, design, phi + np.linspace(0.0, 2.0 * math.pi, 181))
+    found = over(mechanism, design, phi, 180)
     frames = list(dict.fromkeys(part.frame for part in found))
     with house_style():
         figure = new_figure(5.4 * len(frames), 4.6)

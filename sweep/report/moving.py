@@ -6,7 +6,6 @@ The scripts in ``templates/live`` read them.  Lists of numbers are base64 of lit
 from __future__ import annotations
 
 import base64
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -19,7 +18,7 @@ from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.joints import Part, parts
 from sweep.exchange.scene import Placed, extent, shown_name, side_by_side
 from sweep.families.base import Angles, Array, Family
-from sweep.families.domain import Interval
+from sweep.families.domain import Interval, equal_steps
 from sweep.report.curves import FAR_LIMIT, in_window, is_angle, limit_values, shown_curves, turns_fully
 from sweep.report.quantities import quantity
 
@@ -79,7 +78,7 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     family = data.study.family
     design = {name: float(shown.row[name]) for name in family.parameter_names}
     matrix = np.array([list(design.values())])
-    phi = _inputs(family, matrix)
+    phi = equal_steps(family.domain, matrix, POSES)
     found = family.poses(matrix, Angles.of(phi[None, :]), frozenset([*names, family.position]))
     path = np.asarray(found[family.position][0], np.float64)
     closed = not isinstance(family.domain, Interval)
@@ -94,14 +93,6 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     window = data.study.window
     inside = np.zeros(POSES, np.bool_) if window is None else in_window(curves[family.position], window)
     return Motion(shown, phi[order], free, curves, inside, _placed(family, design, phi[order]))
-
-
-def _inputs(family: Family, matrix: Array) -> Array:
-    """Equal steps of one turn from 0, or of the whole interval."""
-    if isinstance(family.domain, Interval):
-        first, last = family.domain.ends(matrix)
-        return np.linspace(float(first[0]), float(last[0]), POSES, dtype=np.float64)
-    return np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
 
 
 def _placed(family: Family, design: dict[str, float], phi: Array) -> tuple[Placed, ...]:
