@@ -160,9 +160,7 @@ def test_mujoco_has_the_reduced_inertia_of_the_masses(tmp_path):
     design = scaled("rssr") | {"speed": 100.0}
     for body, (mass, inertia) in bodies.items():
         design |= {f"m_{body}": mass, f"com_{body}_x": 9.0}
-        # A slender coupler: its spin between two balls is free, and must not count.
-        design |= {f"j_{body}_xx": 1e-9 * inertia if body == "coupler" else inertia}
-        design |= {f"j_{body}_yy": inertia, f"j_{body}_zz": inertia}
+        design |= {f"j_{body}_xx": 0.6 * inertia, f"j_{body}_yy": inertia, f"j_{body}_zz": inertia}
     design |= {"com_crank_y": 2.0, "com_rocker_z": -3.0, "j_rocker_xz": 0.02}
     plain = {key: value for key, value in design.items() if key != "speed"}
     model = mujoco.MjModel.from_xml_path(str(sweep.export("rssr", plain, tmp_path / "m.xml")))
@@ -179,8 +177,8 @@ def test_mujoco_has_the_reduced_inertia_of_the_masses(tmp_path):
         rates[free] = np.linalg.lstsq(rows[:, free], -rows[:, crank], rcond=None)[0]
         momentum = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, momentum, rates)
-        # t mm^2 are 1e-3 kg m^2; the coupler's spin is left with 1e-9 of its inertia
-        assert rates @ momentum == pytest.approx(1e-3 * expected, rel=2e-9)
+        # t mm^2 are 1e-3 kg m^2
+        assert rates @ momentum == pytest.approx(1e-3 * expected, rel=1e-13)
 
 
 def test_mujoco_couples_the_stages_of_a_chain(tmp_path):
@@ -201,6 +199,14 @@ def test_mujoco_is_refused_where_there_is_no_such_linkage_and_for_a_mass_without
         sweep.export("slotted", scaled("slotted"), tmp_path / "m.xml")
     with pytest.raises(sweep.InputError, match="no mass without"):
         sweep.export("rssr", scaled("rssr") | {"m_crank": 1e-4}, tmp_path / "m.xml")
+    with pytest.raises(sweep.InputError, match="a positive mass"):
+        sweep.export("rssr", scaled("rssr") | {"m_crank": 0.0}, tmp_path / "m.xml")
+    plate = {"m_coupler": 1e-4, "j_coupler_xx": 0.1, "j_coupler_yy": 0.01, "j_coupler_zz": 0.01}
+    with pytest.raises(sweep.InputError, match="none exceeds the sum of the others"):
+        sweep.export("rssr", scaled("rssr") | plate, tmp_path / "m.xml")
+    machine = {f"needle.{name}": x for name, x in scaled("rssr").items()}
+    with pytest.raises(sweep.InputError, match="no machine: export each member"):
+        sweep.export({"needle": "rssr"}, machine, tmp_path / "m.xml")
     assert not list(tmp_path.iterdir())
 
 
