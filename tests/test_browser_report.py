@@ -201,6 +201,19 @@ def test_without_webgl_the_curves_move_beside_a_still_picture(address, launch):
         assert page.locator(".cursor").first.get_attribute("x1") != before
 
 
+@pytest.mark.parametrize(("study", "spatial"), [("feed208", True), ("backrest", True), ("crank-rocker-atlas", False)])
+def test_reports_of_a_march_of_an_interval_and_without_curves_open(study, spatial, browser, tmp_path):
+    folder = sweep.run(STUDY.parent / study, out=tmp_path / "designs", smoke=True)
+    with opened(browser, write_report(folder).as_uri(), 390) as page:
+        assert page.locator(".view canvas").count() == spatial
+        assert page.locator("#lines path").count() > 2
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+        if spatial:
+            first = page.evaluate(BALLS)
+            page.evaluate(SET, 0.5)
+            assert page.evaluate(BALLS) != first
+
+
 def test_without_scripts_the_figures_stand_still(address, browser):
     with opened(browser, address, java_script_enabled=False) as page:
         assert page.locator("#live").is_hidden()

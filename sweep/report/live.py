@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sweep.report.scan import Cells
 
 LIVE = TEMPLATES / "live"
-SCRIPTS = ("three.min.js", "view.js", "charts.js", "lines.js", "page.js")
+SPATIAL, PLANE = ("three.min.js", "view.js"), ("charts.js", "lines.js", "page.js")
 
 
 def live(data: Dataset, cells: Sequence[Cells]) -> dict[str, Any]:
@@ -25,7 +25,7 @@ def live(data: Dataset, cells: Sequence[Cells]) -> dict[str, Any]:
     motion = moving(data, shown)
     lines = parallel(data, cells, shown)
     spatial = motion is not None and motion["size"] > 0.0
-    scripts = [name for name in SCRIPTS if spatial or not name.startswith("three")]
+    scripts = [*(SPATIAL if spatial else ()), *PLANE]
     return {
         "shown": shown,
         "motion_data": "" if motion is None else _json(motion),

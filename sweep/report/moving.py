@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -92,14 +92,16 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     curves[family.position] = path[order] - (path[start] if counted else 0.0)
     window = data.study.window
     inside = np.zeros(POSES, np.bool_) if window is None else in_window(curves[family.position], window)
-    return Motion(shown, phi[order], free, curves, inside, _placed(family, design, phi[order]))
+    return Motion(shown, phi[order], free, curves, inside, _placed(family, design, phi, order))
 
 
-def _placed(family: Family, design: dict[str, float], phi: Array) -> tuple[Placed, ...]:
+def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray[np.intp]) -> tuple[Placed, ...]:
+    """Stages and members with their joints in the order of the poses; a march is made in its own order."""
     try:
         found = parts(family, design, phi)
     except InputError:  # a mechanism without joints has curves only
         return ()
+    found = [replace(part, joints={name: path[order] for name, path in part.joints.items()}) for part in found]
     known = [part for part in found if any(np.isfinite(path).all() for path in part.joints.values())]
     return tuple(side_by_side(known)) if known else ()
 

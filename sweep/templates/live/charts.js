@@ -3,6 +3,11 @@
 
 const WIDE = 340, HIGH = 160, LEFT = 46, RIGHT = 14, TOP = 8, BOTTOM = 22;
 
+// Numbers that Python has packed as base64 of float32.
+function numbersOf(text) {
+  return new Float32Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+}
+
 function svg(name, attributes, parent) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);

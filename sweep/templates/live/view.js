@@ -8,10 +8,6 @@ function colourOf(name) {
   return new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue(name).trim());
 }
 
-function numbersOf(text) {
-  return new Float32Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
-}
-
 // Coordinates of a joint at a share of the turn, between two poses; a fixed joint has one pose.
 function jointAt(path, share, closed, into) {
   const poses = path.length / 3;
