@@ -225,6 +225,6 @@ def test_designs_offered_are_the_optimum_one_of_each_other_basin_and_the_referen
     optima = pd.read_parquet(folder.parent / "_optimum.parquet")
     best = optima[optima["role"] == "optimum"].iloc[0]
     others = optima[(optima["role"] == "start") & (optima["status"] == 0) & (optima["basin"] != best["basin"])]
-    names = [f"alternative {k + 1}" for k in range(others["basin"].nunique())]
+    names = [f"another optimum, {k + 1}" for k in range(others["basin"].nunique())]
     with opened(browser, address) as page:
         assert page.locator("#live .designs label").all_inner_texts() == ["optimum", *names, "reference"]

@@ -30,7 +30,7 @@ def shown_designs(data: Dataset) -> list[Shown]:
         return []
     found = [Shown(data.result_name, "result", _objective(data, data.result), data.result)]
     others = enumerate(_other_basins(data), 1)
-    found += [Shown(f"alternative {k}", "alternative", _objective(data, row), row) for k, row in others]
+    found += [Shown(f"another optimum, {k}", "alternative", _objective(data, row), row) for k, row in others]
     found += _of_front(data)
     if data.reference is not None:
         found.append(Shown("reference", "reference", _objective(data, data.reference), data.reference))
