@@ -21,7 +21,7 @@ from sweep.exchange.points import reader_of
 from sweep.exchange.reading import read_points
 from sweep.exchange.scene import over
 from sweep.families import NAMES, family
-from sweep.families.domain import March
+from sweep.families.domain import Interval, March
 
 DRAWN = NAMES
 LINKED = ("rssr", "rssp", "guide", "four_bar", "slider_crank", "kim_dison")  # crank, coupler, rocker or slider
@@ -275,6 +275,22 @@ def test_law_has_units_in_its_headings_and_its_metadata(tmp_path):
     assert schema.field("s").metadata[b"unit"] == b"mm"
     assert schema.field("s").metadata[b"definition"].startswith(b"slider displacement")
     np.testing.assert_array_equal(pd.read_parquet(file)["d2s"], poses["d2s"])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_law_of_every_family_runs_over_its_whole_domain(name, tmp_path):
+    design, domain = scaled(name), family(name).domain
+    table = pd.read_csv(sweep.export(name, design, tmp_path / "law.csv", "law", poses=48, speed=10.0))
+    assert (table["status"] == 0).all() and len(table) == 48
+    steps = table[f"{domain.name} [{domain.unit.replace('length', 'mm')}]"].to_numpy()
+    if isinstance(domain, Interval):
+        ends = domain.ends(np.array([[design.get(p.name, p.default) for p in family(name).parameters]], float))
+        assert [steps[0], steps[-1]] == pytest.approx([end[0] for end in ends])
+        assert not any(column.startswith("t ") for column in table)
+    else:
+        np.testing.assert_allclose(steps, 2.0 * math.pi / 48 * np.arange(48), atol=1e-15)
+        np.testing.assert_allclose(table["t [s]"], steps / 10.0, rtol=1e-15)
+    assert sum(column.startswith(f"{family(name).position} [") for column in table) == 1
 
 
 def test_bad_requests_are_refused(tmp_path):

@@ -52,8 +52,8 @@ class Panel {
     this.drawAxes();
     this.shade = svg("g", { class: "shade" }, this.frame);
     const clip = `clip-${curve.name.replace(/[^a-z0-9]/gi, "-")}`;
-    const window = svg("clipPath", { id: clip }, this.frame);
-    svg("rect", { x: LEFT, y: TOP, width: WIDE - LEFT - RIGHT, height: HIGH - TOP - BOTTOM }, window);
+    const field = svg("clipPath", { id: clip }, this.frame);
+    svg("rect", { x: LEFT, y: TOP, width: WIDE - LEFT - RIGHT, height: HIGH - TOP - BOTTOM }, field);
     const inside = svg("g", { "clip-path": `url(#${clip})` }, this.frame);
     for (const limit of curve.limits) {
       svg("line", { class: "limit", x1: LEFT, x2: WIDE - RIGHT, y1: this.y(limit), y2: this.y(limit) }, inside);
