@@ -16,6 +16,7 @@ from sweep.evaluation.poses import evaluate, pose_wants
 from sweep.exchange.scene import over, shown_name
 from sweep.families import Mechanism
 from sweep.families import family as find_family
+from sweep.families.domain import Interval
 from sweep.plot.space import VIEWS, draw_frame, is_spatial, projection
 from sweep.report.curves import motion_figure
 from sweep.report.figures import OPTIMUM, house_style, new_figure
@@ -54,6 +55,8 @@ def motion(
     import pandas as pd
 
     family = find_family(mechanism)
+    if isinstance(family.domain, Interval):
+        raise InputError("mechanism", family.name, "a mechanism that turns: this one runs over an interval", "plot")
     asked = want.split(",") if isinstance(want, str) else want
     names = (
         list(dict.fromkeys(motion_curves(family))) if asked is None else pose_wants(family, [n.strip() for n in asked])
