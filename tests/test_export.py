@@ -19,7 +19,7 @@ from sweep.cli import main
 from sweep.evaluation.joints import parts
 from sweep.exchange.points import reader_of
 from sweep.exchange.reading import read_points
-from sweep.exchange.scene import over
+from sweep.exchange.scene import over, turn
 from sweep.families import NAMES, family
 from sweep.families.domain import Interval, March
 
@@ -122,14 +122,14 @@ def test_drawing_of_a_spatial_stage_has_three_views_and_of_a_planar_one_the_fron
         assert len(links) == 3 * views
 
 
-def solved(model, data, phi):
+def solved(model, data, phi, crank="crank"):
     """Joint positions that close MuJoCo's own loop at a crank angle, by Newton with MuJoCo's own Jacobians."""
-    data.qpos[model.joint("crank").qposadr[0]] = phi
+    data.qpos[model.joint(crank).qposadr[0]] = phi
     for _ in range(30):
         mujoco.mj_forward(model, data)
         rows = data.efc_J.reshape(-1, model.nv)[: data.ne]
         gap = data.efc_pos[: data.ne].copy()
-        free = [k for k in range(model.nv) if k != model.joint("crank").dofadr[0]]
+        free = [k for k in range(model.nv) if k != model.joint(crank).dofadr[0]]
         step = np.zeros(model.nv)
         step[free] = np.linalg.lstsq(rows[:, free], -gap, rcond=None)[0]
         mujoco.mj_integratePos(model, data.qpos, step, 1.0)
@@ -198,6 +198,38 @@ def test_mujoco_couples_the_stages_of_a_chain(tmp_path):
     assert data.qpos[model.joint("crank 2").qposadr[0]] == pytest.approx(0.7 - psi, abs=1e-15)
 
 
+def test_mujoco_moves_the_members_of_a_machine_together(tmp_path):
+    place = {"at": [1.0, 30.0, 12.0], "axis": [0.0, 1.0, 1.0], "zero": [1.0, 0.0, 0.0]}
+    machine = sweep.machine(
+        {
+            "needle": ["rssr", "guide"],
+            "looper": {"family": "rssr", "ratio": -2, "offset": 0.4, "place": place},
+            "feed": {"family": "four_bar", "driver": "needle.psi1", "ratio": 1},
+        }
+    )
+    design = {f"needle.{key}": value for key, value in chain_design().items()}
+    design |= {f"{member}.{key}": value for member, name in (("looper", "rssr"), ("feed", "four_bar"))
+               for key, value in scaled(name).items()}  # fmt: skip
+    model = mujoco.MjModel.from_xml_path(str(sweep.export(machine, design, tmp_path / "m.xml")))
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    data = mujoco.MjData(model)
+    assert model.neq == 4 + 3  # loops, and shafts of stage 2, looper and feed
+    mujoco.mj_forward(model, data)
+    assert np.abs(data.efc_pos[: data.ne]).max() < 1e-12
+    for phi in np.linspace(0.05, 0.6, 12):  # on from pose to pose: Newton stays in its assembly
+        solved(model, data, phi, "crank needle 1")
+        for part in parts(machine, design, phi):
+            if part.member != "needle":  # the stages of the needle stand side by side
+                for joint in "bc":
+                    at = 1000.0 * data.site(f"{joint.upper()} {part.member}").xpos
+                    np.testing.assert_allclose(at, part.joints[joint][0] + shift_of(part, machine, design), atol=1e-9)
+
+
+def shift_of(part, machine, design):
+    (one,) = (one for one in turn(machine, design, 0.0, 120) if one.part.member == part.member)
+    return one.shift
+
+
 def test_mujoco_is_refused_where_there_is_no_such_linkage_and_for_a_mass_without_inertia(tmp_path):
     with pytest.raises(sweep.InputError, match="crank, coupler and rocker"):
         sweep.export("slotted", scaled("slotted"), tmp_path / "m.xml")
@@ -208,9 +240,10 @@ def test_mujoco_is_refused_where_there_is_no_such_linkage_and_for_a_mass_without
     plate = {"m_coupler": 1e-4, "j_coupler_xx": 0.1, "j_coupler_yy": 0.01, "j_coupler_zz": 0.01}
     with pytest.raises(sweep.InputError, match="none exceeds the sum of the others"):
         sweep.export("rssr", scaled("rssr") | plate, tmp_path / "m.xml")
-    machine = {f"needle.{name}": x for name, x in scaled("rssr").items()}
-    with pytest.raises(sweep.InputError, match="no machine: export each member"):
-        sweep.export({"needle": "rssr"}, machine, tmp_path / "m.xml")
+    machine = {f"needle.{name}": x for name, x in scaled("rssp").items()}
+    machine |= {f"looper.{name}": x for name, x in scaled("slotted").items()}
+    with pytest.raises(sweep.InputError, match="mjcf of looper"):
+        sweep.export({"needle": "rssp", "looper": "slotted"}, machine, tmp_path / "m.xml")
     assert not list(tmp_path.iterdir())
 
 

@@ -20,8 +20,10 @@ from sweep.evaluation.joints import Part
 from sweep.evaluation.poses import evaluate
 from sweep.exchange.inertia import inertial
 from sweep.exchange.scene import Placed, extent
-from sweep.families.base import Angles, Array
+from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import JointRecords
+from sweep.families.members import Machine
+from sweep.quantities import names
 
 METRES = {"mm": 1e-3, "m": 1.0}
 THICK = 0.008  # of a bar, of the extent of all joints
@@ -34,7 +36,7 @@ class Loop:
 
     Parameters
     ----------
-    tag : what stands behind names, a space and the number of the stage in a chain
+    tag : what stands behind names: member and number of the stage
     follower : "rocker" or "slider"
     A, B, C, D : joints; D is C on a slider
     crank, coupler, driven : axes of the bodies, (3, 3); x along the link, z along its axis
@@ -55,50 +57,73 @@ class Loop:
     turn: Array
 
 
-def write_mjcf(name: str, placed: list[Placed], design: Mapping[str, float], path: Path, unit: str) -> None:
+def write_mjcf(family: Family, placed: list[Placed], design: Mapping[str, float], path: Path, unit: str) -> None:
     """The model in its first pose.
 
     Bodies get the masses, centres and inertias (``m_crank``, ``com_crank_x``, ``j_crank_xx`` ...) of the design, else
-    those of steel bars.  Stages of a chain are coupled at their common shaft.
+    those of steel bars.  Stages of a chain are coupled at their common shaft, members of a machine to the first one.
 
     Raises
     ------
     InputError
-        for a machine, a stage that has no crank, coupler and rocker or slider, a mass without inertia.
+        for a stage that has no crank, coupler and rocker or slider, a mass without inertia.
     """
-    root = Xml.Element("mujoco", model=name)
+    root = Xml.Element("mujoco", model=family.name)
     Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="auto")
     option = Xml.SubElement(root, "option")
     world, equality = Xml.SubElement(root, "worldbody"), Xml.SubElement(root, "equality")
     thick = THICK * extent([one.part for one in placed]) * METRES[unit]
-    before = ""
-    for one in placed:
-        part = one.part
-        loop = _loop(one, float(design.get(f"finger{part.stage}", 0.0)), METRES[unit])
-        _stage(world, equality, loop, part, design, unit, thick)
-        if not before:
-            gravity = np.array([float(design.get(f"gravity_{axis}{part.stage}", 0.0)) for axis in "xyz"])
+    for k, one in enumerate(placed):
+        part, before = one.part, placed[k - 1].part if k else None
+        own = _of_member(design, part.member)
+        loop = _loop(one, own.get(f"finger{part.stage}", 0.0), METRES[unit])
+        _stage(world, equality, loop, part, own, unit, thick)
+        if before is None:
+            gravity = np.array([own.get(f"gravity_{axis}{part.stage}", 0.0) for axis in "xyz"])
             option.set("gravity", words(loop.turn @ gravity * METRES[unit]))
-        else:
-            sense = design.get(f"kappa{part.stage}", 1.0)
-            Xml.SubElement(
-                equality, "joint", name=f"shaft{loop.tag}", joint1=f"crank{loop.tag}", joint2=f"rocker {before}",
-                polycoef=words(np.array([0.0, sense, 0.0, 0.0, 0.0])),
-            )  # fmt: skip
-        before = part.stage
+        elif before.member == part.member:
+            _geared(equality, f"crank{loop.tag}", f"rocker{_tag(before)}", own.get(f"kappa{part.stage}", 1.0))
+        elif isinstance(family, Machine):
+            _geared(equality, f"crank{loop.tag}", *_driver(family, part.member, f"crank{_tag(placed[0].part)}"))
     actuators = Xml.SubElement(root, "actuator")
-    Xml.SubElement(actuators, "motor", name="drive", joint=f"crank {placed[0].part.stage}".strip())
+    Xml.SubElement(actuators, "motor", name="drive", joint=f"crank{_tag(placed[0].part)}")
     Xml.indent(root)
     path.write_text(Xml.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+
+
+def _tag(part: Part) -> str:
+    """What stands behind the names of a stage: member and number, each behind a space."""
+    return "".join(f" {word}" for word in (part.member, part.stage) if word)
+
+
+def _of_member(design: Mapping[str, float], member: str) -> dict[str, float]:
+    """The columns of one member without its name, of a family all."""
+    head = f"{member}." if member else ""
+    return {name.removeprefix(head): float(value) for name, value in design.items() if name.startswith(head)}
+
+
+def _driver(machine: Machine, name: str, first: str) -> tuple[str, float]:
+    """The joint that drives a member's crank, and the ratio of both; ``first`` is the crank of the first member."""
+    members = {member.name: member for member in machine.members}
+    member = members[name]
+    if member.driver is None:
+        return first, member.ratio / machine.members[0].ratio
+    # Of the families that are served, the angle that drives another member is that of a rocker.
+    other, output = member.driver
+    return " ".join(word for word in ("rocker", other, names.parts(output).stage) if word), float(member.ratio)
+
+
+def _geared(equality: Xml.Element, joint: str, other: str, ratio: float) -> None:
+    """Couple two joints, from where they stand in the first pose."""
+    Xml.SubElement(
+        equality, "joint", name=f"shaft of {joint}", joint1=joint, joint2=other,
+        polycoef=words(np.array([0.0, ratio, 0.0, 0.0, 0.0])),
+    )  # fmt: skip
 
 
 def _loop(one: Placed, finger: float, metres: float) -> Loop:
     """The stage's joints and directions, from its joint records."""
     part = one.part
-    if part.member:
-        raise InputError(
-            "format", f"mjcf of {part.label}", "no machine: export each member by its own family", "export"
-        )
     records = part.family.find(JointRecords)
     if records is None:
         allowed = "a family or chain of linkages with crank, coupler and rocker or slider"
@@ -121,7 +146,7 @@ def _loop(one: Placed, finger: float, metres: float) -> Loop:
     )
     coupler, driven = np.column_stack([s, np.cross(n, s), n]), np.column_stack([rho, tau, k])
     return Loop(
-        f" {part.stage}" if part.stage else "", records.follower, a, b, c, d,
+        _tag(part), records.follower, a, b, c, d,
         turn @ crank, turn @ coupler, turn @ driven, finger, turn,
     )  # fmt: skip
 
