@@ -148,11 +148,11 @@ def _grid(mechanism: Family, table: Table, phi: ArrayLike) -> NDArray[np.float64
         allowed = f"either phi= for every design, or a column {variable}, not both"
         raise InputError(variable, "a column", allowed, f"table of {mechanism.name}")
     grid = _values_of_the_variable(phi)
-    _check_march(mechanism, grid)
+    check_march(mechanism, grid)
     return grid
 
 
-def _check_march(mechanism: Family, grid: NDArray[np.float64]) -> None:
+def check_march(mechanism: Family, grid: NDArray[np.float64]) -> None:
     """Refuse crank angles that are no march over one turn."""
     if not isinstance(mechanism.domain, March):
         return

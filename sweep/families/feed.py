@@ -117,6 +117,14 @@ EXAMPLE = {
 }  # fmt: skip
 
 
+SKELETON = Skeleton(
+    {"d": standing(PARAMETERS, "h_e"), "l": standing(PARAMETERS, "xE", "yE")},
+    (
+        Link("rocker", ("d", "h")), Link("eccentric", ("l", "e")),
+        Link("lift coupler", ("e", "f")), Link("rack", ("h", "f", "t")),
+    ),
+)  # fmt: skip
+
 FAMILY = Family(
     name="feed",
     title="feed rack on a horizontal and a lift chain",
@@ -133,12 +141,6 @@ FAMILY = Family(
     uses_phi=False,
     capabilities=(
         Points({k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")}),
-        Skeleton(
-            {"d": standing(PARAMETERS, "h_e"), "l": standing(PARAMETERS, "xE", "yE")},
-            (
-                Link("rocker", ("d", "h")), Link("eccentric", ("l", "e")),
-                Link("lift coupler", ("e", "f")), Link("rack", ("h", "f", "t")),
-            ),
-        ),
+        SKELETON,
     ),
 )  # fmt: skip

@@ -16,6 +16,7 @@ from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.drawing import mechanism_caption
 from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
 from sweep.report.files import copy_tables, write_survivors
+from sweep.report.live import live
 from sweep.report.scan import Cells, Scan, most_telling, scan
 from sweep.report.turns import curves, reference_row
 
@@ -157,4 +158,5 @@ def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Sa
         axes=len(cells),
         speed=answer.rpm(data.study.speed),
         today=date.today().isoformat(),
+        **live(data, cells),
     )
