@@ -20,6 +20,7 @@ from sweep.families.members import Machine, Member
 from sweep.families.relations import Timing
 from sweep.quantities.names import error_of, is_place
 from sweep.reductions.catalogue import output, quantity
+from sweep.reductions.dimensions import size
 from sweep.reductions.margins import NAMES as MARGINS
 from sweep.reductions.margins import combined, margins
 from sweep.reductions.sampling import TWO_PI
@@ -40,6 +41,8 @@ def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) 
             own.setdefault(member[0].name, []).append(member[1])
         elif name in MARGINS:
             margin.append(name)
+        elif size(machine, name) is not None:
+            left.append(name)
         elif timing is not None:
             found.append(_timing(machine, timing, accuracy))
         elif quantity(machine, name) is not None:

@@ -78,4 +78,5 @@ FAMILY = Family(
     ),
     example=EXAMPLE,
     analytic=False,
+    capabilities=(feed.SIZES,),
 )

@@ -7,8 +7,9 @@ import numpy as np
 from kernels.families import feed
 from kernels.families.feed import triad
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Points
+from sweep.families.capabilities import Dimensions, Points
 from sweep.families.feed import ROCKER, SIGMA
+from sweep.families.skeletons import links
 
 
 def _eccentric(number: int) -> tuple[Parameter, ...]:
@@ -77,5 +78,8 @@ FAMILY = Family(
     derivative_of={
         "x_t": "dx_t", "dx_t": "d2x_t", "y_t": "dy_t", "dy_t": "d2y_t", "chi": "dchi", "dchi": "d2chi",
     },
-    capabilities=(Points({"t": ("x_t", "y_t", None)}),),
+    capabilities=(
+        Dimensions(links("h_a h_b h_c rh q1 q2 q3"), optional=("rE2", "rE3")),
+        Points({"t": ("x_t", "y_t", None)}),
+    ),
 )  # fmt: skip

@@ -161,6 +161,7 @@ class Program:
         measures = [self.objective, *(r.measure for r in self.requirements)]
         self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
         self.scalars = tuple(dict.fromkeys(name for m in measures for name in m.numbers))
+        self.pieces = {name: piece for m in measures for name, piece in zip(m.numbers, m.pieces, strict=False)}
         self.places = any(m.is_angle for m in measures)
 
     def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
@@ -288,6 +289,11 @@ class _Layout:
         if m.kind == "scalar":
             return [({first + self.scalars.index(m.name): m.sign}, 0.0)]
         names = self.curves.family.parameter_names
+        if m.kind in ("least", "most"):
+            each = [float(piece(self.design[None, :])[0]) for piece in m.pieces]
+            order = sorted(range(len(each)), key=each.__getitem__, reverse=m.kind == "most")
+            asked = order if above == (m.kind == "most") else order[:1]
+            return [({first + self.scalars.index(m.numbers[k]): 1.0}, 0.0) for k in asked]
         sizes = {name: float(self.design[names.index(name)]) for name in m.numbers}
         if above:
             return [({first + self.scalars.index(name): sign}, 0.0) for name in sizes for sign in (1.0, -1.0)]

@@ -87,4 +87,6 @@ def _outward(measure: Measure, inner: float) -> float:
         return 1.0 / (2.0 * math.sqrt(max(-inner * (1.0 + inner), 1e-300)))
     if measure.inner == "ratio":
         return 2.0 * math.pi / (2.0 * math.pi - inner) ** 2
+    if measure.inner == "square":
+        return 0.5 / math.sqrt(abs(inner)) if inner else math.nan
     return 1.0

@@ -15,6 +15,7 @@ from sweep.families.domain import Turn
 from sweep.families.members import Machine, Member
 from sweep.quantities.names import parts
 from sweep.quantities.reduction import Mode, prefixes, reduction_of, split
+from sweep.reductions.dimensions import sizes
 from sweep.reductions.events import event_names
 from sweep.reductions.extrema import Request
 from sweep.reductions.size import SIZE, lengths
@@ -187,7 +188,8 @@ def output_names(family: Family) -> tuple[str, ...]:
         own = [o.name for relation in family.relations for o in relation.outputs]
         reductions = [f"{prefix}{name}" for name in own for prefix in prefixes(family.domain)]
         events = [name for event in family.events for name in event_names(family, event)]
-        return (*dotted, *MARGIN_TEXTS, *(t.name for t in family.timings), *events, *reductions)
+        whole = [name for name in sizes(family) if "." not in name]
+        return (*dotted, *MARGIN_TEXTS, *whole, *(t.name for t in family.timings), *events, *reductions)
     names = [o.name for step in family.steps for o in step.provides]
     assemblies = family.every(Assembly)
     if assemblies:
@@ -199,6 +201,7 @@ def output_names(family: Family) -> tuple[str, ...]:
     names += [name for event in family.events for name in event_names(family, event)]
     names += [STAY.name] if isinstance(family.domain, Turn) else []
     names += [SIZE.name] if lengths(family) else []
+    names += sizes(family)
     names += [f"{prefix}{pose}" for pose in family.pose_names for prefix in prefixes(family.domain)]
     return tuple(dict.fromkeys(names))
 

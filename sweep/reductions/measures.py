@@ -17,6 +17,7 @@ from sweep.families.capabilities import Assembly
 from sweep.families.members import Machine
 from sweep.quantities.names import parts, stem
 from sweep.reductions.catalogue import output, quantity
+from sweep.reductions.dimensions import Piece, size
 from sweep.reductions.size import SIZE, lengths
 
 # A crank that turns must keep this much of Delta/b^2 at its worst pose: cos^2 of 89.94 degrees.
@@ -24,9 +25,9 @@ ROTATABLE_MARGIN = 1e-6
 
 Kind: TypeAlias = Literal[
     "max_abs", "max", "min", "range", "phi_max_abs", "phi_max", "phi_min", "ext", "fold", "phi_ext", "phi_fold", "phi0",
-    "difference", "scalar", "lengths",
+    "difference", "scalar", "lengths", "least", "most",
 ]  # fmt: skip
-Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable"]
+Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable", "square"]
 
 # What the optimiser follows of the two limit positions: which end, or the difference of both.
 LIMIT_KINDS: dict[str, Kind] = {
@@ -55,7 +56,8 @@ class Measure:
     """A design output as ``sign`` * (reduction ``kind`` of its series), read back through ``inner``.
 
     ``parts`` are the two angles of a "difference", the second minus the first.  ``numbers`` are plain numbers instead
-    of series: the output itself ("scalar"), or parameters of which it is the largest magnitude ("lengths").
+    of series: the output itself ("scalar"), parameters of which it is the largest magnitude ("lengths"), or the pieces
+    of which it is the "least" or the "most".  ``pieces`` computes the latter.
     """
 
     name: str
@@ -65,6 +67,7 @@ class Measure:
     sign: float = 1.0
     numbers: tuple[str, ...] = ()
     parts: tuple[Measure, ...] = ()
+    pieces: tuple[Piece, ...] = ()
 
     @property
     def is_angle(self) -> bool:
@@ -79,6 +82,8 @@ class Measure:
             return 2.0 * math.pi * value / (1.0 + value)
         if self.inner == "rotatable":
             return ROTATABLE_MARGIN * value
+        if self.inner == "square":
+            return math.copysign(value * value, value)  # a negative limit stays one that always holds, or never
         return value
 
     def from_inner(self, value: float) -> float:
@@ -90,6 +95,8 @@ class Measure:
             return value / (2.0 * math.pi - value)
         if self.inner == "rotatable":
             return 1.0 if value > 0.0 else 0.0
+        if self.inner == "square":
+            return math.copysign(math.sqrt(abs(value)), value)
         return value
 
 
@@ -141,6 +148,11 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     if asked is not None and asked.route == "reduction":
         inside = window if family.pose_output[asked.of].windowed and asked.modes == (0,) else None
         return Measure(name, cast(Kind, asked.kind), (curve(family, asked.of, inside),))
+    found = size(family, name)
+    if found is not None:
+        numbers = tuple(f"{name}, piece {k}" for k in range(len(found.pieces)))
+        kind: Kind = "least" if found.least else "most"
+        return Measure(name, kind, (), "square" if found.squared else "same", numbers=numbers, pieces=found.pieces)
     steps = {output.name for step in family.steps for output in step.provides}
     if asked is not None or name in steps or name in family.parameter_names:
         return Measure(name, "scalar", (), numbers=(name,))
