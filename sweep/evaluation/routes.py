@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from sweep.errors import InputError
+from sweep.evaluation.boxes import box_route
 from sweep.evaluation.members import machine_routes
 from sweep.evaluation.route import Part, Route
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
@@ -16,6 +17,7 @@ from sweep.families.domain import March
 from sweep.families.members import Machine
 from sweep.quantities.names import at_stage, error_of
 from sweep.quantities.reduction import reduction_of
+from sweep.reductions.box import box
 from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.events import event_outputs
 from sweep.reductions.means import mean_squares
@@ -45,6 +47,10 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
         own is None and one is not None and one.route == "margin" and not one.stage for own, one in asked.values()
     )
     for name, (own, one) in asked.items():
+        extent = box(family, name)
+        if extent is not None:
+            found.append(box_route(family, extent, accuracy))
+            continue
         if own is not None and not (together and one is not None and one.route == "margin"):
             step, stage = own
             steps.setdefault((step.name, stage.number if stage else 0), (step, stage, []))[2].append(name)

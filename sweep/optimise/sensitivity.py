@@ -85,6 +85,8 @@ def _outward(measure: Measure, inner: float) -> float:
     """Derivative of the output by its inner value."""
     if measure.inner == "pressure":  # inner = -cos^2 of the angle
         return 1.0 / (2.0 * math.sqrt(max(-inner * (1.0 + inner), 1e-300)))
+    if measure.inner == "transmission":  # inner = sin^2 of the angle
+        return 1.0 / (2.0 * math.sqrt(max(inner * (1.0 - inner), 1e-300)))
     if measure.inner == "ratio":
         return 2.0 * math.pi / (2.0 * math.pi - inner) ** 2
     if measure.inner == "square":

@@ -16,8 +16,10 @@ from sweep.families.base import Family
 from sweep.families.capabilities import Assembly
 from sweep.families.members import Machine
 from sweep.quantities.names import parts, stem
+from sweep.reductions.box import box
 from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.dimensions import Piece, size
+from sweep.reductions.margins import TRANSMISSION
 from sweep.reductions.size import SIZE, lengths
 
 # A crank that turns must keep this much of Delta/b^2 at its worst pose: cos^2 of 89.94 degrees.
@@ -25,9 +27,9 @@ ROTATABLE_MARGIN = 1e-6
 
 Kind: TypeAlias = Literal[
     "max_abs", "max", "min", "range", "phi_max_abs", "phi_max", "phi_min", "ext", "fold", "phi_ext", "phi_fold", "phi0",
-    "difference", "scalar", "lengths", "least", "most",
+    "difference", "scalar", "lengths", "least", "most", "box",
 ]  # fmt: skip
-Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable", "square"]
+Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable", "square", "transmission"]
 
 # What the optimiser follows of the two limit positions: which end, or the difference of both.
 LIMIT_KINDS: dict[str, Kind] = {
@@ -78,6 +80,8 @@ class Measure:
         """Inner value that stands for a value of the output."""
         if self.inner == "pressure":
             return -(math.cos(value) ** 2)
+        if self.inner == "transmission":
+            return math.sin(value) ** 2
         if self.inner == "ratio":
             return 2.0 * math.pi * value / (1.0 + value)
         if self.inner == "rotatable":
@@ -91,6 +95,8 @@ class Measure:
         if self.inner == "pressure":
             # 1 - cos^2 may come out as -1e-16 where coupler force and velocity are in line.
             return math.atan2(math.sqrt(max(1.0 + value, 0.0)), math.sqrt(-value)) if value <= 0.0 else math.nan
+        if self.inner == "transmission":
+            return math.atan2(math.sqrt(value), math.sqrt(max(1.0 - value, 0.0))) if value >= 0.0 else math.nan
         if self.inner == "ratio":
             return value / (2.0 * math.pi - value)
         if self.inner == "rotatable":
@@ -148,6 +154,11 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     if asked is not None and asked.route == "reduction":
         inside = window if family.pose_output[asked.of].windowed and asked.modes == (0,) else None
         return Measure(name, cast(Kind, asked.kind), (curve(family, asked.of, inside),))
+    extent = box(family, name)
+    if extent is not None:
+        numbers = tuple(f"{name}, still {k}" for k in range(len(extent.still)))
+        curves = tuple(curve(family, of) for of in extent.curves)
+        return Measure(name, "box", curves, numbers=numbers, pieces=extent.still)
     found = size(family, name)
     if found is not None:
         numbers = tuple(f"{name}, piece {k}" for k in range(len(found.pieces)))
@@ -165,4 +176,6 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
 def _margin_measure(name: str, kind: str, series: tuple[Series, ...]) -> Measure:
     if kind == "max_pressure_angle":
         return Measure(name, "min", series, "pressure", sign=-1.0)
+    if kind == TRANSMISSION:
+        return Measure(name, "min", series, "transmission")
     return Measure(name, "min", series, "rotatable" if kind == "rotatable" else "same")

@@ -82,7 +82,7 @@ def _searchable(family: Family, output: Output, bounds: tuple[float, ...], side:
     if found.inner == "rotatable" or output.jumps:
         faults.value(("pareto", "output"), output.name, "a quantity that changes steadily")
         return False
-    if found.inner == "pressure" and not all(0.0 < bound < 0.5 * math.pi for bound in bounds):
+    if found.inner in ("pressure", "transmission") and not all(0.0 < bound < 0.5 * math.pi for bound in bounds):
         faults.value(("pareto", side), list(bounds), "angles between 0 and 90 deg")
         return False
     return True
