@@ -8,6 +8,7 @@ COSTS: dict[str, tuple[float, float]] = {
     "pressure": (58.0, 0.0),
     "pressure_extrema": (0.0, 2500.0),
     "coupler": (66.0, 0.0),
+    "shaking": (17.0, 0.0),
     "kinetostatics": (250.0, 0.0),
     "slider_kinetostatics": (250.0, 0.0),
     "friction": (770.0, 0.0),
