@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sweep.cli.listing import aligned, main_outputs
+from sweep.quantities.names import without_minus
 
 if TYPE_CHECKING:
     from sweep.engine.estimate import Estimate
@@ -42,7 +43,8 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     left = [name for name in main_outputs(study.family) if name not in study.want]
     lines += ["", "will not be computed, because nothing asks for it", f"  {', '.join(left)}"]
     if study.objective is not None:
-        lines += ["", f"to be made small: {study.objective.output}"]
+        large = without_minus(study.objective.output)
+        lines += ["", f"to be made large: {large}" if large else f"to be made small: {study.objective.output}"]
     if study.optimise is not None:
         settings = study.optimise
         brake = "" if settings.time_budget is None else f"; emergency brake after {duration(settings.time_budget)}"

@@ -241,6 +241,9 @@ class _Layout:
         return self._bounded(m, above=m.sign < 0.0)
 
     def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        if m.kind == "minus":
+            of = m.parts[0]
+            return [({k: -w for k, w in t.items()}, -shift) for t, shift in (self.lower if above else self.upper)(of)]
         if m.numbers:
             return self._numbers(m, above)
         if m.kind == "difference":

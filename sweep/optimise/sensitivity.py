@@ -83,6 +83,8 @@ def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
 
 def _outward(measure: Measure, inner: float) -> float:
     """Derivative of the output by its inner value."""
+    if measure.kind == "minus":
+        return _outward(measure.parts[0], -inner)
     if measure.inner == "pressure":  # inner = -cos^2 of the angle
         return 1.0 / (2.0 * math.sqrt(max(-inner * (1.0 + inner), 1e-300)))
     if measure.inner == "transmission":  # inner = sin^2 of the angle

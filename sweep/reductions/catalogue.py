@@ -13,7 +13,7 @@ from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
 from sweep.families.domain import Turn
 from sweep.families.members import Machine, Member
-from sweep.quantities.names import parts
+from sweep.quantities.names import parts, without_minus
 from sweep.quantities.reduction import Mode, prefixes, reduction_of, split
 from sweep.reductions.box import NAMES as BOXES
 from sweep.reductions.box import box, boxes
@@ -153,6 +153,10 @@ def output(family: Family, name: str) -> Output:
     InputError
         if the family has no such output; the message gives the nearest name.
     """
+    of = without_minus(name)
+    if of:
+        found = output(family, of)
+        return replace(found, name=name, text=f"negative of {of}: {found.text}")
     if isinstance(family, Machine):
         member = family.split(name)
         if member is not None:

@@ -119,7 +119,7 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
             best, value = found.best_row[objective.output], value_of(data.optimum, objective.output)
             if not compared(objective.output, value) <= compared(objective.output, best) + 1e-6 * abs(best):
                 shown = quantity(objective.output, data.units.get(objective.output, ""))
-                faults.append(f"the optimiser ended above the best design of the sweep, {shown.show(best)}")
+                faults.append(f"the optimiser ended behind the best design of the sweep, {shown.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
 
 

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, replace
 
 from sweep.families.domain import Turn
-from sweep.quantities.names import is_error, is_place, parts, without_error
+from sweep.quantities.names import is_error, is_place, parts, without_error, without_minus
 from sweep.quantities.reduction import split
 from sweep.study.units import internal_unit
 
@@ -77,6 +77,9 @@ def with_unit(text: str, unit: str) -> str:
 def quantity(name: str, unit: str) -> Quantity:
     """How the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
     unit = internal_unit(unit)
+    if of := without_minus(name):  # what is to be made large is shown as itself
+        shown = quantity(of, unit)
+        return replace(shown, name=name, factor=-shown.factor, speed_scale=-shown.speed_scale)
     if is_error(name):
         shown = quantity(without_error(name), unit)
         return Quantity(name, f"error of {shown.symbol}", f"error of the {shown.words}", shown.unit, shown.factor)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from sweep.dataset import store
-from sweep.quantities.names import is_flag
+from sweep.quantities.names import is_flag, without_minus
 from sweep.report.quantities import number, quantity
 
 if TYPE_CHECKING:
@@ -96,7 +96,9 @@ def slopes(data: Dataset) -> list[Slope]:
         step, step_words = STEPS.get(units.get(name, ""), (0.1, "0.1"))
         if not value > 0.0 or math.isnan(row["growing"]):
             continue
-        up, down = (100.0 * step * x / value for x in (row["growing"], -row["shrinking"]))
+        share = 100.0 * step / value
+        share = -share if without_minus(data.study.objective.output) else share  # shown as what is made large
+        up, down = (share * x for x in (row["growing"], -row["shrinking"]))
         ranked.append(Slope(name, step_words, up, down))
     return sorted(ranked, key=lambda slope: -max(abs(slope.growing), abs(slope.shrinking)))
 

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Output, Parameter, Unit
+from sweep.quantities.names import without_minus
 from sweep.study.design import read_entry
 from sweep.study.faults import Faults, Key
 from sweep.study.limits import read_output_name
@@ -47,7 +48,7 @@ def read_pareto(
     output = read_output_name(family, section.output, place, faults)
     if output is None or len(given) != 1:
         return None
-    if output.name == objective:
+    if output.name in (objective, without_minus(objective or "")):
         faults.value(place, output.name, "another output than the objective")
         return None
     key: Key = ("pareto", given[0])
