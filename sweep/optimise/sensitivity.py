@@ -13,6 +13,7 @@ from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
 from sweep.quantities.names import is_flag
+from sweep.reductions.catalogue import output as described
 from sweep.reductions.measures import Measure
 
 TIE = 1e-6  # extrema this near to the largest one (relative) share it
@@ -39,6 +40,7 @@ def sensitivities(
     -------
     Rows ``parameter``, ``output``, ``value``, ``growing`` and ``shrinking`` (per internal unit of the parameter: mm,
     rad or 1), nan where the output does not exist.  Derivatives are exact to rounding (docs/optimiser.md, Gradients).
+    An output that is constant in pieces, such as a count, has none: it has no rows.
     """
     varied = [k for k, p in enumerate(family.parameters) if p.unit in DIMENSIONS and p.choices is None]
     sizes = {
@@ -50,7 +52,7 @@ def sensitivities(
     fixed = {n: float(x) for n, x in zip(family.parameter_names, design, strict=True) if n not in names}
     rows: dict[str, list[Any]] = {name: [] for name in ("parameter", "output", "value", "growing", "shrinking")}
     for output in outputs:
-        if is_flag(output):
+        if is_flag(output) or described(family, output).jumps:
             continue
         place = design[varied]
         problem = Problem(
