@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.errors import StoreError
@@ -17,6 +17,7 @@ from sweep.report.drawing import mechanism_caption
 from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
 from sweep.report.files import copy_tables, write_survivors
 from sweep.report.scan import Cells, Scan, most_telling, scan
+from sweep.report.sections import buildable
 from sweep.report.turns import curves, reference_row
 
 if TYPE_CHECKING:
@@ -33,12 +34,13 @@ def write(folder: Path, out: Path) -> Path:
         out.mkdir(parents=True, exist_ok=True)
         with house_style():
             figures = draw(data, found, cells, out / "figures")
+            more = buildable(data, out / "figures")
         copy_tables(folder, out)
         write_survivors(data.parts, out / "survivors.parquet")
         target = out / "report.html"
         partial = out / "_tmp-report.html"
         own = own_figures(data.study, out / "figures")
-        partial.write_text(render(data, found, cells, figures, own), encoding="utf-8")
+        partial.write_text(render(data, found, cells, figures, own, more), encoding="utf-8")
         partial.replace(target)
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
@@ -117,8 +119,15 @@ def own_figures(study: Study, folder: Path) -> list[OwnFigure]:
     return found
 
 
-def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Saved], own: list[OwnFigure]) -> str:
-    """The HTML text."""
+def render(
+    data: Dataset,
+    found: Scan,
+    cells: list[Cells],
+    figures: dict[str, Saved],
+    own: list[OwnFigure],
+    more: dict[str, Any],
+) -> str:
+    """The HTML text; ``more`` are the sections about what can be built."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -130,13 +139,13 @@ def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Sa
     )
     pair = most_telling(found)
     return environment.get_template("report.html").render(
-        style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
+        style="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("report.css", "optima.css")),
         study=data.study,
         data=data,
         title=data.study.title or data.study.name,
         figures=figures,
         own_figures=own,
-        sentences=answer.answer(data, found),
+        sentences=answer.answer(data, found, more["further"]),
         limits=limits.limit_states(data),
         outputs=tables.output_rows(data),
         parameters=tables.parameter_rows(data),
@@ -157,4 +166,5 @@ def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Sa
         axes=len(cells),
         speed=answer.rpm(data.study.speed),
         today=date.today().isoformat(),
+        **more,
     )

@@ -47,6 +47,8 @@ def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
         name = str(row["output"])
         within = "" if math.isnan(row["within"]) else f"{number(100.0 * row['within'], 3)}\u00a0%"
         if name == "all limits":
+            known = float((data.optimum or {}).get("yield", math.nan))  # of more mechanisms, where it is known
+            within = f"{number(100.0 * known, 3)}\u00a0%" if math.isfinite(known) else within
             rows.append(ToleranceRow("", "all limits", "", "", "", within))
         elif not is_flag(name):
             shown = quantity(name, data.units.get(name, ""))
