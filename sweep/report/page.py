@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.errors import StoreError
+from sweep.jobs.progress import Say, unsaid
 from sweep.report import answer, front, limits, pictures, robust, tables
 from sweep.report.curves import motion_caption
 from sweep.report.dataset import Dataset, read_dataset
@@ -24,17 +25,22 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
+STEPS = 4  # of a report: rows, figures, optima and yield, page
 DESIGNS_PER_CELL = 3.0
 
 
-def write(folder: Path, out: Path) -> Path:
+def write(folder: Path, out: Path, say: Say = unsaid) -> Path:
     """Write everything the report consists of into ``out`` and return the path of ``report.html``."""
+    say("report", 0, STEPS, "steps")
     data, found, cells = gather(folder)
     try:
         out.mkdir(parents=True, exist_ok=True)
         with house_style():
+            say("report", 1, STEPS, "steps")
             figures = draw(data, found, cells, out / "figures")
+            say("report", 2, STEPS, "steps")
             more = buildable(data, out / "figures")
+        say("report", 3, STEPS, "steps")
         copy_tables(folder, out)
         write_survivors(data.parts, out / "survivors.parquet")
         target = out / "report.html"
