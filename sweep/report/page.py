@@ -58,7 +58,8 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
     data = read_dataset(folder)
     cells = divided_axes(data.study, data.counts.get(codes.OK, 0))
     objective = pictures.objective_of(data.study)
-    found = scan(data.parts, cells, objective, data.second if objective is not None else None)
+    larger = data.study.pareto is not None and data.study.pareto.at_least
+    found = scan(data.parts, cells, objective, data.against if objective is not None else None, larger)
     data = replace(data, best=found.best_row or None)
     if data.optima is None:
         data = replace(data, computed_reference=reference_row(data.study))
