@@ -27,6 +27,7 @@ _ENTRIES = {
     "pressure": ("pressure", "EFFECT"),
     "pressure_extrema": ("pressure_extrema", "EFFECT"),
     "coupler": ("coupler", "EFFECT"),
+    "shaking": ("shaking", "EFFECT"),
     "kinetostatics": ("kinetostatics", "EFFECT"),
     "slider_kinetostatics": ("kinetostatics", "SLIDER"),
     "friction": ("friction", "EFFECT"),

@@ -13,15 +13,18 @@ import numpy as np
 
 from kernels import status as st
 from sweep.errors import InputError
+from sweep.evaluation.boxes import box_route
 from sweep.evaluation.route import Part, Route
 from sweep.families.base import Accuracy, Array, Columns, Work
 from sweep.families.capabilities import Assembly
 from sweep.families.members import Machine, Member
 from sweep.families.relations import Timing
 from sweep.quantities.names import error_of, is_place
+from sweep.reductions.box import box
 from sweep.reductions.catalogue import output, quantity
+from sweep.reductions.dimensions import size
 from sweep.reductions.margins import NAMES as MARGINS
-from sweep.reductions.margins import combined, margins
+from sweep.reductions.margins import TRANSMISSION, combined, margins, with_transmission
 from sweep.reductions.sampling import TWO_PI
 from sweep.reductions.work import group_ns
 
@@ -39,8 +42,12 @@ def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) 
         timing = next((t for t in machine.timings if t.name == name), None)
         if member is not None and is_alone(member[0]) and not is_of_point(machine, name):
             own.setdefault(member[0].name, []).append(member[1])
-        elif name in MARGINS:
+        elif name in (*MARGINS, TRANSMISSION):
             margin.append(name)
+        elif size(machine, name) is not None:
+            left.append(name)
+        elif (extent := box(machine, name)) is not None:
+            found.append(box_route(machine, extent, accuracy))
         elif timing is not None:
             found.append(_timing(machine, timing, accuracy))
         elif quantity(machine, name) is not None:
@@ -118,7 +125,7 @@ def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part)
             columns |= found
             suffixes += loops
         status = np.where(status == st.OK, now, status).astype(np.uint8)
-    return combined(columns, tuple(suffixes)) | {"status": status}
+    return with_transmission(combined(columns, tuple(suffixes)), ("",)) | {"status": status}
 
 
 def _timing(machine: Machine, timing: Timing, accuracy: Accuracy) -> Route:

@@ -108,6 +108,7 @@ FAMILY = Family(
     example=EXAMPLE,
     analytic=False,
     capabilities=(
+        feed.SIZES,
         Skeleton(
             dict(feed.SKELETON.fixed) | {"plate": Fixed(plate, standing(PARAMETERS, axis=Y).axis, "slide")},
             (*feed.SKELETON.links, Link("foot", ("p",))),

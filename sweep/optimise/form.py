@@ -18,10 +18,10 @@ from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.optimise.points import Curves, Points
 from sweep.optimise.problem import PLACE, Problem
+from sweep.optimise.terms import Term, box, numbers
 from sweep.reductions.catalogue import output
 from sweep.reductions.measures import Measure, Series, margins, measure
 
-Term = dict[int, float]
 SMALLEST = 1e-100  # a limit nearer to zero is a limit at zero
 AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first
 FAR = 1e3  # stands for a row that cannot be computed at a trial design: far outside, but a number
@@ -159,10 +159,15 @@ class Program:
                 and not 0.0 < float(limit.maximum or 0) < math.pi / 2
             ):
                 raise InputError(limit.output, limit.maximum, "an angle between 0 and pi/2", PLACE)
+            if found.inner == "transmission" and not all(
+                side is None or 0.0 < float(side) < math.pi / 2 for side in (limit.minimum, limit.maximum)
+            ):
+                raise InputError(limit.output, (limit.minimum, limit.maximum), "angles between 0 and pi/2", PLACE)
             self.requirements.append(Requirement(found, sides[0], sides[1]))
         measures = [self.objective, *(r.measure for r in self.requirements)]
         self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
         self.scalars = tuple(dict.fromkeys(name for m in measures for name in m.numbers))
+        self.pieces = {name: piece for m in measures for name, piece in zip(m.numbers, m.pieces, strict=False)}
         self.places = any(m.is_angle for m in measures)
 
     def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
@@ -238,6 +243,9 @@ class _Layout:
         return self._bounded(m, above=m.sign < 0.0)
 
     def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        if m.kind == "minus":
+            of = m.parts[0]
+            return [({k: -w for k, w in t.items()}, -shift) for t, shift in (self.lower if above else self.upper)(of)]
         if m.numbers:
             return self._numbers(m, above)
         if m.kind == "difference":
@@ -272,6 +280,14 @@ class _Layout:
         apart = self.points.phi[fold] - self.points.phi[ext]
         return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
 
+    def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        """Sums of plain numbers, and of the ends of curves with them."""
+        first = 2 * len(self.points)
+        if m.kind == "box":
+            tops, bottoms = ([(float(self.points.value[k]), k) for k in side] for side in self._ends(m.series))
+            return box(m, tops, bottoms, self.design, self.scalars, first, above)
+        return numbers(m, self.design, self.curves.family.parameter_names, self.scalars, first, above)
+
     def _difference(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
         """Give the second angle minus the first, with whole turns so that it is in (-pi, pi] at the present points."""
         ends = [self._bounded(part, above)[:1] for part in m.parts]
@@ -283,21 +299,6 @@ class _Layout:
         apart -= sum(w * self.points.phi[k - count] for k, w in first.items()) + shift
         turns = 2.0 * math.pi * math.ceil((apart - math.pi) / (2.0 * math.pi))
         return [(second | {k: -w for k, w in first.items()}, other - shift - turns)]
-
-    def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
-        """Give the sums for a plain number, or for the largest of some lengths.
-
-        The largest length is below a bound if every length is, with both signs; above one if the largest of them is.
-        """
-        first = 2 * len(self.points)
-        if m.kind == "scalar":
-            return [({first + self.scalars.index(m.name): m.sign}, 0.0)]
-        names = self.curves.family.parameter_names
-        sizes = {name: float(self.design[names.index(name)]) for name in m.numbers}
-        if above:
-            return [({first + self.scalars.index(name): sign}, 0.0) for name in sizes for sign in (1.0, -1.0)]
-        name = max(sizes, key=lambda name: abs(sizes[name]))
-        return [({first + self.scalars.index(name): math.copysign(1.0, sizes[name])}, 0.0)]
 
     def _outward(self, position: str) -> float:
         """+1 where the extended position of that follower is the largest, -1 where it is the smallest."""

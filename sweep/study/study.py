@@ -14,6 +14,7 @@ from sweep.effects import extended
 from sweep.families import Specification
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
+from sweep.quantities.names import without_minus
 from sweep.study.space import DesignSpace
 
 if TYPE_CHECKING:
@@ -35,9 +36,14 @@ class Limit:
 
 @dataclass(frozen=True)
 class Objective:
-    """The design output to be made small."""
+    """The design output to be made small: the negative of one that is to be made large."""
 
     output: str
+
+    @property
+    def aim(self) -> str:
+        """What is done with the output that the study names."""
+        return "maximised" if without_minus(self.output) else "minimised"
 
 
 @dataclass(frozen=True)

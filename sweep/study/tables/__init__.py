@@ -84,6 +84,7 @@ READERS: tuple[tuple[str, Reader], ...] = (
     ("limits", limits.check),
     ("optimise", optimise.check),
     ("objective", objective.check),
+    ("optimise", optimise.check_steady),
     ("pareto", pareto.check),
     ("fit", fit.check),
     ("design", design.check),
