@@ -9,11 +9,22 @@ from kernels.families.feed.motion import OUTPUTS as _RACK
 from sweep.families import feed
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Step, guarded
 from sweep.families.domain import March
-from sweep.families.foot import EVENT_OUTPUTS, FOOT, NODES, POSE_OUTPUTS, RESTITUTION, TURNS, chosen, marched, nodes_for
+from sweep.families.foot import (
+    EVENT_OUTPUTS,
+    FABRIC,
+    FOOT,
+    NODES,
+    POSE_OUTPUTS,
+    RESTITUTION,
+    TURNS,
+    chosen,
+    marched,
+    nodes_for,
+)
 
-PARAMETERS = (*feed.PARAMETERS, *FOOT, RESTITUTION)
+PARAMETERS = (*feed.PARAMETERS, *FOOT, RESTITUTION, *FABRIC)
 _RACK_COLUMNS = len(feed.PARAMETERS)
-_FEET = [_RACK_COLUMNS + k for k in range(len(FOOT) + 1)]
+_FEET = [_RACK_COLUMNS + k for k in range(len(FOOT) + 1 + len(FABRIC))]
 _PLATE = feed.FAMILY.parameter_names.index("y_plate")
 _ROWS = [_RACK.index(name) for name in ("y_t", "dy_t", "d2y_t", "x_t", "dx_t", "d2x_t")]
 

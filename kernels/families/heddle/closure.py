@@ -71,12 +71,19 @@ class Reduced(NamedTuple):
 
 
 @inline
+def divisor(x: Any) -> Any:
+    """x, or nan for 0: compiled complex numbers raise an exception where real ones give inf."""
+    return x if x.real != 0.0 else math.nan + x
+
+
+@inline
 def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
     """Constants of the closure X C + Y S + W = 0 of a four-bar with coupler b; (3)."""
     difference = (c - b) * (c + b)
-    k0 = 0.5 * (difference + (a * a + e * e)) / c
-    k2 = a * e / c
-    size = 0.5 * (abs(difference.real) + (a * a + e * e).real) / c.real + abs(k2.real)
+    by = divisor(c)
+    k0 = 0.5 * (difference + (a * a + e * e)) / by
+    k2 = a * e / by
+    size = 0.5 * (abs(difference.real) + (a * a + e * e).real) / by.real + abs(k2.real)
     return FourBar(a, c, e, k0, k2, abs(e.real) + a.real, size, side)
 
 
@@ -107,7 +114,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     # 0 * x is nan exactly for what is not finite
     valid = valid and (0.0 * (arm + heddle + slide)).real == 0.0 and heddle.real >= 0.0
     return Reduced(
-        first, second, parallel, b, np.sin(chi_mid), np.cos(chi_mid),
+        first, second, parallel, divisor(b), np.sin(chi_mid), np.cos(chi_mid),
         arm, heddle, slide, heddle.real > 0.0, side_f, unit, valid,
     )  # fmt: skip
 
