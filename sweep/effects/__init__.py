@@ -18,6 +18,7 @@ from sweep.effects.placing import Placed, stages_of
 from sweep.families.base import Family, Output, Parameter, Step
 from sweep.families.chain import Chain
 from sweep.families.members import Machine
+from sweep.families.relations import Reading
 from sweep.quantities.names import stem
 from sweep.quantities.reduction import reduced
 
@@ -146,8 +147,10 @@ def extended(family: Family, wanted: Iterable[str]) -> Family:
 def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     """Dotted names that wanted names are about, those behind relations included."""
     names = {about for name in wanted for about in reduced(name, machine.domain)}
-    places = [place for timing in machine.timings if timing.name in names for place in timing.places]
+    asked = [timing for timing in machine.timings if timing.name in names]
+    places = [place for timing in asked for place in timing.places]
     names |= {about for name in places for about in reduced(name, machine.domain)}
+    names |= {timing.of.name for timing in asked if isinstance(timing, Reading)}
     for relation in machine.relations:
         if not names.isdisjoint(o.name for o in relation.outputs):
             names |= relation.needs

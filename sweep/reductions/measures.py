@@ -16,6 +16,7 @@ from sweep.families.base import Family
 from sweep.families.capabilities import Assembly
 from sweep.families.domain import Turn
 from sweep.families.members import Machine
+from sweep.families.relations import Reading
 from sweep.quantities.names import parts, stem
 from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.events import event_names
@@ -131,6 +132,8 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     if stem(name) == "rotatable" and not margins(family, parts(name).stage):
         return _margin_measure(name, "rotatable", ())
     timing = next((t for t in family.timings if t.name == name), None) if isinstance(family, Machine) else None
+    if isinstance(timing, Reading):
+        return Measure(name, "scalar", (), numbers=(name,))
     if timing is not None:
         ends = tuple(measure(family, place, window) for place in timing.places)
         if not all(end.is_angle for end in ends):
