@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline
+from kernels.complex_step import divisor
 
 Array: TypeAlias = NDArray[np.float64]
 Status: TypeAlias = NDArray[np.uint8]
@@ -68,12 +69,6 @@ class Reduced(NamedTuple):
     side_f: float
     unit: float
     valid: bool
-
-
-@inline
-def divisor(x: Any) -> Any:
-    """x, or nan for 0: compiled complex numbers raise an exception where real ones give inf."""
-    return x if x.real != 0.0 else math.nan + x
 
 
 @inline
