@@ -44,8 +44,8 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 def lever_origin(designs: Array) -> Array:
     """The axis of the lever, (n, 3)."""
-    origin = np.zeros((len(designs), 3))
-    origin[:, 0] = designs[:, 8]
+    origin = np.zeros((len(designs), 3), designs.dtype)
+    origin[:, 0] = parameter(PARAMETERS, "e", designs)
     return origin
 
 

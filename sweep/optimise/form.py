@@ -1,30 +1,24 @@
-"""The program that is solved at one design, in epigraph form: make t small, so that all rows are >= 0 or = 0.
-
-A row is ``c = constant + matrix @ atoms + slack * t``.  Rows of the objective bound it by t; those of limits have no t.
-The atoms are the quantities whose gradients are computed: the values of curves at K points, which are extrema or
-ends of windows, the crank angles of these points, and plain numbers such as lengths.
-"""
+"""The epigraph program of a problem, laid out as rows for any design (:mod:`sweep.optimise.rows`)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sweep.errors import InputError
 from sweep.families.base import Array
+from sweep.optimise.passages import first_passage
 from sweep.optimise.points import Curves, Points
 from sweep.optimise.problem import PLACE, Problem
+from sweep.optimise.rows import Form, Label
 from sweep.optimise.terms import Term, box, numbers
 from sweep.reductions.catalogue import output
 from sweep.reductions.measures import Measure, Series, margins, measure
 
 SMALLEST = 1e-100  # a limit nearer to zero is a limit at zero
-AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first
-FAR = 1e3  # stands for a row that cannot be computed at a trial design: far outside, but a number
 
 
 @dataclass(frozen=True)
@@ -39,91 +33,6 @@ class Requirement:
     def equal(self) -> bool:
         """Whether this is an equation."""
         return self.minimum is not None and self.minimum == self.maximum
-
-
-@dataclass(frozen=True)
-class Label:
-    """The output that a row is about, and which bound of it: "objective", "minimum", "maximum" or "equal".
-
-    ``per`` turns the row's multiplier into one per relative change of the bound: the bound over the row's scale.
-    """
-
-    name: str
-    side: str
-    per: float = 1.0
-
-
-@dataclass(frozen=True)
-class Form:
-    """Rows of the program and the points whose curves they use.
-
-    ``complete`` says that the design turns and every limit exists for it, ``reaches`` that every stage assembles
-    somewhere, so that its margin says how far it is from turning.
-    """
-
-    points: Points
-    scalars: tuple[str, ...]
-    matrix: Array
-    constant: Array
-    slack: Array
-    equal: NDArray[np.bool_]
-    labels: tuple[Label, ...]
-    complete: bool
-    reaches: bool
-
-    def rows(self, atoms: Array, t: float) -> Array:
-        """Evaluate the rows; a row that is nan counts as far outside."""
-        if np.isfinite(atoms).all():
-            return np.asarray(self.constant + self.matrix @ atoms + self.slack * t)
-        return np.nan_to_num(self.constant + self.matrix @ np.nan_to_num(atoms, nan=1e30) + self.slack * t, nan=-FAR)
-
-    def objective(self, atoms: Array) -> float:
-        """Give the objective: the smallest t that its rows allow; infinite where there is no such row."""
-        own = np.array([label.side == "objective" for label in self.labels], dtype=np.bool_)
-        if not own.any():
-            return math.inf
-        return float(-(self.constant + self.matrix @ atoms)[own].min())
-
-    def violation(self, atoms: Array) -> float:
-        """Give the largest scaled violation of a limit; infinite where this design lacks a limited output."""
-        if not self.complete:
-            return math.inf
-        return self.known_violation(atoms)
-
-    def known_violation(self, atoms: Array) -> float:
-        """Give the largest scaled violation of the limits on outputs that exist; infinite if no stage closes."""
-        if not self.reaches:
-            return math.inf
-        c = self.constant + self.matrix @ atoms
-        own = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
-        if np.isnan(c[own]).any():
-            return math.inf
-        return float(np.maximum(np.where(self.equal, np.abs(c), -c)[own], 0.0).max(initial=0.0))
-
-    def near(self, atoms: Array, t: float) -> Form:
-        """Leave out the rows that are far from their bound, which no short step reaches."""
-        keep = (self.rows(atoms, t) < AT_HAND) | self.equal
-        labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
-        return replace(
-            self, matrix=self.matrix[keep], constant=self.constant[keep], slack=self.slack[keep],
-            equal=self.equal[keep], labels=labels,
-        )  # fmt: skip
-
-    def relaxed(self, hard: set[str]) -> Form:
-        """Make the elastic program: its t is the amount by which all limits but the ``hard`` ones have to give way."""
-        keep = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
-        soft = np.array([label.name not in hard for label in self.labels], dtype=np.float64)[keep]
-        both = self.equal[keep]
-        matrix, constant = self.matrix[keep], self.constant[keep]
-        labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
-        return replace(
-            self,
-            matrix=np.concatenate([matrix, -matrix[both]]),
-            constant=np.concatenate([constant, -constant[both]]),
-            slack=np.concatenate([soft, soft[both]]),
-            equal=np.zeros(len(labels) + int(both.sum()), dtype=np.bool_),
-            labels=labels + tuple(label for label, twice in zip(labels, both, strict=True) if twice),
-        )
 
 
 def measured_in(size: float) -> float:
@@ -214,6 +123,7 @@ class _Layout:
     def require(self, r: Requirement) -> bool:
         """Add the rows of one limit; the result is false where the design has none of the extrema that it is about."""
         found = True
+        self._keep_first(r, "minimum" if r.maximum is None else "maximum")
         if r.equal and r.minimum is not None:
             for term, shift in self.lower(r.measure)[:1]:
                 size = self._size(r, r.minimum)
@@ -250,6 +160,9 @@ class _Layout:
             return self._numbers(m, above)
         if m.kind == "difference":
             return self._difference(m, above)
+        if m.kind == "phi_event":
+            first, _ = self._passage(m.series[0])
+            return [] if first is None else [({len(self.points) + first: 1.0}, self._turns(first))]
         maxima, minima = self._ends(m.series)
         if m.kind in ("max", "min"):
             many = above == (m.kind == "max")
@@ -299,6 +212,20 @@ class _Layout:
         apart -= sum(w * self.points.phi[k - count] for k, w in first.items()) + shift
         turns = 2.0 * math.pi * math.ceil((apart - math.pi) / (2.0 * math.pi))
         return [(second | {k: -w for k, w in first.items()}, other - shift - turns)]
+
+    def _passage(self, series: Series) -> tuple[int | None, list[int]]:
+        own = np.flatnonzero(self.points.series == self.curves.series.index(series)).tolist()
+        return first_passage(self.points.phi, self.points.how, own)
+
+    def _keep_first(self, r: Requirement, side: str) -> None:
+        """Rows that let no earlier passage arise where an event is limited."""
+        for series in r.measure.series:
+            if series.passes is None:
+                continue
+            level, sense = series.passes
+            for k in self._passage(series)[1]:
+                size = measured_in(max(abs(level), 1e-3 * abs(self.points.value[k])))
+                self.add({k: -sense}, 0.0, 1.0 / size, sense * level / size, 0.0, False, Label(r.measure.name, side))
 
     def _outward(self, position: str) -> float:
         """+1 where the extended position of that follower is the largest, -1 where it is the smallest."""

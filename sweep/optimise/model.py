@@ -11,10 +11,11 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.optimise.certificate import ACTIVE, Multipliers, multipliers
-from sweep.optimise.form import Form, Program
+from sweep.optimise.form import Program
 from sweep.optimise.gradients import gradients, scalar_gradient, stepped
 from sweep.optimise.points import STEP, Curves, Points
 from sweep.optimise.problem import Problem
+from sweep.optimise.rows import Form
 
 FEASIBLE = 1e-9  # largest scaled violation of a feasible design
 PRICE = 10.0  # of a unit of scaled violation when two designs are compared, until multipliers are known

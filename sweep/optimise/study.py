@@ -32,7 +32,7 @@ from sweep.optimise.proportions import from_proportions, widened
 from sweep.optimise.robust import robust, yields
 from sweep.optimise.sensitivity import sensitivities
 from sweep.optimise.solve import explore
-from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn
+from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn, of_task
 from sweep.optimise.survey import CUT, Survey
 from sweep.optimise.tolerance import tolerance_rows
 from sweep.optimise.written import certificates, outputs, write
@@ -135,10 +135,19 @@ def problem_and_starts(
 ) -> tuple[OptimiseSettings, Problem, Array]:
     """Settings, problem and starts: the diverse best of the dataset, filled up from samples where they are too few.
 
-    Where no row of the dataset is feasible, the first starts are the best of random designs.  With
+    Where no row of the dataset is feasible, the first starts are the best of random designs.  The mechanisms that do
+    the study's [task] come before all others.  With
     ``optimise.global = "proportions"`` five of six starts come from the search over proportions instead; ``stop`` ends
     it early.
     """
+    settings, problem, starts = _problem_and_starts(study, folder, stop)
+    first = of_task(study, settings.starts, settings.seed)
+    return settings, problem, np.concatenate([first, starts])[: max(len(starts), len(first))]
+
+
+def _problem_and_starts(
+    study: Study, folder: Path, stop: Callable[[], bool]
+) -> tuple[OptimiseSettings, Problem, Array]:
     if study.optimise is None or study.objective is None:
         raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
     settings = study.optimise

@@ -14,11 +14,14 @@ from typing import Literal, TypeAlias, cast
 from sweep.errors import InputError
 from sweep.families.base import Family
 from sweep.families.capabilities import Assembly
+from sweep.families.domain import Turn
 from sweep.families.members import Machine
+from sweep.families.relations import Reading
 from sweep.quantities.names import parts, stem, without_minus
 from sweep.reductions.box import box
 from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.dimensions import Piece, size
+from sweep.reductions.events import event_names
 from sweep.reductions.margins import TRANSMISSION
 from sweep.reductions.size import SIZE, lengths
 
@@ -27,7 +30,7 @@ ROTATABLE_MARGIN = 1e-6
 
 Kind: TypeAlias = Literal[
     "max_abs", "max", "min", "range", "phi_max_abs", "phi_max", "phi_min", "ext", "fold", "phi_ext", "phi_fold", "phi0",
-    "difference", "scalar", "lengths", "least", "most", "box", "minus",
+    "phi_event", "difference", "scalar", "lengths", "least", "most", "box", "minus",
 ]  # fmt: skip
 Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable", "square", "transmission"]
 
@@ -44,13 +47,15 @@ class Series:
 
     ``output`` is the pose output; with ``pressure`` it is a discriminant and the curve is Delta/b^2 = cos^2 of that
     pressure angle (the ratio of both does not depend on the crank angle, and the discriminant goes on below zero).
-    ``window`` limits it to a part of the stroke.  ``wrapped`` curves are angles that jump by a full turn.
+    ``window`` limits it to a part of the stroke.  ``wrapped`` curves are angles that jump by a full turn.  With
+    ``passes``, a level and +1 upwards or -1 downwards, not its extrema are followed but where it passes that level.
     """
 
     output: str
     pressure: str = ""
     window: tuple[float, float] | None = None
     wrapped: bool = False
+    passes: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -150,12 +155,18 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     if stem(name) == "rotatable" and not margins(family, parts(name).stage):
         return _margin_measure(name, "rotatable", ())
     timing = next((t for t in family.timings if t.name == name), None) if isinstance(family, Machine) else None
+    if isinstance(timing, Reading):
+        return Measure(name, "scalar", (), numbers=(name,))
     if timing is not None:
         ends = tuple(measure(family, place, window) for place in timing.places)
-        if not all(end.is_angle for end in ends):  # an event is found as a root, not followed as an extremum
+        if not all(end.is_angle for end in ends):
             return Measure(name, "scalar", (), numbers=(name,))
         return Measure(name, "difference", tuple(s for end in ends for s in end.series), parts=ends)
     asked = quantity(family, name)
+    event = next((e for e in family.events if event_names(family, e)[0] == name), None)
+    # The passage of an angle that jumps, and one on the way out of an interval, are found anew for every design.
+    if event is not None and isinstance(family.domain, Turn) and not family.pose_output[event.of].wraps:
+        return Measure(name, "phi_event", (Series(event.of, passes=(event.level, 1.0 if event.rising else -1.0)),))
     if asked is not None and asked.route == "margin":
         return _margin_measure(name, asked.kind, margins(family, asked.stage))
     if asked is not None and asked.route == "limits" and asked.kind in LIMIT_KINDS:

@@ -20,6 +20,7 @@ from sweep.study.space import DesignSpace
 if TYPE_CHECKING:
     from sweep.synthesis.fit import LineFit
     from sweep.synthesis.prescription import OnLocus
+    from sweep.synthesis.tasks.problem import Problem
 
 
 @dataclass(frozen=True)
@@ -156,6 +157,7 @@ class Study:
     pareto: ParetoSettings | None
     tolerance: Tolerance | None
     reference: dict[str, float] | None
+    task: Problem | None
     output: OutputSettings
     budget: Budget
     data: dict[str, Any]
@@ -226,6 +228,8 @@ class Study:
             content["pareto"] = _counted(self.pareto)
         if self.accuracy.certify:
             content["certify"] = self.accuracy.proven or True
+        if self.task is not None:
+            content["task"] = repr(self.task)
         if self.tolerance is not None:
             content["tolerance"] = _without_none(asdict(self.tolerance), "robust")
         return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()
