@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -75,6 +75,12 @@ bench-peers: $(VENV)/ready  ## the planar case next to pylinkage, which gets an 
 	$(PYTHON) -m venv .venv-peers
 	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable . 'pylinkage[numba]'
 	.venv-peers/bin/python -m studies.accuracy.peers --out results/accuracy
+
+bench-scale: $(VENV)/ready  ## 10^5 to 10^9 samples, to 10^8 designs, and reading them: writes docs/scale.md, about 10 minutes
+	$(BIN)/python -m tests.bench.scale --out docs/scale.md
+
+smoke-scale: $(VENV)/ready  ## the same to 10^7, writes no page
+	$(BIN)/python -m tests.bench.scale --samples 7 --designs 6
 
 bench-object-store: $(VENV)/ready  ## a dataset by way of an object store; its server gets an environment of its own
 	$(PYTHON) -m venv .venv-store
