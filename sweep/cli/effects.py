@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sweep.cli import completion
 from sweep.cli.listing import aligned, echo_columns
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=completion.effects)
 @click.option("--markdown", is_flag=True, help="The whole register as docs/effects.md.")
 def effects(name: str | None, markdown: bool) -> None:
     """List the effects a scene can call for, or explain one: outputs, inputs, cost, when it matters."""

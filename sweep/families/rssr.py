@@ -34,7 +34,8 @@ from sweep.families.capabilities import (
     Skeleton,
 )
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
-from sweep.families.skeletons import CRANK_ROCKER, crank_axis, standing
+from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
+from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -322,11 +323,14 @@ FAMILY = Family(
     outward="branch",
     uses_phi=False,
     capabilities=(
+        CRANK_ROCKER_SIZES,
         Assembly("discriminant", "pressure_angle", discriminant_scale),
         JointRecords(joint_records, JOINT_NEEDS, "rocker"),
         PressureEllipse(ellipse),
         CrankRockerLoop(np.ascontiguousarray),
         LimitLocus("swing", sized=("c", "e", "g")),
+        CRANK_ROCKER_BY_AXES,
+        CRANK_ROCKER_BY_ROCKER,
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(rocker_origin),
         CRANK_ROCKER_POINTS,
