@@ -83,6 +83,11 @@ def is_place(name: str) -> bool:
     return parts(name).stem.startswith("phi_")
 
 
+def is_largest(name: str, *, magnitude: bool = False) -> bool:
+    """Whether a design output is the largest value of a pose output, or its largest magnitude."""
+    return stem(name).startswith("max_abs_" if magnitude else "max_")
+
+
 def is_flag(name: str) -> bool:
     """Whether a design output is a yes or no."""
     return stem(name) == "rotatable"
