@@ -159,6 +159,7 @@ def _static(kind: loads.Follower) -> Effect:
         needs=("pressure",),
         inputs=INPUTS[kind.name],
         outputs=_static_outputs(kind),
+        least=("frequency_ratio",),
         compute=compute_static,
         called_for="a fast machine, a precise meeting of hook and needle",
         negligible="largest lag times the lever of the working point below the tolerance (1e-4 rad: 0.01 mm at 100 mm)",

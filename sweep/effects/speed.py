@@ -54,7 +54,8 @@ def _samples(grid: Scene) -> tuple[Array, Array]:
     """Reduced inertia and torque excess J'w^2/2 - M_drive(w, 0): weights and load reduced to the crank."""
     even = grid.inputs | {"speed_change": np.zeros(len(grid.designs))}
     after = tuple(d._replace(inputs=d.inputs | {"speed_change": even["speed_change"]}) for d in grid.after)
-    found = kinetostatics.compute(Scene(grid.family, grid.designs, grid.angles, even, after), _NEEDED)
+    turning = Scene(grid.family, grid.designs, grid.angles, even, after, curves=grid.curves)
+    found = kinetostatics.compute(turning, _NEEDED)
     inertia, slope, drive = (np.asarray(found[name], np.float64) for name in _NEEDED_NAMES)
     speed = grid.inputs["speed"][:, None]
     return inertia + grid.inputs["flywheel"][:, None], 0.5 * slope * speed * speed - drive

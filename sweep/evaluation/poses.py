@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sweep.effects import elsewhere, extended, input_names, offered
+from sweep.effects.wanted import expanded
 from sweep.errors import InputError, nearest
+from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, wanted_names
 from sweep.families import Mechanism
@@ -32,6 +34,7 @@ def evaluate(
     *,
     keep: bool | str | Sequence[str] = False,
     status_text: bool = False,
+    loads: Loads | None = None,
 ) -> pd.DataFrame:
     """Pose outputs of mechanisms at given crank angles, one row per pose, in the order of the input.
 
@@ -39,12 +42,13 @@ def evaluate(
     ----------
     family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1
-    want : names of pose outputs (see ``sweep families``)
+    want : names of pose outputs (see ``sweep families``); the name of an effect stands for all of its own
     phi : crank angles [rad], one or a plain list of them, for every design; without it the table must have a column
         ``phi``, and with it none.  A family over an interval takes values of its own variable here, or in a column of
         that name; one whose poses depend on those before takes equal steps of one turn from 0, in order
     keep : columns of the table that the result repeats in front: names, or True for all of them
     status_text : add a column ``status_text``, the meaning of ``status`` in words
+    loads : loads over the turn, as for `summarise`
 
     Returns
     -------
@@ -61,8 +65,9 @@ def evaluate(
     import pandas as pd
 
     bare = find_family(family).precise()
-    mechanism = extended(bare, wanted_names(want, f"pose outputs of {bare.name}"))
-    wanted = pose_wants(mechanism, want)
+    names = expanded(bare, wanted_names(want, f"pose outputs of {bare.name}"), poses=True)
+    mechanism = extended(bare, names, curves_of(bare, loads))
+    wanted = pose_wants(mechanism, names)
     variable = mechanism.domain.name
     extra = () if phi is not None else (variable,)
     matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))

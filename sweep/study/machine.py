@@ -21,7 +21,7 @@ Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
 ThreeTexts = Annotated[list[str], Field(min_length=3, max_length=3)]
 
 # Tables in which a member's own entries may stand in a table of the member's name.
-BY_MEMBER = (("design",), ("limits",), ("reference", "design"))
+BY_MEMBER = (("design",), ("bodies",), ("loads",), ("limits",), ("reference", "design"))
 
 
 class PlaceTable(Section):

@@ -14,6 +14,7 @@ from sweep.study.reading import Reading
 from sweep.study.tables import (
     about,
     accuracy,
+    bodies,
     design,
     fit,
     limits,
@@ -38,6 +39,8 @@ TABLES = (
     "relations",
     "scene",
     "design",
+    "bodies",
+    "loads",
     "locus",
     "fit",
     "limits",
@@ -64,6 +67,8 @@ READERS: tuple[tuple[str, Reader], ...] = (
     ("objective", objective.read),
     ("accuracy", accuracy.read),
     ("design", design.read),
+    ("bodies", bodies.read),
+    ("loads", bodies.read_loads),
     ("locus", locus.read),
     ("limits", limits.read),
     ("reference", design.read_compared),
@@ -79,6 +84,7 @@ READERS: tuple[tuple[str, Reader], ...] = (
     ("scene", scene.check_wanted),
     # What the mechanism has to do with it.
     ("mechanism", mechanism.demand),
+    ("bodies", bodies.check),
     ("scene", scene.extend),
     ("locus", locus.check),
     ("limits", limits.check),
