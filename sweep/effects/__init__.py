@@ -34,6 +34,8 @@ _ENTRIES = {
     "slider_friction": ("friction", "SLIDER"),
     "speed_fluctuation": ("speed", "EFFECT"),
     "slider_speed_fluctuation": ("speed", "SLIDER"),
+    "speed_fluctuation_friction": ("speed_friction", "EFFECT"),
+    "slider_speed_fluctuation_friction": ("speed_friction", "SLIDER"),
     "sliding_bearings": ("bearings", "SLIDING"),
     "rolling_bearings": ("bearings", "ROLLING"),
     "sliding_limits": ("bearings", "SLIDING_LIMIT"),

@@ -51,7 +51,8 @@ class Scene:
     """One block of designs at their crank angles, as the effects see it; what two effects share is computed once.
 
     In a chain it is one stage: ``after`` are the stages behind it, ``before`` the scene that drives it.  ``curves`` are
-    loads over the turn of the first crank, by the input they add to.
+    loads over the turn of the first crank, by the input they add to.  ``uneven`` are speed and acceleration of that
+    crank at the poses, (n, m); None where they are the constants among the inputs.
     """
 
     family: Family
@@ -61,6 +62,7 @@ class Scene:
     after: tuple[Driven, ...] = ()
     before: Scene | None = None
     curves: Mapping[str, Curve] = field(default_factory=dict)
+    uneven: tuple[Array, Array] | None = None
     memo: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -129,7 +131,8 @@ class Scene:
 
     def crank(self) -> tuple[Array, Array]:
         """Speed and angular acceleration of this stage's crank, (n, m), or (n, 1) where it turns evenly."""
-        speed, change = self.inputs["speed"][:, None], self.inputs["speed_change"][:, None]
+        even = self.inputs["speed"][:, None], self.inputs["speed_change"][:, None]
+        speed, change = self._first.uneven or even
         if self.rates is None:
             return speed, change
         first, second = self.rates
@@ -151,6 +154,12 @@ class Scene:
         """A load at the poses: (n, 1) where it is constant, (n, m) where a curve adds to it."""
         constant, curve = self.inputs[name][:, None], self.curves.get(name)
         return constant if curve is None else constant + curve(self._first.angles.phi)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether no load of this stage or a later one is given over the turn, or jumps while a tool pierces."""
+        piercing = "pierce_force" in self.inputs and bool(self.inputs["pierce_force"].any())
+        return not self.curves and not piercing and (self.driven is None or self.driven.smooth)
 
     @property
     def _first(self) -> Scene:

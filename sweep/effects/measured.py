@@ -14,6 +14,8 @@ COSTS: dict[str, tuple[float, float]] = {
     "slider_friction": (1400.0, 0.0),
     "speed_fluctuation": (290.0, 170000.0),
     "slider_speed_fluctuation": (530.0, 280000.0),
+    "speed_fluctuation_friction": (31000.0, 23000000.0),
+    "slider_speed_fluctuation_friction": (30000.0, 20000000.0),
     "sliding_bearings": (80.0, 0.0),
     "rolling_bearings": (96.0, 0.0),
     "sliding_limits": (900.0, 0.0),

@@ -18,9 +18,9 @@ def expanded(family: Family, wanted: Iterable[str], *, poses: bool = False) -> l
 
     ``friction`` stands for the design outputs that the friction effect has of its own, and for the largest magnitude
     over the turn of each of its pose outputs; of some, such as a life, for the least value.  A vector counts by its
-    length, and what jumps or is known up to full turns is left out.  With ``poses`` it stands for all its pose outputs,
-    unless one of them has the same name.  In a chain ``friction2`` is the effect at stage 2, ``friction`` that of every
-    stage which can be asked; in a machine a member's name stands before it.
+    length, and what jumps or is known up to full turns is left out.  With ``poses`` it stands for all its pose outputs.
+    An output of the same name goes before.  In a chain ``friction2`` is the effect at stage 2, ``friction`` that of
+    every stage which can be asked; in a machine a member's name stands before it.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def names_of_effects(family: Family, poses: bool = False) -> dict[str, tuple[str
                 found[f"{m.name}.{name}"] = tuple(f"{m.name}.{output}" for output in own)
         return found
     effects = applicable(family)
-    taken = {o.name for placed in effects for o in placed.pose_outputs} if poses else set()
+    taken = {o.name for placed in effects for o in (placed.pose_outputs if poses else placed.design_outputs)}
     for placed in effects:
         outputs = _pose_names(placed) if poses else _design_names(placed, prefixes(family.domain))
         found[placed.name] = outputs

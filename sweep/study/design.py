@@ -247,7 +247,7 @@ def _checked(p: Parameter, written: float, value: float, key: Key, faults: Fault
 
 def _usual(internal: str) -> str:
     """The unit a designer writes where the internal one is given."""
-    return {"rad": "deg", "t": "kg", "t*mm^2": "kg*mm^2", "rad/s": "rpm"}.get(internal, internal)
+    return {"rad": "deg", "t": "kg", "t*mm^2": "kg*mm^2", "rad/s": "rpm", "N*mm*s": "N*m/rpm"}.get(internal, internal)
 
 
 def _forms(p: Parameter, number: object = None) -> str:
