@@ -39,6 +39,12 @@ class TableCurve:
         found: Array = self._cubics(start + np.mod(phi - start, TWO_PI))
         return found
 
+    def slope(self, phi: Array) -> Array:
+        """Derivative at any angles."""
+        start = self.phi[0]
+        found: Array = self._cubics(start + np.mod(phi - start, TWO_PI), 1)
+        return found
+
     @cached_property
     def _cubics(self) -> PchipInterpolator:
         from scipy.interpolate import PchipInterpolator

@@ -37,6 +37,7 @@ _DEFINITIONS = (
     "gram = 1e-6 * tonne = g",
     "newton = tonne * millimetre / second ** 2 = N",
     "kilonewton = 1e3 * newton = kN",
+    "gram_force = 9.80665e-3 * newton = gf",
     "megapascal = newton / millimetre ** 2 = MPa",
     "revolution_per_minute = revolution / minute = rpm",
     "byte = [information] = B",

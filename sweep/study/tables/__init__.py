@@ -26,6 +26,7 @@ from sweep.study.tables import (
     pareto,
     report,
     scene,
+    thread,
     tolerance,
 )
 
@@ -37,6 +38,7 @@ TABLES = (
     "mechanism",
     "machine",
     "relations",
+    "thread",
     "scene",
     "design",
     "bodies",
@@ -72,6 +74,7 @@ READERS: tuple[tuple[str, Reader], ...] = (
     ("locus", locus.read),
     ("limits", limits.read),
     ("reference", design.read_compared),
+    ("thread", thread.read),
     ("mechanism", mechanism.read),
     # Values, and what one table asks of another.
     ("scene", scene.read_values),
