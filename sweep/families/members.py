@@ -163,6 +163,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         parameters += own
         placed.append(replace(m, columns=slice(start, start + len(own))))
         parameters += [replace(p, name=f"{m.name}.{p.name}", text=f"{m.name}: {p.text}") for p in m.added]
+    parameters += [p for relation in machine.relations for p in relation.parameters]
     outputs = [
         replace(o, name=f"{m.name}.{o.name}", own=f"{m.name}.{o.base}") for m in placed for o in m.family.pose_outputs
     ]
@@ -236,6 +237,8 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             np.copyto(status, columns.pop("status"), where=status == OK)
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
     found["phi"] = angles.phi
+    columns_of = machine.parameter_names
+    found |= {p.name: designs[:, [columns_of.index(p.name)]] for r in relations for p in r.parameters}
     for relation in relations:
         found |= relation.compute(found, {m.name: m.place.rotation for m in machine.members}, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from sweep.families.base import Array, Output
+from sweep.families.base import Array, Output, Parameter
 from sweep.families.placing import AXES
 
 
@@ -19,6 +19,8 @@ class Relation(Protocol):
     def name(self) -> str: ...  # noqa: D102
     @property
     def outputs(self) -> tuple[Output, ...]: ...  # noqa: D102
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...  # noqa: D102
     @property
     def needs(self) -> frozenset[str]: ...  # noqa: D102
 
@@ -63,6 +65,11 @@ class Distance:
         return size, *parts
 
     @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
+
+    @property
     def needs(self) -> frozenset[str]:
         """Coordinates of both points."""
         return frozenset(f"{point}_{axis}" for point in self.points for axis in AXES)
@@ -92,6 +99,11 @@ class Speed:
         """The speed, per radian of the main shaft."""
         text = f"speed of {self.points[-1]}" + (f" relative to {self.points[0]}" if len(self.points) == 2 else "")
         return (Output(self.name, "length", f"{text}, per radian of the main shaft", "ours"),)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
 
     @property
     def needs(self) -> frozenset[str]:
@@ -130,6 +142,11 @@ class ShaftTorque:
         return (Output(self.name, "torque", f"torque on the main shaft that drives {words}", "ours"),)
 
     @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
+
+    @property
     def needs(self) -> frozenset[str]:
         """The drive torques."""
         return frozenset(name for name, _ in self.torques)
@@ -158,6 +175,11 @@ class Shaking:
             for x in AXES
         )
         return size, *parts
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
 
     @property
     def needs(self) -> frozenset[str]:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from sweep.errors import InputError, nearest
-from sweep.families.base import Array, Output
+from sweep.families.base import Array, Output, Parameter
 from sweep.families.capabilities import ThreadPath
 from sweep.families.placing import AXES, vector
 from sweep.families.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY
@@ -60,7 +60,7 @@ class ThreadBalance:
     ----------
     name : stands before the names of the outputs
     path : from tensioner to stitch: fixed points in the machine's frame, dotted names of moving points, take-ups
-    stock : thread between tensioner and stitch when nothing is taken up [length]
+    stock : thread between tensioner and stitch when nothing is taken up; the default of the parameter ``NAME_stock``
     tension : at the tensioner, while the thread is just tight [force]
     stiffness : force per length by which the thread is slack or stretched
     radii : of the contour at each bend, in the order of the path [mm]
@@ -90,6 +90,12 @@ class ThreadBalance:
         )
 
     @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The stock, which a study can vary."""
+        text = f"thread {self.name} between tensioner and stitch when nothing is taken up"
+        return (Parameter(f"{self.name}_stock", "length", text, default=self.stock),)
+
+    @property
     def needs(self) -> frozenset[str]:
         """Coordinates of the moving points, and what the take-ups give."""
         names = [f"{place}_{axis}" for place in self.path if isinstance(place, str) for axis in AXES]
@@ -99,7 +105,7 @@ class ThreadBalance:
     def compute(
         self, found: Mapping[str, Any], rotations: Mapping[str, Array], wanted: frozenset[str]
     ) -> dict[str, Any]:
-        """The outputs, (n, m); ``found`` has the main shaft's angle as "phi"."""
+        """The outputs, (n, m); ``found`` has the main shaft's angle as "phi", and the stock."""
         needed: Any = 0.0 * found[PHI]
         taken: Any = 0.0 * found[PHI]
         wraps: list[Any] = []
@@ -118,7 +124,7 @@ class ThreadBalance:
                     wraps.append(bend(along, direction))
                 along = direction
             before = point
-        given = self.stock - taken
+        given = found[f"{self.name}_stock"] - taken
         surplus = given - needed
         columns = {"needed": needed, "given": given, "surplus": surplus}
         columns["wrap"] = sum(wraps, 0.0 * needed)

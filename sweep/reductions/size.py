@@ -6,6 +6,7 @@ import numpy as np
 
 from sweep.effects import input_names
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step
+from sweep.families.members import Machine
 
 SIZE = Output("size", "length", "largest length of the mechanism, offsets by magnitude")
 NS_SIZE = 10.0
@@ -13,7 +14,9 @@ NS_SIZE = 10.0
 
 def lengths(family: Family) -> tuple[str, ...]:
     """Parameters that are lengths of the mechanism itself, not of bodies and bearings that effects ask for."""
-    others = input_names(family)
+    others = set(input_names(family))
+    if isinstance(family, Machine):
+        others |= {p.name for relation in family.relations for p in relation.parameters}
     return tuple(p.name for p in family.parameters if p.unit == "length" and p.name not in others)
 
 
