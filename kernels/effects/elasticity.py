@@ -44,6 +44,7 @@ def quasi_static(
     eta: Array | None,
     displacement: Array | None,
     frequency_ratio: Array | None,
+    varying: Array | None = None,
 ) -> None:
     """Lag of the follower under inertia and load, its displacement at the joint, and the frequency ratio.
 
@@ -54,11 +55,15 @@ def quasi_static(
     reach : (n,), what a lag is compared with: 1 of an angle, the coupler's length of a displacement
     status : (n, m), in and out; NOT_LINEAR where |eta| > 0.1 reach cos(pressure angle); the number stays
     eta, displacement, frequency_ratio : (n, m) or None; [rad], c eta [length], sqrt(k/J) |p| / speed
+    varying : (n, m) or None; what is added to the torque M over the turn
     """
     for i in range(p.shape[0]):
         inertia, stiffness, speed, torque = data[i, 0], data[i, 1], data[i, 3], data[i, 4]
         for j in range(p.shape[1]):
-            lag = (torque - inertia * speed * speed * d2psi[i, j]) / (stiffness * p[i, j] * p[i, j])
+            load = torque
+            if varying is not None:
+                load = torque + varying[i, j]
+            lag = (load - inertia * speed * speed * d2psi[i, j]) / (stiffness * p[i, j] * p[i, j])
             if status[i, j] == st.OK and not abs(lag) <= LINEAR * reach[i] * abs(p[i, j]) / c[i]:
                 status[i, j] = st.NOT_LINEAR
             good = 1.0 if status[i, j] == st.OK or status[i, j] == st.NOT_LINEAR else math.nan
@@ -73,7 +78,7 @@ def quasi_static(
 @kernel
 def steady_state(
     p: Array, d2psi: Array, c: Array, reach: Array, data: Array, phi: Array, last: bool, status: Status, eta: Array,
-    elongation: Array, floquet: Array,
+    elongation: Array, floquet: Array, varying: Array | None = None,
 ) -> None:  # fmt: skip
     """Periodic steady state of the lag and the largest Floquet multiplier.
 
@@ -86,6 +91,7 @@ def steady_state(
         NOT_LINEAR where |eta| > 0.1 reach cos(pressure angle) somewhere (the numbers stay), NOT_ROTATABLE where p is
         nan
     eta, elongation : (n, m) out [rad], [length];  floquet : (n,) out, largest modulus or nan
+    varying : (n, N) or None; what is added to the torque M on the grid
     """
     n = p.shape[1]
     half = (n + 1) // 2
@@ -98,6 +104,8 @@ def steady_state(
         for j in range(n):
             square[j] = p[i, j] * p[i, j]
             right[j] = data[i, 4] / mass - d2psi[i, j]
+            if varying is not None:
+                right[j] += varying[i, j] / mass
             bad = bad or not math.isfinite(square[j] * right[j])
         if bad:
             status[i], floquet[i] = st.NOT_ROTATABLE, math.nan

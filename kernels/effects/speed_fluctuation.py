@@ -3,6 +3,7 @@
 W is the integral of the excess of torque over the crank angle, less its mean.  The speed is omega = sqrt(2 (E + W)/J).
 The constant E follows from the mean speed in time: 2 pi / omega_mean is the integral of d phi / omega, which falls
 strictly with E.  The effect needs the whole turn and takes samples on a uniform odd grid.
+A motor whose torque falls with the speed answers to it: kernels/effects/motor_line.py.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline, kernel
+from kernels.effects.motor_line import steady_energy
 from kernels.periodic import coefficients, on_grid, series, significant, tail
 
 Array = NDArray[np.float64]
@@ -40,6 +42,9 @@ def speed_fluctuation(
     energy: Array,
     speed: Array | None,
     acceleration: Array | None,
+    coarsest: float = RESOLVED,
+    missed: Array | None = None,
+    slope: Array | None = None,
 ) -> None:
     """Steady-state speed, its extremes and the degree of unevenness.
 
@@ -51,12 +56,17 @@ def speed_fluctuation(
     phi : (n, m) or (1, m), where speed and acceleration are wanted
     status : (n,) out; JAMMED where the machine stalls (no E above -min W), NOT_CONVERGED where N resolves too little,
         NOT_ROTATABLE where a sample is nan, INVALID_INPUT where nothing has inertia
+    coarsest : share of the kinetic energy's scale that the highest harmonics of the excess may have; above RESOLVED for
+        loads that jump, of which no grid resolves all
+    missed : (n,) out or None; that share
+    slope : (n,) or None; torque that the motor gains per speed it loses, 0 for a constant torque
     delta, fastest, slowest, energy : (n,) out; (max - min)/mean, extremes of omega, the constant E
     speed, acceleration : (n, m) or None; omega and d omega/d t = (1/2) d(omega^2)/d phi
     """
     n = inertia.shape[1]
     half = (n + 1) // 2
     all_jc, all_js, all_wc, all_ws = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
+    all_xc, all_xs = (np.empty(half), np.empty(half)) if slope is not None else (all_wc, all_ws)
     work, turn = np.empty(n), np.empty((4, half))
     fine_j, fine_w, looks = np.empty(FINER * n), np.empty(FINER * n), np.empty((4, FINER * n))
     for i in range(inertia.shape[0]):
@@ -68,23 +78,37 @@ def speed_fluctuation(
             code = st.INVALID_INPUT
         # A torque excess far below the inertia torque moves no speed: its noise need not be resolved.
         energy_scale = all_jc[0] * mean_speed[i] * mean_speed[i]
-        if code == st.OK and (tail(all_jc, all_js, 0.0) > RESOLVED or tail(all_wc, all_ws, energy_scale) > RESOLVED):
+        left = tail(all_wc, all_ws, energy_scale)
+        if code == st.OK and (tail(all_jc, all_js, 0.0) > RESOLVED or left > coarsest):
             code = st.NOT_CONVERGED
+        if missed is not None:
+            missed[i] = left
         all_wc[0], all_ws[0] = 0.0, 0.0
+        if slope is not None:
+            all_xc[:], all_xs[:] = all_wc, all_ws
         for k in range(1, half):
             all_wc[k], all_ws[k] = -all_ws[k] / k, all_wc[k] / k
         count = significant(all_jc, all_js)
         jc, js = all_jc[:count], all_js[:count]
+        on_grid(jc, js, looks, fine_j)
         count = significant(all_wc, all_ws)
         wc, ws = all_wc[:count], all_ws[:count]
         on_grid(wc, ws, looks, work)
-        on_grid(jc, js, looks, fine_j)
         on_grid(wc, ws, looks, fine_w)
         e = math.nan
         if code == st.OK:
             e = _energy(inertia[i], work, mean_speed[i], 0.5 * energy_scale)
-            e = _settled(jc, js, wc, ws, fine_j, fine_w, mean_speed[i], e)
+            e = _settled(jc, js, wc, ws, fine_j, fine_w, mean_speed[i], e, max(STILL, left))
             code = st.OK if math.isfinite(e) else st.JAMMED
+        if slope is not None and code == st.OK and slope[i] > 0.0:
+            if steady_energy(jc, js, all_xc, all_xs, mean_speed[i], slope[i], e + work[0], max(STILL, left), work):
+                coefficients(work, turn, all_wc, all_ws)
+                e, all_wc[0] = all_wc[0], 0.0
+                count = significant(all_wc, all_ws)
+                wc, ws = all_wc[:count], all_ws[:count]
+                on_grid(wc, ws, looks, fine_w)
+            else:
+                code = st.JAMMED
         status[i], energy[i] = code, e
         high = _extreme(jc, js, wc, ws, e, 1.0, fine_j, fine_w) if code == st.OK else math.nan
         low = _extreme(jc, js, wc, ws, e, -1.0, fine_j, fine_w) if code == st.OK else math.nan
@@ -102,7 +126,7 @@ def speed_fluctuation(
 
 @inline
 def _settled(
-    jc: Array, js: Array, wc: Array, ws: Array, inertia: Array, work: Array, mean_speed: float, e: float
+    jc: Array, js: Array, wc: Array, ws: Array, inertia: Array, work: Array, mean_speed: float, e: float, still: float
 ) -> float:
     """Find E on finer and finer grids until it no longer changes; nan where the machine nearly stands still (stall).
 
@@ -110,7 +134,7 @@ def _settled(
     """
     while True:
         new = _energy(inertia, work, mean_speed, e)
-        if abs(new - e) <= STILL * (abs(new) + jc[0] * mean_speed * mean_speed):
+        if abs(new - e) <= still * (abs(new) + jc[0] * mean_speed * mean_speed):
             return new
         e, size = new, FINER * work.size
         if size > MOST:

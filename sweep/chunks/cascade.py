@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from kernels import status as codes
 from sweep.costs import nanoseconds
+from sweep.effects import called_for
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array, Columns
 from sweep.families.chain import stages_of
@@ -253,12 +254,15 @@ def ordered_routes(study: Study) -> tuple[Route, ...]:
 
 
 def _before_fit(study: Study, route: Route) -> bool:
-    """Whether the route concerns only stages before the one that [fit] finishes."""
+    """Whether the route concerns only stages before the one that [fit] finishes, and no load that it hands back."""
     if study.fit is None:
         return False
     last = len(stages_of(study.bare))
     numbers = [parts(name).stage for name in route.outputs]
-    return all(number and int(number) < last for number in numbers)
+    if not all(number and int(number) < last for number in numbers):
+        return False
+    # Loads of a stage are those of all stages behind it.
+    return not any(placed.entry.takes_load for placed in called_for(study.bare, route.outputs))
 
 
 def compared(name: str, values: Number) -> Number:

@@ -11,8 +11,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
 from importlib import import_module
+from types import MappingProxyType
 
-from sweep.effects.base import Effect
+from sweep.effects.base import CURVED, Effect
 from sweep.effects.evaluation import effect_poses, on_own_columns, run_design
 from sweep.effects.placing import Placed, stages_of
 from sweep.errors import InputError
@@ -20,6 +21,7 @@ from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work
 from sweep.families.chain import Chain
 from sweep.families.members import Machine
 from sweep.families.relations import Reading
+from sweep.numerics.curves import Curve
 from sweep.quantities.names import stem
 from sweep.quantities.reduction import reduced
 
@@ -35,6 +37,8 @@ _ENTRIES = {
     "slider_friction": ("friction", "SLIDER"),
     "speed_fluctuation": ("speed", "EFFECT"),
     "slider_speed_fluctuation": ("speed", "SLIDER"),
+    "speed_fluctuation_friction": ("speed_friction", "EFFECT"),
+    "slider_speed_fluctuation_friction": ("speed_friction", "SLIDER"),
     "sliding_bearings": ("bearings", "SLIDING"),
     "rolling_bearings": ("bearings", "ROLLING"),
     "sliding_limits": ("bearings", "SLIDING_LIMIT"),
@@ -53,6 +57,8 @@ NAMES = tuple(_ENTRIES)
 
 # In the stages behind the first, speed and acceleration are those of the first stage's crank.
 _FIRST_ONLY = ("speed", "speed_change")
+
+NO_CURVES: Mapping[str, Curve] = MappingProxyType({})
 
 _INPUT_NAMES: dict[tuple[tuple[str, str], ...], frozenset[str]] = {}
 
@@ -108,6 +114,16 @@ def input_names(family: Family) -> frozenset[str]:
     return _INPUT_NAMES[stages]
 
 
+def curved_inputs(family: Family) -> tuple[str, ...]:
+    """Inputs of effects that a load over the turn can add to, for a family, a chain or a machine."""
+    if isinstance(family, Machine):
+        return tuple(f"{m.name}.{name}" for m in family.members for name in curved_inputs(m.family))
+    numbers = [number for _, number in stages_of(family)]
+    return tuple(
+        name for name in sorted(input_names(family)) if any(name == f"{own}{k}" for own in CURVED for k in numbers)
+    )
+
+
 def offered(family: Family) -> tuple[Output, ...]:
     """Pose and design outputs of all effects that can be asked of a family, or of the stages of a chain."""
     if isinstance(family, Machine):
@@ -132,19 +148,27 @@ def elsewhere(family: Family, name: str) -> str:
     return f"; {name} is an output of the effects{even}, families in brackets: {words}"
 
 
-def extended(family: Family, wanted: Iterable[str]) -> Family:
+def extended(family: Family, wanted: Iterable[str], curves: Mapping[str, Curve] = NO_CURVES) -> Family:
     """The family with the effects that ``wanted`` calls for; the family itself where it calls for none.
 
     The inputs of the effects become further parameters, after the family's own.  In a chain an effect belongs to a
-    stage, and its inputs and outputs carry the stage's number.
+    stage, and its inputs and outputs carry the stage's number.  ``curves`` are loads over the turn of the crank, by the
+    input that they add to; what no wanted effect takes is left out.
     """
     if isinstance(family, Machine):
         asked = _asked(family, wanted)
-        found = {m.name: extended(m.family, [own for own in map(m.own, asked) if own]) for m in family.members}
+        found = {
+            m.name: extended(
+                m.family,
+                [own for own in map(m.own, asked) if own],
+                {own: curve for name, curve in curves.items() if (own := m.own(name))},
+            )
+            for m in family.members
+        }
         _check_even(family, found)
         same = all(found[m.name] is m.family for m in family.members)
         return family if same else family.with_families(found)
-    return with_effects(family, called_for(family, wanted))
+    return with_effects(family, called_for(family, wanted), curves)
 
 
 def _check_even(machine: Machine, found: Mapping[str, Family]) -> None:
@@ -171,7 +195,7 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     return names
 
 
-def with_effects(family: Family, effects: tuple[Placed, ...]) -> Family:
+def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[str, Curve] = NO_CURVES) -> Family:
     """The family with the outputs and inputs of these effects."""
     if not effects:
         return family
@@ -181,7 +205,7 @@ def with_effects(family: Family, effects: tuple[Placed, ...]) -> Family:
         Step(
             name=placed.name,
             provides=placed.design_outputs,
-            run=partial(run_design, family, placed, added, own),
+            run=partial(run_design, family, placed, added, curves, own),
             work=Work.EFFECT,
             cost=partial(_design_ns, placed.entry),
         )
@@ -192,8 +216,8 @@ def with_effects(family: Family, effects: tuple[Placed, ...]) -> Family:
         family,
         parameters=(*family.parameters, *added),
         pose_outputs=(*family.pose_outputs, *(o for placed in effects for o in placed.pose_outputs)),
-        poses=partial(effect_poses, family, effects, added, own),
-        precise_poses=family.precise_poses and partial(effect_poses, family.precise(), effects, added, own),
+        poses=partial(effect_poses, family, effects, added, curves, own),
+        precise_poses=family.precise_poses and partial(effect_poses, family.precise(), effects, added, curves, own),
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
         dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )

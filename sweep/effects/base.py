@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
@@ -18,6 +18,12 @@ from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
 from sweep.families.capabilities import JointRecords, ToolPoint
 from sweep.families.chain import drive, driving_names
+from sweep.numerics.curves import Curve
+
+# Loads that a curve over the turn of the crank can add to.
+CURVED = ("load_torque", "load_force", "tool_force")
+# Inputs that stand in [loads] of a study; the others but the speed stand in [bodies].
+LOADS = (*CURVED, "pierce_force", "pierce_at", "pierce_sense", "resisting_torque", "motor_slope", "thread_tension")
 
 Status: TypeAlias = NDArray[np.uint8]
 Rows: TypeAlias = NDArray[np.intp]
@@ -31,18 +37,21 @@ class Driven(NamedTuple):
     kappa: Array
     offset: Array
     inputs: dict[str, Array]
+    curves: Mapping[str, Curve] = {}
 
     def only(self, rows: Rows) -> Driven:
         """Some of the designs."""
         given = {name: x[rows] for name, x in self.inputs.items()}
-        return Driven(self.family, self.designs[rows], self.kappa[rows], self.offset[rows], given)
+        return Driven(self.family, self.designs[rows], self.kappa[rows], self.offset[rows], given, self.curves)
 
 
 @dataclass
 class Scene:
     """One block of designs at their crank angles, as the effects see it; what two effects share is computed once.
 
-    In a chain it is one stage: ``after`` are the stages behind it, ``before`` the scene that drives it.
+    In a chain it is one stage: ``after`` are the stages behind it, ``before`` the scene that drives it.  ``curves`` are
+    loads over the turn of the first crank, by the input they add to.  ``uneven`` are speed and acceleration of that
+    crank at the poses, (n, m); None where they are the constants among the inputs.
     """
 
     family: Family
@@ -51,6 +60,8 @@ class Scene:
     inputs: dict[str, Array]  # input name -> (n,)
     after: tuple[Driven, ...] = ()
     before: Scene | None = None
+    curves: Mapping[str, Curve] = field(default_factory=dict)
+    uneven: tuple[Array, Array] | None = None
     memo: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -86,7 +97,7 @@ class Scene:
         names = frozenset(driving_names(self.family, following.family))
         turn = self.family.poses(self.designs, self.angles, names)
         angles = drive(turn, self.family.position, following.kappa, following.offset)
-        return Scene(following.family, following.designs, angles, following.inputs, tuple(rest), self)
+        return Scene(following.family, following.designs, angles, following.inputs, tuple(rest), self, following.curves)
 
     def stage(self, index: int) -> Scene:
         """The scene of the stage ``index`` places behind this one."""
@@ -119,7 +130,8 @@ class Scene:
 
     def crank(self) -> tuple[Array, Array]:
         """Speed and angular acceleration of this stage's crank, (n, m), or (n, 1) where it turns evenly."""
-        speed, change = self.inputs["speed"][:, None], self.inputs["speed_change"][:, None]
+        even = self.inputs["speed"][:, None], self.inputs["speed_change"][:, None]
+        speed, change = self._first.uneven or even
         if self.rates is None:
             return speed, change
         first, second = self.rates
@@ -137,28 +149,43 @@ class Scene:
         """Inputs side by side, (n, len(names))."""
         return np.column_stack([self.inputs[name] for name in names])
 
+    def load(self, name: str) -> Array:
+        """A load at the poses: (n, 1) where it is constant, (n, m) where a curve adds to it."""
+        constant, curve = self.inputs[name][:, None], self.curves.get(name)
+        return constant if curve is None else constant + curve(self._first.angles.phi)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether no load of this stage or a later one is given over the turn, or jumps while a tool pierces."""
+        piercing = "pierce_force" in self.inputs and bool(self.inputs["pierce_force"].any())
+        return not self.curves and not piercing and (self.driven is None or self.driven.smooth)
+
+    @property
+    def _first(self) -> Scene:
+        return self if self.before is None else self.before._first
+
     def only(self, rows: Rows) -> Scene:
         """Some of the designs; the scene itself where these are all."""
         if rows.size == len(self.designs):
             return self
         angles = Angles(*(x[rows] for x in self.angles)) if self.angles.cos.shape[0] > 1 else self.angles
         given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
-        return Scene(self.family, self.designs[rows], angles, given, after)
+        return Scene(self.family, self.designs[rows], angles, given, after, curves=self.curves)
 
     def posed(self, rows: Rows, phi: Array) -> Scene:
         """Some of the designs, each as often as wanted, at crank angles (k, m) of their own."""
         given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
-        return Scene(self.family, self.designs[rows], Angles.of(phi), given, after)
+        return Scene(self.family, self.designs[rows], Angles.of(phi), given, after, curves=self.curves)
 
     def precise(self) -> Scene:
         """The same scene with the most accurate poses that its families have."""
         after = tuple(d._replace(family=d.family.precise()) for d in self.after)
-        return Scene(self.family.precise(), self.designs, self.angles, self.inputs, after)
+        return Scene(self.family.precise(), self.designs, self.angles, self.inputs, after, curves=self.curves)
 
     def on_grid(self, size: int) -> Scene:
         """The same designs at ``size`` equidistant crank angles of one turn: what a whole-turn effect samples."""
         angles = Angles.of(2.0 * np.pi * np.arange(size)[None] / size)
-        return Scene(self.family, self.designs, angles, self.inputs, self.after)
+        return Scene(self.family, self.designs, angles, self.inputs, self.after, curves=self.curves)
 
 
 ComputeFunction: TypeAlias = Callable[[Scene, frozenset[str]], Columns]
@@ -210,8 +237,9 @@ class Effect:
     ``takes_load`` is the key of the effect that hands back the load of a chain's later stages; without it their load
     does not enter.  ``requires`` is the capability that a family must have, ``followers`` are the kinds of
     follower that the effect is made for, ``tool_inputs`` are further inputs where the family has a point that a tool
-    can hang on.  ``advise(scene)`` applies the effect's rule of negligibility to some designs
-    over a turn; None where none turns.
+    can hang on.  ``least`` are pose outputs of which the least value over the turn counts, as a life, not the largest
+    (:func:`sweep.effects.wanted.expanded`).  ``advise(scene)`` applies the effect's rule of negligibility to some
+    designs over a turn; None where none turns.
     """
 
     key: str
@@ -232,6 +260,7 @@ class Effect:
     advise: AdviceFunction | None = None
     requires: type = JointRecords
     tool_inputs: tuple[Parameter, ...] = ()
+    least: tuple[str, ...] = ()
     followers: tuple[str, ...] = ("rocker", "slider")
 
     def inputs_of(self, family: Family) -> tuple[Parameter, ...]:

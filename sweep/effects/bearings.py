@@ -148,6 +148,7 @@ def _effect(
         called_for="bearing choice while the linkage is being synthesised",
         negligible="other members govern: utilisation below 0.5",
         even_crank=SPEED in inputs,
+        least=tuple(o.name for o in results if o.name.startswith(("life", "permissible", "theta1_reserve"))),
         advise=advise if kind else None,
     )
 

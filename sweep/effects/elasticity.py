@@ -10,7 +10,7 @@ from sweep.effects import loads
 from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status
 from sweep.effects.loads import SPEED
 from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
-from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, filled
+from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, optional_outputs
 
 EQUATION = "E1 (1), (2), E2 (3), (4)"
 FORMULAS = (
@@ -31,12 +31,12 @@ INPUTS = {
     "rocker": (
         Parameter("driven_inertia", "inertia", "inertia of rocker and all it drives about its axis", positive=True),
         *_SHARED,
-        Parameter("load_torque", "torque", "constant torque on the rocker about its axis", default=0.0),
+        Parameter("load_torque", "torque", "torque on the rocker about its axis", default=0.0),
     ),
     "slider": (
         Parameter("driven_mass", "mass", "mass of slider and all it moves", positive=True),
         *_SHARED,
-        Parameter("load_force", "force", "constant force on the slider along the slide", default=0.0),
+        Parameter("load_force", "force", "force on the slider along the slide", default=0.0),
     ),
 }
 
@@ -81,9 +81,23 @@ def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     return per_pose[:, :, 21] * c[:, None], np.ascontiguousarray(per_pose[:, :, 23]), c, reach, data
 
 
+def _varying(scene: Scene) -> Array | None:
+    """What a curve adds to the constant load, (n, m); None where the load is constant."""
+    load = loads.follower(scene).load.name
+    if load not in scene.curves:
+        return None
+    return np.ascontiguousarray(np.broadcast_to(scene.load(load) - scene.inputs[load][:, None], scene.shape))
+
+
 def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted pointwise quantities; status NOT_LINEAR where the deflection is no longer small."""
-    return filled(quasi_static, _arguments(scene), _KERNEL_NAMES, wanted, scene.status())
+    outputs = optional_outputs(_KERNEL_NAMES, wanted, scene.shape)
+    lag, displacement, ratio = outputs
+    status = scene.status()
+    p, d2psi, c, reach, data = _arguments(scene)
+    quasi_static(p, d2psi, c, reach, data, status, lag, displacement, ratio, _varying(scene))
+    columns: Columns = {name: out for name, out in zip(_KERNEL_NAMES, outputs, strict=True) if out is not None}
+    return columns | {"status": status}
 
 
 def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
@@ -96,7 +110,7 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
     status, floquet = np.empty(n, np.uint8), np.empty(n)
     lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
     p, d2psi, c, reach, data = _arguments(grid)
-    steady_state(p, d2psi, c, reach, data, phi, last, status, lag, elongation, floquet)
+    steady_state(p, d2psi, c, reach, data, phi, last, status, lag, elongation, floquet, _varying(grid))
     return {"lag_dynamic": lag, "elongation_dynamic": elongation, "floquet": floquet}, status
 
 
@@ -159,6 +173,7 @@ def _static(kind: loads.Follower) -> Effect:
         needs=("pressure",),
         inputs=INPUTS[kind.name],
         outputs=_static_outputs(kind),
+        least=("frequency_ratio",),
         compute=compute_static,
         called_for="a fast machine, a precise meeting of hook and needle",
         negligible="largest lag times the lever of the working point below the tolerance (1e-4 rad: 0.01 mm at 100 mm)",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from sweep.effects.base import Status, take_over
 from sweep.effects.placing import Placed, first_scene
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Parameter, Step
+from sweep.numerics.curves import Curve
 
 # Poses per block: their joint records, 24 numbers each, fill about half a second-level cache.
 BLOCK = 4096
@@ -23,6 +24,7 @@ def effect_poses(
     family: Family,
     effects: tuple[Placed, ...],
     inputs: tuple[Parameter, ...],
+    curves: Mapping[str, Curve],
     own: int,
     designs: Array,
     angles: Angles,
@@ -33,14 +35,14 @@ def effect_poses(
     Parameters
     ----------
     family : without effects, or the chain;  own : number of its parameters
-    effects, inputs : what extends it
+    effects, inputs : what extends it;  curves : loads over the turn, by the input they add to
     designs : (n, P) with the inputs behind the family's own columns;  angles : (n, m) or (1, m)
     wanted : pose outputs of family and effects
     """
     bare = np.ascontiguousarray(designs[:, :own])
     columns = family.poses(bare, angles, wanted & frozenset(family.pose_names))
     if np.iscomplexobj(designs) or np.iscomplexobj(angles.cos):
-        return _differenced(family, effects, inputs, own, designs, angles, wanted) | columns
+        return _differenced(family, effects, inputs, curves, own, designs, angles, wanted) | columns
     asked = [(placed, [name for name in placed.own if name in wanted]) for placed in effects]
     asked = [(placed, names) for placed, names in asked if names]
     if not asked:
@@ -55,7 +57,7 @@ def effect_poses(
     for parts, blocks in ((pointwise, _blocks(shape, BLOCK)), (whole, _row_blocks(shape))):
         for rows, poses in blocks if parts else ():
             part = _part(angles, rows, poses)
-            scene = first_scene(family, bare[rows], part, {n: x[rows] for n, x in given.items()})
+            scene = first_scene(family, bare[rows], part, {n: x[rows] for n, x in given.items()}, curves)
             for placed, names in parts:
                 found = placed.entry.compute(scene.stage(placed.stage), frozenset(placed.own[name] for name in names))
                 take_over(status[rows, poses], found["status"])
@@ -68,6 +70,7 @@ def _differenced(
     family: Family,
     effects: tuple[Placed, ...],
     inputs: tuple[Parameter, ...],
+    curves: Mapping[str, Curve],
     own: int,
     designs: Array,
     angles: Angles,
@@ -85,7 +88,7 @@ def _differenced(
 
     def moved(sign: float) -> Columns:
         x, phi, cos, sin = (np.ascontiguousarray(z.real + sign * t * z.imag) for z in (designs, *angles))
-        return effect_poses(family, effects, inputs, own, x, Angles(phi, cos, sin), names)
+        return effect_poses(family, effects, inputs, curves, own, x, Angles(phi, cos, sin), names)
 
     here, ahead, behind = moved(0.0), moved(1.0), moved(-1.0)
     columns: Columns = {"status": here["status"]}
@@ -99,6 +102,7 @@ def run_design(
     family: Family,
     placed: Placed,
     inputs: tuple[Parameter, ...],
+    curves: Mapping[str, Curve],
     own: int,
     designs: Array,
     wanted: frozenset[str],
@@ -114,7 +118,7 @@ def run_design(
     parts = []
     for start in range(0, max(len(bare), 1), whole_turn.block):
         rows = slice(start, start + whole_turn.block)
-        scene = first_scene(family, bare[rows], at_rest, {n: x[rows] for n, x in given.items()})
+        scene = first_scene(family, bare[rows], at_rest, {n: x[rows] for n, x in given.items()}, curves)
         parts.append(whole_turn.run(scene, names, accuracy))
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     columns: Columns = {"status": whole["status"]}

@@ -135,7 +135,7 @@ def drive(scene: Scene, handed_back: Columns | None, name: str = "drive_torque")
     ``handed_back``, acts on the rocker besides its own load.
     """
     speed, change = scene.crank()
-    load = scene.inputs[loads.follower(scene).load.name][:, None]
+    load = scene.load(loads.follower(scene).load.name)
     if handed_back is not None:
         load = load - scene.after[0].kappa[:, None] * np.asarray(handed_back[name], np.float64)
     return np.stack(np.broadcast_arrays(load, speed, change), axis=2)
@@ -193,7 +193,7 @@ def advise(scene: Scene) -> Advice | None:
     load = loads.follower(scene).load.name
     whole = compute(scene, frozenset({"force_c"}))
     still = {name: np.zeros_like(x) if name.startswith(("m_", "j_")) else x for name, x in scene.inputs.items()}
-    alone = Scene(scene.family, scene.designs, scene.angles, still, scene.after, scene.before)
+    alone = Scene(scene.family, scene.designs, scene.angles, still, scene.after, scene.before, scene.curves)
     useful = compute(alone, frozenset({"force_c"}))
     turning = (whole["status"] == st.OK).all(axis=1)
     if not turning.any():

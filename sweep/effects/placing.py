@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 from sweep.effects.base import Driven, Effect, Scene
 from sweep.families.base import Angles, Array, Family, Output
 from sweep.families.chain import Chain
+from sweep.numerics.curves import Curve
 from sweep.quantities.names import at_stage
 
 
@@ -65,20 +68,30 @@ def stages_of(family: Family) -> tuple[tuple[Family, str], ...]:
     return ((family, ""),)
 
 
-def first_scene(family: Family, designs: Array, angles: Angles, given: dict[str, Array]) -> Scene:
-    """The scene of a family, or of a chain's first stage with those behind it, from the inputs by name, each (n,)."""
+def first_scene(
+    family: Family,
+    designs: Array,
+    angles: Angles,
+    given: dict[str, Array],
+    curves: Mapping[str, Curve] = MappingProxyType({}),
+) -> Scene:
+    """The scene of a family, or of a chain's first stage with those behind it.
+
+    ``given`` are the inputs by name, each (n,), ``curves`` what adds to some of them over the turn.
+    """
     if not isinstance(family, Chain):
-        return Scene(family, designs, angles, {"speed_change": 0.0 * designs[:, 0]} | given)
+        return Scene(family, designs, angles, {"speed_change": 0.0 * designs[:, 0]} | given, curves=curves)
     still = {"speed_change": 0.0 * designs[:, 0]}
     crank = still | {name: given[f"{name}1"] for name in ("speed", "speed_change") if f"{name}1" in given}
     parts = []
     for stage in family.stages:
         number = str(stage.number)
         own = {plain: x for name, x in given.items() if (plain := at_stage(name, number))}
-        parts.append((stage.family, stage.designs(designs), own | crank))
+        over = {plain: x for name, x in curves.items() if (plain := at_stage(name, number))}
+        parts.append((stage.family, stage.designs(designs), own | crank, over))
     after = tuple(
-        Driven(bare, matrix, designs[:, stage.kappa], designs[:, stage.offset], own)
-        for stage, (bare, matrix, own) in zip(family.stages[1:], parts[1:], strict=True)
+        Driven(bare, matrix, designs[:, stage.kappa], designs[:, stage.offset], own, over)
+        for stage, (bare, matrix, own, over) in zip(family.stages[1:], parts[1:], strict=True)
     )
-    bare, matrix, own = parts[0]
-    return Scene(bare, matrix, angles, own, after)
+    bare, matrix, own, over = parts[0]
+    return Scene(bare, matrix, angles, own, after, curves=over)

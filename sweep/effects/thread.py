@@ -8,9 +8,9 @@ from kernels.effects.capstan import capstan
 from kernels.effects.thread_contour import thread_contour
 from kernels.effects.thread_speed import thread_speed
 from sweep.effects.base import Effect, Scene
-from sweep.effects.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY, EXPONENT, REFERENCE_SPEED, SHARE
 from sweep.families.base import Array, Columns, Output, Parameter
 from sweep.families.capabilities import ThreadPath
+from sweep.families.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY, EXPONENT, REFERENCE_SPEED, SHARE
 
 MM_PER_M = 1e3
 

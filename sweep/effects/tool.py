@@ -21,17 +21,17 @@ OUTPUTS = (
 def _loaded(scene: Scene) -> bool:
     """Whether a tool with mass or force hangs on the coupler: without one nothing is computed."""
     given = [scene.inputs[name] for name in ("m_tool", "tool_force", "pierce_force") if name in scene.inputs]
-    return any(bool(values.any()) for values in given)
+    return "tool_force" in scene.curves or any(bool(values.any()) for values in given)
 
 
 def _data(scene: Scene) -> tuple[Array, Array]:
-    """Columns of the kernel, and the working force (n, 1)."""
+    """Columns of the kernel, and the working force, (n, 1) or over the turn (n, m)."""
     place = scene.family.find(ToolPoint)
     assert place is not None
     gravity = scene.table(tuple(p.name for p in loads.GRAVITY))
-    mass, force, *pierce = (scene.inputs[p.name][:, None] for p in loads.TOOL)
+    mass, _, *pierce = (scene.inputs[p.name][:, None] for p in loads.TOOL)
     data = np.hstack([mass, place.point(scene.designs), place.direction(scene.designs), gravity, *pierce])
-    return np.ascontiguousarray(data), np.ascontiguousarray(force)
+    return np.ascontiguousarray(data), np.ascontiguousarray(scene.load("tool_force"))
 
 
 def wrench_and_inertia(scene: Scene, drive: Array, reduced: bool) -> tuple[Array | None, Array | None]:

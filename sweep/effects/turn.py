@@ -49,13 +49,22 @@ def at_poses(scene: Scene, found: dict[str, Array], turn: Status, wanted: frozen
 
 
 def per_turn(
-    found: dict[str, Array], status: Status, numbers: Columns, curves: Sequence[Output], wanted: frozenset[str]
+    found: dict[str, Array],
+    status: Status,
+    numbers: Columns,
+    curves: Sequence[Output],
+    wanted: frozenset[str],
+    limit: float = RESOLVED,
+    known: Array | float = RESOLVED,
 ) -> Columns:
-    """The wanted ones of ``numbers`` and of the reductions of ``curves``, sampled on an odd grid in ``found``."""
+    """The wanted ones of ``numbers`` and of the reductions of ``curves``, sampled on an odd grid in ``found``.
+
+    ``limit`` is the share of a curve that the grid may miss, ``known`` the relative error of what it is made of.
+    """
     columns = dict(numbers)
     for o in curves:
         if any(name.endswith(f"_{o.name}") for name in wanted):
-            columns |= reductions(o.name, found[o.name], status)
+            columns |= reductions(o.name, found[o.name], status, limit, known)
     return chosen(columns, wanted, status)
 
 
@@ -64,27 +73,30 @@ def reduction_outputs(outputs: Sequence[Output]) -> tuple[Output, ...]:
     return tuple(reduction.output(o, Turn()) for o in outputs for reduction in REDUCTIONS)
 
 
-def reductions(name: str, values: Array, status: Status) -> Columns:
+def reductions(
+    name: str, values: Array, status: Status, limit: float = RESOLVED, known: Array | float = RESOLVED
+) -> Columns:
     """All reductions of one curve from its samples on a uniform odd grid, (n, N), with their errors.
 
-    ``status`` (n,) becomes NOT_CONVERGED where the grid does not resolve the curve; what is not OK gives nan.
+    ``status`` (n,) becomes NOT_CONVERGED where the grid misses more than the share ``limit`` of the curve; what is not
+    OK gives nan.
     """
     n = len(values)
     largest, phi_largest, least, phi_least, rms, missed = (np.empty(n) for _ in range(6))
     turn_extremes(np.ascontiguousarray(values), largest, phi_largest, least, phi_least, rms, missed)
-    status[(status == st.OK) & ~(missed < RESOLVED)] = st.NOT_CONVERGED
+    status[(status == st.OK) & ~(missed < limit)] = st.NOT_CONVERGED
     upward = np.abs(largest) >= np.abs(least)
     size = np.maximum(np.abs(largest), np.abs(least))
     # The curve itself is known as well as the steady state it comes from was resolved.
-    err = (missed + RESOLVED) * size
+    err = (missed + known) * size
     found = {
         "max": (largest, err),
         "min": (least, err),
         "max_abs": (size, err),
         # The slope's zero is as sharp as the square root of the value's error.
-        "phi_max_abs": (np.where(upward, phi_largest, phi_least), np.full(n, np.sqrt(RESOLVED))),
-        "phi_max": (phi_largest, np.full(n, np.sqrt(RESOLVED))),
-        "phi_min": (phi_least, np.full(n, np.sqrt(RESOLVED))),
+        "phi_max_abs": (np.where(upward, phi_largest, phi_least), np.full(n, np.sqrt(known))),
+        "phi_max": (phi_largest, np.full(n, np.sqrt(known))),
+        "phi_min": (phi_least, np.full(n, np.sqrt(known))),
         "range": (largest - least, 2.0 * err),
         "rms": (rms, err),
     }

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sweep.effects import elsewhere, extended, input_names, offered
+from sweep.effects.wanted import expanded
 from sweep.errors import InputError, nearest
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
+from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, wanted_names
 from sweep.families import Mechanism
@@ -34,6 +36,7 @@ def evaluate(
     keep: bool | str | Sequence[str] = False,
     status_text: bool = False,
     angles: AngleUnit | None = None,
+    loads: Loads | None = None,
 ) -> pd.DataFrame:
     """Pose outputs of mechanisms at given crank angles, one row per pose, in the order of the input.
 
@@ -41,7 +44,8 @@ def evaluate(
     ----------
     family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1
-    want : names of pose outputs (see ``sweep families``), in a list or in one text between commas
+    want : names of pose outputs (see ``sweep families``), in a list or in one text between commas; the name of an
+        effect stands for all of its own
     phi : crank angles [rad], one or a plain list of them, for every design; without it the table must have a column
         ``phi``, and with it none.  A family over an interval takes values of its own variable here, or in a column of
         that name; one whose poses depend on those before takes equal steps of one turn from 0, in order
@@ -50,6 +54,7 @@ def evaluate(
     angles : the unit of angles in ``table`` and ``phi``, "rad" or "deg"; a header such as ``alpha [deg]`` says it of
         one column.  Left out, it is rad, and what reads as degrees is refused: a parameter above 2 pi, crank angles
         whose largest is a whole or half number between 4 pi and 720.  Results are in rad
+    loads : loads over the turn, as for `summarise`
 
     Returns
     -------
@@ -78,8 +83,9 @@ def evaluate(
     import pandas as pd
 
     bare = find_family(family).precise()
-    mechanism = extended(bare, wanted_names(want, f"pose outputs of {bare.name}"))
-    wanted = pose_wants(mechanism, want)
+    names = expanded(bare, wanted_names(want, f"pose outputs of {bare.name}"), poses=True)
+    mechanism = extended(bare, names, curves_of(bare, loads))
+    wanted = pose_wants(mechanism, names)
     table = in_radians(mechanism, given := table, angles, input_names(bare), mechanism.domain)
     phi = None if phi is None else grid_in_radians(mechanism.domain.name, mechanism.domain.unit, phi, angles)
     variable = mechanism.domain.name

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from sweep.effects import extended, input_names
+from sweep.effects.wanted import expanded
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians
+from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.route import Part, Route
 from sweep.evaluation.routes import routes
 from sweep.evaluation.statuses import explained, meanings
@@ -61,6 +63,7 @@ def summarise(
     keep: bool | str | Sequence[str] = False,
     status_text: bool = False,
     angles: AngleUnit | None = None,
+    loads: Loads | None = None,
 ) -> pd.DataFrame:
     """Design outputs of mechanisms, one row per design, in the order of the input.
 
@@ -71,7 +74,7 @@ def summarise(
         ``want`` calls for; missing ``branch`` means +1
     want : names of design outputs: ``rotatable``, ``margin``, ``stroke``, ``max_abs_d2s`` ... (see ``sweep families``),
         ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``); a list, or one text between
-        commas
+        commas; the name of an effect, as ``friction``, stands for its outputs
     samples : extrema on a dense grid of so many crank angles
     accuracy : true extrema, refined to this relative error; 1e-8 if neither is given.  A family whose poses depend on
         those before (a march) has no true extrema: 720 samples if neither is given
@@ -83,6 +86,8 @@ def summarise(
     status_text : add a column ``status_text``, the meaning of ``status`` in words
     angles : the unit of angles in ``table``, "rad" or "deg"; a header such as ``alpha [deg]`` says it of one column.
         Left out, it is rad, and a parameter above 2 pi is refused.  Results are in rad
+    loads : loads over the turn, by the input that each adds to (``load_torque``, ``tool_force2``): a pair (crank angles
+        [rad], values), joined by periodic monotone cubics, or ``{"mean": m, "cos": [...], "sin": [...]}``
 
     Returns
     -------
@@ -114,8 +119,8 @@ def summarise(
     import pandas as pd
 
     bare = find_family(family)
-    wanted = wanted_names(want, f"design outputs of {bare.name}")
-    mechanism = extended(bare, wanted)
+    wanted = expanded(bare, wanted_names(want, f"design outputs of {bare.name}"))
+    mechanism = extended(bare, wanted, curves_of(bare, loads))
     wanted = [name for name in wanted if name != "status"]
     chosen = _accuracy(mechanism.domain, samples, accuracy, certify)
     if certify:

@@ -134,7 +134,9 @@ def _loop(one: Placed, finger: float, metres: float) -> Loop:
     # as kernels/joints.py writes them: B C s rho_b tau_b rho tau per pose, u k A D per design
     s, rho_b, tau_b, rho, tau = (pose[k : k + 3] for k in (6, 9, 12, 15, 18))
     u, k, center, d = (own[n : n + 3] for n in (0, 3, 6, 9))
-    found = evaluate(part.family, part.parameters | {"finger": finger}, ["n_x", "n_y", "n_z"], phi=part.crank[:1])
+    found = evaluate(
+        part.family, part.parameters | {"finger": finger}, ["n_x", "n_y", "n_z"], phi=part.crank[:1], angles="rad"
+    )
     n = found[["n_x", "n_y", "n_z"]].to_numpy(np.float64)[0]
     # The records of a family may stand in the frame of another one whose effects it shares.
     crank = np.column_stack([rho_b, tau_b, u])

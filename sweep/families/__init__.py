@@ -103,10 +103,12 @@ def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = No
         ``ratio`` (whole turns of its crank for one of what drives it, default 1), ``offset`` (its crank angle where the
         driving angle is 0 [rad]), ``driver`` ("shaft", or an angle of an earlier member such as "needle.psi1"),
         ``place`` (``at``, ``axis``, ``zero``: origin, z and x of the member's frame, for a chain the last stage's, in
-        the machine's frame) and ``tip`` (a point fixed to the output link: along it, across it, along its axis)
+        the machine's frame), ``tip`` (a point fixed to the output link: along it, across it, along its axis) and
+        ``eye`` (a point of the coupler)
     relations : by name, each one of ``{"distance": [point, point]}``, ``{"timing": [crank angle, crank angle]}``,
         ``{"speed": [point]}`` or of the second of two points relative to the first, ``{"torque": [member, ...]}``,
-        ``{"shaking": [member, ...]}``, ``{"event": pose output, "level": number, "rising": true or false}``
+        ``{"shaking": [member, ...]}``, ``{"event": pose output, "level": number, "rising": true or false}``,
+        ``{"thread": [point, take-up, ...], "stock": length, ...}`` (docs/thread.md, section 7)
 
     Returns
     -------

@@ -19,7 +19,7 @@ Columns: TypeAlias = dict[str, NDArray[np.generic]]
 Unit = Literal[
     "length", "1/length", "angle", "ratio", "sign", "count", "none", "choice",
     "mass", "inertia", "force", "torque", "pressure", "stiffness", "damping", "speed", "angular_acceleration",
-    "acceleration", "time",
+    "acceleration", "time", "rotary_damping",
 ]  # fmt: skip
 
 

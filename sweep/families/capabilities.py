@@ -165,6 +165,7 @@ class ThreadPath:
     wrap: str
     rate: str
     rate2: str
+    taken: str = "P"
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from sweep.families.base import (
     Work,
     filled_with_places,
 )
-from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton
+from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton, ThreadPath
 from sweep.families.skeletons import Y, line, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
@@ -43,6 +43,7 @@ VALUE_OUTPUTS = (
     Output("d2S", "length", "acceleration analogue of the follower", "(12)"),
     Output("pressure_angle", "rad", "between the normal of the profile and the way of the follower", "(15)"),
 )
+WRAP = Output("wrap", "rad", "angle by which the thread turns at the follower", "(17 a)")
 
 PROFILE_OUTPUTS = (
     Output("X_P", "length", "profile of the cam in its own axes, along its zero", "(17)"),
@@ -63,7 +64,13 @@ ROUNDING = 2.0**-53
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its cam angles, each (n, m)."""
-    return filled_with_places(guided_cam.poses, designs, angles, _VALUES, _PROFILE, wanted)
+    asked = wanted | {"S"} if WRAP.name in wanted else wanted
+    columns = filled_with_places(guided_cam.poses, designs, angles, _VALUES, _PROFILE, asked)
+    if WRAP.name in wanted:
+        x1, z1, e = (designs[:, [k]] for k in (1, 2, 3))
+        # The guides stand symmetrically, so the thread makes the same angle with their line on both sides.
+        columns[WRAP.name] = 2.0 * np.arctan(np.asarray(columns["S"]) / np.sqrt(z1 * z1 + (e - x1) ** 2))
+    return {name: columns[name] for name in (*wanted, "status")}
 
 
 def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -117,7 +124,7 @@ FAMILY = Family(
     title="thread take-up by a cam with a guided follower",
     parameters=PARAMETERS,
     position="S",
-    pose_outputs=(*VALUE_OUTPUTS, *PROFILE_OUTPUTS, CURVATURE),
+    pose_outputs=(*VALUE_OUTPUTS, *PROFILE_OUTPUTS, CURVATURE, WRAP),
     poses=poses,
     steps=(Step("cam body", DESIGN_OUTPUTS, size, work=Work.LONG),),
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},
@@ -125,6 +132,7 @@ FAMILY = Family(
     example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
     capabilities=(
         Points({"profile": ("X_P", "Y_P", None)}),
+        ThreadPath(WRAP.name, "dP", "d2P"),
         Skeleton(
             {
                 "a": Fixed(cam_axis, standing(PARAMETERS).axis),

@@ -13,7 +13,7 @@ from kernels.chain import chain_rule
 from kernels.status import OK
 from sweep.families.base import Angles, Array, Columns, Event, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Points
-from sweep.families.located import TIP, coordinates, velocity
+from sweep.families.located import EYE, TIP, coordinates, coupler_joints, velocity
 from sweep.families.placing import AXES, Place
 from sweep.families.relations import Frame, Reading, Relation, Timing
 
@@ -32,6 +32,8 @@ class Member:
     place : its frame in the machine's frame; ``at`` is the default of the parameters ``x_at``, ``y_at``, ``z_at``
     drives : of the driver's outputs, the derivative of each
     tip : a point fixed to the output link: along it, across it, along its axis; the defaults of ``x_tip`` ...
+    eye : a point of the coupler: along it from its first joint; of a planar one also across it and along the axes; the
+        defaults of ``x_eye`` ...
     columns : where its own parameters stand in the machine's design matrix
     """
 
@@ -43,6 +45,7 @@ class Member:
     drives: Mapping[str, str] = field(default_factory=dict)
     place: Place = field(default_factory=Place)
     tip: tuple[float, float, float] | None = None
+    eye: tuple[float, ...] | None = None
     columns: slice = field(default_factory=lambda: slice(0, 0))
 
     def designs(self, designs: Array) -> Array:
@@ -71,7 +74,11 @@ class Member:
             Parameter(f"{axis}_tip", "length", f"tip {way} the output link", default=x)
             for axis, way, x in zip(AXES, ("along", "across", "along the axis of"), self.tip or (), strict=False)
         ]
-        return crank, *place, *tip
+        eye = [
+            Parameter(f"{axis}_eye", "length", f"point of the coupler {way}", default=x)
+            for axis, way, x in zip(AXES, ("along it", "across it", "along the axes"), self.eye or (), strict=False)
+        ]
+        return crank, *place, *tip, *eye
 
     @cached_property
     def derivatives(self) -> frozenset[str]:
@@ -82,7 +89,7 @@ class Member:
     def points(self) -> tuple[str, ...]:
         """Names of the points whose coordinates are given in the machine's frame."""
         named = [name for points in self.family.every(Points) for name in points.at]
-        return (*named, TIP) if self.tip is not None else tuple(named)
+        return (*named, *((TIP,) if self.tip is not None else ()), *((EYE,) if self.eye is not None else ()))
 
     @cached_property
     def moving(self) -> Mapping[str, tuple[str | None, ...]]:
@@ -163,6 +170,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         parameters += own
         placed.append(replace(m, columns=slice(start, start + len(own))))
         parameters += [replace(p, name=f"{m.name}.{p.name}", text=f"{m.name}: {p.text}") for p in m.added]
+    parameters += [p for relation in machine.relations for p in relation.parameters]
     outputs = [
         replace(o, name=f"{m.name}.{o.name}", own=f"{m.name}.{o.base}") for m in placed for o in m.family.pose_outputs
     ]
@@ -236,6 +244,9 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             np.copyto(status, columns.pop("status"), where=status == OK)
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
     frames = {m.name: Frame(m.place.rotation, m.origin(designs)) for m in machine.members} if relations else {}
+    found["phi"] = angles.phi
+    columns_of = machine.parameter_names
+    found |= {p.name: designs[:, [columns_of.index(p.name)]] for r in relations for p in r.parameters}
     for relation in relations:
         found |= relation.compute(found, frames, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
@@ -325,4 +336,6 @@ def _made_of(m: Member, point: str, own: set[str]) -> set[str]:
     found = {name for name in m.moving.get(point, ()) if name} if moves else set()
     if point == TIP:
         return found | ({m.family.position} if at or moves else set())
+    if point == EYE:
+        return {name for joint in coupler_joints(m) or () for name in joint if name and at}
     return found | {name for points in m.family.every(Points) for name in points.at.get(point, ()) if name and at}

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from sweep.families.base import Array, Output
+from sweep.families.base import Array, Output, Parameter
 from sweep.families.placing import AXES
 
 
@@ -30,6 +30,9 @@ class Relation(Protocol):
     def name(self) -> str: ...  # noqa: D102
     @property
     def outputs(self) -> tuple[Output, ...]: ...  # noqa: D102
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...  # noqa: D102
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]: ...  # noqa: D102
 
@@ -91,6 +94,11 @@ class Distance:
         )
         return size, *parts
 
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
+
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Coordinates of both points."""
         return frozenset(f"{point}_{axis}" for point in self.points for axis in AXES)
@@ -117,6 +125,11 @@ class Speed:
         """The speed, per radian of the main shaft."""
         text = f"speed of {self.points[-1]}" + (f" relative to {self.points[0]}" if len(self.points) == 2 else "")
         return (Output(self.name, "length", f"{text}, per radian of the main shaft", "ours"),)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Velocities of the points."""
@@ -151,6 +164,11 @@ class ShaftTorque:
         words = ", ".join(name for name, _ in self.torques)
         return (Output(self.name, "torque", f"torque on the main shaft that drives {words}", "ours"),)
 
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
+
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """The drive torques."""
         return frozenset(name for name, _ in self.torques)
@@ -182,6 +200,11 @@ class Shaking:
             found.append(Output(name, unit, f"magnitude of {what}", "ours"))
             found += [Output(f"{name}_{x}", unit, f"{x} of {what}, machine's frame", "ours") for x in AXES]
         return tuple(found)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
 
     @property
     def _moment(self) -> str:

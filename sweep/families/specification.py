@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from sweep.errors import InputError, nearest
@@ -12,12 +13,14 @@ from sweep.families import Specification
 from sweep.families.base import Event, Family, Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.domain import Turn, reads_as_degrees
+from sweep.families.located import coupler_joints, is_planar
 from sweep.families.members import Machine, Member, assemble
 from sweep.families.placing import place, vector
 from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Shaking, Speed, Timing
+from sweep.families.thread_balance import thread_balance
 
-MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip")
-RELATION_KINDS = ("distance", "speed", "timing", "event", "value", "torque", "shaking")
+MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye")
+RELATION_KINDS = ("distance", "speed", "timing", "event", "value", "torque", "shaking", "thread")
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
@@ -123,7 +126,20 @@ def _member(name: str, table: dict[str, Any], earlier: Mapping[str, Member], fin
     driver = _driver(table.get("driver"), earlier, where)
     drives = {} if driver is None else dict(earlier[driver[0]].family.derivative_of)
     spot = place(name, None if table.get("place") is None else dict(table["place"]))
-    return Member(name, family, int(ratio), float(offset), driver, drives, spot, tip)
+    member = Member(name, family, int(ratio), float(offset), driver, drives, spot, tip)
+    return member if table.get("eye") is None else replace(member, eye=_eye(member, table["eye"], f"{where}.eye"))
+
+
+def _eye(member: Member, given: Any, where: str) -> tuple[float, ...]:
+    """A point of the coupler; how a spatial one turns about its own line is not known, so it lies on that line."""
+    x, y, z = vector(given, where)
+    if coupler_joints(member) is None:
+        raise InputError("eye", given, f"a member with a coupler; {member.family.name} has none", where)
+    if is_planar(member):
+        return x, y, z
+    if (y, z) != (0.0, 0.0):
+        raise InputError("eye", given, "[x, 0, 0]: on the line of the joints of a coupler that moves in space", where)
+    return (x,)
 
 
 def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[str, str] | None:
@@ -175,6 +191,8 @@ def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> E
 
 def _relation(name: str, table: dict[str, Any], members: Mapping[str, Member]) -> Relation | Timing:
     where = f"machine.relations.{name}"
+    if "thread" in table:
+        return thread_balance(name, table, members)
     if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
         raise InputError(name, dict(table), f"one of {', '.join(RELATION_KINDS)}", where)
     kind, given = next(iter(table.items()))

@@ -28,7 +28,7 @@ def listed(study: Study) -> dict[str, Array]:
     Signs are listed by nature and are not among them.  What [locus] or [fit] sets or scales has no list: there the
     values are proportions, and prescribed ones are ranges.
     """
-    raw = study.data.get("design", {})
+    raw = study.written
     names = study.family.parameter_names
     signs = {p.name for p in study.family.parameters if p.choices is not None}
     found = {}

@@ -7,13 +7,16 @@ import numpy as np
 from sweep.costs import nanoseconds
 from sweep.effects import input_names
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work
+from sweep.families.members import Machine
 
 SIZE = Output("size", "length", "largest length of the mechanism, offsets by magnitude")
 
 
 def lengths(family: Family) -> tuple[str, ...]:
     """Parameters that are lengths of the mechanism itself, not of bodies and bearings that effects ask for."""
-    others = input_names(family)
+    others = set(input_names(family))
+    if isinstance(family, Machine):
+        others |= {p.name for relation in family.relations for p in relation.parameters}
     return tuple(p.name for p in family.parameters if p.unit == "length" and p.name not in others)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from sweep.chunks.cascade import compared, meets
-from sweep.quantities.names import is_flag
+from sweep.quantities.names import error_of, is_flag
 from sweep.report.quantities import Quantity, number, quantity
 
 if TYPE_CHECKING:
@@ -60,6 +60,9 @@ def limit_state(
         rooms.append((limit.maximum - size, limit.maximum))
     room, bound = min(rooms, key=lambda pair: pair[0]) if not math.isnan(size) else (math.nan, math.nan)
     tolerance = ACTIVE * max(abs(bound), 1e-12)
+    known = value_of(row, error_of(limit.output))
+    if bound == 0.0 and known > tolerance:
+        tolerance = known  # no share of 0 says how near is near enough: the error of the value does
     if math.isnan(room):
         state = "unknown"
     elif room < -tolerance:

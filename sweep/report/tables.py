@@ -116,7 +116,7 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
 def _few_values(study: Study, name: str) -> list[float] | None:
     """Two or three listed values of an axis: to a sweep they are a choice, not a range."""
     axis = next((axis for axis in study.space.axes if axis.name == name), None)
-    listed = "values" in study.data["design"].get(name, {})
+    listed = "values" in study.written.get(name, {})
     return None if axis is None or axis.values is None or not listed or axis.count > FEW else axis.values.tolist()
 
 

@@ -37,16 +37,18 @@ def read_space(
     given: Mapping[str, float] = MappingProxyType({}),
     made: tuple[str, ...] = (),
     prescribed: Mapping[str, Entry] = MappingProxyType({}),
+    tables: Mapping[str, str] = MappingProxyType({}),
 ) -> DesignSpace | None:
     """The designs of a study, or None if a parameter is faulty (all faults are reported).
 
     ``fitted`` parameters are set by [fit]: they must not be given, except lam, which then says where "up" is.
     ``given`` ones have their value from [scene] and must not be given again.  ``made`` ones follow from [locus], whose
-    ``prescribed`` outputs take their place in the space.
+    ``prescribed`` outputs take their place in the space.  ``tables`` names the tables of what does not stand in
+    [design].
     """
     before = len(faults.lines)
     sample = read_section(SampleTable, raw["sample"], ("design", "sample"), faults) if "sample" in raw else None
-    _check_names(family, raw, ("design",), faults, extra=("sample",), fitted=(*fitted, *given, *made))
+    _check_names(family, raw, ("design",), faults, extra=("sample",), fitted=(*fitted, *given, *made), tables=tables)
     for name in given:
         if name in raw:
             faults.value(("design", name), raw[name], "nothing here: [scene] gives it")
@@ -59,7 +61,7 @@ def read_space(
     found: dict[str, Entry] = dict(prescribed)
     for name in [name for name in raw if name in family.parameter_names]:
         parameter = next(p for p in family.parameters if p.name == name)
-        entry = read_entry(parameter, raw[name], ("design", name), faults, sampled=sample is not None)
+        entry = read_entry(parameter, raw[name], (tables.get(name, "design"), name), faults, sampled=sample is not None)
         if entry is not None:
             found[name] = entry
     axes = tuple(entry for entry in found.values() if isinstance(entry, Axis))
@@ -114,6 +116,7 @@ def _check_names(
     faults: Faults,
     extra: tuple[str, ...] = (),
     fitted: tuple[str, ...] = (),
+    tables: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     for name in raw:
         if name not in family.parameter_names and name not in extra:
@@ -125,7 +128,8 @@ def _check_names(
     for p in family.parameters:
         if p.name not in raw and p.default is None and p.name not in fitted:
             needed = f"{p.text}: {_forms(p)}" if key[0] == "reference" else missing_parameter(p)
-            faults.missing((*key, p.name), needed)
+            if not faults.misspelt((*key, p.name)):
+                faults.missing((tables.get(p.name, key[0]), *key[1:], p.name), needed)
 
 
 def missing_parameter(p: Parameter) -> str:
@@ -243,7 +247,7 @@ def _checked(p: Parameter, written: float, value: float, key: Key, faults: Fault
 
 def _usual(internal: str) -> str:
     """The unit a designer writes where the internal one is given."""
-    return {"rad": "deg", "t": "kg", "t*mm^2": "kg*mm^2", "rad/s": "rpm"}.get(internal, internal)
+    return {"rad": "deg", "t": "kg", "t*mm^2": "kg*mm^2", "rad/s": "rpm", "N*mm*s": "N*m/rpm"}.get(internal, internal)
 
 
 def _forms(p: Parameter, number: object = None) -> str:

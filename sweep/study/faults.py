@@ -39,8 +39,12 @@ class Faults:
 
     def missing(self, key: Key, needed: str, instead: str = "") -> None:
         """Report a key that must be there, or another one instead."""
-        if key not in self._misspelt and (*key[:-1], instead) not in self._misspelt:
+        if not self.misspelt(key) and not self.misspelt((*key[:-1], instead)):
             self._add(key, f"{spelled(key)} is missing; needed: {needed}")
+
+    def misspelt(self, key: Key) -> bool:
+        """Whether a key that is missing stands there with a spelling mistake, which was reported."""
+        return key in self._misspelt
 
     def unknown(self, key: Key, known: Iterable[str], what: str = "key") -> None:
         """Report a key that nobody reads, with the nearest right one."""

@@ -16,6 +16,7 @@ from sweep.study.reading import Reading
 from sweep.study.study import Study
 from sweep.study.tables import READERS, REQUIRED_TABLES, TABLES
 from sweep.study.tables.accuracy import accuracy_table
+from sweep.study.tables.bodies import Besides
 from sweep.study.toml import read_toml, toml_text
 
 
@@ -110,4 +111,7 @@ def _build(
         "accuracy": accuracy_table(reading.fields["accuracy"]),
         "output": reading.get(OutputSection).model_dump(),
     }
+    loads = reading.get(Besides).inlined
+    if loads:
+        defaults["loads"] = copy.deepcopy(loads)
     return Study(path=path, data=copy.deepcopy(dict(data)) | defaults, **reading.fields)

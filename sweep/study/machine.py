@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -21,7 +22,7 @@ Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
 ThreeTexts = Annotated[list[str], Field(min_length=3, max_length=3)]
 
 # Tables in which a member's own entries may stand in a table of the member's name.
-BY_MEMBER = (("design",), ("limits",), ("reference", "design"))
+BY_MEMBER = (("design",), ("bodies",), ("loads",), ("limits",), ("reference", "design"))
 
 
 class PlaceTable(Section):
@@ -43,6 +44,9 @@ class MemberSection(Section):
     place: PlaceTable | None = Field(None, description="{ at = [...], axis = [...], zero = [...] }")
     tip: ThreeTexts | None = Field(
         None, description='three lengths along, across, along the axis, as ["30 mm", "0 mm", "2 mm"]'
+    )
+    eye: ThreeTexts | None = Field(
+        None, description='three lengths along the coupler, across it, along its axes, as ["30 mm", "0 mm", "0 mm"]'
     )
 
 
@@ -87,8 +91,10 @@ def _flatten(data: dict[str, Any], key: tuple[str, ...], members: Mapping[str, A
     data[key[0]] = flat
 
 
-def read_machine(data: Mapping[str, Any], faults: Faults) -> tuple[Specification, Family] | None:
-    """The machine of a file, or None with its faults."""
+def read_machine(
+    data: Mapping[str, Any], faults: Faults, threads: Mapping[str, dict[str, Any]] = MappingProxyType({})
+) -> tuple[Specification, Family] | None:
+    """The machine of a file with its threads, or None with its faults."""
     before = len(faults.lines)
     tables = _tables(data, "machine", faults)
     members = {name: _member(name, raw, faults) for name, raw in tables.items()}
@@ -96,6 +102,10 @@ def read_machine(data: Mapping[str, Any], faults: Faults) -> tuple[Specification
     for name, raw in _tables(data, "relations", faults).items():
         section = read_section(RelationSection, raw, ("relations", name), faults)
         relations[name] = section.model_dump(exclude_none=True)
+    for name, thread in threads.items():
+        if name in relations:
+            faults.value(("thread", name), thread, "a name that no relation has")
+        relations[name] = thread
     if len(faults.lines) > before:
         return None
     try:
@@ -110,9 +120,17 @@ def read_machine(data: Mapping[str, Any], faults: Faults) -> tuple[Specification
         return given, find_family(given)
     except InputError as error:
         place: Key = tuple(error.place.removeprefix("machine.").split(".")) if error.place != "machine" else ()
+        if place[:1] == ("relations",) and place[1:] and place[1] in threads:
+            faults.value(("thread", place[1], _key_of_thread(error)), error.value, error.allowed)
+            return None
         key: Key = place if place[:1] == ("relations",) else ("machine", *place)
         faults.value(key if place[:1] == ("relations",) else (*key, error.name), error.value, error.allowed)
         return None
+
+
+def _key_of_thread(error: InputError) -> str:
+    """A fault of the path is that of its key in the file."""
+    return "path" if error.name == "thread" or error.place.endswith(".thread") else error.name
 
 
 def _level(given: str | float, internal: str, name: str, faults: Faults) -> float:
@@ -136,11 +154,12 @@ def _tables(data: Mapping[str, Any], name: str, faults: Faults) -> dict[str, Any
 def _member(name: str, raw: object, faults: Faults) -> dict[str, Any]:
     key: Key = ("machine", name)
     section = read_section(MemberSection, raw, key, faults)
-    found: dict[str, Any] = section.model_dump(exclude_none=True, exclude={"offset", "place", "tip"})
+    found: dict[str, Any] = section.model_dump(exclude_none=True, exclude={"offset", "place", "tip", "eye"})
     if section.offset is not None:
         found["offset"] = _number(section.offset, "rad", (*key, "offset"), faults)
-    if section.tip is not None:
-        found["tip"] = [_number(text, "mm", (*key, "tip", k), faults) for k, text in enumerate(section.tip)]
+    for name, texts in (("tip", section.tip), ("eye", section.eye)):
+        if texts is not None:
+            found[name] = [_number(text, "mm", (*key, name, k), faults) for k, text in enumerate(texts)]
     if section.place is not None:
         place: dict[str, Any] = section.place.model_dump(exclude_none=True, exclude={"at"})
         if section.place.at is not None:

@@ -14,6 +14,7 @@ from sweep.effects import extended
 from sweep.families import Specification
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
+from sweep.numerics.curves import Curve
 from sweep.quantities.names import without_minus
 from sweep.study.space import DesignSpace
 
@@ -135,8 +136,9 @@ class Study:
     """A question about one mechanism, made by :func:`sweep.study.load_study`.
 
     ``want`` holds every design output that is computed: the wanted ones, those of the limits, the objective and what is
-    set against it.  ``data`` is the file's content with defaults filled in, ready for JSON;
-    ``study_from_data`` makes the study again.
+    set against it.  ``curves`` are the loads over the turn, by the input they add to.  ``data`` is the file's content
+    with defaults filled in and tables of other files inserted, ready for JSON; ``study_from_data`` makes the study
+    again.
     """
 
     name: str
@@ -145,6 +147,7 @@ class Study:
     path: Path
     mechanism: tuple[str, ...] | Specification
     speed: float | None
+    curves: dict[str, Curve]
     want: tuple[str, ...]
     space: DesignSpace
     locus: OnLocus | None
@@ -161,6 +164,11 @@ class Study:
     output: OutputSettings
     budget: Budget
     data: dict[str, Any]
+
+    @property
+    def written(self) -> dict[str, Any]:
+        """The entries of parameters and of inputs of effects as they stand in the file, by name."""
+        return {name: x for table in ("loads", "bodies", "design") for name, x in self.data.get(table, {}).items()}
 
     @property
     def parameter_limits(self) -> tuple[Limit, ...]:
@@ -196,7 +204,7 @@ class Study:
     @cached_property
     def family(self) -> Family:
         """The mechanism: a family, a chain or a machine, with the effects that what is wanted calls for."""
-        return extended(self.bare, self.want)
+        return extended(self.bare, self.want, self.curves)
 
     @property
     def bare(self) -> Family:
@@ -226,6 +234,8 @@ class Study:
         }
         if self.pareto is not None:
             content["pareto"] = _counted(self.pareto)
+        if self.curves:
+            content["curves"] = {name: asdict(curve) for name, curve in self.curves.items()}
         if self.accuracy.certify:
             content["certify"] = self.accuracy.proven or True
         if self.task is not None:

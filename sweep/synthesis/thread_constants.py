@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sweep.effects.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY, RADIUS, REFERENCE_SPEED
 from sweep.errors import InputError
 from sweep.evaluation.thread.rows import Sheet, columns_of
 from sweep.families.base import Array, Parameter
+from sweep.families.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY, RADIUS, REFERENCE_SPEED
 
 if TYPE_CHECKING:
     import pandas as pd

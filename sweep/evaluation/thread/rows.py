@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sweep.effects.thread_inputs import Range
 from sweep.errors import MeasuredRangeWarning
 from sweep.evaluation.angles import in_radians
 from sweep.evaluation.tables import Parametrised, design_matrix
 from sweep.families.base import Array, Parameter
+from sweep.families.thread_inputs import Range
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,11 @@ from kernels.effects.thread_contour import COLUMNS, contour_of_least_tension, th
 from kernels.effects.thread_speed import COLUMNS as SPEED_COLUMNS
 from kernels.effects.thread_speed import thread_speed
 from kernels.status import SINGULAR
-from sweep.effects.thread_inputs import (
+from sweep.errors import InputError
+from sweep.evaluation.tables import numbers
+from sweep.evaluation.thread.rows import Sheet, columns_of, frame, side_by_side, warn_outside
+from sweep.families.base import Parameter
+from sweep.families.thread_inputs import (
     ALPHA,
     BENDING,
     BETA,
@@ -21,10 +25,6 @@ from sweep.effects.thread_inputs import (
     RADIUS,
     SPEED_CONSTANTS,
 )  # fmt: skip
-from sweep.errors import InputError
-from sweep.evaluation.tables import numbers
-from sweep.evaluation.thread.rows import Sheet, columns_of, frame, side_by_side, warn_outside
-from sweep.families.base import Parameter
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,6 +14,7 @@ from sweep.study.reading import Reading
 from sweep.study.tables import (
     about,
     accuracy,
+    bodies,
     design,
     fit,
     limits,
@@ -26,6 +27,7 @@ from sweep.study.tables import (
     report,
     scene,
     task,
+    thread,
     tolerance,
 )
 
@@ -37,8 +39,11 @@ TABLES = (
     "mechanism",
     "machine",
     "relations",
+    "thread",
     "scene",
     "design",
+    "bodies",
+    "loads",
     "locus",
     "fit",
     "limits",
@@ -66,9 +71,12 @@ READERS: tuple[tuple[str, Reader], ...] = (
     ("objective", objective.read),
     ("accuracy", accuracy.read),
     ("design", design.read),
+    ("bodies", bodies.read),
+    ("loads", bodies.read_loads),
     ("locus", locus.read),
     ("limits", limits.read),
     ("reference", design.read_compared),
+    ("thread", thread.read),
     ("mechanism", mechanism.read),
     # Values, and what one table asks of another.
     ("scene", scene.read_values),
@@ -82,6 +90,7 @@ READERS: tuple[tuple[str, Reader], ...] = (
     ("scene", scene.check_wanted),
     # What the mechanism has to do with it.
     ("mechanism", mechanism.demand),
+    ("bodies", bodies.check),
     ("scene", scene.extend),
     ("locus", locus.check),
     ("limits", limits.check),

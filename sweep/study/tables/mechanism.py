@@ -13,6 +13,7 @@ from sweep.study.faults import Faults, Key
 from sweep.study.machine import read_machine
 from sweep.study.model import MechanismSection
 from sweep.study.reading import Reading
+from sweep.study.tables.thread import Threads
 
 
 def read(reading: Reading) -> None:
@@ -32,7 +33,7 @@ def read(reading: Reading) -> None:
     for table in ("locus", "fit"):
         if table in data:
             faults.value((table,), data[table], "nothing here: it finishes the links of a [mechanism] alone")
-    found = read_machine(data, faults)
+    found = read_machine(data, faults, reading.get(Threads).relations)
     reading.fields["mechanism"], reading.bare = ((), None) if found is None else found
 
 

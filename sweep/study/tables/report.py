@@ -20,7 +20,7 @@ def check(reading: Reading) -> None:
     """Report incomplete figures, and curves over what the study does not have."""
     report, known = reading.get(ReportSection), reading.family.parameter_names
     _check_figures(report, reading.faults)
-    own = [name for name in reading.raw.get("design", {}) if name in known]
+    own = [name for t in ("design", "bodies", "loads") for name in reading.raw.get(t, {}) if name in known]
     _check_curves(report, [*reading.get(Prescribed).entries, *own], reading.faults)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sweep.effects import extended
+from sweep.effects.wanted import expanded, names_of_effects
 from sweep.families.base import Family
 from sweep.families.members import Machine
 from sweep.quantities.names import parts
@@ -12,6 +13,7 @@ from sweep.study.faults import Faults
 from sweep.study.limits import read_output_name
 from sweep.study.model import ObjectiveSection, ParetoSection, SceneSection
 from sweep.study.reading import Reading
+from sweep.study.tables.bodies import Besides
 from sweep.study.tables.locus import Prescribed
 
 
@@ -45,16 +47,20 @@ def extend(reading: Reading) -> None:
     asked = reading.texts("scene", "want")
     others = [name for name in (_goal(reading), reading.get(ParetoSection).output) if name]
     wanted = [*(name for _, name in asked), *reading.raw.get("limits", {}), *others]
-    reading.family = extended(reading.mechanism, wanted)
+    wanted = expanded(reading.mechanism, wanted)
+    reading.family = extended(reading.mechanism, wanted, reading.get(Besides).curves)
     speed = reading.fields["speed"]
     reading.put(Given({} if speed is None else speeds(reading.family, speed)))
+    effects = names_of_effects(reading.mechanism)
     for k, name in asked:
+        if name in effects:
+            continue
         read_output_name(reading.family, name, ("scene", "want", k), reading.faults)
 
 
 def collect(reading: Reading) -> None:
     """All design outputs that are computed: wanted, prescribed, limited, to be made small, or set against that."""
-    wanted = [*reading.get(SceneSection).want, *reading.get(Prescribed).entries]
+    wanted = [*expanded(reading.mechanism, reading.get(SceneSection).want), *reading.get(Prescribed).entries]
     wanted += [limit.output for limit in reading.fields["limits"]]
     goal, front = _goal(reading), reading.fields["pareto"]
     wanted += [goal] if goal else []

@@ -1,0 +1,112 @@
+"""D4 with D2: fluctuation of the crank speed where the joints rub."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from sweep.effects import friction, kinetostatics, loads
+from sweep.effects.base import DesignResult, Effect, Scene, Status
+from sweep.effects.speed import (
+    FLYWHEEL,
+    FORMULAS,
+    GRIDS,
+    LEFT,
+    MOTOR,
+    OF_CONSTANT_MEAN,
+    advise,
+    compute,
+    numbers,
+    outputs,
+    samples,
+    steady,
+    turn,
+)
+from sweep.effects.turn import reduction_outputs
+from sweep.families.base import Array
+
+SUFFIX = "_friction"
+OUTPUTS = outputs(SUFFIX, f"{OF_CONSTANT_MEAN}, friction included")
+PER_TURN = numbers(SUFFIX, ", friction included")
+# Friction grows with the loads, and these with the speed: it is computed again with the speed that it makes.
+PASSES = 8
+SETTLED = 1e-7  # share of the largest torque excess or loss by which the last pass changes the loss
+
+
+def loss(grid: Scene, slope: Array) -> tuple[Array, Status]:
+    """Torque on the crank that friction takes, (n, N), at the speed over the turn that it makes, and the status.
+
+    The speed is found on a grid of GRIDS[-1] poses: what that misses of it changes the loss by as small a share.
+    """
+    coarse = grid if grid.shape[1] <= GRIDS[-1] else grid.on_grid(GRIDS[-1])
+    inertia, excess = samples(coarse)
+    mean, motor = grid.inputs["speed"], slope if slope.any() else None
+    status = np.zeros(len(grid.designs), np.uint8)
+    even = np.broadcast_to(mean[:, None], coarse.shape)
+    lost = _lost(coarse, even, np.zeros(coarse.shape), status)
+    phi = coarse.angles.phi
+    for _ in range(PASSES):
+        before, lost = lost, _lost(coarse, *_turning(inertia, excess - lost, mean, motor, phi), status)
+        size = np.maximum(np.abs(excess).max(axis=1), np.abs(lost).max(axis=1))
+        moved: NDArray[np.bool_] = np.asarray(np.abs(lost - before).max(axis=1) > SETTLED * size)
+        if not moved.any():
+            break
+    else:
+        status[(status == st.OK) & moved] = st.NOT_CONVERGED
+    if coarse is not grid:
+        lost = _lost(grid, *_turning(inertia, excess - lost, mean, motor, grid.angles.phi), status)
+    return lost, status
+
+
+def _turning(inertia: Array, excess: Array, mean: Array, motor: Array | None, phi: Array) -> tuple[Array, Array]:
+    """Speed and acceleration over the turn; even where there is no steady state, which its status says."""
+    found, _ = steady(inertia, excess, mean, motor, phi, LEFT)
+    usable = np.logical_and.reduce(np.isfinite(found["crank_speed"]), axis=1, keepdims=True)
+    speed = np.where(usable, found["crank_speed"], mean[:, None])
+    return speed, np.where(usable, found["crank_acceleration"], 0.0)
+
+
+def _lost(grid: Scene, speed: Array, change: Array, status: Status) -> Array:
+    """Driving torque with friction minus that without, where the crank turns like this; ``status`` is worsened."""
+    turning = Scene(
+        grid.family, grid.designs, grid.angles, grid.inputs, grid.after, curves=grid.curves, uneven=(speed, change)
+    )
+    rubbing = friction.compute(turning, frozenset({"drive_torque_friction"}))
+    smooth = kinetostatics.compute(turning, frozenset({"drive_torque"}))
+    worst = np.asarray(rubbing["status"], np.uint8).max(axis=1)
+    np.copyto(status, worst, where=status == st.OK)
+    with_friction = np.asarray(rubbing["drive_torque_friction"], np.float64)
+    return with_friction - np.asarray(smooth["drive_torque"], np.float64)
+
+
+def _effect(kind: loads.Follower) -> Effect:
+    rubbing = friction.SLIDER if kind is loads.SLIDER else friction.EFFECT
+    return Effect(
+        key="D4, D2",
+        name=f"{kind.prefix}speed_fluctuation_friction",
+        title="fluctuation of the crank speed at constant mean speed, friction included",
+        equation="D4 (1)-(5)",
+        formulas=(*FORMULAS, "(5) friction takes drive_torque_friction - drive_torque, both at omega(phi), eps(phi)"),
+        followers=(kind.name,),
+        needs=(f"{kind.prefix}speed_fluctuation", f"{kind.prefix}friction"),
+        inputs=(*rubbing.inputs, FLYWHEEL, MOTOR),
+        tool_inputs=loads.TOOL,
+        outputs=OUTPUTS,
+        compute=partial(compute, loss=loss, suffix=SUFFIX),
+        called_for="unevenness of a drive whose joints rub",
+        negligible="friction takes less than a tenth of the torque",
+        whole_turn=True,
+        even_crank=True,
+        takes_load=friction.KEY,
+        design_result=DesignResult(
+            (*PER_TURN, *reduction_outputs(OUTPUTS)), partial(turn, loss=loss, suffix=SUFFIX), block=8
+        ),
+        advise=advise,
+    )
+
+
+EFFECT = _effect(loads.ROCKER)
+SLIDER = _effect(loads.SLIDER)

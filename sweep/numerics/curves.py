@@ -1,0 +1,105 @@
+"""Periodic functions of one angle that a user gives: a table, or a Fourier series."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
+
+Array: TypeAlias = NDArray[np.float64]
+TWO_PI = 2.0 * np.pi
+AROUND = 3  # points of the next and the last turn: the slope at a point depends on its two neighbours alone
+
+
+@dataclass(frozen=True)
+class TableCurve:
+    """A table over one turn, joined by monotone cubics (Fritsch and Carlson 1980, Fritsch and Butland 1984).
+
+    Between two points the curve stays between their values: a table of forces that are never negative gives no
+    negative force.  Value and slope are continuous, over the seam of the turn too.
+
+    Parameters
+    ----------
+    phi : two or more rising angles within one turn, the seam once [rad]
+    values : the values there
+    """
+
+    phi: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __call__(self, phi: Array) -> Array:
+        """Values at any angles, of the same shape."""
+        start = self.phi[0]
+        found: Array = self._cubics(start + np.mod(phi - start, TWO_PI))
+        return found
+
+    def slope(self, phi: Array) -> Array:
+        """Derivative at any angles."""
+        start = self.phi[0]
+        found: Array = self._cubics(start + np.mod(phi - start, TWO_PI), 1)
+        return found
+
+    @cached_property
+    def _cubics(self) -> PchipInterpolator:
+        from scipy.interpolate import PchipInterpolator
+
+        rounds = -(-AROUND // len(self.phi))
+        phi = np.concatenate([np.array(self.phi) + k * TWO_PI for k in range(-rounds, rounds + 2)])
+        with np.errstate(
+            over="ignore"
+        ):  # next to a level piece a reciprocal slope may be infinite: the slope is 0 then
+            return PchipInterpolator(phi, np.tile(self.values, 2 * rounds + 2), extrapolate=False)
+
+
+@dataclass(frozen=True)
+class SeriesCurve:
+    """A Fourier series: mean + sum of cos[k - 1] cos(k phi) + sin[k - 1] sin(k phi)."""
+
+    mean: float = 0.0
+    cos: tuple[float, ...] = ()
+    sin: tuple[float, ...] = ()
+
+    def __call__(self, phi: Array) -> Array:
+        """Values at any angles, of the same shape."""
+        total = np.full_like(phi, self.mean)
+        for factors, function in ((self.cos, np.cos), (self.sin, np.sin)):
+            for order, factor in enumerate(factors, start=1):
+                total += factor * function(order * phi)
+        return total
+
+
+Curve: TypeAlias = TableCurve | SeriesCurve
+
+
+def table_curve(phi: Array, values: Array) -> TableCurve:
+    """The curve of a table, its points in any order of the turn.
+
+    Parameters
+    ----------
+    phi : (n,) angles [rad]; the point of the seam may stand twice, at both ends
+    values : (n,)
+
+    Raises
+    ------
+    ValueError
+        says what is wrong: fewer than two points, values that are not finite, angles that do not rise or cover more
+        than a turn, two values at the seam.
+    """
+    if phi.ndim != 1 or phi.shape != values.shape:
+        raise ValueError("as many angles as values")
+    if not (np.isfinite(phi).all() and np.isfinite(values).all()):
+        raise ValueError("finite numbers")
+    whole = phi.size > 1 and abs(phi[-1] - phi[0] - TWO_PI) < 1e-9
+    if whole and values[0] != values[-1]:
+        raise ValueError("the same value at both ends of the turn")
+    if whole:
+        phi, values = phi[:-1], values[:-1]
+    if phi.size < 2 or not (np.diff(phi) > 0.0).all() or not phi[-1] - phi[0] < TWO_PI:
+        raise ValueError("two or more rising angles within one turn")
+    return TableCurve(tuple(map(float, phi)), tuple(map(float, values)))

@@ -1,0 +1,172 @@
+"""[bodies] and [loads] of a study: the same study as with everything in [design], loads over the turn, faults."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.errors import StudyError
+from sweep.study import load_study, study_from_data
+from sweep.study.load import merged
+
+HEAD = """
+[study]
+name = "loaded"
+[mechanism]
+chain = ["rssr", "guide"]
+[scene]
+speed = "7000 rpm"
+want = ["kinetostatics2", "max_abs_tool_load2"]
+[design]
+a1 = { from = 10, to = 14, count = 3, unit = "mm" }
+b1 = "60 mm"
+c1 = "30 mm"
+e1 = "50 mm"
+f1 = "5 mm"
+g1 = "2 mm"
+alpha1 = "1.2 rad"
+a2 = "11 mm"
+b2 = "40 mm"
+c2 = "45 mm"
+e2 = "38 mm"
+xi2 = "75 mm"
+eta2 = "12 mm"
+lam2 = "1.4 rad"
+h2 = "5 mm"
+"""
+BODIES = """
+m_crank2 = "10 g"
+m_coupler2 = { values = [10, 20], unit = "g" }
+m_rocker2 = "10 g"
+m_tool2 = "25 g"
+"""
+FORCE = "tool_force2 = { phi = [0, 90, 180], values = [0, -5, 0], unit = 'N' }\n"
+
+
+def load(tmp_path, text, files=None):
+    (tmp_path / "study.toml").write_text(text)
+    for name, content in (files or {}).items():
+        (tmp_path / name).write_text(content)
+    return load_study(tmp_path)
+
+
+def faults(tmp_path, text, files=None):
+    with pytest.raises(StudyError) as error:
+        load(tmp_path, text, files)
+    return "\n".join(error.value.faults)
+
+
+def test_bodies_in_a_table_of_their_own_make_the_same_study_as_in_design(tmp_path):
+    old = load(tmp_path, HEAD + BODIES + 'tool_force2 = "-3 N"\n')
+    new = load(tmp_path, HEAD + "[bodies]\n" + BODIES + '[loads]\ntool_force2 = "-3 N"\n')
+    assert new.fingerprint == old.fingerprint
+    columns, others = (study.space.columns(0, study.space.count) for study in (new, old))
+    assert list(columns) == list(others)
+    for name, values in columns.items():
+        np.testing.assert_array_equal(values, others[name])
+    assert study_from_data(new.data, new.path).fingerprint == new.fingerprint
+
+
+def test_what_nothing_wanted_takes_describes_the_machine_and_changes_no_study(tmp_path):
+    bare = load(tmp_path, HEAD + "[bodies]\n" + BODIES)
+    more = load(tmp_path, HEAD + "[bodies]\n" + BODIES + "mu_a1 = 0.05\nflywheel1 = '2 kg*mm^2'\n")
+    assert more.fingerprint == bare.fingerprint
+    assert "mu_a1" not in more.family.parameter_names
+
+
+def test_name_of_an_effect_among_the_wanted_stands_for_its_outputs(tmp_path):
+    study = load(tmp_path, HEAD + "[bodies]\n" + BODIES)
+    assert {"max_abs_force_a2", "max_abs_drive_torque2", "max_abs_tool_load2"} <= set(study.want)
+    assert "kinetostatics2" not in study.want
+
+
+def test_load_over_the_turn_is_the_same_from_the_study_a_csv_and_a_parquet_file(tmp_path):
+    inline = load(tmp_path, HEAD + "[bodies]\n" + BODIES + "[loads]\n" + FORCE)
+    table = pd.DataFrame({"note": ["x"] * 3, "angle": [0.0, 90.0, 180.0], "force": [0.0, -5.0, 0.0]})
+    table.to_parquet(tmp_path / "force.parquet")
+    files = {"force.csv": "angle,force\n0,0\n90,-5\n180,0\n"}
+    columns = ', columns = ["angle", "force"]'
+    for name, more in (("force.csv", ""), ("force.parquet", columns)):
+        entry = f'[loads]\ntool_force2 = {{ file = "{name}", unit = "N"{more} }}\n'
+        study = load(tmp_path, HEAD + "[bodies]\n" + BODIES + entry, files)
+        assert study.curves == inline.curves
+        assert study.fingerprint == inline.fingerprint
+        # A dataset keeps what the file said: it is complete without it.
+        (tmp_path / name).unlink()
+        assert study_from_data(study.data, tmp_path / "study.toml").curves == inline.curves
+    stronger = FORCE.replace("-5", "-6")
+    assert load(tmp_path, HEAD + "[bodies]\n" + BODIES + "[loads]\n" + stronger).fingerprint != inline.fingerprint
+
+
+def test_units_of_angle_and_load_are_those_written(tmp_path):
+    entry = "[loads]\nload_torque1 = { phi = [0.0, 0.25, 0.5], angle = 'rev', values = [0, 1, 0], unit = 'N*m' }\n"
+    first = BODIES.replace("2 =", "1 =").replace('m_tool1 = "25 g"', "")
+    text = HEAD.replace("kinetostatics2", "kinetostatics") + "[bodies]\n" + BODIES + first + entry
+    curve = load(tmp_path, text).curves["load_torque1"]
+    np.testing.assert_allclose(curve(np.array([0.5 * np.pi])), 1000.0, rtol=1e-14)
+
+
+def test_smoke_version_replaces_a_curve_key_by_key(tmp_path):
+    over = merged({"loads": {"tool_force2": {"mean": 1.0, "unit": "N"}}}, {"loads": {"tool_force2": {"mean": 2.0}}})
+    assert over["loads"]["tool_force2"] == {"mean": 2.0, "unit": "N"}
+
+
+@pytest.mark.parametrize(
+    ("tables", "line"),
+    [
+        ('[bodies]\nm_crnk2 = "1 g"\n', "bodies.m_crnk2: unknown input of the effects of rssr+guide; allowed: m"),
+        ('[bodies]\nload_torque1 = "1 N*m"\n', "bodies.load_torque1 = '1 N*m'; allowed: nothing here: it stands in [l"),
+        ('[loads]\nm_crank2 = "1 g"\n', "loads.m_crank2 = '1 g'; allowed: nothing here: it stands in [bodies]"),
+        ('[bodies]\na2 = "1 mm"\n', "bodies.a2 = '1 mm'; allowed: nothing here: it is a parameter of the mechanism"),
+        ('[bodies]\nspeed1 = "1 rpm"\n', "bodies.speed1 = '1 rpm'; allowed: nothing here: it stands in [scene] or"),
+        ("[bodies]\n" + BODIES.replace('m_crank2 = "10 g"\n', ""), "bodies.m_crank2 is missing"),
+        ("[loads]\npierce_at2 = { phi = [0, 1], values = [1, 2], unit = 'mm' }\n", "it does not change over the turn"),
+        ("[loads]\ntool_force2 = { phi = [0, 90], values = [1, 2] }\n", "loads.tool_force2.unit is missing"),
+        ("[loads]\ntool_force2 = { phi = [0, 400], values = [1, 2], unit = 'N' }\n", "rising angles within one turn"),
+        ("[loads]\ntool_force2 = { phi = [0, 90], unit = 'N' }\n", "loads.tool_force2.values is missing"),
+        ("[loads]\ntool_force2 = { phi = [0, 9], values = [1, 2], mean = 1, unit = 'N' }\n", "allowed: one of {"),
+        ("[loads]\ntool_force2 = { mean = 1, unit = 'mm' }\n", "a force, in N or kN"),
+        ("[loads]\ntool_force2 = { file = 'f.csv', unit = 'N' }\n", "a table that can be read"),
+        ("[loads]\ntool_force2 = { file = '../f.csv', unit = 'N' }\n", "without a folder"),
+        ("[loads]\ntool_force2 = { file = 'g.csv', columns = ['a', 'c'], unit = 'N' }\n", "columns of the file: a, b"),
+        ("[loads]\ntool_force2 = { file = 'g.csv', unit = 'N' }\n", "numbers in both columns"),
+    ],
+)  # fmt: skip
+def test_faults_of_bodies_and_loads_name_the_place_and_what_is_right(tmp_path, tables, line):
+    text = HEAD + tables if "[bodies]" in tables else HEAD + "[bodies]\n" + BODIES + tables
+    assert line in faults(tmp_path, text, {"g.csv": "a,b\n0,x\n90,2\n"})
+
+
+def test_an_input_given_twice_is_a_fault(tmp_path):
+    assert "either here or in [design]" in faults(tmp_path, HEAD + 'm_tool2 = "2 g"\n[bodies]\n' + BODIES)
+
+
+def test_bodies_of_members_stand_under_the_member(tmp_path):
+    text = """
+[study]
+name = "machine"
+[machine.needle]
+family = "guide"
+[scene]
+speed = "7000 rpm"
+want = ["needle.tool"]
+[design.needle]
+a = "11 mm"
+b = "40 mm"
+c = "45 mm"
+e = "38 mm"
+xi = "75 mm"
+eta = "12 mm"
+lam = "1.4 rad"
+h = "5 mm"
+[bodies.needle]
+m_tool = "25 g"
+[loads.needle]
+tool_force = { mean = -2.0, cos = [1.0], unit = "N" }
+"""
+    study = load(tmp_path, text)
+    assert study.want == ("needle.max_abs_tool_load", "needle.max_abs_tool_torque")
+    assert set(study.curves) == {"needle.tool_force"}
+    assert study.space.fixed["needle.m_tool"] == pytest.approx(25e-6)
+    assert study_from_data(study.data, study.path).fingerprint == study.fingerprint
