@@ -121,7 +121,7 @@ def test_figures_depend_on_the_data_only(full: Path, tmp_path: Path) -> None:
         ({"kkt_residual": 1e-3}, "Not achieved: the optimiser did not settle (KKT residual 0.001,"),
         ({"kkt_residual": 1.0, "ended": "time"}, "the optimiser had no time left to settle (KKT residual 1, 1·10⁻⁶"),
         ({"kkt_residual": np.nan}, "the optimiser did not settle (its KKT residual does not exist, 1·10⁻⁶ is wanted)"),
-        ({"max_abs_d2s": 9.0}, "Not achieved: the optimiser ended above the best design of the sweep, 8.5 mm/rad²"),
+        ({"max_abs_d2s": 9.0}, "Not achieved: the optimiser ended behind the best design of the sweep, 8.5 mm/rad²"),
         ({"stroke": 24.0, "status": 5}, "No design was found that keeps all limits"),
         ({"stroke": 24.0, "status": 5}, "Not achieved: stroke: 24 mm instead of 24.4 to 24.6 mm"),
         ({"max_abs_d2s": 11.0}, "10 % more than the reference design"),

@@ -38,7 +38,7 @@ def write_law(
     else:
         matrix, _ = design_matrix(family, design)
         angles, text = equal_steps(domain, matrix, poses), domain.text
-    found = evaluate(mechanism, design, names, phi=angles)
+    found = evaluate(mechanism, design, names, phi=angles, angles="rad")
     units = {o.name: o.unit for o in family.pose_outputs} | {domain.name: domain.unit}
     units = {name: of.replace("length", unit) for name, of in units.items()}
     texts = {o.name: o.text for o in family.pose_outputs} | {domain.name: text}

@@ -7,10 +7,10 @@ import numpy as np
 from kernels.families import feed
 from kernels.families.feed import triad
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Link, Made, Points, Skeleton
+from sweep.families.capabilities import Dimensions, Link, Made, Points, Skeleton
 from sweep.families.feed import ROCKER, SIGMA
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
-from sweep.families.skeletons import parameter, standing
+from sweep.families.skeletons import links, parameter, standing
 
 
 def _eccentric(number: int) -> tuple[Parameter, ...]:
@@ -115,6 +115,7 @@ FAMILY = Family(
         "x_t": "dx_t", "dx_t": "d2x_t", "y_t": "dy_t", "dy_t": "d2y_t", "chi": "dchi", "dchi": "d2chi",
     },
     capabilities=(
+        Dimensions(links("h_a h_b h_c rh q1 q2 q3"), optional=("rE2", "rE3")),
         Points({"t": ("x_t", "y_t", None)}),
         Skeleton(
             {

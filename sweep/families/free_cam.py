@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.families import free_cam
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, poses_of
 from sweep.families.capabilities import Link, Made, Points, Skeleton, ThreadPath
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
@@ -36,12 +36,8 @@ POSE_OUTPUTS = (
 )
 _NAMES = tuple(o.name for o in POSE_OUTPUTS)
 
-
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its cam angles, each (n, m)."""
-    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-    dtype = np.result_type(designs, angles.cos)
-    return filled(free_cam.poses, (designs, angles.cos, angles.sin), _NAMES, wanted, status, dtype)
+# Wanted pose outputs and status of every design at its angles, each (n, m).
+poses = poses_of(free_cam.poses, _NAMES)
 
 
 EDGE = {"k1": -1.0, "k2": -0.5, "k3": 0.5, "k4": 1.0}

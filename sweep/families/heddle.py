@@ -6,8 +6,8 @@ import numpy as np
 
 from kernels.families import heddle
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, Fixed, Link, Made, Points, Skeleton
-from sweep.families.skeletons import ORIGIN, Y, Z, line, parameter, standing
+from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, Made, Points, Skeleton
+from sweep.families.skeletons import ORIGIN, Y, Z, line, links, parameter, standing
 
 PARAMETERS = (
     Parameter("O2B", "length", "arm of the cam lever", positive=True),
@@ -128,6 +128,7 @@ FAMILY = Family(
     derivative_of={"chi": "dchi", "dchi": "d2chi", "d2chi": "d3chi", "y": "dy", "dy": "d2y", "d2y": "d3y"},
     uses_phi=False,
     capabilities=(
+        Dimensions(links("O2B BC O3C O4E"), optional=("O3D", "O4F", "DF", "EG")),
         Assembly("discriminant", "pressure_angle", rod_square),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
         Skeleton(

@@ -15,7 +15,7 @@ from sweep.families.base import Angles, Array, Columns, Event, Family, Output, P
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.located import TIP, coordinates, velocity
 from sweep.families.placing import AXES, Place
-from sweep.families.relations import Relation, Timing
+from sweep.families.relations import Frame, Reading, Relation, Timing
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,11 @@ class Member:
     def designs(self, designs: Array) -> Array:
         """The design matrix of this member's family."""
         return np.ascontiguousarray(designs[:, self.columns])
+
+    def origin(self, designs: Array) -> Array:
+        """Where the origin of its frame stands in the machine's frame, (n, 3)."""
+        start = self.columns.stop + 1  # behind its own parameters and the phase
+        return designs[:, start : start + 3]
 
     def own(self, name: str) -> str:
         """A dotted name as the member's family knows it; "" for a name of another member."""
@@ -103,7 +108,7 @@ class Machine(Family):
 
     members: tuple[Member, ...] = ()
     relations: tuple[Relation, ...] = ()
-    timings: tuple[Timing, ...] = ()
+    timings: tuple[Timing | Reading, ...] = ()
 
     def member(self, name: str) -> Member:
         """The member of that name."""
@@ -134,11 +139,13 @@ class Machine(Family):
         return _built(self, tuple(replace(m, family=families.get(m.name, m.family)) for m in self.members))
 
 
-def assemble(name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | Event, ...]) -> Machine:
+def assemble(
+    name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | Reading | Event, ...]
+) -> Machine:
     """The machine of these members; each may be driven by one that stands before it."""
-    timings = tuple(r for r in relations if isinstance(r, Timing))
+    timings = tuple(r for r in relations if isinstance(r, Timing | Reading))
     events = tuple(r for r in relations if isinstance(r, Event))
-    others = tuple(r for r in relations if not isinstance(r, Timing | Event))
+    others = tuple(r for r in relations if not isinstance(r, Timing | Reading | Event))
     bare = Machine(name, "", (), "", (), _no_poses, relations=others, timings=timings, events=events)
     return _built(bare, members)
 
@@ -216,7 +223,7 @@ def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: fro
 def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted outputs of members and relations, and the first status that is not OK, in the order of the members."""
     relations = [r for r in machine.relations if not wanted.isdisjoint(o.name for o in r.outputs)]
-    needed = set(wanted).union(*(r.needs for r in relations))
+    needed = set(wanted).union(*(r.needs(wanted) for r in relations))
     for m in reversed(machine.members):
         needed |= _driving(m, needed)
     shape = (len(designs), angles.cos.shape[1])
@@ -228,8 +235,9 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             columns = _member(m, designs, angles, own, found)
             np.copyto(status, columns.pop("status"), where=status == OK)
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
+    frames = {m.name: Frame(m.place.rotation, m.origin(designs)) for m in machine.members} if relations else {}
     for relation in relations:
-        found |= relation.compute(found, {m.name: m.place.rotation for m in machine.members}, wanted)
+        found |= relation.compute(found, frames, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
 
 

@@ -10,15 +10,16 @@ from kernels import status as st
 from sweep.families.base import Array
 from sweep.optimise.certificate import Multipliers, Result, in_words, multipliers
 from sweep.optimise.descent import KKT, Descent
-from sweep.optimise.form import Form, Program
+from sweep.optimise.form import Program
 from sweep.optimise.model import LooksUsedUp, State, Stopped
 from sweep.optimise.problem import Problem
+from sweep.optimise.rows import Form
 
 FIRST = 2  # looks that give a start its scale and its first design
 
 
 def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool], allowed: float = math.inf) -> Result:
-    """Search from one start, on one BLAS thread: the systems are small, and the bits stay those of any other process.
+    """Search from one start on one BLAS thread, as the systems are small and the bits must not depend on the process.
 
     Parameters
     ----------
