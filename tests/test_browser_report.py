@@ -79,7 +79,7 @@ def joints_at(design, phi):
 def test_slider_moves_the_mechanism_and_all_cursors_to_the_computed_pose(folder, address, browser, role):
     design, start = lowest(folder, role)
     with opened(browser, address) as page:
-        page.get_by_role("radio", name=role).check(force=True)
+        page.get_by_role("radio", name=role, exact=True).check(force=True)
         for share in (0.0, 0.25, 0.6):
             page.evaluate(SET, share)
             shown, expected = page.evaluate(BALLS), joints_at(design, start + share * 2.0 * math.pi)
@@ -105,7 +105,7 @@ def test_picture_is_not_empty_and_changes_with_the_angle_the_design_and_the_view
         assert (np.ptp(seen[0], axis=2) > 0.2).mean() > 0.005  # the coloured links
         for act in (
             lambda: page.evaluate(SET, 0.4),
-            lambda: page.get_by_role("radio", name="reference").check(force=True),
+            lambda: page.get_by_role("radio", name="reference", exact=True).check(force=True),
             lambda: page.get_by_role("button", name="front").click(),
         ):
             act()
