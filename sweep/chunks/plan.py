@@ -59,7 +59,7 @@ class Column:
 
 
 class Pilot(NamedTuple):
-    """What a few designs tell of all: cost of one design on one core [s], share of those within every limit."""
+    """Estimates from a few designs: time of one design on one core [s], and the share of designs within every limit."""
 
     seconds_per_design: float
     feasible: float
@@ -67,7 +67,7 @@ class Pilot(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """The cut of a sweep and all that makes its chunks what they are; equal plans give equal bytes."""
+    """The cut of a sweep into chunks and everything that decides their content: equal plans give equal bytes."""
 
     name: str
     study: str
@@ -121,14 +121,14 @@ def make_plan(study: Study, chunk_size: int | None = None) -> Plan:
 
 
 def _repetitive(study: Study) -> tuple[str, ...]:
-    """Parameters whose values recur from design to design: what the store writes as a dictionary."""
+    """List the parameters whose values recur from design to design; the store writes them with a dictionary."""
     names = study.space.fixed if study.space.kind == "sobol" else study.space.names
     own = study.family.parameter_names
     return tuple(name for name in names if name in own and name not in (*study.made, *study.rescaled))
 
 
 def designs_fingerprint(study: Study) -> str:
-    """The study's fingerprint without what concerns only the optimum, so that a change there keeps the designs."""
+    """Hash the study without what concerns only the optimum, so that a change there leaves the designs valid."""
     output = replace(study.output, curves="none")
     return replace(study, optimise=None, pareto=None, tolerance=None, reference=None, output=output).fingerprint
 
@@ -143,6 +143,10 @@ def choose_chunk_size(study: Study) -> int:
     by_memory = CHUNK_BYTES / row_bytes(study)
     by_count = max(study.space.count / CHUNKS_AT_LEAST, SECONDS_AT_LEAST / seconds)
     return CHUNK_STEP * max(1, math.floor(min(by_time, by_memory, by_count) / CHUNK_STEP))
+
+
+TRIED = (512, 4096)  # designs that are sent through the limits where some that keep them are asked for
+RUN = 8  # of them that stand side by side: what one call costs is shared
 
 
 def pilot(study: Study) -> Pilot:
@@ -175,6 +179,29 @@ def spread_designs(study: Study, number: int) -> Array:
     starts = sorted({int((k * golden) % 1.0 * count) for k in range(number)})
     blocks = [parameter_matrix(study, start, start + 1) for start in starts]
     return np.concatenate([matrix[status == OK] for matrix, status in blocks])
+
+
+def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
+    """About that many designs that keep all limits, spread over those found, and how many were tried.
+
+    512 designs spread over the space go through the limits, then 4096 if none of them keeps all: fitted and on their
+    locus, as those of the sweep.
+    """
+    count, tried = study.space.count, 0
+    golden = (math.sqrt(5.0) - 1.0) / 2.0
+    kept = np.empty((0, len(study.family.parameters)))
+    for many in TRIED:
+        runs = -(-count // RUN)
+        chosen = range(runs) if count <= many else sorted({int((k * golden) % 1.0 * runs) for k in range(many // RUN)})
+        blocks = [parameter_matrix(study, k * RUN, min((k + 1) * RUN, count)) for k in chosen]
+        designs, status = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+        cascade = Cascade(study, keep=False)
+        cascade.feed(np.arange(len(designs)), designs, status)
+        kept, tried = cascade.end(()).designs, len(designs)
+        if len(kept) or tried == count:
+            break
+    some = np.unique(np.linspace(0, len(kept) - 1, min(number, len(kept))).astype(int))
+    return kept[some], tried
 
 
 def row_bytes(study: Study) -> int:

@@ -13,16 +13,20 @@ import numpy as np
 
 from kernels import status as st
 from sweep.errors import InputError
+from sweep.evaluation.boxes import box_route
 from sweep.evaluation.route import Part, Route
-from sweep.families.base import Accuracy, Array, Columns
+from sweep.families.base import Accuracy, Array, Columns, Work
 from sweep.families.capabilities import Assembly
 from sweep.families.members import Machine, Member
 from sweep.families.relations import Reading, Timing
 from sweep.quantities.names import error_of, is_place
+from sweep.reductions.box import box
 from sweep.reductions.catalogue import output, quantity
+from sweep.reductions.dimensions import size
 from sweep.reductions.margins import NAMES as MARGINS
-from sweep.reductions.margins import combined, margins
+from sweep.reductions.margins import TRANSMISSION, combined, margins, with_transmission
 from sweep.reductions.sampling import TWO_PI, pose_columns
+from sweep.reductions.work import group_ns
 
 SLOPE = 1e-5  # rad, for the slope that says what the error of an angle does to a value there
 
@@ -40,8 +44,12 @@ def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) 
         timing = next((t for t in machine.timings if t.name == name), None)
         if member is not None and is_alone(member[0]) and not is_of_point(machine, name):
             own.setdefault(member[0].name, []).append(member[1])
-        elif name in MARGINS:
+        elif name in (*MARGINS, TRANSMISSION):
             margin.append(name)
+        elif size(machine, name) is not None:
+            left.append(name)
+        elif (extent := box(machine, name)) is not None:
+            found.append(box_route(machine, extent, accuracy))
         elif timing is not None:
             found.append(_timing(machine, timing, accuracy))
         elif quantity(machine, name) is not None:
@@ -53,9 +61,11 @@ def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) 
     for m in machine.members:
         for inner in routes(m.family, own.get(m.name, ()), accuracy):
             names = tuple(f"{m.name}.{name}" for name in inner.outputs)
-            found.append(Route(f"{m.name}: {inner.name}", names, inner.ns_per_design, partial(_of_member, m, inner)))
+            run = partial(_of_member, m, inner)
+            found.append(Route(f"{m.name}: {inner.name}", names, inner.ns_per_design, run, order=inner.order))
     if margin:
-        found.append(Route("margins", tuple(margin), 100.0 * len(machine.members), partial(_margins, machine)))
+        cost = sum(group_ns(m.family, "margin", (), accuracy) for m in machine.members)
+        found.append(Route("margins", tuple(margin), cost, partial(_margins, machine), order=(Work.QUICK, 0)))
     return found, left
 
 
@@ -117,16 +127,17 @@ def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part)
             columns |= found
             suffixes += loops
         status = np.where(status == st.OK, now, status).astype(np.uint8)
-    return combined(columns, tuple(suffixes)) | {"status": status}
+    return with_transmission(combined(columns, tuple(suffixes)), ("",)) | {"status": status}
 
 
 def _timing(machine: Machine, timing: Timing | Reading, accuracy: Accuracy) -> Route:
     from sweep.evaluation.routes import routes
 
-    cost = sum(route.ns_per_design for route in routes(machine, timing.places, accuracy))
+    both = routes(machine, timing.places, accuracy)
+    cost, order = sum(route.ns_per_design for route in both), max(route.order for route in both)
     if isinstance(timing, Reading):
-        return Route(f"value {timing.name}", (timing.name,), cost, partial(_value, machine, timing))
-    return Route(f"timing {timing.name}", (timing.name,), cost, partial(_difference, machine, timing))
+        return Route(f"value {timing.name}", (timing.name,), cost, partial(_value, machine, timing), order=order)
+    return Route(f"timing {timing.name}", (timing.name,), cost, partial(_difference, machine, timing), order=order)
 
 
 def _value(machine: Machine, reading: Reading, designs: Array, accuracy: Accuracy, window: Part) -> Columns:

@@ -8,24 +8,28 @@ from functools import partial
 import numpy as np
 
 from sweep.errors import InputError
+from sweep.evaluation.boxes import box_route
 from sweep.evaluation.members import machine_routes
+from sweep.evaluation.negatives import negative_route
 from sweep.evaluation.route import Part, Route
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.chain import Stage
 from sweep.families.domain import March
 from sweep.families.members import Machine
-from sweep.quantities.names import at_stage, error_of
+from sweep.quantities.names import at_stage, error_of, without_minus
 from sweep.quantities.reduction import reduction_of
+from sweep.reductions.box import box
 from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.events import event_outputs
 from sweep.reductions.means import mean_squares
 from sweep.reductions.precise import sharpen_maxima
-from sweep.reductions.steps import applying_step
-from sweep.reductions.turn import Group, group_ns, limits_and_reductions, margin_group
+from sweep.reductions.steps import applying_step, step_ns, steps_of
+from sweep.reductions.turn import Group, limits_and_reductions, margin_group
+from sweep.reductions.work import group_ns, group_order
 
 
 def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
-    """What will be computed and how, cheapest first; each route's outputs can be asked of `design_outputs` alone.
+    """What will be computed and how, in order; each route's outputs can be asked of `design_outputs` alone.
 
     Raises
     ------
@@ -33,10 +37,11 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
         for an unknown name, or an accuracy that the family's domain or the output does not serve.
     """
     _check_domain(family, accuracy)
-    found: list[Route] = []
+    found = [negative_route(family, name, accuracy) for name in dict.fromkeys(wanted) if without_minus(name)]
+    wanted = [name for name in wanted if not without_minus(name)]
     if isinstance(family, Machine):
-        found, left = machine_routes(family, wanted, accuracy)
-        wanted = left
+        of_members, wanted = machine_routes(family, wanted, accuracy)
+        found += of_members
     steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
     groups: dict[tuple[Group, str], list[str]] = {}
     asked = {name: (applying_step(family, name, accuracy), quantity(family, name)) for name in dict.fromkeys(wanted)}
@@ -45,6 +50,10 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
         own is None and one is not None and one.route == "margin" and not one.stage for own, one in asked.values()
     )
     for name, (own, one) in asked.items():
+        extent = box(family, name)
+        if extent is not None:
+            found.append(box_route(family, extent, accuracy))
+            continue
         if own is not None and not (together and one is not None and one.route == "margin"):
             step, stage = own
             steps.setdefault((step.name, stage.number if stage else 0), (step, stage, []))[2].append(name)
@@ -62,7 +71,7 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
             raise InputError("output", name, allowed, f"design outputs of {family.name}")
     found += [_own(family, step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
     found += [_general(family, *key, tuple(names), accuracy) for key, names in groups.items()]
-    return tuple(sorted(found, key=lambda route: route.ns_per_design))
+    return tuple(sorted(found, key=lambda route: (*route.order, route.name)))
 
 
 def _check_domain(family: Family, accuracy: Accuracy) -> None:
@@ -73,13 +82,17 @@ def _check_domain(family: Family, accuracy: Accuracy) -> None:
 
 def _own(family: Family, step: Step, stage: Stage | None, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
     name = f"stage {stage.number}: {step.name}" if stage else step.name
-    return Route(name, outputs, step.cost(accuracy), partial(_run_step, family, step, stage, outputs))
+    owner = stage.family if stage else family
+    place = [own.name for own in steps_of(owner)].index(step.name)
+    run, cost = partial(_run_step, family, step, stage, outputs), step_ns(owner, step, accuracy)
+    return Route(name, outputs, cost, run, order=(step.work, place))
 
 
 def _general(family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
     run = partial(_run_general, family, general, outputs)
     cost = group_ns(family, general, outputs, accuracy)
-    return Route(f"{general} {effect}".rstrip(), outputs, cost, run, general)
+    order = group_order(family, general, outputs)
+    return Route(f"{general} {effect}".rstrip(), outputs, cost, run, general, order)
 
 
 def _run_general(

@@ -8,6 +8,7 @@ from kernels.families import backrest
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, guarded
 from sweep.families.capabilities import Points
 from sweep.families.domain import Interval
+from sweep.families.warp import skeleton
 
 FRAME = (
     Parameter("a1", "length", "warp stop motion, where the warp ends, to the right of the beam axis"),
@@ -154,5 +155,5 @@ FAMILY = Family(
     poses=guarded(poses),
     example=EXAMPLE | {"phi": 0.4, "turn": -0.15, "K0": 1482.0},
     domain=beam_of(_NAMES),
-    capabilities=(POINTS,),
+    capabilities=(POINTS, skeleton(PARAMETERS, "phi_rho")),
 )

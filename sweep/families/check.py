@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from sweep.families.base import Family
-from sweep.families.capabilities import Assembly, JointRecords, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, JointRecords, OutputLink, Points, Skeleton
 from sweep.families.domain import Turn
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -67,6 +67,10 @@ def _outputs(family: Family) -> list[str]:
     for name, of in family.derivative_of.items():
         missing = [one for one in (name, of) if one not in names]
         faults += [f"derivative_of names {one!r}, which is no pose output: add it or leave it out" for one in missing]
+    steps = [step.name for step in family.steps]
+    faults += [f"two steps are called {name!r}: rename one" for name in set(steps) if steps.count(name) > 1]
+    if "size" in steps:
+        faults.append("a step is called 'size', as one that every family is given: rename it")
     if family.outward:
         sign = next((p for p in family.parameters if p.name == family.outward), None)
         if sign is None or sign.choices != (-1.0, 1.0):
@@ -111,6 +115,9 @@ def _capabilities(family: Family) -> list[str]:
             for one in made.needs
             if one not in names
         ]
+    lengths = {p.name for p in family.parameters if p.unit == "length"}
+    for dimensions in family.every(Dimensions):
+        faults += [f"Dimensions names {x!r}, which is no length" for x in dimensions.names if x not in lengths]
     turned = family.find(OutputLink) is not None
     if turned and family.position in names and not family.pose_output[family.position].wraps:
         faults.append("OutputLink turns by the position, which is no angle: mark it (wraps=True) or leave it out")

@@ -8,9 +8,9 @@ import numpy as np
 
 from kernels.families import cylindrical_looper
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Link, Made, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Points, Skeleton
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
-from sweep.families.skeletons import crank_axis, parameter, standing
+from sweep.families.skeletons import crank_axis, links, parameter, standing
 
 PARAMETERS = (
     Parameter("a1", "length", "crank that swings the shaft", positive=True),
@@ -139,6 +139,7 @@ FAMILY = Family(
     },
     uses_phi=False,
     capabilities=(
+        Dimensions(links("a1 b1 c1 a2 b2")),
         Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
         Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")}),

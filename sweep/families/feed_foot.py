@@ -7,7 +7,8 @@ import numpy as np
 from kernels.families import feed as kernels
 from kernels.families.feed.motion import OUTPUTS as _RACK
 from sweep.families import feed
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Step, guarded
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Step, Work, guarded
+from sweep.families.capabilities import Fixed, Link, Made, Skeleton
 from sweep.families.domain import March
 from sweep.families.foot import (
     EVENT_OUTPUTS,
@@ -21,6 +22,7 @@ from sweep.families.foot import (
     marched,
     nodes_for,
 )
+from sweep.families.skeletons import Y, standing
 
 PARAMETERS = (*feed.PARAMETERS, *FOOT, RESTITUTION, *FABRIC)
 _RACK_COLUMNS = len(feed.PARAMETERS)
@@ -90,6 +92,33 @@ def feeding(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
     return feed.events(np.ascontiguousarray(designs[:, :_RACK_COLUMNS]), wanted, accuracy)
 
 
+def _rack(designs: Array, angles: Angles, *names: str) -> list[Array]:
+    found = feed.poses(np.ascontiguousarray(designs[:, :_RACK_COLUMNS]), angles, frozenset(names))
+    return [np.asarray(found[name], np.float64) for name in names]
+
+
+def of_rack(joint: str) -> Made:
+    """A joint of the feed mechanism."""
+
+    def at(designs: Array, angles: Angles, found: Columns) -> Array:
+        x, y = _rack(designs, angles, f"x_{joint}", f"y_{joint}")
+        return np.stack([x, y, 0.0 * x], axis=-1)
+
+    return Made((), at)
+
+
+def plate(designs: Array) -> Array:
+    """Where the foot stands on the needle plate: above the tooth's place at phi = 0."""
+    (x,) = _rack(designs, Angles.of(np.zeros((1, 1))), "x_t")
+    return np.stack([x[:, 0], designs[:, _PLATE], 0.0 * x[:, 0]], axis=1)
+
+
+def foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
+    """The foot."""
+    y = np.asarray(found["y_foot"], np.float64)
+    return plate(designs)[:, None, :] + np.stack([0.0 * y, y, 0.0 * y], axis=-1)
+
+
 CONTACT_OUTPUTS = (
     Output("k_min_contact", "force/length", "softest spring that keeps contact with this preload, rigid ground; nan if "
            "none does, for want of preload", "(3)"),
@@ -108,10 +137,18 @@ FAMILY = Family(
     poses=guarded(poses),
     domain=March(turns=TURNS),
     steps=(
-        Step("feeding", feed.FEEDING_OUTPUTS, feeding, 150_000.0),
-        Step("contact", CONTACT_OUTPUTS, contact, 500_000.0),
-        Step("march", EVENT_OUTPUTS, events, 2_000_000.0),
+        Step("feeding", feed.FEEDING_OUTPUTS, feeding, work=Work.LONG),
+        Step("contact", CONTACT_OUTPUTS, contact, work=Work.LONG),
+        Step("march", EVENT_OUTPUTS, events, work=Work.LONG),
     ),
     example=EXAMPLE,
     analytic=False,
+    capabilities=(
+        feed.SIZES,
+        Skeleton(
+            dict(feed.SKELETON.fixed) | {"plate": Fixed(plate, standing(PARAMETERS, axis=Y).axis, "slide")},
+            (*feed.SKELETON.links, Link("foot", ("p",))),
+            {joint: of_rack(joint) for joint in ("h", "e", "f", "t")} | {"p": Made(("y_foot",), foot_place)},
+        ),
+    ),
 )

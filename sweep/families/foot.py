@@ -10,8 +10,11 @@ from kernels.effects.foot_fabric import march_on_fabric
 from kernels.families import foot
 from kernels.families.foot.harmonic import OUTPUTS as _CLOSED
 from kernels.status import NO_EVENT, OK
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, guarded
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, Work, guarded
+from sweep.families.capabilities import Link, Made, Skeleton
 from sweep.families.domain import March
+from sweep.families.skeletons import Y as UPWARDS
+from sweep.families.skeletons import parameter, standing
 
 FOOT = (
     Parameter("m", "mass", "foot with its bar", positive=True),
@@ -143,6 +146,18 @@ def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     return chosen(columns, wanted)
 
 
+def foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
+    """The foot, above the middle of the rack's travel."""
+    y = np.asarray(found["y_foot"], np.float64)
+    return np.stack([0.0 * y, y, 0.0 * y], axis=-1)
+
+
+def rack_place(designs: Array, angles: Angles, found: Columns) -> Array:
+    """The rack's tooth."""
+    y = np.asarray(found["y_rack"], np.float64)
+    return np.stack([-parameter(PARAMETERS, "X", designs)[:, None] * np.cos(angles.phi) + 0.0 * y, y, 0.0 * y], axis=-1)
+
+
 EXAMPLE = {"m": 0.05, "k": 3000.0, "F0": 6.0, "omega": 400.0, "Y": 1.5e-3, "p": 0.5e-3, "X": 1e-3}
 
 
@@ -155,9 +170,16 @@ FAMILY = Family(
     poses=guarded(poses),
     domain=March(turns=TURNS),
     steps=(
-        Step("closed forms", CLOSED_OUTPUTS, closed, 20_000.0),
-        Step("march", EVENT_OUTPUTS, events, 1_500_000.0),
+        Step("closed forms", CLOSED_OUTPUTS, closed, work=Work.LONG),
+        Step("march", EVENT_OUTPUTS, events, work=Work.LONG),
     ),
     example=EXAMPLE,
     analytic=False,
+    capabilities=(
+        Skeleton(
+            {"d": standing(PARAMETERS, axis=UPWARDS, kind="slide")},
+            (Link("foot", ("p",)), Link("rack", ("t",))),
+            {"p": Made(("y_foot",), foot_place), "t": Made(("y_rack",), rack_place)},
+        ),
+    ),
 )

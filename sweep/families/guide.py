@@ -11,8 +11,10 @@ from kernels.families import guide
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
 from sweep.families.capabilities import (
+    Arm,
     Assembly,
     CrankRockerLoop,
+    Dimensions,
     GuidedPoint,
     JointRecords,
     Link,
@@ -22,7 +24,7 @@ from sweep.families.capabilities import (
     ToolPoint,
 )
 from sweep.families.hardpoints import GUIDE_POINTS
-from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, parameter, standing
+from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -151,6 +153,7 @@ FAMILY = Family(
     outward="branch",
     uses_phi=False,
     capabilities=(
+        Dimensions(links("a b c"), arms=(Arm(("xi", "eta"), ("b",)),)),
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         JointRecords(joint_records, (), "rocker"),
         PressureEllipse(ellipse),

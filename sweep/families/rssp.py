@@ -9,7 +9,7 @@ from kernels.families import rssp
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
 from sweep.families.capabilities import Assembly, JointRecords, LimitLocus, Points, PressureEllipse, Skeleton
 from sweep.families.hardpoints import SLIDER_CRANK_POINTS
-from sweep.families.skeletons import SLIDER_CRANK, Y, crank_axis, standing
+from sweep.families.skeletons import SLIDER_CRANK, SLIDER_CRANK_SIZES, Y, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -157,13 +157,14 @@ FAMILY = Family(
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
     poses=poses,
     steps=(
-        Step("margin", MARGIN_OUTPUTS, margins, 200.0),
-        Step("limit positions", LIMIT_OUTPUTS, limit_positions, 500.0),
+        Step("margin", MARGIN_OUTPUTS, margins),
+        Step("limit positions", LIMIT_OUTPUTS, limit_positions),
     ),
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
     outward="branch",
     uses_phi=False,
     capabilities=(
+        SLIDER_CRANK_SIZES,
         Assembly("discriminant", "pressure_angle", coupler_square),
         JointRecords(joint_records, _JOINT_NEEDS, "slider"),
         PressureEllipse(ellipse),

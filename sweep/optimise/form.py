@@ -14,16 +14,16 @@ from sweep.optimise.passages import first_passage
 from sweep.optimise.points import Curves, Points
 from sweep.optimise.problem import PLACE, Problem
 from sweep.optimise.rows import Form, Label
+from sweep.optimise.terms import Term, box, numbers
 from sweep.reductions.catalogue import output
 from sweep.reductions.measures import Measure, Series, margins, measure
 
-Term = dict[int, float]
 SMALLEST = 1e-100  # a limit nearer to zero is a limit at zero
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """One limit in inner values; ``minimum == maximum`` is an equation."""
+    """One limit in the optimiser's inner values (`Measure`); it is an equation where ``minimum == maximum``."""
 
     measure: Measure
     minimum: float | None
@@ -36,7 +36,7 @@ class Requirement:
 
 
 def measured_in(size: float) -> float:
-    """What violations of a limit of that size are divided by: 1 where it is so small that they would overflow."""
+    """Give the divisor of violations of a limit of that size; it is 1 where the quotient would overflow."""
     return size if size > SMALLEST else 1.0
 
 
@@ -68,14 +68,19 @@ class Program:
                 and not 0.0 < float(limit.maximum or 0) < math.pi / 2
             ):
                 raise InputError(limit.output, limit.maximum, "an angle between 0 and pi/2", PLACE)
+            if found.inner == "transmission" and not all(
+                side is None or 0.0 < float(side) < math.pi / 2 for side in (limit.minimum, limit.maximum)
+            ):
+                raise InputError(limit.output, (limit.minimum, limit.maximum), "angles between 0 and pi/2", PLACE)
             self.requirements.append(Requirement(found, sides[0], sides[1]))
         measures = [self.objective, *(r.measure for r in self.requirements)]
         self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
         self.scalars = tuple(dict.fromkeys(name for m in measures for name in m.numbers))
+        self.pieces = {name: piece for m in measures for name, piece in zip(m.numbers, m.pieces, strict=False)}
         self.places = any(m.is_angle for m in measures)
 
     def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
-        """Rows for a design; ``points`` are its extrema, ``scale`` divides the objective."""
+        """Lay out the rows for a design; ``points`` are its extrema, ``scale`` divides the objective."""
         layout = _Layout(curves, points, design, self.scalars)
         complete = turns
         for requirement in self.requirements:
@@ -86,14 +91,14 @@ class Program:
         return layout.form(complete and layout.has_objective, reaches)
 
     def value(self, found: Measure, form: Form, curves: Curves, design: Array, atoms: Array) -> float:
-        """A measure's value in its own unit; nan where it does not exist."""
+        """Give the value of a measure in its own unit; nan where it does not exist."""
         layout = _Layout(curves, form.points, design, self.scalars)
         inner = [sum(w * atoms[k] for k, w in term.items()) + shift for term, shift in layout.upper(found)]
         return found.from_inner(float(max(inner))) if inner else math.nan
 
 
 def _label(r: Requirement, side: str, bound: float, size: float) -> Label:
-    """Label of a limit's row; pressure angles and margins are measured by themselves, whatever the bound is."""
+    """Make the label of a limit's row; violations of pressure angles and margins are not divided by the bound."""
     own = r.measure.inner == "pressure" or any(s.pressure for s in r.measure.series)
     return Label(r.measure.name, side, 1.0 if own else abs(bound) / size)
 
@@ -116,7 +121,7 @@ class _Layout:
         self.rest.append((weight * shift + bound, slack, equal, label))
 
     def require(self, r: Requirement) -> bool:
-        """Rows of one limit; false where the design has none of the extrema it is about."""
+        """Add the rows of one limit; the result is false where the design has none of the extrema that it is about."""
         found = True
         self._keep_first(r, "minimum" if r.maximum is None else "maximum")
         if r.equal and r.minimum is not None:
@@ -140,14 +145,17 @@ class _Layout:
         return found
 
     def upper(self, m: Measure) -> list[tuple[Term, float]]:
-        """Sums of atoms that all have to stay below a bound for the inner value to do so."""
+        """List sums of atoms: the inner value is below a bound if and only if all of them are."""
         return self._bounded(m, above=m.sign > 0.0)
 
     def lower(self, m: Measure) -> list[tuple[Term, float]]:
-        """Sums of atoms that all have to stay above a bound for the inner value to do so."""
+        """List sums of atoms: the inner value is above a bound if and only if all of them are."""
         return self._bounded(m, above=m.sign < 0.0)
 
     def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        if m.kind == "minus":
+            of = m.parts[0]
+            return [({k: -w for k, w in t.items()}, -shift) for t, shift in (self.lower if above else self.upper)(of)]
         if m.numbers:
             return self._numbers(m, above)
         if m.kind == "difference":
@@ -185,8 +193,16 @@ class _Layout:
         apart = self.points.phi[fold] - self.points.phi[ext]
         return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
 
+    def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        """Sums of plain numbers, and of the ends of curves with them."""
+        first = 2 * len(self.points)
+        if m.kind == "box":
+            tops, bottoms = ([(float(self.points.value[k]), k) for k in side] for side in self._ends(m.series))
+            return box(m, tops, bottoms, self.design, self.scalars, first, above)
+        return numbers(m, self.design, self.curves.family.parameter_names, self.scalars, first, above)
+
     def _difference(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
-        """The second angle minus the first, in (-pi, pi] at the present points."""
+        """Give the second angle minus the first, with whole turns so that it is in (-pi, pi] at the present points."""
         ends = [self._bounded(part, above)[:1] for part in m.parts]
         if not all(ends):
             return []
@@ -211,18 +227,6 @@ class _Layout:
                 size = measured_in(max(abs(level), 1e-3 * abs(self.points.value[k])))
                 self.add({k: -sense}, 0.0, 1.0 / size, sense * level / size, 0.0, False, Label(r.measure.name, side))
 
-    def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
-        """A plain number, or every length with both signs; only the largest length has to stay above a bound."""
-        first = 2 * len(self.points)
-        if m.kind == "scalar":
-            return [({first + self.scalars.index(m.name): m.sign}, 0.0)]
-        names = self.curves.family.parameter_names
-        sizes = {name: float(self.design[names.index(name)]) for name in m.numbers}
-        if above:
-            return [({first + self.scalars.index(name): sign}, 0.0) for name in sizes for sign in (1.0, -1.0)]
-        name = max(sizes, key=lambda name: abs(sizes[name]))
-        return [({first + self.scalars.index(name): math.copysign(1.0, sizes[name])}, 0.0)]
-
     def _outward(self, position: str) -> float:
         """+1 where the extended position of that follower is the largest, -1 where it is the smallest."""
         family = self.curves.family
@@ -233,7 +237,7 @@ class _Layout:
         return -2.0 * math.pi * math.floor(float(self.points.phi[k]) / (2.0 * math.pi))
 
     def _ends(self, series: Sequence[Series]) -> tuple[list[int], list[int]]:
-        """Points that are maxima, highest first, and minima, lowest first, of some series."""
+        """List the points that are maxima, highest first, and those that are minima, lowest first, of some series."""
         numbers = [self.curves.series.index(s) for s in series]
         own = np.isin(self.points.series, numbers)
         value, sense = self.points.value, self.points.sense
@@ -242,9 +246,9 @@ class _Layout:
         return maxima, minima
 
     def _size(self, r: Requirement, bound: float) -> float:
-        """What a violation is measured in: the bound itself, unless it is tiny against the curve; 1 for margins.
+        """Give the divisor of a limit's violations: its bound, unless that is tiny against the curve; 1 for margins.
 
-        A plain number has no curve: the larger of its bounds says how large it is.
+        For a plain number, which has no curve, it is the larger of both bounds.
         """
         if r.measure.inner == "pressure":
             return 1.0 + bound  # sin^2 of the limit: a few degrees are as hard a limit as forty

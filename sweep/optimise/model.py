@@ -163,7 +163,7 @@ class Model:
         return found.residual
 
     def _scalar_gradient(self, name: str, fractions: Array, designs: Any) -> Array:
-        if name in self.problem.family.parameter_names:
+        if name in self.problem.family.parameter_names or name in self.program.pieces:
             return np.asarray(self._scalar(name, designs).imag / STEP, np.float64)
         return scalar_gradient(lambda f: self._scalar(name, self.problem.placed(self.base, f)), fractions)
 
@@ -171,6 +171,8 @@ class Model:
         names = self.problem.family.parameter_names
         if name in names:
             return designs[:, names.index(name)]
+        if name in self.program.pieces:
+            return self.program.pieces[name](designs)
         from sweep.evaluation.summaries import design_outputs
 
         columns = design_outputs(self.problem.family, designs, [name], self.problem.accuracy, self.problem.window)

@@ -12,11 +12,13 @@ import numpy as np
 
 from kernels import status as st
 from sweep.dataset import store
+from sweep.dataset.tables import metadata
 from sweep.errors import InputError
 from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Angles, Array, Parameter
 from sweep.families.domain import Interval
+from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.candidates import ranking
 from sweep.optimise.certificate import Result
 from sweep.optimise.coordinates import LocusCoordinates
@@ -29,7 +31,7 @@ from sweep.optimise.problem import Problem
 from sweep.optimise.proportions import from_proportions, widened
 from sweep.optimise.robust import robust, yields
 from sweep.optimise.sensitivity import sensitivities
-from sweep.optimise.solve import Tell, explore
+from sweep.optimise.solve import explore
 from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn, of_task
 from sweep.optimise.survey import CUT, Survey
 from sweep.optimise.tolerance import tolerance_rows
@@ -192,7 +194,7 @@ def optimise_study(
     folder: str | Path,
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
-    tell: Tell | None = None,
+    say: Say = unsaid,
 ) -> Path:
     """Search from diverse best designs of the dataset and write the result beside it.
 
@@ -202,7 +204,7 @@ def optimise_study(
     folder : its dataset; where it has no feasible row, the starts come from a sample of the same bounds
     stop : asked often; true ends the search as Ctrl-C does
     jobs : processes the starts are spread over; the result does not depend on it
-    tell : called with the number of starts that are done and the most there will be
+    say : called with the number of starts that are done and the most there will be, then with what else is worked on
 
     Returns
     -------
@@ -221,20 +223,30 @@ def optimise_study(
     """
     place = Path(folder)
     settings, problem, starts = problem_and_starts(study, place, stop or (lambda: False))
-    results, found = explore(problem, starts, settings, stop, jobs, tell)
+    results, found = explore(
+        problem, starts, settings, stop, jobs, lambda done, most: say("optimum", done, most, "starts")
+    )
     catalogue = listed(study)
     if catalogue and found.ended not in CUT:
+        say("neighbours in the catalogue", 0, 0, "steps")
         results = with_neighbours(problem, results, catalogue, settings, stop, jobs)
     nominal = results[0]
     if study.tolerance is not None and study.tolerance.robust is not None and found.ended not in CUT:
+        say("robust design", 0, 0, "steps")
         made = robust(problem, results, study.tolerance, settings, stop, jobs)
         results = results if made is None else [made.result, *results]
     side = store.beside(place)
+    parts = 3 if study.tolerance is None else 4
+    after = "curves, sensitivities" if study.tolerance is None else "yield, curves, sensitivities, tolerances"
+    say(after, 0, parts, "tables")
     frame = _table(study, problem, results, nominal)
     about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}
     write(side / store.OPTIMUM, frame, study, about=about)
+    say(after, 1, parts, "tables")
     write(side / store.CURVES, _curves(study, frame), study)
+    say(after, 2, parts, "tables")
     write(side / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
+    say(after, 3, parts, "tables")
     if study.tolerance is None:
         (side / store.TOLERANCE).unlink(missing_ok=True)
     else:
@@ -246,11 +258,7 @@ def optimise_study(
 
 def read_survey(path: Path) -> Survey | None:
     """What the starts told of the search that a ``_optimum.parquet`` comes from; None where there is no such file."""
-    import pyarrow.parquet as pq
-
-    if not path.is_file():
-        return None
-    noted = (pq.read_schema(path).metadata or {}).get(b"search")
+    noted = metadata(path).get(b"search")
     if noted is None:
         return None
     content = json.loads(noted)

@@ -118,6 +118,11 @@ class Dataset:
         ranked += [name for name in others if name.startswith("max_")]
         return ranked[0] if ranked else None
 
+    @property
+    def against(self) -> str | None:
+        """The criterion of the trade-off: that of [pareto], also where more of it is better."""
+        return self.study.pareto.output if self.study.pareto is not None else self.second
+
     def _role(self, role: str) -> Row | None:
         if self.optima is None:
             return None

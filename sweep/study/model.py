@@ -6,6 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator
 
+from sweep.quantities.names import negative
+
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e100, le=1e100)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
@@ -19,7 +21,7 @@ def _proofs(value: object) -> object:
     raise ValueError("neither a truth value nor names")
 
 
-Proofs = Annotated[bool | list[str], PlainValidator(_proofs)]
+Proofs = Annotated[bool | list[str], PlainValidator(_proofs, json_schema_input_type=bool | list[str])]
 
 
 class Section(BaseModel):
@@ -117,8 +119,13 @@ class FitSection(Section):
 class ObjectiveSection(Section):
     """[objective]"""
 
-    required = ("minimise",)
     minimise: str | None = Field(None, description="the name of a design output")
+    maximise: str | None = Field(None, description="the name of a design output")
+
+    @property
+    def goal(self) -> str | None:
+        """The output that is made small: of one to be made large its negative."""
+        return self.minimise or (self.maximise and negative(self.maximise))
 
 
 class AccuracySection(Section):
@@ -129,6 +136,16 @@ class AccuracySection(Section):
         None, description="a whole number of crank angles, 8 to 1048576"
     )
     certify: Proofs = Field(False, description="true or false, or a list of the wanted maxima to prove")
+
+
+class ProveTable(Section):
+    """optimise.prove"""
+
+    required = ("gap",)
+    gap: str | None = Field(None, description='a share as a text, as "1 %"')
+    boxes: Annotated[int, Field(ge=64, le=10**9)] = Field(1_000_000, description="a whole number, 64 to 10^9")
+    smallest: str = Field("0.00001 %", description='a share of every range as a text, as "0.1 %"')
+    time: str | None = Field(None, description='a time as a text, as "60 s"')
 
 
 class OptimiseSection(Section):
@@ -142,6 +159,7 @@ class OptimiseSection(Section):
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
     variables: Literal["parameters", "locus"] | None = Field(None, description='"parameters" or "locus"')
     globally: Literal["none", "proportions"] = Field("none", alias="global", description='"none" or "proportions"')
+    prove: ProveTable | None = Field(None, description='{ gap = "1 %", boxes = 1000000, time = "10 min" }')
 
 
 class ParetoSection(Section):

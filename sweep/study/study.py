@@ -14,6 +14,7 @@ from sweep.effects import extended
 from sweep.families import Specification
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
+from sweep.quantities.names import without_minus
 from sweep.study.space import DesignSpace
 
 if TYPE_CHECKING:
@@ -36,9 +37,29 @@ class Limit:
 
 @dataclass(frozen=True)
 class Objective:
-    """The design output to be made small."""
+    """The design output to be made small: the negative of one that is to be made large."""
 
     output: str
+
+    @property
+    def aim(self) -> str:
+        """What is done with the output that the study names."""
+        return "maximised" if without_minus(self.output) else "minimised"
+
+
+@dataclass(frozen=True)
+class ProveSettings:
+    """The gap between optimum and proven bound that is wanted, and the boxes of designs that may be judged for it.
+
+    A box is not halved once all its sides are below the share ``smallest`` of their ranges; what it holds stays open,
+    as an exception that the answer names.  ``seconds`` is an emergency brake: no round of boxes begins after it, and
+    the answer says so.
+    """
+
+    gap: float
+    boxes: int = 1_000_000
+    smallest: float = 1e-7
+    seconds: float | None = None
 
 
 @dataclass(frozen=True)
@@ -50,7 +71,7 @@ class OptimiseSettings:
     often enough; ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from
     evolution strategies over what is not linear; ``finalists`` is the number of starts that go on after a first heat,
     None for all.  ``time_budget`` [s] is an emergency brake: what it stops says so, and no result that was not stopped
-    depends on it.
+    depends on it.  ``prove`` asks for a proof that nothing in the space is better.
     """
 
     starts: int = 20
@@ -61,6 +82,7 @@ class OptimiseSettings:
     looks: int = 20_000
     globally: Literal["none", "proportions"] = "none"
     finalists: int | None = None
+    prove: ProveSettings | None = None
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,7 @@
 """The looper on a cylinder whose second ball stands off the shaft's axis: both loops ask for angle and place at once.
 
-For a given angle psi of the shaft the second coupler gives its place s in closed form, so the first coupler's closure
-is a function H(psi) of one variable, on the whole circle or on the arc where the second coupler reaches.  All its roots
-are found by a scan; branches name the one that is meant.  Equation numbers are of docs/cylindrical_looper.md.
+The angles at which both loops close are those of :mod:`kernels.families.cylindrical_looper.shaft_roots`.  Equation
+numbers are of docs/cylindrical_looper.md.
 """
 
 from __future__ import annotations
@@ -18,12 +17,9 @@ from kernels._jit import inline, kernel
 from kernels.complex_step import magnitude
 from kernels.driven_ball import EPS, Path, Swung, rotated
 from kernels.families.cylindrical_looper.closure import Numbers, Reduced, Status, reduce_design
+from kernels.families.cylindrical_looper.shaft_roots import MOST, Loops, chosen, place
 from kernels.looper_outputs import put_angle, put_loop, put_point
 from kernels.vectors import Vector, dot
-
-SAMPLES = 48  # cells of the scan: H is a trigonometric polynomial of degree 1 and one root of another
-MOST = 8  # roots that are kept; there are at most four, and rounding at a double root may show it as a few
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 class Offset(NamedTuple):
@@ -51,186 +47,17 @@ class Fixed(NamedTuple):
     valid: bool
 
 
-class Loops(NamedTuple):
-    """Both driving balls from the foot of the rocker at s = 0, real numbers: what H is made of at one crank angle."""
-
-    x1: Any
-    y1: Any
-    z1: Any
-    x2: Any
-    y2: Any
-    z2: Any
-    b1: Any
-    c1: Any
-    b2: Any
-    d: Any
-    cos_beta: Any
-    sin_beta: Any
-    branch2: float
-    slides: float
-
-
-class Place(NamedTuple):
-    """H(psi), its derivative, the shaft's place s there, and what is left of the second coupler's square."""
-
-    value: Any
-    slope: Any
-    s: Any
-    q: Any
-
-
 @inline
 def _fixed(designs: Numbers, i: int, r: Reduced) -> Fixed:
     per = 1.0 / r.unit
     d, beta, gamma, mode = designs[i, 19] * per, designs[i, 20], designs[i, 21], designs[i, 22].real
     valid = abs(beta.real) < 1e5 and abs(gamma.real) < 1e5 and abs(d.real) < 1e140
     valid = r.valid and valid and (mode == 1.0 or mode == 2.0)
-    size = r.size1 + r.c1.real + r.b1.real + abs(d.real) + r.m_size + r.n_size
+    size = r.size1 + r.swings.c.real + r.swings.b.real + abs(d.real) + r.moves.m_size + r.moves.n_size
     return Fixed(
         d, np.cos(beta), np.sin(beta), np.cos(gamma), np.sin(gamma), 2 if mode == 2.0 else 1,
-        size * size / (r.c1.real if r.c1.real > 0.0 else 1.0), valid,
+        size * size / (r.swings.c.real if r.swings.c.real > 0.0 else 1.0), valid,
     )  # fmt: skip
-
-
-@inline
-def _place(k: Loops, cos: Any, sin: Any) -> Place:
-    """H and its derivative at one angle of the shaft; (6), (7)."""
-    # second ball across the shaft, and from the pin of crank 2
-    bx, by = k.d * (cos * k.cos_beta - sin * k.sin_beta), k.d * (sin * k.cos_beta + cos * k.sin_beta)
-    px, py = bx - k.x2, by - k.y2
-    q = (k.b2 - px) * (k.b2 + px) - py * py
-    w = k.branch2 * np.sqrt(q if q.real > 0.0 else 0.0 * q)
-    s = k.z2 + w
-    height = k.slides * s - k.z1
-    square = (k.c1 - k.b1) * (k.c1 + k.b1) + (k.x1 * k.x1 + k.y1 * k.y1) + height * height
-    value = 0.5 * square / k.c1 - (k.x1 * cos + k.y1 * sin)
-    # ds/dpsi = -(d2 . tau2)/w
-    turn = py * bx - px * by
-    slope = k.x1 * sin - k.y1 * cos
-    if k.slides != 0.0 and w.real != 0.0:
-        slope = slope - k.slides * height * turn / (w * k.c1)
-    return Place(value, slope, s, q)
-
-
-@inline
-def _at(k: Loops, centre: float, half: float, tau: float) -> tuple[float, float]:
-    """Angle of the shaft for the scan's parameter, and H there; on an arc the root of its ends becomes smooth."""
-    psi = tau if half >= math.pi else centre - half * math.cos(tau)
-    return psi, _place(k, math.cos(psi), math.sin(psi)).value
-
-
-@kernel
-def _bracketed(k: Loops, centre: float, half: float, lo: float, hi: float, f_lo: float) -> float:
-    """Shaft angle of the root between two places of opposite sign: bisection, which no shape misleads."""
-    # 30 halvings of a cell leave 1e-10 rad, of which the caller's Newton steps leave rounding
-    for _ in range(30):
-        mid = 0.5 * (lo + hi)
-        _, f = _at(k, centre, half, mid)
-        if (f > 0.0) == (f_lo > 0.0):
-            lo = mid
-        else:
-            hi = mid
-    psi, _ = _at(k, centre, half, 0.5 * (lo + hi))
-    return psi
-
-
-@kernel
-def _dip(k: Loops, centre: float, half: float, lo: float, hi: float, sign: float) -> tuple[float, float]:
-    """Place and value of the least of sign * H between two places, by the golden section."""
-    p, q = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
-    _, f_p = _at(k, centre, half, p)
-    _, f_q = _at(k, centre, half, q)
-    # 0.618^45 = 4e-10 of the cells: nearer to the least the value no longer changes by a rounding
-    for _ in range(45):
-        if sign * f_p <= sign * f_q:
-            hi, q, f_q = q, p, f_p
-            p = hi - _GOLDEN * (hi - lo)
-            _, f_p = _at(k, centre, half, p)
-        else:
-            lo, p, f_p = p, q, f_q
-            q = lo + _GOLDEN * (hi - lo)
-            _, f_q = _at(k, centre, half, q)
-    return (p, sign * f_p) if sign * f_p <= sign * f_q else (q, sign * f_q)
-
-
-@inline
-def _arc(k: Loops) -> tuple[float, float]:
-    """Centre and half width of the arc of shaft angles at which the second coupler reaches; half 0 where none."""
-    reach, away = 2.0 * k.d * math.hypot(k.x2, k.y2), math.hypot(k.x2, k.y2)
-    # q = b2^2 - |ball - pin|^2 lies between (b2 - away - d)(b2 + away + d) and (b2 - |away - d|)(b2 + |away - d|)
-    low = (k.b2 - away - abs(k.d)) * (k.b2 + away + abs(k.d))
-    high = (k.b2 - abs(away - abs(k.d))) * (k.b2 + abs(away - abs(k.d)))
-    if low >= 0.0:
-        return 0.0, math.pi
-    if high <= 0.0 or reach == 0.0:
-        return 0.0, 0.0
-    centre = math.atan2(k.y2, k.x2) - math.atan2(k.sin_beta, k.cos_beta) + (0.0 if k.d > 0.0 else math.pi)
-    return centre, 2.0 * math.atan2(math.sqrt(high), math.sqrt(-low))
-
-
-@kernel
-def shaft_angles(k: Loops, noise: float, at: NDArray[np.float64]) -> tuple[int, float, float]:
-    """Shaft angles of all solutions into ``at`` (MOST numbers); their number, the least and the largest H met.
-
-    A place where |H| comes as near to zero as ``noise`` without crossing it counts as one.
-    """
-    centre, half = _arc(k)
-    if half == 0.0:
-        return 0, math.nan, math.nan
-    whole = half >= math.pi
-    begin, width = (-math.pi, 2.0 * math.pi) if whole else (0.0, math.pi)
-    step = width / SAMPLES
-    count, before, least, most = 0, math.inf, math.inf, -math.inf
-    if whole:
-        _, before = _at(k, centre, half, begin - step)
-    _, here = _at(k, centre, half, begin)
-    for n in range(SAMPLES + 1):
-        tau, last, after = begin + step * n, n == SAMPLES, math.inf
-        if whole or not last:
-            _, after = _at(k, centre, half, tau + step)
-        sign = 1.0 if here > 0.0 else -1.0
-        least, most = min(least, here), max(most, here)
-        if not last and (after > 0.0) != (here > 0.0):
-            if count < MOST:
-                at[count] = _bracketed(k, centre, half, tau, tau + step, here)
-                count += 1
-        elif abs(here) <= abs(after) and (before == math.inf or sign * before >= abs(here)) and not (whole and last):
-            # the samples on both sides have the same sign and are no nearer to zero; beyond an end counts as far
-            lo = tau if before == math.inf else tau - step
-            hi = tau if after == math.inf else tau + step
-            place, dip = _dip(k, centre, half, lo, hi, sign)
-            least, most = min(least, sign * dip), max(most, sign * dip)
-            if dip <= 0.0 and count + 1 < MOST:
-                at[count] = _bracketed(k, centre, half, lo, place, sign)
-                at[count + 1] = _bracketed(k, centre, half, place, hi, -sign)
-                count += 2
-            # zero within the noise of H is a double root, which rounding may have lifted off
-            elif dip <= noise and count < MOST:
-                at[count], _ = _at(k, centre, half, place)
-                count += 1
-        before, here = here, after
-    return count, least, most
-
-
-@kernel
-def _chosen(
-    k: Loops, branch1: float, mode: int, noise: float, at: NDArray[np.float64]
-) -> tuple[int, float, float, float]:
-    """Status, cosine and sine of the solution that branches and mode name, and -|least H largest H| where none."""
-    count, least, most = shaft_angles(k, noise, at)
-    best, second, found, other = -math.inf, -math.inf, math.nan, math.nan
-    for n in range(count):
-        slope = branch1 * _place(k, math.cos(at[n]), math.sin(at[n])).slope
-        if slope > best:
-            second, other = best, found
-            best, found = slope, at[n]
-        elif slope > second:
-            second, other = slope, at[n]
-    if mode == 2:
-        best, found = second, other
-    if not best > 0.0:
-        return st.NOT_ASSEMBLED, math.nan, math.nan, -abs(least * most)
-    return st.OK, math.cos(found), math.sin(found), 0.0
 
 
 class Pose(NamedTuple):
@@ -344,16 +171,17 @@ def _curve(r: Vector, t: Vector, p1: Any, p2: Any, s2: Any, pin: Vector) -> Vect
 @inline
 def _pins(r: Reduced, o: Fixed, u: float, v: float) -> tuple[Path, Path]:
     """Pins of both cranks from the rocker's foot at s = 0, with three derivatives; (2), (6)."""
-    hu, hv, tu, tv = r.a1 * (r.ca * u), r.a1 * (r.ca * v), r.a1 * (r.sa * u), r.a1 * (r.sa * v)
-    pin1 = (r.a1 * u - r.e1, r.y0 + hv, r.lift - r.g1 - tv)
-    first = pin1, (-r.a1 * v, hu, -tu), (-r.a1 * u, -hv, tv), (r.a1 * v, -hu, tu)
+    one, two = r.swings, r.moves
+    hu, hv, tu, tv = one.a * (one.ca * u), one.a * (one.ca * v), one.a * (one.sa * u), one.a * (one.sa * v)
+    pin1 = (one.a * u - one.e, one.y0 + hv, one.lift - one.g - tv)
+    first = pin1, (-one.a * v, hu, -tu), (-one.a * u, -hv, tv), (one.a * v, -hu, tu)
     u2, v2 = u * r.cos_offset - v * r.sin_offset, v * r.cos_offset + u * r.sin_offset
-    m, n, y = r.a2 * u2 - r.e2, r.n0 - r.na * v2, r.k0 + r.ka * v2
+    m, n, y = two.a * u2 - two.e, two.n0 - two.na * v2, two.k0 + two.ka * v2
     second = (
         _about(o, m, n, y),
-        _about(o, -r.a2 * v2, -r.na * u2, r.ka * u2),
-        _about(o, -r.a2 * u2, r.na * v2, -r.ka * v2),
-        _about(o, r.a2 * v2, r.na * u2, -r.ka * u2),
+        _about(o, -two.a * v2, -two.na * u2, two.ka * u2),
+        _about(o, -two.a * u2, two.na * v2, -two.ka * v2),
+        _about(o, two.a * v2, two.na * u2, -two.ka * u2),
     )
     return first, second
 
@@ -368,33 +196,32 @@ def _about(o: Fixed, x: Any, z: Any, y: Any) -> Vector:
 def _solved(r: Reduced, o: Fixed, first: Path, second: Path, at: NDArray[np.float64]) -> Pose:
     """Both loops at one crank angle; ``at`` is room for the scan."""
     p1, p2 = first[0], second[0]
-    k = Loops(
-        p1[0], p1[1], p1[2], p2[0], p2[1], p2[2], r.b1, r.c1, r.b2, o.d, o.cos_beta, o.sin_beta, r.branch2, r.slides
-    )  # fmt: skip
+    b1, c1, b2, branch = r.swings.b, r.swings.c, r.moves.b, r.moves.branch
+    k = Loops(p1[0], p1[1], p1[2], p2[0], p2[1], p2[2], b1, c1, b2, o.d, o.cos_beta, o.sin_beta, branch, r.slides)
     real = Loops(
-        p1[0].real, p1[1].real, p1[2].real, p2[0].real, p2[1].real, p2[2].real, r.b1.real, r.c1.real, r.b2.real,
-        o.d.real, o.cos_beta.real, o.sin_beta.real, r.branch2, r.slides,
+        p1[0].real, p1[1].real, p1[2].real, p2[0].real, p2[1].real, p2[2].real, b1.real, c1.real, b2.real,
+        o.d.real, o.cos_beta.real, o.sin_beta.real, branch, r.slides,
     )  # fmt: skip
     noise = 16.0 * EPS * o.size
     code, c, s, short = st.INVALID_INPUT, math.nan, math.nan, math.nan
     if o.valid:
-        code, c, s, short = _chosen(real, r.branch1, o.mode, noise, at)
+        code, c, s, short = chosen(real, r.swings.branch, o.mode, noise, at)
     cos, sin = c + 0.0 * k.x1, s + 0.0 * k.x1
     if code == st.OK:
         # Two rounds with everything the numbers carry: rounding is all that is left, and complex parts are exact.
         for _ in range(2):
-            here = _place(k, cos, sin)
+            here = place(k, cos, sin)
             turn = -here.value / here.slope if here.slope.real != 0.0 else 0.0 * cos
             cos, sin = cos - turn * sin, sin + turn * cos
             per = 1.0 / np.sqrt(cos * cos + sin * sin)
             cos, sin = cos * per, sin * per
         # the slope of H over one rounding of it is no larger than the noise: a dead point of both loops together
-        here = _place(real, cos.real, sin.real)
+        here = place(real, cos.real, sin.real)
         away = here.q > 32.0 * EPS * real.b2 * real.b2
         if not away or not here.slope * here.slope > 4.0 * noise * (abs(here.slope) + o.size):
             code = st.DEAD_POINT
     if code == st.OK or code == st.DEAD_POINT:
-        s0 = _place(k, cos, sin).s
+        s0 = place(k, cos, sin).s
         if code == st.OK:
             cos, sin, s0 = _together(k, cos, sin, s0)
             cos, sin, s0 = _together(k, cos, sin, s0)
@@ -443,7 +270,7 @@ def coupled_poses(
             pose = _solved(r, o, first, second, at)
             status[i, j] = pose.status
             scale = r.unit + undefined
-            none = 0.0 * r.e1
+            none = 0.0 * r.swings.e
             one = Swung(
                 pose.status, pose.cos, pose.sin, pose.along1, pose.across1, pose.delta1,
                 pose.psi[0], pose.psi[1], pose.psi[2],
@@ -465,10 +292,10 @@ def coupled_poses(
                 (none, none, pose.slide[2]),
             )
             path = rotated(pose.cos, pose.sin, pose.psi[0], pose.psi[1], pose.psi[2], tip)
-            foot = (r.e1, none, r.g1)
+            foot = (r.swings.e, none, r.swings.g)
             put_point(point, velocity, acceleration, jerk, magnitudes, i, j, foot, path, scale)
             if joints is not None:
-                ball = (r.c1 * pose.cos, r.c1 * pose.sin, r.slides * pose.s)
+                ball = (r.swings.c * pose.cos, r.swings.c * pose.sin, r.slides * pose.s)
                 for n in range(3):
                     joints[n, i, j] = (foot[n] + first[0][n]) * scale
                     joints[3 + n, i, j] = (foot[n] + ball[n]) * scale

@@ -88,6 +88,7 @@ READERS: tuple[tuple[str, Reader], ...] = (
     ("optimise", optimise.check),
     ("task", task.check),
     ("objective", objective.check),
+    ("optimise", optimise.check_steady),
     ("pareto", pareto.check),
     ("fit", fit.check),
     ("design", design.check),
