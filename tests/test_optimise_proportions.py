@@ -92,7 +92,7 @@ def test_starts_keep_stroke_and_straightness_and_are_those_of_their_seed(
     linear: Elimination, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(proportions, "SAMPLED", 1 << 15)
-    monkeypatch.setattr(proportions, "GENERATIONS", 20)
+    monkeypatch.setattr(proportions, "GENERATIONS", 60)
     signs = [{"branch1": 1.0, "branch2": x, "kappa2": 1.0} for x in (1.0, -1.0)]
     starts = from_proportions(linear, signs, 4, 3)
     np.testing.assert_array_equal(starts, from_proportions(linear, signs, 4, 3))

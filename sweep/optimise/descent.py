@@ -1,4 +1,4 @@
-"""One start: rounds of SLSQP, then of Newton steps, each checked against the true extrema; then polish and verify."""
+"""One start: rounds of learnt curvature, then of Newton steps, each checked against the true extrema; then polish."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from sweep.families.base import Array
-from sweep.optimise import newton, slsqp
+from sweep.optimise import newton, quasi
 from sweep.optimise.form import Form, Program
 from sweep.optimise.model import FEASIBLE, Model, State
 from sweep.optimise.points import STATIC, Points
@@ -51,7 +51,7 @@ class Descent:
                 self._restore()
             if math.isfinite(self.best.objective) and self.best.violation < NEAR:
                 for _ in range(CYCLES):
-                    self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=8)
+                    self._rounds(quasi.propose, relaxed=False, enough=1e-4, rounds=8)
                     self._rounds(newton.propose, relaxed=False, enough=1e-13, rounds=NEWTON)
                     if self.model.certificate(self.best).residual <= KKT:
                         break
@@ -66,7 +66,7 @@ class Descent:
             before = self.best
             if math.isinf(before.known):
                 return  # the links reach nowhere: there is nothing to follow
-            self._rounds(slsqp.propose, relaxed=True, enough=1e-4)
+            self._rounds(quasi.propose, relaxed=True, enough=1e-4)
             same_rows = before.form.complete == self.best.form.complete
             if self.best.feasible or (same_rows and self.best.known > 0.999 * before.known):
                 break

@@ -36,6 +36,7 @@ SOLVED = ("xi", "eta", "lam", "h")
 SCALED = ("a", "b", "c", "e")
 EXCESS = 0.5  # price of a deviation twice as large as allowed, in strokes
 WEIGHT = 3.0  # price of a limit missed by its own size, in strokes
+DIRECTIONS = 3  # in which the least scale of a guide is asked for
 STUCK = 1e6  # above every objective: does not turn
 NEEDED = (
     "a chain of rssr and guide without a window, whose guide's crank, point and line vary ([fit]), with a lower limit "
@@ -90,18 +91,58 @@ class Elimination:
         ends = s[number, np.argmax(found[self.driver], axis=1)] - s[number, np.argmin(found[self.driver], axis=1)]
         bound = 1e3 * self.stroke if self.bound is None else self.bound
         price = EXCESS * self.stroke / bound
-        x, least, missed = np.empty((len(base), 5)), np.empty(len(base)), np.empty(len(base))
-        status = np.empty(len(base), np.uint8)
-        minimax(g, d, ends, bound, self.stroke, price, x, least, missed, status)
-        scale: Array = np.hypot(x[:, 0], x[:, 1])
-        lam: Array = -np.arctan2(x[:, 1], x[:, 0])
-        point = size * (x[:, 2] + 1j * x[:, 3]) * np.exp(1j * lam)
+        x, worth, known = self._minimised(g, d, ends, np.full(d.shape[:2], bound), self._least_scale(base), price)
+        scale: Array = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
+        # numpy's arctan2 and complex products depend on the processor, the C library's arctan2 does not
+        lam = np.array([math.atan2(-y, x) for x, y in x[:, :2]])
+        xi = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * (size / scale)
+        eta = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * (size / scale)
         out = designs.copy()
         for name in SCALED:
             out[:, at[name]] *= scale
-        out[:, at["xi"]], out[:, at["eta"]], out[:, at["h"]] = point.real, point.imag, x[:, 4]
+        out[:, at["xi"]], out[:, at["eta"]], out[:, at["h"]] = xi, eta, x[:, 4]
         out[:, at["lam"]] = self._turned(lam)
-        return out, least + price * missed, status == st.OK
+        return out, worth, known
+
+    def _minimised(
+        self, g: Array, d: Array, ends: Array, bound: Array, least_scale: Array, price: float
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Unknowns (n, 5), objective with what is missed, and whether there is a solution.
+
+        That the guide is at least so large is a bound on the modulus of z1 from below, which no linear program knows.
+        It is asked for in the direction that z1 has without it, then in the one it has with it.
+        """
+        n = len(g)
+        rows, need = np.zeros((n, 2, 5)), np.zeros((n, 2))
+        rows[:, 0], need[:, 0] = ends, self.stroke
+        x, worth, known = np.empty((n, 5)), np.empty(n), np.empty(n, np.bool_)
+        own = np.arange(n)
+        for _ in range(DIRECTIONS):
+            some, t, v, status = (
+                np.empty((len(own), 5)),
+                np.empty(len(own)),
+                np.empty(len(own)),
+                np.empty(len(own), np.uint8),
+            )
+            minimax(g[own], d[own], rows[own], bound[own], need[own], price, some, t, v, status)
+            x[own], worth[own], known[own] = some, t + price * v, status == st.OK
+            scale = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
+            own = np.flatnonzero(known & (scale < (1.0 - 1e-6) * least_scale))
+            if not len(own):
+                break
+            rows[own, 1, :2] = x[own, :2] / scale[own, None]
+            need[own, 1] = least_scale[own]
+        return x, worth, known
+
+    def _least_scale(self, designs: Array) -> Array:
+        """Scale (n,) at which the last of the guide's lengths reaches its lower bound."""
+        names, problem = self.problem.family.parameter_names, self.problem
+        least = np.zeros(len(designs))
+        for name in (f"{name}{self.last}" for name in SCALED):
+            if name in problem.variables:
+                low = float(problem.lower[problem.variables.index(name)])
+                least = np.maximum(least, max(low, 0.0) / np.abs(designs[:, names.index(name)]))
+        return least
 
     def _turned(self, lam: Array) -> Array:
         """The direction as an angle within its bounds, if one of its turns is."""

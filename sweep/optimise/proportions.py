@@ -20,6 +20,7 @@ SAMPLED = 1 << 17  # proportions per combination of signs, two in a hundred of w
 BLOCK = 1 << 13
 STRATEGIES = 8  # per start
 RADIUS, GENERATIONS = 0.1, 100
+SHORT = 0.05  # shortest length of a guide that is looked at, against the longest its crank may have
 MIDDLE = Accuracy(target=1e-3)
 
 
@@ -38,24 +39,29 @@ class Proportions:
         at = [problem.variables.index(name) for name in linear.free]
         self.low, self.high = problem.lower[at].astype(np.float64), problem.upper[at].astype(np.float64)
         units = {p.name: p for p in problem.family.parameters}
+        unit = problem.variables.index(f"a{number}")
+        self.log = np.zeros(len(linear.free), dtype=np.bool_)
         for k, name in enumerate(linear.free):
             if units[name].unit == "angle" and self.high[k] - self.low[k] >= 2.0 * math.pi:
                 self.low[k], self.high[k] = -math.pi, math.pi
             # A frame to the other side is the same guide, turned by half a turn.
-            if name == f"e{number}" and self.high[k] > 0.0:
-                self.low[k] = max(self.low[k], 0.0)
-        self.log = np.array([name in (f"b{number}", f"c{number}") for name in linear.free])
+            if name in (f"b{number}", f"c{number}", f"e{number}"):
+                shortest = max(self.low[k], problem.upper[unit] * SHORT)
+                self.low[k] = shortest / problem.upper[unit]
+                self.high[k] /= max(problem.lower[unit], problem.upper[unit] * SHORT)
+                self.log[k] = True
         self.columns = [names.index(name) for name in linear.free]
-        own = problem.variables.index(f"a{number}")
-        self.base[names.index(f"a{number}")] = math.sqrt(float(problem.lower[own]) * float(problem.upper[own]))
+        self.base[names.index(f"a{number}")] = 1.0
         self.offset = names.index(f"offset{number}") if f"offset{number}" in linear.free else -1
         self.driver = stages_of(problem.family)[0].family
 
     def designs(self, places: Array) -> Array:
         """Designs (k, P) at places (k, n), with the point, line and scale still to be found."""
         values: Array = self.low + places * (self.high - self.low)
-        low, high = self.low[self.log], self.high[self.log]
-        values[:, self.log] = low * (high / low) ** places[:, self.log]
+        low, wide = self.low[self.log], np.array([math.log(x) for x in self.high[self.log] / self.low[self.log]])
+        # numpy's exponential depends on the processor, that of the C library does not
+        grown = [math.exp(x) for x in (places[:, self.log] * wide).ravel()]
+        values[:, self.log] = low * np.reshape(grown, (len(places), -1))
         designs = np.repeat(self.base[None, :], len(places), axis=0)
         designs[:, self.columns] = values
         if self.offset >= 0:
@@ -88,26 +94,24 @@ def from_proportions(
     stop : true ends the strategies where they are
     """
     from scipy.stats import qmc
-    from threadpoolctl import threadpool_limits
 
     share = -(-count // len(signs))
     kinds = []
-    with threadpool_limits(1, user_api="blas"):
-        for number, chosen in enumerate(signs):
-            own = Proportions(linear, chosen)
-            place = qmc.Sobol(len(own.columns), seed=seed + number).random(SAMPLED)
-            merit = np.concatenate([own.merit(block) for block in np.split(place, SAMPLED // BLOCK)])
-            order = np.argsort(merit, kind="stable")
-            order = order[merit[order] < STUCK]
-            if not len(order):
-                continue
-            begin = place[order][spread(place[order], np.zeros(len(order), np.intp), STRATEGIES * share)]
-            rng = np.random.default_rng(seed + number)
-            place, merit = evolved(own.merit, begin, RADIUS, GENERATIONS, rng, stop)
-            order = np.argsort(merit, kind="stable")[: len(merit) // 3 + 1]
-            order = order[spread(place[order], np.zeros(len(order), np.intp), share)]
-            designs = linear.merit(own.designs(place[order]))[0]
-            kinds.append(_turned_into(linear.problem, designs[np.isfinite(designs).all(axis=1)]))
+    for number, chosen in enumerate(signs):
+        own = Proportions(linear, chosen)
+        place = qmc.Sobol(len(own.columns), seed=seed + number).random(SAMPLED)
+        merit = np.concatenate([own.merit(block) for block in np.split(place, SAMPLED // BLOCK)])
+        order = np.argsort(merit, kind="stable")
+        order = order[merit[order] < STUCK]
+        if not len(order):
+            continue
+        begin = place[order][spread(place[order], np.zeros(len(order), np.intp), STRATEGIES * share)]
+        rng = np.random.default_rng(seed + number)
+        place, merit = evolved(own.merit, begin, RADIUS, GENERATIONS, rng, stop)
+        order = np.argsort(merit, kind="stable")[: len(merit) // 3 + 1]
+        order = order[spread(place[order], np.zeros(len(order), np.intp), share)]
+        designs = linear.merit(own.designs(place[order]))[0]
+        kinds.append(_turned_into(linear.problem, designs[np.isfinite(designs).all(axis=1)]))
     rows = [kind[k] for k in range(share) for kind in kinds if k < len(kind)]
     return np.array(rows[:count]).reshape(-1, len(linear.problem.family.parameters))
 
