@@ -20,6 +20,7 @@ ROUNDS, CYCLES = 60, 3
 NEWTON = 240  # rounds of Newton steps: along a narrow curved valley hundreds are needed, and each gains
 KKT = 1e-6  # residual of a converged result
 DWINDLING = 1e-9  # gain of a round from which a fulfilled condition of optimality ends the search
+REMEMBERED = 48  # extrema of refused designs that stay among the rows: the next long step would meet them again
 NEAR_ANGLE = 0.1  # a followed point reaches this far by itself [rad]
 NEAR = 1e-3  # scaled violation from which the objective is looked at
 Propose: TypeAlias = Callable[[Model, State, Form, float, float, float | None], tuple[Array, float]]
@@ -83,7 +84,8 @@ class Descent:
             at = self.best
             form, t, floor = self.model.with_points(at, extra), at.objective, None
             if not refused:
-                form = form.near(at.atoms, t if math.isfinite(t) else 0.0)
+                known = at.atoms if not len(extra) else self.model.atoms(at.design, form, form.points)
+                form = form.near(known, t if math.isfinite(t) else 0.0)
             if relaxed:
                 form, t, floor = form.relaxed({"rotatable"} if at.form.complete else set()), at.short, 0.0
                 if not at.form.complete:
@@ -93,7 +95,7 @@ class Descent:
             gain = at.short - new.short if relaxed else at.merit(self.model.price) - new.merit(self.model.price)
             step = float(np.abs(fractions - at.fractions).max())
             if gain > 0.0:
-                self.best, extra, refused = new, Points.of([]), False
+                self.best, refused = new, False
                 residual = math.nan if relaxed else self.model.learn(new)
                 radius = max(radius, min(1.0, 2.0 * step))
                 true = new.known if relaxed else new.objective
@@ -107,6 +109,7 @@ class Descent:
             else:
                 radius, refused = 0.25 * min(radius, step), True
                 extra = Points.joined(extra, self._unknown(new.form.points, form.points))
+                extra = extra.take(slice(-REMEMBERED, None))
 
     def _unknown(self, found: Points, known: Points) -> Points:
         """Extrema of a refused design that are not near a known point, to be held at their crank angles."""

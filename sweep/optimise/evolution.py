@@ -58,15 +58,17 @@ def evolved(
     generations: int,
     rng: np.random.Generator,
     stop: Callable[[], bool] = lambda: False,
+    heats: tuple[int, ...] = (),
 ) -> tuple[Array, Array]:
-    """The best place of each strategy and its value.
+    """The best place of each strategy that goes on to the end, and its value.
 
     Parameters
     ----------
     function : (k, n) places between 0 and 1 to (k,) values, the smaller the better
     places : (m, n) where the strategies begin
     radius : first standard deviation
-    generations : steps of every strategy
+    generations : steps of the strategies that go on to the end
+    heats : generations after which only the better half of them goes on
     rng : source of its random numbers
     stop : asked before every generation; true ends all strategies
     """
@@ -81,6 +83,11 @@ def evolved(
     for generation in range(generations):
         if stop():
             break
+        if generation in heats:
+            kept = np.argsort(value, kind="stable")[: (len(value) + 1) // 2]
+            mean, sigma, covariance, path, step_path = (x[kept] for x in (mean, sigma, covariance, path, step_path))
+            best, value, m = best[kept], value[kept], len(kept)
+            row = np.arange(m)[:, None]
         sizes, axes = symmetric(covariance)
         sizes = np.sqrt(np.maximum(sizes, 1e-20))
         drawn = rng.standard_normal((m, count, n))

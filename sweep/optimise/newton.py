@@ -17,6 +17,7 @@ from sweep.optimise.points import Index
 from sweep.optimise.quadratic import FLAT, quadratic_step
 
 CORRECTIONS = 8  # of a step along curved limits, each two or three milliseconds
+SHORTENED, KEPT = 4, 0.1  # times a step is halved, and the share of the promised gain that it must keep
 LOST = 1.0  # scaled violation that no correction mends, above all of links that do not reach: the step must be shorter
 DIFFERENCE = 1e-5  # of the scaled variables; gradients are good to 1e-12, so the Hessian is to 1e-5
 RANK = 1e-9  # of rows that hold: what is left of one below this, relative to the largest, is rounding
@@ -35,16 +36,37 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
     curvature = hessian(model, at, form, found, np.arange(len(at.fractions)))
     curvature = _upward(curvature, _holding(jacobian, form, found))
     full = np.column_stack([jacobian, form.slack])
-    low, high = np.maximum(-radius, -at.fractions), np.minimum(radius, 1.0 - at.fractions)
+    best, value, reach = np.zeros(len(at.fractions) + 1), np.inf, radius
+    now = model.price * _missed(form, rows)
+    for _ in range(SHORTENED):
+        box = (np.maximum(-reach, -at.fractions), np.minimum(reach, 1.0 - at.fractions))
+        step, merit, promised = _corrected(model, at, form, t, (curvature, full, rows), (*box, floor))
+        if merit < value:
+            best, value = step, merit
+        if merit <= now - KEPT * promised:
+            break
+        # The limits bend more than their corrections can follow: a shorter step, with the same curvature.
+        reach = 0.5 * min(reach, float(np.abs(step[:-1]).max()))
+    return np.clip(at.fractions + best[:-1], 0.0, 1.0), t + float(best[-1])
+
+
+def _corrected(
+    model: Model, at: State, form: Form, t: float, parts: tuple[Array, Array, Array],
+    bounds: tuple[Array, Array, float | None],
+) -> tuple[Array, float, float]:  # fmt: skip
+    """Step within bounds brought back to the curved rows, the merit it reaches, and the gain that was promised."""
+    curvature, full, rows = parts
+    low, high, floor = bounds
     box = (low, high, -np.inf if floor is None else floor - t)
     step, _ = quadratic_step(curvature, full, rows, form, box, model.price)
+    promised = model.price * (_missed(form, rows) - _missed(form, rows + times(full, step))) - float(step[-1])
     best, value = step, np.inf
     for _ in range(CORRECTIONS):
         there = np.clip(at.fractions + step[:-1], 0.0, 1.0)
-        _, atoms = model.moved(there, form, points)
+        _, atoms = model.moved(there, form, form.points)
         true = form.rows(atoms, t + step[-1])
-        missed = float(np.maximum(np.where(form.equal, np.abs(true), -true), 0.0).max(initial=0.0))
-        merit = step[-1] + model.price * missed
+        missed = _missed(form, true)
+        merit = float(step[-1]) + model.price * missed
         if not merit < value:
             break
         best, value = step, merit
@@ -52,7 +74,11 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
             break
         # The rows bend away from their tangents: aim beside by what was missed.
         step, _ = quadratic_step(curvature, full, true - times(full, step), form, box, model.price)
-    return np.clip(at.fractions + best[:-1], 0.0, 1.0), t + float(best[-1])
+    return best, value, promised
+
+
+def _missed(form: Form, rows: Array) -> float:
+    return float(np.maximum(np.where(form.equal, np.abs(rows), -rows), 0.0).max(initial=0.0))
 
 
 def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index) -> Array:

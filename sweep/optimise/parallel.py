@@ -7,8 +7,9 @@ import os
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from sweep.errors import WorkerDied
 from sweep.families.base import Array
@@ -18,8 +19,27 @@ from sweep.optimise.certificate import Result
 from sweep.optimise.problem import Problem
 from sweep.optimise.search import search
 
+T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
 POLL = 0.05  # between two looks at whether to stop [s]
 GRACE = 1.0  # for workers to hand back what they have once they are to stop [s]
+
+
+class Task(Protocol[T_co]):
+    """Something to be done for a number, that asks often whether it is to stop; pickled for a worker."""
+
+    def __call__(self, number: int, asked: Callable[[], bool]) -> T_co:
+        """Do it; what is known so far if ``asked`` becomes true."""
+
+
+@dataclass(frozen=True)
+class _Search:
+    problem: Problem
+    starts: Array
+    allowed: float
+
+    def __call__(self, number: int, asked: Callable[[], bool]) -> Result:
+        return search(number, self.problem, self.starts[number], asked, self.allowed)
 
 
 def in_processes(
@@ -38,9 +58,33 @@ def in_processes(
     ----------
     problem, starts : as for ``minimise``
     numbers : which of the starts
+    asked, jobs : see :func:`spread_over`
+    allowed : looks at designs that each start may take
+    """
+    return over_processes(_Search(problem, starts, allowed), numbers, asked, jobs)
+
+
+def spread_over(task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int) -> list[T]:
+    """What a task gives for each number, in their order, here or in processes; those not begun are left out."""
+    if jobs == 1 or len(numbers) == 1:
+        out = []
+        for number in numbers:
+            if asked():
+                break
+            out.append(task(number, asked))
+        return out
+    return over_processes(task, numbers, asked, jobs)
+
+
+def over_processes(task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int) -> list[T]:
+    """What a task gives for each number that was begun before ``asked`` became true, in their order.
+
+    Parameters
+    ----------
+    task : pickled
+    numbers : what it is called with
     asked : looked at in this process; workers learn of it by a file, and those that do not answer soon are ended
     jobs : how many workers
-    allowed : looks at designs that each start may take
 
     Raises
     ------
@@ -62,8 +106,7 @@ def in_processes(
                 while todo and len(waiting) <= workers:
                     number = todo.pop()
                     with unheard():
-                        task = _task, number, problem, starts[number], flag, os.getpid(), allowed
-                        begun.append(executor.submit(*task))
+                        begun.append(executor.submit(_done, task, number, flag, os.getpid()))
                     waiting.add(begun[-1])
                 waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED).not_done
                 if not flag.exists() and asked():
@@ -80,8 +123,8 @@ def in_processes(
     return [result for result in found if result is not None]
 
 
-def _task(number: int, problem: Problem, start: Array, flag: Path, parent: int, allowed: float) -> Result | None:
+def _done(task: Task[T], number: int, flag: Path, parent: int) -> T | None:
     if os.getpid() != parent:
         depend_on_parent(parent)
     # A parent that was killed leaves no folder to look into, but then this process ends as well.
-    return None if flag.exists() else search(number, problem, start, flag.exists, allowed)
+    return None if flag.exists() else task(number, flag.exists)
