@@ -3,7 +3,7 @@
 For given proportions the motion of a guided coupler point is linear in two complex numbers and an offset
 (docs/guide.md), so the least largest acceleration with a straightness and a stroke prescribed is a linear program:
 
-    minimise t + price v   subject to   |g_j x| <= t,   |d_j x| <= bound + v,   e x >= need,   v >= 0
+    minimise t + price v   subject to   |g_j x| <= t,   |d_j x| <= bound_j + v,   e_j x >= need_j,   v >= 0
 
 It is solved by the revised simplex method on the dual, which has as many rows as the primal has unknowns.
 """
@@ -23,7 +23,7 @@ Status = NDArray[np.uint8]
 
 UNKNOWNS = 5
 SIZE = UNKNOWNS + 2  # and t, and v
-FAR = 1e6  # unknowns are sought within, in units of need
+FAR = 1e6  # unknowns are sought within, in units of the largest need
 STEPS = 400
 REFRESHED = 25  # steps after which the inverse of the basis is computed anew
 ROUNDING = 1e-11  # by which a row may be missed, relative to the size of the values
@@ -31,9 +31,9 @@ PIVOT = 1e-12  # smallest element to exchange on
 
 
 @inline
-def _row(number: int, g: Array, d: Array, e: Array, bound: float, need: float, row: Array) -> float:
+def _row(number: int, g: Array, d: Array, e: Array, bound: Array, need: Array, far: float, row: Array) -> float:
     """Coefficients of a row of ``A (x, t, v) >= b``, and b."""
-    mg, md = g.shape[0], d.shape[0]
+    mg, md, me = g.shape[0], d.shape[0], e.shape[0]
     for k in range(SIZE):
         row[k] = 0.0
     if number < 2 * mg:
@@ -50,22 +50,23 @@ def _row(number: int, g: Array, d: Array, e: Array, bound: float, need: float, r
         for k in range(UNKNOWNS):
             row[k] = sign * d[j, k]
         row[UNKNOWNS + 1] = 1.0
-        return -bound
+        return -float(bound[j])
     number -= 2 * md
-    if number == 0:
+    if number < me:
         for k in range(UNKNOWNS):
-            row[k] = e[k]
-        return need
-    row[number - 1] = 1.0
-    return -FAR * need if number <= UNKNOWNS else 0.0
+            row[k] = e[number, k]
+        return float(need[number])
+    number -= me
+    row[number] = 1.0
+    return -far if number < UNKNOWNS else 0.0
 
 
 @inline
-def _inverse(basis: NDArray[np.int64], g: Array, d: Array, e: Array, bound: float, need: float,
+def _inverse(basis: NDArray[np.int64], g: Array, d: Array, e: Array, bound: Array, need: Array, far: float,
              a: Array, b: Array, out: Array, row: Array) -> bool:  # fmt: skip
     """Inverse of the basis' rows (Gauss-Jordan with row exchange); false where they depend on each other."""
     for i in range(SIZE):
-        b[i] = _row(basis[i], g, d, e, bound, need, row)
+        b[i] = _row(basis[i], g, d, e, bound, need, far, row)
         for k in range(SIZE):
             a[i, k] = row[k]
             out[i, k] = 1.0 if i == k else 0.0
@@ -103,12 +104,12 @@ def _finite(rows: Array) -> bool:
 
 @inline
 def _most_violated(
-    g: Array, d: Array, e: Array, bound: float, need: float, price: float, z: Array
+    g: Array, d: Array, e: Array, bound: Array, need: Array, price: float, size: float, z: Array
 ) -> int:  # fmt: skip
     """Number of the row that a point z misses most, -1 where it keeps all of them to rounding."""
     mg, md = g.shape[0], d.shape[0]
     t, v = z[UNKNOWNS], z[UNKNOWNS + 1]
-    entering, worst = -1, ROUNDING * (abs(t) + price * abs(v) + need)
+    entering, worst = -1, ROUNDING * (abs(t) + price * abs(v) + size)
     for j in range(mg):
         value = 0.0
         for k in range(UNKNOWNS):
@@ -120,16 +121,17 @@ def _most_violated(
         value = 0.0
         for k in range(UNKNOWNS):
             value += d[j, k] * z[k]
-        if abs(value) - bound - v > worst:
-            worst = abs(value) - bound - v
+        if abs(value) - bound[j] - v > worst:
+            worst = abs(value) - bound[j] - v
             entering = 2 * mg + (j if value < 0.0 else md + j)
-    value = need
-    for k in range(UNKNOWNS):
-        value -= e[k] * z[k]
-    if value > worst:
-        worst, entering = value, 2 * (mg + md)
+    for j in range(e.shape[0]):
+        value = need[j]
+        for k in range(UNKNOWNS):
+            value -= e[j, k] * z[k]
+        if value > worst:
+            worst, entering = value, 2 * (mg + md) + j
     if -v > worst:
-        entering = 2 * (mg + md) + SIZE
+        entering = 2 * (mg + md) + e.shape[0] + SIZE - 1
     return entering
 
 
@@ -158,7 +160,7 @@ def _exchanged(inverse: Array, row: Array, y: Array, w: Array) -> int:
 
 @kernel
 def minimax(
-    g: Array, d: Array, e: Array, bound: float, need: float, price: float, x: Array, largest: Array, missed: Array,
+    g: Array, d: Array, e: Array, bound: Array, need: Array, price: float, x: Array, largest: Array, missed: Array,
     status: Status,
 ) -> None:  # fmt: skip
     """Solve one linear program per design.
@@ -167,8 +169,10 @@ def minimax(
     ----------
     g : (n, mg, 5) rows whose largest magnitude is to be small
     d : (n, md, 5) rows whose magnitude is at most ``bound``, or more at a price
-    e : (n, 5) row that reaches at least ``need``, which is positive
-    bound, need, price : in the units of their rows; the price is that of a unit of v in units of t
+    e : (n, me, 5) rows that reach at least ``need``
+    bound, need : (n, md) and (n, me) in the units of their rows; the largest need is positive, the others are not
+        negative; a negative bound is missed by so much, at the price
+    price : of a unit of v in units of t
     x : (n, 5) out, the unknowns; nan where the status is not OK
     largest, missed : (n,) out, t and v
     status : (n,) out; OK, NOT_ASSEMBLED where an input is no finite number, NOT_CONVERGED where the simplex stalls
@@ -177,34 +181,39 @@ def minimax(
     -----
     Measured against HiGHS on random programs: 1e-14 relative.
     """
-    last = 2 * (g.shape[1] + d.shape[1])
+    last = 2 * (g.shape[1] + d.shape[1]) + e.shape[1]
     a, inverse = np.empty((SIZE, SIZE)), np.empty((SIZE, SIZE))
     b, row, w, z, y = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
     basis = np.empty(SIZE, np.int64)
     for i in range(g.shape[0]):
         x[i, :], largest[i], missed[i] = math.nan, math.nan, math.nan
         status[i] = st.NOT_ASSEMBLED
-        if not (_finite(g[i]) and _finite(d[i]) and math.isfinite(e[i].sum())):
+        if not (_finite(g[i]) and _finite(d[i]) and _finite(e[i])):
             continue
         status[i] = st.NOT_CONVERGED
+        size = 0.0
+        for k in range(need.shape[1]):
+            size = max(size, need[i, k])
         # The unknowns at their far bounds, t = v = 0: the basis is the unit matrix, its multipliers those of t and v.
         for k in range(SIZE):
-            basis[k] = last + 1 + k
+            basis[k] = last + k
         for step in range(STEPS):
-            if step % REFRESHED == 0 and not _inverse(basis, g[i], d[i], e[i], bound, need, a, b, inverse, row):
+            if step % REFRESHED == 0 and not _inverse(
+                basis, g[i], d[i], e[i], bound[i], need[i], FAR * size, a, b, inverse, row
+            ):
                 break
             for k in range(SIZE):
                 value = 0.0
                 for j in range(SIZE):
                     value += inverse[k, j] * b[j]
                 z[k], y[k] = value, max(inverse[UNKNOWNS, k] + price * inverse[UNKNOWNS + 1, k], 0.0)
-            entering = _most_violated(g[i], d[i], e[i], bound, need, price, z)
+            entering = _most_violated(g[i], d[i], e[i], bound[i], need[i], price, size, z)
             if entering < 0:
                 for k in range(UNKNOWNS):
                     x[i, k] = z[k]
                 largest[i], missed[i], status[i] = z[UNKNOWNS], z[UNKNOWNS + 1], st.OK
                 break
-            right = _row(entering, g[i], d[i], e[i], bound, need, row)
+            right = _row(entering, g[i], d[i], e[i], bound[i], need[i], FAR * size, row)
             leaving = _exchanged(inverse, row, y, w)
             if leaving < 0:
                 break

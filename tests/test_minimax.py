@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 from kernels import status as st
 from kernels.minimax import minimax
 
-BOUND, NEED, PRICE = 0.015, 24.5, 100.0
+BOUND, NEED, PRICE = 0.015, np.array([24.5, 3.0]), 100.0
 
 
 def problems(count: int, poses: int = 32, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -23,28 +23,29 @@ def problems(count: int, poses: int = 32, seed: int = 0) -> tuple[np.ndarray, np
         ]
         return np.einsum("wm,nwu->nmu", waves, rng.standard_normal((count, 8, 5)))
 
-    g, d, e = rows(), rows(), rng.standard_normal((count, 5))
-    g[:, :, 4], d[:, :, 4], e[:, 4] = 0.0, -1.0, 0.0
+    g, d, e = rows(), rows(), rng.standard_normal((count, 2, 5))
+    g[:, :, 4], d[:, :, 4], e[:, :, 4] = 0.0, -1.0, 0.0
     return g, d, e
 
 
-def solved(g: np.ndarray, d: np.ndarray, e: np.ndarray, bound: float = BOUND) -> tuple[np.ndarray, ...]:
+def solved(g: np.ndarray, d: np.ndarray, e: np.ndarray, bound: float | np.ndarray = BOUND) -> tuple[np.ndarray, ...]:
     n = len(g)
+    bounds, needs = np.broadcast_to(bound, d.shape[:2]).copy(), np.broadcast_to(NEED, (n, 2)).copy()
     x, t, v, status = np.empty((n, 5)), np.empty(n), np.empty(n), np.empty(n, np.uint8)
-    minimax(g, d, e, bound, NEED, PRICE, x, t, v, status)
+    minimax(g, d, e, bounds, needs, PRICE, x, t, v, status)
     return x, t, v, status
 
 
-def theirs(g: np.ndarray, d: np.ndarray, e: np.ndarray, bound: float = BOUND) -> float:
+def theirs(g: np.ndarray, d: np.ndarray, e: np.ndarray, bound: float | np.ndarray = BOUND) -> float:
     one, none = np.ones((len(g), 1)), np.zeros((len(g), 1))
     own, nil = np.ones((len(d), 1)), np.zeros((len(d), 1))
     a = np.vstack(
         [
             np.hstack([g, -one, none]), np.hstack([-g, -one, none]),
-            np.hstack([d, nil, -own]), np.hstack([-d, nil, -own]), np.append(-e, [0.0, 0.0])[None],
+            np.hstack([d, nil, -own]), np.hstack([-d, nil, -own]), np.hstack([-e, np.zeros((2, 2))]),
         ]
     )  # fmt: skip
-    b = np.concatenate([np.zeros(2 * len(g)), np.full(2 * len(d), bound), [-NEED]])
+    b = np.concatenate([np.zeros(2 * len(g)), *[np.broadcast_to(bound, len(d))] * 2, -NEED])
     free = [(None, None)] * 5 + [(0, None)] * 2
     return float(linprog(np.array([0, 0, 0, 0, 0, 1, PRICE]), A_ub=a, b_ub=b, bounds=free).fun)
 
@@ -58,7 +59,16 @@ def test_least_largest_magnitude_equals_scipys(bound: float) -> None:
         # HiGHS keeps its rows to 1e-7.
         assert t[i] + PRICE * v[i] == pytest.approx(theirs(g[i], d[i], e[i], bound), rel=1e-6)
         assert np.abs(g[i] @ x[i]).max() == pytest.approx(t[i], rel=1e-9)
-        assert np.abs(d[i] @ x[i]).max() <= bound + v[i] + 1e-9 and e[i] @ x[i] >= NEED * (1.0 - 1e-9)
+        assert np.abs(d[i] @ x[i]).max() <= bound + v[i] + 1e-9 and (e[i] @ x[i] >= NEED * (1.0 - 1e-9)).all()
+
+
+def test_every_row_may_have_a_bound_of_its_own_and_a_negative_one_is_missed_at_the_price() -> None:
+    g, d, e = problems(6)
+    bound = np.linspace(-0.01, 0.05, d.shape[1])
+    _, t, v, status = solved(g, d, e, bound)
+    assert (status == st.OK).all() and (v >= 0.01).all()
+    for i in range(len(g)):
+        assert t[i] + PRICE * v[i] == pytest.approx(theirs(g[i], d[i], e[i], bound), rel=1e-6)
 
 
 def test_rows_of_the_deviation_may_be_none() -> None:

@@ -11,6 +11,8 @@ import pytest
 import sweep
 from sweep.chunks.cascade import levels
 from sweep.study import load_study
+from tests.needle208_record import record
+from tests.reference.needle_drive import share_within
 
 FOLDER = Path(__file__).parents[1] / "studies" / "needle208"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text())
@@ -29,6 +31,10 @@ def test_full_study_sweeps_ten_million_designs_and_asks_for_the_documented_requi
     assert study.space.count >= 10**7
     limits = {limit.output: limit for limit in study.limits}
     assert limits["max_abs_dev"].maximum <= 0.05
+    assert study.tolerance is not None and study.tolerance.robust == pytest.approx(0.95)
+    assert (study.tolerance.lengths, study.tolerance.angles) == pytest.approx((0.02, np.radians(0.05)))
+    links = {limit.output: limit.minimum for limit in study.parameter_limits}
+    assert all(links[name] == pytest.approx(8.0) for name in ("a2", "b2", "c2", "e2"))
     for name in ("max_pressure_angle1", "max_pressure_angle2"):
         assert limits[name].maximum == pytest.approx(np.radians(45.0))
     assert limits["stroke"].minimum <= 24.5 <= limits["stroke"].maximum
@@ -41,18 +47,20 @@ def test_stage_1_is_judged_before_anything_is_fitted():
     assert stops[1:3] == [("swing1",), ("fit",)]
 
 
-@pytest.mark.parametrize("found", ["optimum", "longer_search"])
+@pytest.mark.parametrize("found", ["optimum", "record"])
 def test_accepted_optimum_has_the_accepted_figures_and_keeps_every_limit(found):
-    study, design = load_study(FOLDER), EXPECTED[found]["design"]
+    study, design = (load_study(FOLDER) if found == "optimum" else record()), EXPECTED[found]["design"]
     row = outputs_of(design, [limit.output for limit in study.output_limits])
     for name, value in EXPECTED[found]["outputs"].items():
         assert row[name] == pytest.approx(value, rel=EXPECTED["relative_tolerance"])
     # Active limits are met to the optimiser's feasibility tolerance.
     for limit in study.parameter_limits:
-        assert limit.maximum is not None and design[limit.output] <= limit.maximum
+        # A length at its bound comes out of its fraction of the bounds, one rounding beside.
+        assert limit.maximum is not None and design[limit.output] <= limit.maximum * (1.0 + 1e-12)
+        assert limit.minimum is None or design[limit.output] >= limit.minimum * (1.0 - 1e-12)
     for name, (low, high) in study.space.bounds.items():
         if name.endswith("1"):
-            assert low <= design[name] <= high
+            assert low - 1e-12 <= design[name] <= high + 1e-12
     for limit in study.output_limits:
         value = abs(row[limit.output]) if limit.output in ("swing1", "stroke") else row[limit.output]
         assert limit.maximum is None or value <= limit.maximum + 1e-8 * abs(limit.maximum)
@@ -76,9 +84,43 @@ def test_reference_is_the_textbook_design_and_has_the_accepted_figures():
         assert design[name] == pytest.approx(ratio * design["a2"], abs=2e-4)
 
 
+def limits_of_what_is_made() -> dict[str, tuple[float, float]]:
+    study = load_study(FOLDER)
+    return {
+        x.output: (-np.inf if x.minimum is None else x.minimum, np.inf if x.maximum is None else x.maximum)
+        for x in study.output_limits
+        if not x.output.startswith("rotatable")
+    }
+
+
+def share(design, count, limits=None):
+    return share_within(design, limits or limits_of_what_is_made(), 0.02, np.radians(0.05), count, seed=29)
+
+
+def test_accepted_share_of_what_is_made_keeps_every_limit():
+    # 4000 mechanisms: 95 % is good to 0.35 %, three of which are allowed.
+    assert share(EXPECTED["optimum"]["design"], 4000) == pytest.approx(EXPECTED["optimum"]["share"], abs=0.011)
+    within = {"max_abs_dev": (0.0, 0.05)}
+    assert share(EXPECTED["optimum"]["design"], 4000, within) > 0.95
+    # What is best on paper is not what is best when made.
+    assert share(EXPECTED["record"]["design"], 2000) < 0.05
+    assert 0.5 < share(EXPECTED["record"]["design"], 2000, within) < 0.65
+
+
+@pytest.mark.long
+def test_accepted_share_holds_for_a_hundred_thousand_mechanisms():
+    found = share(EXPECTED["optimum"]["design"], 100_000)
+    # 0.07 % is the standard error of the share of so many.
+    assert found == pytest.approx(EXPECTED["optimum"]["share"], abs=0.003) and found >= 0.95 - 0.0015
+
+
 def test_optimum_beats_the_marks_of_the_source():
     best, old = EXPECTED["optimum"]["outputs"], EXPECTED["reference"]["outputs"]
-    assert best["max_abs_dev"] <= old["max_abs_dev"] / 3.0
     assert best["max_abs_d2s"] <= 0.85 * old["max_abs_d2s"]
+    # The deviation counts as it is made: within the requirement for 95 % of the optimum, for 8 % of the reference.
+    names = load_study(FOLDER).family.parameter_names
+    known = {"branch1": 1.0, "branch2": 1.0, "kappa2": 1.0} | load_study(FOLDER).reference
+    reference = {name: float(known[name]) for name in names}
+    assert share(reference, 2000, {"max_abs_dev": (0.0, 0.05)}) < 0.1
     # Rest to rest over S within |a| <= A takes at least 2 sqrt(S/A), twice per turn: A >= 4 S/pi^2.
     assert best["max_abs_d2s"] > 4.0 * best["stroke"] / np.pi**2

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import sweep
+import sweep.optimise.study
 from sweep.errors import StudyError
-from sweep.study import Limit, load_study, study_from_data
+from sweep.optimise import Problem, explore
+from sweep.optimise.brake import Brake
+from sweep.optimise.study import read_survey
+from sweep.study import Limit, OptimiseSettings, load_study, study_from_data
 from tests.test_optimise_study import STUDY
 
 STUDIES = Path(__file__).parents[1] / "studies"
@@ -94,3 +99,20 @@ def test_robust_search_refuses_equations_and_shares_that_cannot_be() -> None:
     for share in ("100 %", "0 %", "95"):
         with pytest.raises(StudyError, match=r"tolerance\.robust"):
             study_from_data(study.data | {"tolerance": table | {"robust": share}}, study.path)
+
+
+def test_brake_that_is_pulled_after_the_starts_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def explored(problem: Problem, starts: np.ndarray, settings: OptimiseSettings, brake: Brake, *rest: Any) -> Any:
+        found = explore(problem, starts, settings, brake, *rest)
+        brake.end = -math.inf
+        return found
+
+    monkeypatch.setattr(sweep.optimise.study, "explore", explored)
+    (tmp_path / "study.toml").write_text(ROBUST)
+    out = sweep.run(tmp_path, tmp_path / "designs", jobs=1)
+    survey = read_survey(out.parent / "_optimum.parquet")
+    assert survey is not None and survey.ended == "time" and survey.late
+    assert "not all that follows" in survey.warnings[0]
+    # The answer is that of the starts, and no more is claimed.
+    table = pd.read_parquet(out.parent / "_optimum.parquet").set_index("role")
+    assert table.loc["optimum", "yield"] < 0.75

@@ -75,13 +75,19 @@ class GuidedPoint:
     ``shares(designs)``, (n, 6), are the factors that the proof of its maxima takes (:mod:`sweep.reductions.travel`).
     The coupler point, the line and the scale can be fitted: ``fitted`` are the parameters of the point along and across
     the coupler, of the line's direction and of its distance from the origin, ``scaled`` the lengths that grow with the
-    stroke, ``direction`` the third of the fitted ones.
+    stroke, ``direction`` the third of the fitted ones.  ``links`` are the crank, the coupler and the other lengths of
+    the linkage, ``arms`` the point along and across the coupler, ``offset`` that of the line.  ``across`` names the
+    pose output across the line beside each one along it.
     """
 
     shares: DesignMap
     fitted: tuple[str, ...]
     scaled: tuple[str, ...]
     direction: str
+    links: tuple[str, ...]
+    arms: tuple[str, str]
+    offset: str
+    across: Mapping[str, str]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The optimiser: smallest objective under limits, by SLSQP on the epigraph form with exact gradients."""
+"""The optimiser: smallest objective under limits, by quadratic programs on its epigraph form, exact gradients."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from sweep.families.base import Array
+from sweep.optimise.dense import non_negative, times
 from sweep.optimise.rows import Form, Label
 
 ACTIVE = 1e-6  # a row within this of its bound (scaled) may carry a multiplier
@@ -48,8 +49,6 @@ def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, with
     fractions : (n,) scaled variables
     within : scaled distance from its bound at which a row may carry a multiplier
     """
-    from scipy.optimize import nnls
-
     n = len(fractions)
     active = np.flatnonzero((rows <= within) | form.equal)
     lower, upper = np.flatnonzero(fractions <= 1e-10), np.flatnonzero(fractions >= 1.0 - 1e-10)
@@ -63,10 +62,10 @@ def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, with
     matrix = np.concatenate([full, -equations, edges], axis=1)
     target = np.concatenate([np.zeros(n), [1.0]])
     # Columns of very different size would hide the small ones from the active-set choice.
-    size = np.linalg.norm(matrix, axis=0)
+    size = np.sqrt((matrix * matrix).sum(axis=0))
     size[size == 0.0] = 1.0
-    solution = nnls(matrix / size, target)[0] / size if matrix.shape[1] else np.zeros(0)
-    residual = np.abs(matrix @ solution - target).max()
+    solution = non_negative(matrix / size, target) / size
+    residual = np.abs(times(matrix, solution) - target).max()
     weights = np.zeros(len(rows))
     weights[active] = solution[: len(active)]
     weights[active[form.equal[active]]] -= solution[len(active) : len(active) + equations.shape[1]]

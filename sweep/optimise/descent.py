@@ -1,4 +1,4 @@
-"""One start: rounds of SLSQP, then of Newton steps, each checked against the true extrema; then polish and verify."""
+"""One start: rounds of learnt curvature, then of Newton steps, each checked against the true extrema; then polish."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from sweep.families.base import Array
-from sweep.optimise import newton, slsqp
+from sweep.optimise import newton, quasi
 from sweep.optimise.form import Program
 from sweep.optimise.model import FEASIBLE, Model, State
 from sweep.optimise.points import STATIC, Points
@@ -21,6 +21,7 @@ ROUNDS, CYCLES = 60, 3
 NEWTON = 240  # rounds of Newton steps: along a narrow curved valley hundreds are needed, and each gains
 KKT = 1e-6  # residual of a converged result
 DWINDLING = 1e-9  # gain of a round from which a fulfilled condition of optimality ends the search
+REMEMBERED = 48  # extrema of refused designs that stay among the rows: the next long step would meet them again
 NEAR_ANGLE = 0.1  # a followed point reaches this far by itself [rad]
 NEAR = 1e-3  # scaled violation from which the objective is looked at
 Propose: TypeAlias = Callable[[Model, State, Form, float, float, float | None], tuple[Array, float]]
@@ -52,7 +53,7 @@ class Descent:
                 self._restore()
             if math.isfinite(self.best.objective) and self.best.violation < NEAR:
                 for _ in range(CYCLES):
-                    self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=8)
+                    self._rounds(quasi.propose, relaxed=False, enough=1e-4, rounds=8)
                     self._rounds(newton.propose, relaxed=False, enough=1e-13, rounds=NEWTON)
                     if self.model.certificate(self.best).residual <= KKT:
                         break
@@ -67,7 +68,7 @@ class Descent:
             before = self.best
             if math.isinf(before.known):
                 return  # the links reach nowhere: there is nothing to follow
-            self._rounds(slsqp.propose, relaxed=True, enough=1e-4)
+            self._rounds(quasi.propose, relaxed=True, enough=1e-4)
             same_rows = before.form.complete == self.best.form.complete
             if self.best.feasible or (same_rows and self.best.known > 0.999 * before.known):
                 break
@@ -84,7 +85,8 @@ class Descent:
             at = self.best
             form, t, floor = self.model.with_points(at, extra), at.objective, None
             if not refused:
-                form = form.near(at.atoms, t if math.isfinite(t) else 0.0)
+                known = at.atoms if not len(extra) else self.model.atoms(at.design, form, form.points)
+                form = form.near(known, t if math.isfinite(t) else 0.0)
             if relaxed:
                 form, t, floor = form.relaxed({"rotatable"} if at.form.complete else set()), at.short, 0.0
                 if not at.form.complete:
@@ -94,7 +96,7 @@ class Descent:
             gain = at.short - new.short if relaxed else at.merit(self.model.price) - new.merit(self.model.price)
             step = float(np.abs(fractions - at.fractions).max())
             if gain > 0.0:
-                self.best, extra, refused = new, Points.of([]), False
+                self.best, refused = new, False
                 residual = math.nan if relaxed else self.model.learn(new)
                 radius = max(radius, min(1.0, 2.0 * step))
                 true = new.known if relaxed else new.objective
@@ -108,6 +110,7 @@ class Descent:
             else:
                 radius, refused = 0.25 * min(radius, step), True
                 extra = Points.joined(extra, self._unknown(new.form.points, form.points))
+                extra = extra.take(slice(-REMEMBERED, None))
 
     def _unknown(self, found: Points, known: Points) -> Points:
         """Extrema of a refused design that are not near a known point, to be held at their crank angles."""

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.families.base import Array
+from sweep.optimise.dense import symmetric
 
 OUTSIDE = 10.0  # price of a unit beyond the bounds, in values of the best
 
@@ -38,7 +39,7 @@ class _Rates(NamedTuple):
 def _rates(n: int) -> _Rates:
     count = 4 + int(3.0 * math.log(n))
     half = count // 2
-    weights = math.log(half + 0.5) - np.log(np.arange(1, half + 1))
+    weights = np.array([math.log(half + 0.5) - math.log(k) for k in range(1, half + 1)])
     weights /= weights.sum()
     effective = 1.0 / float((weights**2).sum())
     c_sigma = (effective + 2.0) / (n + effective + 5.0)
@@ -57,15 +58,17 @@ def evolved(
     generations: int,
     rng: np.random.Generator,
     stop: Callable[[], bool] = lambda: False,
+    heats: tuple[int, ...] = (),
 ) -> tuple[Array, Array]:
-    """The best place of each strategy and its value.
+    """The best place of each strategy that goes on to the end, and its value.
 
     Parameters
     ----------
     function : (k, n) places between 0 and 1 to (k,) values, the smaller the better
     places : (m, n) where the strategies begin
     radius : first standard deviation
-    generations : steps of every strategy
+    generations : steps of the strategies that go on to the end
+    heats : generations after which only the better half of them goes on
     rng : source of its random numbers
     stop : asked before every generation; true ends all strategies
     """
@@ -80,7 +83,12 @@ def evolved(
     for generation in range(generations):
         if stop():
             break
-        sizes, axes = np.linalg.eigh(covariance)
+        if generation in heats:
+            kept = np.argsort(value, kind="stable")[: (len(value) + 1) // 2]
+            mean, sigma, covariance, path, step_path = (x[kept] for x in (mean, sigma, covariance, path, step_path))
+            best, value, m = best[kept], value[kept], len(kept)
+            row = np.arange(m)[:, None]
+        sizes, axes = symmetric(covariance)
         sizes = np.sqrt(np.maximum(sizes, 1e-20))
         drawn = rng.standard_normal((m, count, n))
         steps = np.einsum("kij,kj,kcj->kci", axes, sizes, drawn)
@@ -97,7 +105,7 @@ def evolved(
         mean = mean + sigma[:, None] * move
         white = np.einsum("kij,kj,klj,kl->ki", axes, 1.0 / sizes, axes, move)
         step_path = (1.0 - c_sigma) * step_path + math.sqrt(c_sigma * (2.0 - c_sigma) * effective) * white
-        length = np.linalg.norm(step_path, axis=1)
+        length = np.sqrt((step_path**2).sum(axis=1))
         fading = math.sqrt(1.0 - (1.0 - c_sigma) ** (2 * (generation + 1)))
         moving = length / fading < (1.4 + 2.0 / (n + 1.0)) * normal
         path = (1.0 - c_path) * path
@@ -108,5 +116,7 @@ def evolved(
             + c_one * path[:, :, None] * path[:, None, :]
             + c_mu * np.einsum("h,khi,khj->kij", weights, chosen, chosen)
         )
-        sigma = np.minimum(sigma * np.exp(np.clip(c_sigma / damping * (length / normal - 1.0), -1.0, 1.0)), 1.0)
+        growth = np.clip(c_sigma / damping * (length / normal - 1.0), -1.0, 1.0)
+        # numpy's exponential depends on the processor, that of the C library does not
+        sigma = np.minimum(sigma * np.array([math.exp(x) for x in growth]), 1.0)
     return best, value

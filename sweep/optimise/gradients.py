@@ -16,6 +16,13 @@ from sweep.optimise.problem import Problem
 OFFSET = 1e-3
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 
+# Twelve times the weights of the derivative at the first of five points, in their middle, and at the last.
+FIVE_POINTS = {
+    2.0: (-25.0, 48.0, -36.0, 16.0, -3.0),
+    0.0: (1.0, -8.0, 0.0, 8.0, -1.0),
+    -2.0: (3.0, -16.0, 36.0, -48.0, 25.0),
+}
+
 
 def stepped(problem: Problem, base: Array, fractions: Array) -> Any:
     """Complex designs (n, P): the imaginary step STEP in one scaled variable (n,) each, and in all that follows."""
@@ -81,8 +88,7 @@ def scalar_gradient(function: Any, fractions: Array) -> Array:
     for j in range(n):
         shift = 0.0 if 2.0 * step <= fractions[j] <= 1.0 - 2.0 * step else 2.0 * math.copysign(1.0, 0.5 - fractions[j])
         nodes = np.arange(-2.0, 3.0) + shift
-        powers = np.vander(nodes, 5, increasing=True).T
-        weights.append(np.linalg.solve(powers, np.array([0.0, 1.0, 0.0, 0.0, 0.0])) / step)
+        weights.append(np.array(FIVE_POINTS[shift]) / (12.0 * step))
         moved = np.repeat(fractions[None, :], 5, axis=0)
         moved[:, j] += nodes * step
         samples.append(moved)

@@ -13,33 +13,34 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.minimax import minimax
-from sweep.families.base import Accuracy, Angles, Array
-from sweep.families.chain import Chain, driven_guide
+from sweep.families.base import Angles, Array
+from sweep.families.capabilities import GuidedPoint
+from sweep.families.chain import driven_guide
+from sweep.optimise.made import changes
 from sweep.optimise.problem import Problem
+from sweep.optimise.tolerance import SIGMAS, touched
 
 if TYPE_CHECKING:
-    from sweep.study import Limit
+    from sweep.study import Tolerance
 
 POSES = 64  # per turn on which the linear program sees the motion
-ACCURACY = Accuracy(samples=POSES)  # of what is not linear: pressure angles, the box of the coupler point
-# Pairs of outputs along and across the line, by what is limited or to be made small.
-LINEAR = {"max_abs_ds": "ds", "max_abs_d2s": "d2s", "max_abs_d3s": "d3s", "max_abs_dev": "dev"}
-ACROSS = {"s": "dev", "ds": "ddev", "d2s": "d2dev"}
-SOLVED = ("xi", "eta", "lam", "h")
-SCALED = ("a", "b", "c", "e")
+SPREAD_AT = 2  # every second pose tells what tolerances do: that changes slowly along the turn
+PASSES = 2  # of solving with the room that the tolerances of the solution before need
 EXCESS = 0.5  # price of a deviation twice as large as allowed, in strokes
-WEIGHT = 3.0  # price of a limit missed by its own size, in strokes
-STUCK = 1e6  # above every objective: does not turn
+DIRECTIONS = 3  # in which the least scale of a guide is asked for
+BOTH = 4.0  # a deviation misses its limit on either side, and in two places that know little of each other
+TURN: Array = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
 NEEDED = (
     "a chain of rssr and guide without a window, whose guide's crank, point and line vary ([fit]), with a lower limit "
-    "of the stroke and max_abs_ds, max_abs_d2s, max_abs_d3s or max_abs_dev to be made small"
+    "of the stroke and max_abs_ds, max_abs_d2s or max_abs_dev to be made small"
 )
 
 
@@ -47,22 +48,41 @@ NEEDED = (
 class Elimination:
     """The linear part of a problem.
 
-    ``wanted`` is the output along the line that is to be small (``dev`` across it), ``bound`` the largest deviation or
-    None, ``stroke`` the least one.
+    ``wanted`` is the output along the line that is to be small (that across it where ``straight``), ``bound`` the
+    largest deviation or None, ``stroke`` the least one, ``driver`` the output of the crank-rocker.  ``sigma``, (P,),
+    are standard deviations of what is made, and the limits on deviation and stroke shall hold ``level`` of them away.
     """
 
     problem: Problem
-    wanted: str
-    bound: float | None
-    stroke: float
+    guide: GuidedPoint
     last: str
     driver: str
+    wanted: str
+    straight: bool
+    bound: float | None
+    stroke: float
+    sigma: Array | None = None
+    level: float = 0.0
 
     @cached_property
     def free(self) -> tuple[str, ...]:
         """Variables that remain: all but the point, the line and one length of the guide, which is its unit."""
-        out = {f"{name}{self.last}" for name in (*SOLVED, "a")}
+        out = {f"{name}{self.last}" for name in (*self.guide.fitted, self.guide.links[0])}
         return tuple(name for name in self.problem.variables if name not in out)
+
+    @cached_property
+    def links(self) -> tuple[str, ...]:
+        """Lengths of the guide that grow with its scale."""
+        return tuple(f"{name}{self.last}" for name in self.guide.links)
+
+    @cached_property
+    def position(self) -> str:
+        """The output along the line."""
+        return next(iter(self.guide.across))
+
+    def column(self, name: str) -> int:
+        """Column of a parameter of the guide."""
+        return self.problem.family.parameter_names.index(f"{name}{self.last}")
 
     def solve(self, designs: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Finish designs (n, P): their point, line and scale are replaced by the best ones.
@@ -71,126 +91,169 @@ class Elimination:
         -------
         designs (n, P), the objective with what a too large deviation costs (n,), and whether there is a solution (n,).
         """
-        column = {name: k for k, name in enumerate(self.problem.family.parameter_names)}
-        at = {name: column[f"{name}{self.last}"] for name in (*SOLVED, *SCALED)}
         base = designs.copy()
-        base[:, [at[name] for name in SOLVED]] = 0.0
-        beside = base.copy()
-        # The guide's own length as the arm keeps the columns of one size.
-        size: Array = base[:, at["b"]].astype(np.float64)
-        beside[:, at["xi"]] = size
-        turn: Array = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
-        along = {"dev": "s"}.get(self.wanted, self.wanted)
-        names = frozenset({"s", "dev", along, ACROSS.get(along, "dev"), self.driver})
-        found, moved = (self.problem.family.poses(x, Angles.of(turn[None, :]), names) for x in (base, beside))
-        g = _rows(found, moved, along, self.wanted == "dev")
-        d = _rows(found, moved, "s", True)[:, :: 1 if self.bound is not None else POSES]
-        s = _rows(found, moved, "s", False)
-        number = np.arange(len(designs))
-        ends = s[number, np.argmax(found[self.driver], axis=1)] - s[number, np.argmin(found[self.driver], axis=1)]
+        base[:, [self.column(name) for name in self.guide.fitted]] = 0.0
+        motion = self._motion(base)
         bound = 1e3 * self.stroke if self.bound is None else self.bound
         price = EXCESS * self.stroke / bound
-        x, least, missed = np.empty((len(base), 5)), np.empty(len(base)), np.empty(len(base))
-        status = np.empty(len(base), np.uint8)
-        minimax(g, d, ends, bound, self.stroke, price, x, least, missed, status)
-        scale: Array = np.hypot(x[:, 0], x[:, 1])
-        lam: Array = -np.arctan2(x[:, 1], x[:, 0])
-        point = size * (x[:, 2] + 1j * x[:, 3]) * np.exp(1j * lam)
+        bounds, need = np.full(motion.across.shape[:2], bound), np.full(len(designs), self.stroke)
+        least = self._least_scale(base)
+        x, t, v = _minimised(motion, bounds, need, least, price)
+        out = self._finished(designs, x)
+        if self.sigma is not None and self.bound is not None:
+            for _ in range(PASSES):
+                across, along = self._rooms(out, motion)
+                x, t, v = _minimised(motion, bounds - across, need + along, least, price)
+                out = self._finished(designs, x)
+            # What counts is the room that this solution needs, not the one before.
+            across, along = self._rooms(out, motion)
+            off = np.abs((motion.across * x[:, None, :]).sum(axis=2)) + across - bound
+            v = np.maximum(off.max(axis=1), 0.0)
+            t = t * (1.0 + np.maximum(need + along - (motion.ends * x).sum(axis=1), 0.0) / self.stroke)
+        return out, t + price * v, np.isfinite(t + v)
+
+    def _motion(self, base: Array) -> _Motion:
+        """What is linear in the unknowns, of designs without point and line."""
+        beside = base.copy()
+        # The coupler's length as the arm keeps the columns of one size.
+        beside[:, self.column(self.guide.arms[0])] = base[:, self.column(self.guide.links[1])]
+        s, names = self.position, self.guide.across
+        wanted = frozenset({s, names[s], self.wanted, names[self.wanted], self.driver})
+        found, moved = (self.problem.family.poses(x, Angles.of(TURN[None, :]), wanted) for x in (base, beside))
+        rows = [self._rows(found, moved, *which) for which in ((self.wanted, self.straight), (s, True), (s, False))]
+        number = np.arange(len(base))
+        high, low = np.argmax(found[self.driver], axis=1), np.argmin(found[self.driver], axis=1)
+        across = rows[1][:, :: 1 if self.bound is not None else POSES]
+        return _Motion(rows[0], np.ascontiguousarray(across), rows[2][number, high] - rows[2][number, low], high, low)
+
+    def _rows(self, base: Any, beside: Any, name: str, across: bool) -> Array:
+        """Coefficients (n, m, 5) of an output along the line, or of the one across it, of (z1, z2, h)."""
+        other = self.guide.across[name]
+        bx, by = base[name], base[other]
+        dx, dy = beside[name] - bx, beside[other] - by
+        zero = np.zeros_like(bx)
+        offset = zero - 1.0 if name == self.position else zero
+        rows = [by, bx, dy, dx, offset] if across else [bx, -by, dx, -dy, zero]
+        return np.ascontiguousarray(np.stack(rows, axis=2))
+
+    def _finished(self, designs: Array, x: Array) -> Array:
+        """Designs with the point, line and scale that belong to the unknowns."""
+        scale: Array = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
+        along, aside, line, offset = (
+            self.column(n) for n in (*self.guide.arms, self.guide.direction, self.guide.offset)
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):  # a guide without size is missing what is asked of it
+            grown = designs[:, self.column(self.guide.links[1])] / scale
         out = designs.copy()
-        for name in SCALED:
-            out[:, at[name]] *= scale
-        out[:, at["xi"]], out[:, at["eta"]], out[:, at["h"]] = point.real, point.imag, x[:, 4]
-        out[:, at["lam"]] = self._turned(lam)
-        return out, least + price * missed, status == st.OK
+        for name in self.guide.links:
+            out[:, self.column(name)] *= scale
+        # numpy's arctan2 and complex products depend on the processor, the C library's arctan2 does not
+        lam = np.array([math.atan2(-y, x) for x, y in x[:, :2]])
+        grown[scale == 0.0] = np.nan
+        out[:, along] = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * grown
+        out[:, aside] = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * grown
+        out[:, offset], out[:, line] = x[:, 4], self._turned(lam)
+        return out
 
     def _turned(self, lam: Array) -> Array:
         """The direction as an angle within its bounds, if one of its turns is."""
-        name = f"lam{self.last}"
+        name = f"{self.guide.direction}{self.last}"
         if name not in self.problem.variables:
             return lam
         k = self.problem.variables.index(name)
         middle = 0.5 * (self.problem.lower[k] + self.problem.upper[k])
         return np.asarray(lam - 2.0 * np.pi * np.round((lam - middle) / (2.0 * np.pi)), np.float64)
 
-    def merit(self, designs: Array) -> tuple[Array, Array]:
-        """Finished designs (n, P), and the objective plus what missed limits cost (n,), the smaller the better."""
-        from sweep.chunks.cascade import compared
-        from sweep.evaluation.summaries import design_outputs
+    def _least_scale(self, designs: Array) -> Array:
+        """Scale (n,) at which the last of the guide's lengths reaches its lower bound."""
+        problem = self.problem
+        least = np.zeros(len(designs))
+        for name in self.links:
+            if name in problem.variables:
+                low = float(problem.lower[problem.variables.index(name)])
+                length = np.abs(designs[:, problem.family.parameter_names.index(name)])
+                least = np.maximum(least, max(low, 0.0) / length)
+        return least
 
-        family = self.problem.family
-        names = family.parameter_names
-        done = ("stroke", "max_abs_dev")
-        limits = [x for x in self.problem.limits if not x.output.startswith(("rotatable", *done))]
-        margins = [f"margin{stage.number}" for stage in family.stages] if isinstance(family, Chain) else []
-        first = [x for x in limits if x.output.rstrip("0123456789") in ("max_pressure_angle", "swing", "margin")]
-        wanted = list(dict.fromkeys([*margins, *(x.output for x in first)]))
-        columns = design_outputs(family, designs, wanted, ACCURACY, self.problem.window)
-        margin = np.min([np.nan_to_num(columns[name], nan=-1e3) for name in margins], axis=0)
-        merit = STUCK * (2.0 - margin)
-        turns = np.flatnonzero(margin > 0.0)
-        missed = np.zeros(len(designs))
-        for limit in first:
-            missed += _missed(limit, compared(limit.output, np.asarray(columns[limit.output], np.float64)))
-        finished, least, solved = self.solve(designs[turns])
-        own = missed[turns]
-        rest = [x for x in limits if x not in first]
-        columns = {n: finished[:, k] for k, n in enumerate(names)}
-        if any(x.output not in names for x in rest):
-            outputs = [x.output for x in rest if x.output not in names]
-            columns |= design_outputs(family, finished, outputs, ACCURACY, self.problem.window)
-        for limit in rest:
-            own = own + _missed(limit, compared(limit.output, np.asarray(columns[limit.output], np.float64)))
-        out = np.full(designs.shape, np.nan)
-        out[turns] = finished
-        own = own + self._outside(finished)
-        merit[turns] = np.where(solved, least + WEIGHT * self.stroke * own, STUCK)
-        return out, merit
-
-    def _outside(self, designs: Array) -> Array:
-        """How far lengths of the guide lie outside their bounds, relative to them (n,)."""
-        missed = np.zeros(len(designs))
-        names = self.problem.family.parameter_names
-        for name in SCALED:
-            full = f"{name}{self.last}"
-            if full in self.problem.variables:
-                k = self.problem.variables.index(full)
-                values, high = designs[:, names.index(full)], self.problem.upper[k]
-                missed += np.maximum(values - high, 0.0) / abs(high)
-                missed += np.maximum(self.problem.lower[k] - values, 0.0) / max(abs(self.problem.lower[k]), 1e-9)
-        return missed
+    def _rooms(self, designs: Array, motion: _Motion) -> tuple[Array, Array]:
+        """Room that the tolerances need: of the deviation at every pose (n, m), of the stroke (n,)."""
+        if self.sigma is None:
+            return np.zeros(motion.across.shape[:2]), np.zeros(len(designs))
+        off, s = self.guide.across[self.position], self.position
+        found = changes(self.problem.family, designs, self.sigma, (off, s), TURN[::SPREAD_AT])
+        seen = np.sqrt((found[off] ** 2).sum(axis=1))
+        between = 0.5 * (seen + np.roll(seen, -1, axis=1))
+        across = np.stack([seen, between], axis=2).reshape(len(designs), -1)
+        number, high, low = np.arange(len(designs)), motion.high // SPREAD_AT, motion.low // SPREAD_AT
+        ends = found[s][number, :, high] - found[s][number, :, low]
+        return self.level * across, self.level * np.sqrt((ends**2).sum(axis=1))
 
 
-def _rows(base: Any, beside: Any, name: str, across: bool) -> Array:
-    """Coefficients (n, m, 5) of an output along the line, or of the deviation, of (z1, z2, h)."""
-    other = ACROSS[name]
-    bx, by = base[name], base[other]
-    dx, dy = beside[name] - bx, beside[other] - by
-    zero = np.zeros_like(bx)
-    rows = [by, bx, dy, dx, zero - 1.0] if across else [bx, -by, dx, -dy, zero]
-    return np.ascontiguousarray(np.stack(rows, axis=2))
+class _Motion(NamedTuple):
+    """Coefficients of the unknowns: of what is to be small and of the deviation (n, m, 5), of the stroke (n, 5).
+
+    ``high`` and ``low``, (n,), are the poses at the ends of the stroke.
+    """
+
+    wanted: Array
+    across: Array
+    ends: Array
+    high: NDArray[np.intp]
+    low: NDArray[np.intp]
 
 
-def _missed(limit: Limit, value: Array) -> Array:
-    size = max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)) or 1.0
-    low = -math.inf if limit.minimum is None else limit.minimum
-    high = math.inf if limit.maximum is None else limit.maximum
-    return np.nan_to_num(np.maximum(np.maximum(low - value, value - high), 0.0) / size, nan=1e3)
+def _minimised(motion: _Motion, bounds: Array, need: Array, least: Array, price: float) -> tuple[Array, Array, Array]:
+    """Unknowns (n, 5), largest of what is wanted and by how much the bounds are missed, nan where there is no solution.
+
+    That the guide is at least so large is a bound on the modulus of z1 from below, which no linear program knows.  It
+    is asked for in the direction that z1 has without it, then in the one it has with it.
+    """
+    n = len(need)
+    rows, needs = np.zeros((n, 2, 5)), np.zeros((n, 2))
+    rows[:, 0], needs[:, 0] = motion.ends, need
+    x, t, v = np.empty((n, 5)), np.empty(n), np.empty(n)
+    own = np.arange(n)
+    for _ in range(DIRECTIONS):
+        some, value, missed = np.empty((len(own), 5)), np.empty(len(own)), np.empty(len(own))
+        status = np.empty(len(own), np.uint8)
+        minimax(motion.wanted[own], motion.across[own], rows[own], bounds[own], needs[own], price,
+                some, value, missed, status)  # fmt: skip
+        x[own], t[own], v[own] = some, np.where(status == st.OK, value, np.nan), missed
+        scale = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
+        # nan is not less; a guide without any size has no direction
+        own = np.flatnonzero((scale < (1.0 - 1e-6) * least) & (scale > 0.0))
+        if not len(own):
+            break
+        rows[own, 1, :2] = x[own, :2] / scale[own, None]
+        needs[own, 1] = least[own]
+    return x, t, v
 
 
-def elimination(problem: Problem) -> Elimination | None:
-    """The linear part of a problem, or None where it has none."""
-    family = problem.family
-    stages = driven_guide(family)
-    if stages is None or problem.window is not None:
+def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimination | None:
+    """The linear part of a problem, or None where it has none.
+
+    With a ``tolerance`` that has a share, the limits on deviation and stroke are to hold for what is made.
+    """
+    stages = driven_guide(problem.family)
+    if stages is None or problem.window is not None or problem.coordinates is not None:
         return None
     before, last = stages[0], str(stages[1].number)
-    limits = {limit.output: limit for limit in problem.limits}
-    stroke, deviation = limits.get("stroke"), limits.get("max_abs_dev")
-    needed = {f"{name}{last}" for name in (*SOLVED, "a")}
-    if problem.objective not in LINEAR or stroke is None or not stroke.minimum or problem.coordinates is not None:
+    guide = stages[1].family.find(GuidedPoint)
+    if guide is None or not {f"{name}{last}" for name in (*guide.fitted, guide.links[0])} <= set(problem.variables):
         return None
-    if not needed <= set(problem.variables):
+    off = next(iter(guide.across.values()))
+    small = {f"max_abs_{name}": name for name in list(guide.across)[1:]} | {f"max_abs_{off}": next(iter(guide.across))}
+    limits = {limit.output: limit for limit in problem.limits}
+    stroke, deviation = limits.get("stroke"), limits.get(f"max_abs_{off}")
+    if problem.objective not in small or stroke is None or not stroke.minimum:
         return None
     bound = None if deviation is None else deviation.maximum
+    share = None if tolerance is None else tolerance.robust
+    sigma, level = None, 0.0
+    if tolerance is not None and share is not None:
+        sigma, level = touched(problem.family, tolerance) / SIGMAS, NormalDist().inv_cdf(1.0 - (1.0 - share) / BOTH)
     driver = f"{before.family.position}{before.number}"
-    return Elimination(problem, LINEAR[problem.objective], bound, float(stroke.minimum), last, driver)
+    return Elimination(
+        problem, guide, last, driver, small[problem.objective], problem.objective == f"max_abs_{off}", bound,
+        float(stroke.minimum), sigma, level,
+    )  # fmt: skip

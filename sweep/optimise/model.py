@@ -11,6 +11,7 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.optimise.certificate import ACTIVE, Multipliers, multipliers
+from sweep.optimise.dense import times
 from sweep.optimise.form import Program
 from sweep.optimise.gradients import gradients, scalar_gradient, stepped
 from sweep.optimise.points import STEP, Curves, Points
@@ -134,7 +135,7 @@ class Model:
         # What has no derivative, as the angle of a vanishing extremum, spoils the rows that ask for it and no others.
         lost = ~np.isfinite(jacobian).all(axis=1)
         jacobian[lost] = 0.0
-        rows = np.asarray(form.matrix @ jacobian, np.float64)
+        rows = times(form.matrix, jacobian)
         rows[form.matrix[:, lost].any(axis=1)] = np.nan
         return rows
 

@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from sweep.chunks.plan import optimiser_hash
 from sweep.errors import InputError, WorkerDied
 from sweep.families.base import Array
 from sweep.jobs.executors import place_of_searches
+from sweep.jobs.flow import Task
 from sweep.jobs.signals import Stop
 from sweep.optimise.certificate import Result
 from sweep.optimise.problem import Problem
 from sweep.optimise.search import search
+
+T = TypeVar("T")
 
 
 class _Asked(Stop):
@@ -30,21 +34,32 @@ class _Asked(Stop):
 
 
 @dataclass(frozen=True)
-class SearchTask:
-    """Search from one of the starts; a worker whose sources are not those of the process that asks does nothing."""
+class _Checked(Generic[T]):
+    """A task for workers; one whose sources are not those of the process that asks does nothing."""
 
-    problem: Problem
-    starts: Array
-    allowed: float
+    task: Task[T]
     code: str
 
-    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Result | None:
-        """The result from that start, None if it is not to be begun any more."""
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[int, T] | None:
+        """The number with what the task gives for it, None if it is not to be begun any more."""
         own = optimiser_hash()
         if own != self.code:
             allowed = f"{self.code}, the sources and libraries of the process that searches"
             raise InputError("code", own, allowed, "worker")
-        return None if should_stop() else search(number, self.problem, self.starts[number], should_stop, self.allowed)
+        return None if should_stop() else (number, self.task(number, should_stop))
+
+
+@dataclass(frozen=True)
+class SearchTask:
+    """Search from one of the starts."""
+
+    problem: Problem
+    starts: Array
+    allowed: float
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Result:
+        """The result from that start."""
+        return search(number, self.problem, self.starts[number], should_stop, self.allowed)
 
 
 def in_processes(
@@ -57,15 +72,41 @@ def in_processes(
 ) -> list[Result]:
     """Results of the starts ``numbers`` that were begun before ``asked`` became true, in their order.
 
-    Each is what a serial search finds, to the bit.  They run on the cluster of the run, if it has one.
+    Each is what a serial search finds, to the bit.
 
     Parameters
     ----------
     problem, starts : as for ``minimise``
     numbers : which of the starts
+    asked, jobs : see :func:`over_processes`
+    allowed : looks at designs that each start may take
+    """
+    return over_processes(SearchTask(problem, starts, allowed), numbers, asked, jobs)
+
+
+def spread_over(task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int) -> list[T]:
+    """What a task gives for each number, in their order, here or in processes; those not begun are left out."""
+    if jobs == 1 or len(numbers) == 1:
+        out = []
+        for number in numbers:
+            if asked():
+                break
+            out.append(task(number, asked))
+        return out
+    return over_processes(task, numbers, asked, jobs)
+
+
+def over_processes(task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int) -> list[T]:
+    """What a task gives for each number that was begun before ``asked`` became true, in their order.
+
+    They run on the cluster of the run, if it has one.
+
+    Parameters
+    ----------
+    task : fit to be pickled
+    numbers : what it is called with
     asked : looked at in this process; workers learn of it, and what does not answer soon is given up
     jobs : how many workers
-    allowed : looks at designs that each start may take
 
     Raises
     ------
@@ -73,12 +114,12 @@ def in_processes(
         if a worker process was killed.
     """
     stop = _Asked(asked)
-    task = SearchTask(problem, starts, allowed, optimiser_hash())
-    found: dict[int, Result] = {}
+    found: dict[int, T] = {}
     try:
-        for result in place_of_searches().outcomes(task, iter(numbers), min(jobs, len(numbers)), stop):
-            if result is not None:
-                found[result.start] = result
+        checked = _Checked(task, optimiser_hash())
+        for outcome in place_of_searches().outcomes(checked, iter(numbers), min(jobs, len(numbers)), stop):
+            if outcome is not None:
+                found[outcome[0]] = outcome[1]
     except WorkerDied as error:
         if not stop:  # the signal that stops us may have hit them too
             raise WorkerDied(f"optimiser: {error}; run again") from error

@@ -121,12 +121,14 @@ class Curves:
             if s.passes is not None:
                 rows += passages(n, phi, self.curve(s, columns)[0], *s.passes)
             elif n not in windowed:
-                rows += _extrema(n, phi, self.curve(s, columns)[0], s.wrapped)
+                x, room = self.curve(s, columns)[0], self._room(n, design[None, :], phi)[0]
+                for sense in (1.0, -1.0):
+                    rows += _extrema(n, phi, x + sense * room, s.wrapped, sense)
         points = self.follow(design, Points.of(rows), stride=2.0 * math.pi / samples)
         if windowed and turns:
             edge_rows: list[tuple[int, float, float, int, float, float]] = []
             for n in windowed:
-                edge_rows += self._inside(n, phi, columns, points)
+                edge_rows += self._inside(n, design, phi, columns, points)
             points = self.follow(design, Points.joined(points, Points.of(edge_rows)), stride=2.0 * math.pi / samples)
         return _without_repetition(points), turns
 
@@ -137,6 +139,11 @@ class Curves:
             with np.errstate(invalid="ignore"):
                 x = x / _discriminant_scale(x, columns[series.pressure])
         return x
+
+    def _room(self, n: int, designs: Any, phi: Any) -> Any:
+        """What tolerances add to the maxima of series n and take from its minima, (n, m)."""
+        room = self.problem.rooms.get(self.series[n].output)
+        return np.zeros((len(designs), len(phi))) if room is None else room.at(designs, phi)
 
     def stroke(self, points: Points) -> tuple[int, int]:
         """The points with the smallest and the largest position."""
@@ -193,6 +200,8 @@ class Curves:
             if not own.any():
                 continue
             out[:, own] = self.curve(s, columns)[:, : len(points)][:, own]
+            if s.output in self.problem.rooms:
+                out[:, own] += points.sense[own] * self._room(n, designs, points.phi[own])
             if s.wrapped:
                 # The angle of the same turn as before: a step of the optimiser never moves it by half a turn.
                 turns = np.round((points.value[own] - out[:, own].real) / (2.0 * math.pi))
@@ -221,6 +230,9 @@ class Curves:
             if own.any():
                 curve = columns[s.output][0].reshape(3, k)[:, own]
                 slopes[:, own], value[own] = curve.imag / STEP, curve[1].real
+                if s.output in self.problem.rooms:
+                    room = self.problem.rooms[s.output].slope(design, three).reshape(3, k)
+                    slopes[:, own] += points.sense[own] * room[:, own]
         curvature = (slopes[2] - slopes[0]) / (2.0 * NEIGHBOUR)
         if self.position < 0:
             return slopes[1], curvature, np.zeros(k), np.zeros(k), value
@@ -239,7 +251,7 @@ class Curves:
         move[edges] = -(place[edges] - target) / pace[edges]
 
     def _inside(
-        self, n: int, phi: Array, columns: dict[str, Any], points: Points
+        self, n: int, design: Array, phi: Array, columns: dict[str, Any], points: Points
     ) -> list[tuple[int, float, float, int, float, float]]:
         """Extrema inside the window of series n, and both senses at every crossing of the window's edges."""
         series = self.series[n]
@@ -259,7 +271,9 @@ class Curves:
                 start = phi[j] + part * (phi[1] - phi[0])
                 rows += [(n, start, sense, CROSSING, edge, x[j]) for sense in (1.0, -1.0)]
         inside = (share >= series.window[0] - 1e-12) & (share <= series.window[1] + 1e-12)
-        return rows + _extrema(n, phi, x, False, inside)
+        for sense in (1.0, -1.0):
+            rows += _extrema(n, phi, x + sense * self._room(n, design[None, :], phi)[0], False, sense, inside)
+        return rows
 
 
 def _discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
@@ -277,8 +291,9 @@ def _discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
 
 
 def _extrema(
-    n: int, phi: Array, x: Array, wrapped: bool, inside: NDArray[np.bool_] | None = None
+    n: int, phi: Array, x: Array, wrapped: bool, sense: float, inside: NDArray[np.bool_] | None = None
 ) -> list[tuple[int, float, float, int, float, float]]:
+    """Maxima (sense +1) or minima (-1) of a curve."""
     if not np.isfinite(x).all():
         return []
     if wrapped:
@@ -290,15 +305,12 @@ def _extrema(
         return []
     top, bottom = float(x[counts].max()), float(x[counts].min())
     if top - bottom <= 1e-13 * max(abs(top), abs(bottom)):
-        return [(n, float(phi[0]), sense, STATIC, math.nan, float(x[0])) for sense in (1.0, -1.0)]
+        return [(n, float(phi[0]), sense, STATIC, math.nan, float(x[0]))]
     before, after, middle = np.roll(x, 1), np.roll(x, -1), 0.5 * (top + bottom)
-    rows = []
-    for sense in (1.0, -1.0):
-        peak = counts & (sense * x > sense * before) & (sense * x >= sense * after)
-        if inside is None:
-            peak &= sense * (x - middle) >= 0.0  # in a window all count: a refused step cannot add those it met
-        rows += [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
-    return rows
+    peak = counts & (sense * x > sense * before) & (sense * x >= sense * after)
+    if inside is None:
+        peak &= sense * (x - middle) >= 0.0  # in a window all count: a refused step cannot add those it met
+    return [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
 
 
 def _without_repetition(points: Points) -> Points:

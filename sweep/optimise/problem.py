@@ -15,6 +15,7 @@ from sweep.families.domain import March
 from sweep.optimise.coordinates import Coordinates
 
 if TYPE_CHECKING:
+    from sweep.optimise.rooms import Room
     from sweep.study import Limit
 
 PLACE = "optimisation problem"
@@ -37,6 +38,7 @@ class Problem:
     accuracy : relative error to which the extrema over the turn are verified (``target``), or the number of poses per
         turn they are looked for on (``samples``)
     coordinates : variables that are no parameters, and what follows from them; None varies parameters alone
+    rooms : what tolerances add to pose outputs along the turn, where limits are to hold for what is made
 
     Raises
     ------
@@ -54,6 +56,7 @@ class Problem:
     window: tuple[float, float] | None = None
     accuracy: Accuracy = field(default_factory=lambda: Accuracy(target=1e-9))
     coordinates: Coordinates | None = None
+    rooms: Mapping[str, Room] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if isinstance(self.family.domain, March):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,14 +12,17 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.chain import stages_of
 from sweep.optimise.evolution import evolved
-from sweep.optimise.linear import STUCK, Elimination
+from sweep.optimise.linear import Elimination
+from sweep.optimise.merit import STUCK, merit
+from sweep.optimise.parallel import spread_over
 from sweep.optimise.problem import Problem
 from sweep.optimise.starts import spread
 
-SAMPLED = 1 << 17  # proportions per combination of signs, two in a hundred of which turn
+SAMPLED = 1 << 15  # proportions per group, two to eight in a hundred of which turn
 BLOCK = 1 << 13
-STRATEGIES = 8  # per start
-RADIUS, GENERATIONS = 0.1, 100
+STRATEGIES, PER_GROUP = 24, 3  # side by side in a group; starts that a group is worth
+RADIUS, GENERATIONS, HEATS = 0.1, 700, (100, 250)  # the better half goes on after each heat
+SHORT = 0.15  # shortest length of a guide that the strategies begin with, against the longest its crank may have
 MIDDLE = Accuracy(target=1e-3)
 
 
@@ -38,24 +41,29 @@ class Proportions:
         at = [problem.variables.index(name) for name in linear.free]
         self.low, self.high = problem.lower[at].astype(np.float64), problem.upper[at].astype(np.float64)
         units = {p.name: p for p in problem.family.parameters}
+        unit = problem.variables.index(linear.links[0])
+        self.log = np.zeros(len(linear.free), dtype=np.bool_)
         for k, name in enumerate(linear.free):
             if units[name].unit == "angle" and self.high[k] - self.low[k] >= 2.0 * math.pi:
                 self.low[k], self.high[k] = -math.pi, math.pi
             # A frame to the other side is the same guide, turned by half a turn.
-            if name == f"e{number}" and self.high[k] > 0.0:
-                self.low[k] = max(self.low[k], 0.0)
-        self.log = np.array([name in (f"b{number}", f"c{number}") for name in linear.free])
+            if name in linear.links:
+                shortest = max(self.low[k], problem.upper[unit] * SHORT)
+                self.low[k] = shortest / problem.upper[unit]
+                self.high[k] /= max(problem.lower[unit], problem.upper[unit] * SHORT)
+                self.log[k] = True
         self.columns = [names.index(name) for name in linear.free]
-        own = problem.variables.index(f"a{number}")
-        self.base[names.index(f"a{number}")] = math.sqrt(float(problem.lower[own]) * float(problem.upper[own]))
+        self.base[names.index(linear.links[0])] = 1.0
         self.offset = names.index(f"offset{number}") if f"offset{number}" in linear.free else -1
         self.driver = stages_of(problem.family)[0].family
 
     def designs(self, places: Array) -> Array:
         """Designs (k, P) at places (k, n), with the point, line and scale still to be found."""
         values: Array = self.low + places * (self.high - self.low)
-        low, high = self.low[self.log], self.high[self.log]
-        values[:, self.log] = low * (high / low) ** places[:, self.log]
+        low, wide = self.low[self.log], np.array([math.log(x) for x in self.high[self.log] / self.low[self.log]])
+        # numpy's exponential depends on the processor, that of the C library does not
+        grown = [math.exp(x) for x in (places[:, self.log] * wide).ravel()]
+        values[:, self.log] = low * np.reshape(grown, (len(places), -1))
         designs = np.repeat(self.base[None, :], len(places), axis=0)
         designs[:, self.columns] = values
         if self.offset >= 0:
@@ -67,7 +75,35 @@ class Proportions:
 
     def merit(self, places: Array) -> Array:
         """Least objective for these proportions, plus what missed limits cost (k,)."""
-        return self.linear.merit(self.designs(places))[1]
+        return merit(self.linear, self.designs(places))[1]
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Strategies that advance together, of one combination of signs: a task for processes."""
+
+    linear: Elimination
+    signs: tuple[dict[str, float], ...]
+    seed: int
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[Array, Array]:
+        """Designs (k, P) and their merits, the best first."""
+        from scipy.stats import qmc
+
+        own = Proportions(self.linear, self.signs[number % len(self.signs)])
+        place = qmc.Sobol(len(own.columns), seed=self.seed + number).random(SAMPLED)
+        worth = np.concatenate([own.merit(block) for block in np.split(place, max(1, SAMPLED // BLOCK))])
+        order = np.argsort(worth, kind="stable")
+        order = order[worth[order] < STUCK]
+        if not len(order):
+            return np.empty((0, len(own.base))), np.empty(0)
+        begin = place[order][spread(place[order], np.zeros(len(order), np.intp), STRATEGIES)]
+        rng = np.random.default_rng(self.seed + number)
+        place, worth = evolved(own.merit, begin, RADIUS, GENERATIONS, rng, should_stop, HEATS)
+        order = np.argsort(worth, kind="stable")
+        designs, worth = merit(self.linear, own.designs(place[order]))
+        known = np.isfinite(designs).all(axis=1) & (worth < STUCK)
+        return _turned_into(self.linear.problem, designs[known]), worth[known]
 
 
 def from_proportions(
@@ -76,40 +112,32 @@ def from_proportions(
     count: int,
     seed: int,
     stop: Callable[[], bool] = lambda: False,
+    jobs: int = 1,
 ) -> Array:
-    """At most ``count`` diverse designs (k, P), each the end of an evolution strategy, in turn from every kind.
+    """At most ``count`` diverse designs (k, P), each the end of an evolution strategy, the best first.
 
     Parameters
     ----------
     linear : the linear part of the problem
     signs : combinations of the parameters that are not varied; each has strategies of its own
-    count : how many
+    count : how many; the more, the more groups of strategies
     seed : of samples and strategies
     stop : true ends the strategies where they are
+    jobs : processes; the designs do not depend on it
     """
-    from scipy.stats import qmc
-    from threadpoolctl import threadpool_limits
-
-    share = -(-count // len(signs))
-    kinds = []
-    with threadpool_limits(1, user_api="blas"):
-        for number, chosen in enumerate(signs):
-            own = Proportions(linear, chosen)
-            place = qmc.Sobol(len(own.columns), seed=seed + number).random(SAMPLED)
-            merit = np.concatenate([own.merit(block) for block in np.split(place, SAMPLED // BLOCK)])
-            order = np.argsort(merit, kind="stable")
-            order = order[merit[order] < STUCK]
-            if not len(order):
-                continue
-            begin = place[order][spread(place[order], np.zeros(len(order), np.intp), STRATEGIES * share)]
-            rng = np.random.default_rng(seed + number)
-            place, merit = evolved(own.merit, begin, RADIUS, GENERATIONS, rng, stop)
-            order = np.argsort(merit, kind="stable")[: len(merit) // 3 + 1]
-            order = order[spread(place[order], np.zeros(len(order), np.intp), share)]
-            designs = linear.merit(own.designs(place[order]))[0]
-            kinds.append(_turned_into(linear.problem, designs[np.isfinite(designs).all(axis=1)]))
-    rows = [kind[k] for k in range(share) for kind in kinds if k < len(kind)]
-    return np.array(rows[:count]).reshape(-1, len(linear.problem.family.parameters))
+    groups = max(1, -(-count // (PER_GROUP * len(signs)))) * len(signs)
+    found = spread_over(_Group(linear, tuple(signs), seed), list(range(groups)), stop, jobs)
+    designs = np.concatenate([x for x, _ in found]) if found else np.empty((0, len(linear.problem.family.parameters)))
+    order = np.argsort(np.concatenate([w for _, w in found]) if found else np.empty(0), kind="stable")
+    designs = designs[order]
+    if not len(designs):
+        return designs
+    others = [k for k in range(designs.shape[1]) if k not in linear.problem.columns]
+    kind = np.unique(designs[:, others], axis=0, return_inverse=True)[1].ravel()
+    place = (designs[:, linear.problem.columns] - designs[:, linear.problem.columns].mean(axis=0)) / (
+        designs[:, linear.problem.columns].std(axis=0) + 1e-300
+    )
+    return np.asarray(designs[spread(0.3 * place, kind, count)], np.float64)
 
 
 def _turned_into(problem: Problem, designs: Array) -> Array:

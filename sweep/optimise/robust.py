@@ -1,21 +1,25 @@
-"""Limits that hold for what is made: bounds drawn in until the wanted share of toleranced mechanisms keeps them all."""
+"""Limits that hold for what is made: they give up room until the wanted share of toleranced mechanisms keeps them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import status as st
 from sweep.families.base import Array
 from sweep.optimise.certificate import Result
+from sweep.optimise.form import Program
+from sweep.optimise.model import Model
+from sweep.optimise.parallel import spread_over
 from sweep.optimise.problem import Problem
+from sweep.optimise.rooms import curves_with_room, rooms
+from sweep.optimise.search import search
 from sweep.optimise.sensitivity import sensitivities
-from sweep.optimise.solve import minimise
 from sweep.optimise.survey import CUT
 from sweep.optimise.tolerance import SIGMAS, deviating, touched
 
@@ -23,18 +27,27 @@ if TYPE_CHECKING:
     from sweep.study import Limit, OptimiseSettings, Tolerance
 
 SAMPLES = 8192  # a power of two: the share of 95 % is good to 0.25 %
-ROUNDS = 10  # of drawing the bounds in, searching, sampling
-TRIED = 4  # basins whose best design is made robust; the best of these is the answer
+BOTH = 4.0  # ways in which a design misses a limit that know little of each other, to begin with
+TRIED = 4  # basins of the search that are begun with
+ENDED = 3  # designs that go on after the first rounds
+HEAT = 400  # looks of each of the first rounds
+ROUNDS, CORRECTIONS = 4, 10  # of search with the room of the design before; of the number of standard deviations
+ONCE = 2  # looks that say how good a design is
+STAYED = 1e-3  # step of a design that the room and the share agree on
+RADIUS = 0.15  # of the first rounds, in scaled variables
+SETTLED = 1e-5  # step of a round, in scaled variables
+NEARLY = 1e-4  # scaled violation of a design whose objective counts
+ALIKE = 0.02  # greatest distance in scaled variables of designs that are taken for one
 ENOUGH = 0.004  # by so much the sampled share may exceed the wanted one
-SETTLED = 1e-4  # relative change of the objective
 
 
 @dataclass(frozen=True)
 class Robust:
-    """A robust result and the sampled share of toleranced mechanisms that keep all limits."""
+    """A robust result, the sampled share of mechanisms that keep all limits, and whether time cut it short."""
 
     result: Result
     share: float
+    cut: bool = False
 
 
 def kept(problem: Problem, designs: Array) -> tuple[dict[str, Array], NDArray[np.bool_]]:
@@ -64,109 +77,208 @@ def robust(
     settings: OptimiseSettings,
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
+    more: Array | None = None,
 ) -> Robust | None:
     """The best design of which the wanted share of toleranced mechanisms keeps all limits.
 
-    Bounds are drawn in by what the tolerances do to each output: first linearised, by exact gradients, then by the
-    quantiles of a sample about the new design, at a level that is corrected until the sampled share holds.
+    Every limit gives up the room that the tolerances need, a number of standard deviations: of curves it is followed
+    along the turn, and to first order as the design changes, so the search trades acceleration for insensitivity; of
+    other outputs it is a fixed amount.  Rounds of search with the room of the design before end where the design stays.
+    The number of standard deviations is corrected until the share of a sample holds.
 
     Parameters
     ----------
     problem : with the limits as they are asked for
-    results : of the search, best first; the best of up to four basins are made robust
+    results : of the search, best first; the best of up to four basins are begun with
     tolerance : with ``robust``, the share
     settings, stop, jobs : as for ``minimise``
+    more : (k, P) designs that a search for insensitive ones has found, to begin with as well
 
     Returns
     -------
-    The best one that reaches the share, else the one with the largest share; None where no result keeps the limits.
+    The best one that reaches the share, else the one with the largest share; None where there is nothing to begin with.
     ``violation`` and ``relaxation`` of the result are about the limits as they are asked for.
-
-    Notes
-    -----
-    While the bounds are drawn in by fixed amounts the search does not see that another design would need less room;
-    the next round does, where it is near.
     """
     heads: list[Result] = []
     for result in results:
         if result.feasible and result.ended not in (*CUT, "left") and result.basin not in [h.basin for h in heads]:
             heads.append(result)
-    found = [_made(problem, head, tolerance, settings, stop, jobs) for head in heads[:TRIED]]
-    wanted = tolerance.robust or 0.0
-    good = [x for x in found if x.share >= wanted]
-    if good:
-        return min(good, key=lambda x: x.result.objective)
-    return max(found, key=lambda x: x.share) if found else None
+    heads = heads[:TRIED]
+    number = 1 + max((r.start for r in results), default=-1)
+    begin = [h.design for h in heads] + list(np.empty((0, 0)) if more is None else more)
+    starts = [h.start for h in heads] + list(range(number, number + len(begin) - len(heads)))
+    if not begin:
+        return None
+    asked = stop or _never
+    level = NormalDist().inv_cdf(1.0 - (1.0 - (tolerance.robust or 0.0)) / BOTH)
+    near = _Approach(problem, np.array(begin), tuple(starts), tolerance, level, min(HEAT, settings.looks))
+    found = spread_over(near, list(range(len(begin))), asked, jobs)
+    # The objective of designs that miss their limits still says little.
+    order = sorted(found, key=lambda r: (r.violation > NEARLY, r.objective if r.violation <= NEARLY else r.violation))
+    ends = _different(problem, order)[:ENDED]
+    numbers = {r.start: k for k, r in enumerate(ends)}
+    last = _Calibrate(problem, tuple(ends), tolerance, level, settings.seed, settings.looks)
+    made = spread_over(last, list(numbers.values()), asked, jobs) or [
+        Robust(r, _share(problem, r.design, tolerance, settings.seed), True) for r in ends[:1]
+    ]
+    good = [x for x in made if x.share >= (tolerance.robust or 0.0)]
+    best = min(good, key=lambda x: x.result.objective) if good else max(made, key=lambda x: x.share)
+    return replace(best, cut=best.cut or any(x.cut for x in made) or len(made) < len(ends) or len(found) < len(begin))
 
 
-def _made(
+def _never() -> bool:
+    return False
+
+
+def _different(problem: Problem, results: Sequence[Result]) -> list[Result]:
+    """Results whose designs are not near those of better ones."""
+    places = [problem.scaled(r.design[None, :])[0] for r in results]
+    apart: list[int] = []
+    for k, place in enumerate(places):
+        if all(float(np.abs(place - places[other]).max()) > ALIKE for other in apart):
+            apart.append(k)
+    return [results[k] for k in apart]
+
+
+@dataclass(frozen=True)
+class _Approach:
+    """First rounds from some designs: a task for processes."""
+
+    problem: Problem
+    designs: Array
+    numbers: tuple[int, ...]
+    tolerance: Tolerance
+    level: float
+    looks: int
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Result:
+        start = self.numbers[number]
+        return _approached(
+            self.problem,
+            start,
+            self.designs[number],
+            self.tolerance,
+            self.level,
+            should_stop,
+            ROUNDS,
+            self.looks,
+            RADIUS,
+        )[0]
+
+
+@dataclass(frozen=True)
+class _Calibrate:
+    """The rest of the way, and the number of standard deviations that the share needs: a task for processes."""
+
+    problem: Problem
+    results: tuple[Result, ...]
+    tolerance: Tolerance
+    level: float
+    seed: int
+    looks: int
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Robust:
+        head, level, wanted = self.results[number], self.level, self.tolerance.robust or 0.0
+        best = Robust(head, self._share(head.design), True)
+        design, radius = head.design, RADIUS
+        for _ in range(CORRECTIONS):
+            if should_stop():
+                return replace(best, cut=True)
+            result, radius, step = _approached(
+                self.problem, head.start, design, self.tolerance, level, should_stop, ROUNDS, self.looks, radius
+            )
+            design, share = result.design, self._share(result.design)
+            better = share >= wanted and (best.share < wanted or result.objective < best.result.objective)
+            if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
+                best = Robust(replace(result, agree=head.agree), share, result.ended in CUT)
+            if wanted <= share <= wanted + ENOUGH:
+                if step < STAYED:
+                    break
+            else:
+                level = max(level + _quantile(wanted + 0.5 * ENOUGH) - _quantile(share), 0.0)
+        nominal = Model(self.problem, Program(self.problem), best.result.design, _never)
+        state = nominal.state(self.problem.scaled(best.result.design[None, :])[0])
+        return replace(best, result=replace(best.result, violation=state.violation, relaxation={}))
+
+    def _share(self, design: Array) -> float:
+        return _share(self.problem, design, self.tolerance, self.seed)
+
+
+def _quantile(share: float) -> float:
+    """Standard deviations within which so large a share stays, if limits are missed in a few ways."""
+    return NormalDist().inv_cdf(1.0 - (1.0 - min(max(share, 0.5), 1.0 - 0.5 / SAMPLES)) / BOTH)
+
+
+def _approached(
     problem: Problem,
-    head: Result,
+    number: int,
+    design: Array,
     tolerance: Tolerance,
-    settings: OptimiseSettings,
-    stop: Callable[[], bool] | None,
-    jobs: int,
-) -> Robust:
-    wanted = tolerance.robust or 0.0
-    limits = bounded(problem)
-    count = max(1, sum((x.minimum is not None) + (x.maximum is not None) for x in limits))
-    missing = (1.0 - wanted) / min(count, 4)  # of each active limit, at first
-    best = Robust(head, _share(problem, head.design, tolerance, settings.seed))
-    rooms = _linear(problem, head.design, tolerance, 1.0 - missing)
-    design, last = head.design, math.nan
-    for _ in range(ROUNDS):
-        if stop is not None and stop():
+    level: float,
+    asked: Callable[[], bool],
+    rounds: int,
+    looks: int,
+    radius: float,
+) -> tuple[Result, float, float]:
+    """Search again and again, each time with the room of the design before, until the design stays.
+
+    Returns
+    -------
+    The last result, the radius for further rounds, and the last step, in scaled variables.
+    """
+    total, step, room_of, before = 0, math.inf, design, np.zeros(len(problem.variables))
+    for _ in range(rounds):
+        result = search(number, _with_room(problem, design, tolerance, level, radius), design, asked, looks)
+        total += result.looks
+        move = (problem.scaled(result.design[None, :]) - problem.scaled(design[None, :]))[0]
+        step, room_of, design = float(np.abs(move).max()), design, result.design
+        if result.ended in CUT or step < SETTLED:
             break
-        own = replace(problem, limits=tuple(_drawn_in(x, rooms) for x in problem.limits))
-        result = minimise(own, design[None, :], replace(settings, starts=1, finalists=None), stop, jobs)[0]
-        design = result.design
-        values, good = kept(problem, deviating(problem.family, design, tolerance, settings.seed, SAMPLES))
-        share = float(good.mean())
-        whole = replace(result, start=head.start, basin=head.basin, agree=head.agree)
-        better = share >= wanted and (best.share < wanted or result.objective < best.result.objective)
-        if result.status != st.LIMIT_EXCEEDED and (better or (best.share < wanted and share > best.share)):
-            best = Robust(whole, share)
-        settled = abs(result.objective - last) <= SETTLED * abs(result.objective)
-        if settled and wanted <= share <= wanted + ENOUGH:
-            break
-        last = result.objective
-        # The share that is lost should be the share that may be lost.
-        missing *= float(np.clip(((1.0 - wanted) + 1e-4) / ((1.0 - share) + 1e-4), 0.4, 2.0))
-        nominal, _ = kept(problem, design[None, :])
-        rooms = _sampled(limits, values, nominal, 1.0 - missing)
-    return best
+        # The room is exact where it was taken.  Who turns round goes to and fro in a flat valley.
+        if (move * before).sum() < 0.0:
+            radius *= 0.5
+        elif step > 0.9 * radius:
+            radius = min(2.0 * radius, RADIUS)
+        before = move
+    # Bounds of the last round may hold the design where those of the problem do not.
+    whole = search(number, _with_room(problem, room_of, tolerance, level, None), design, asked, ONCE)
+    kept_ended = result.ended if whole.ended == "looks" else whole.ended
+    return replace(whole, looks=total, ended=kept_ended), radius, step
+
+
+def _with_room(problem: Problem, design: Array, tolerance: Tolerance, level: float, radius: float | None) -> Problem:
+    """The problem with the room that this design needs taken from its limits, within a distance in scaled variables."""
+    sigma = touched(problem.family, tolerance) / SIGMAS
+    along = curves_with_room(problem)
+    curves = rooms(problem, design, sigma, level, set(along.values()))
+    fixed = _fixed_rooms(problem, design, sigma, level, {name for name, curve in along.items() if curve in curves})
+    limits = tuple(_drawn_in(x, fixed) for x in problem.limits)
+    lower, upper = problem.lower, problem.upper
+    if radius is not None:
+        place = np.clip(problem.scaled(design[None, :])[0], 0.0, 1.0)
+        lower = problem.lower + np.maximum(place - radius, 0.0) * problem.span
+        upper = problem.lower + np.minimum(place + radius, 1.0) * problem.span
+    return replace(problem, limits=limits, rooms=curves, lower=lower, upper=upper)
+
+
+def _fixed_rooms(
+    problem: Problem, design: Array, sigma: Array, level: float, others: set[str]
+) -> dict[str, tuple[float, float]]:
+    """Room below and above of limited outputs but ``others``, from exact derivatives by every toleranced dimension."""
+    names = [x.output for x in bounded(problem) if x.output not in others and not x.output.startswith("rotatable")]
+    if not names:
+        return {}
+    rows = sensitivities(problem.family, design, list(dict.fromkeys(names)), problem.window)
+    spread = dict(zip(problem.family.parameter_names, sigma, strict=True))
+    variance: dict[str, float] = {}
+    for name, output, up, down in zip(*(rows[k] for k in ("parameter", "output", "growing", "shrinking")), strict=True):
+        steep = max(abs(up), abs(down)) * spread[name]
+        variance[output] = variance.get(output, 0.0) + (steep * steep if math.isfinite(steep) else 0.0)
+    return {name: (level * math.sqrt(v),) * 2 for name, v in variance.items()}
 
 
 def _share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> float:
     return float(kept(problem, deviating(problem.family, design, tolerance, seed, SAMPLES))[1].mean())
-
-
-def _linear(problem: Problem, design: Array, tolerance: Tolerance, level: float) -> dict[str, tuple[float, float]]:
-    """Room that each output needs below and above, from its exact derivatives by every toleranced dimension."""
-    from scipy.special import ndtri
-
-    names = [x.output for x in bounded(problem) if not x.output.startswith("rotatable")]
-    rows = sensitivities(problem.family, design, list(dict.fromkeys(names)), problem.window)
-    sigma = dict(zip(problem.family.parameter_names, touched(problem.family, tolerance) / SIGMAS, strict=True))
-    variance: dict[str, float] = {}
-    for name, output, up, down in zip(*(rows[k] for k in ("parameter", "output", "growing", "shrinking")), strict=True):
-        steep = max(abs(up), abs(down)) * sigma[name]
-        variance[output] = variance.get(output, 0.0) + (steep * steep if math.isfinite(steep) else 0.0)
-    return {name: (float(ndtri(level)) * math.sqrt(v),) * 2 for name, v in variance.items()}
-
-
-def _sampled(
-    limits: Sequence[Limit], values: dict[str, Array], nominal: dict[str, Array], level: float
-) -> dict[str, tuple[float, float]]:
-    """Room that each output needs below and above its nominal value, from a sample."""
-    rooms = {}
-    for limit in limits:
-        known = values[limit.output][np.isfinite(values[limit.output])]
-        centre = float(nominal[limit.output][0])
-        if len(known) and math.isfinite(centre):
-            low, high = np.quantile(known, [1.0 - level, level])
-            rooms[limit.output] = (max(centre - float(low), 0.0), max(float(high) - centre, 0.0))
-    return rooms
 
 
 def _drawn_in(limit: Limit, rooms: dict[str, tuple[float, float]]) -> Limit:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.families.base import Array
+from sweep.optimise.dense import times
 from sweep.optimise.points import Points
 
 AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first
@@ -51,15 +52,16 @@ class Form:
     def rows(self, atoms: Array, t: float) -> Array:
         """The rows' values; a row that is nan counts as far outside."""
         if np.isfinite(atoms).all():
-            return np.asarray(self.constant + self.matrix @ atoms + self.slack * t)
-        return np.nan_to_num(self.constant + self.matrix @ np.nan_to_num(atoms, nan=1e30) + self.slack * t, nan=-FAR)
+            return np.asarray(self.constant + times(self.matrix, atoms) + self.slack * t)
+        far = times(self.matrix, np.nan_to_num(atoms, nan=1e30))
+        return np.nan_to_num(self.constant + far + self.slack * t, nan=-FAR)
 
     def objective(self, atoms: Array) -> float:
         """Largest of the objective's rows: the smallest t they allow."""
         own = np.array([label.side == "objective" for label in self.labels], dtype=np.bool_)
         if not own.any():
             return math.inf
-        return float(-(self.constant + self.matrix @ atoms)[own].min())
+        return float(-(self.constant + times(self.matrix, atoms))[own].min())
 
     def violation(self, atoms: Array) -> float:
         """Largest scaled violation of the limits; infinite where one of them does not exist for this design."""
@@ -71,7 +73,7 @@ class Form:
         """Largest scaled violation of those limits that exist for this design; infinite where it reaches nowhere."""
         if not self.reaches:
             return math.inf
-        c = self.constant + self.matrix @ atoms
+        c = self.constant + times(self.matrix, atoms)
         own = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
         if np.isnan(c[own]).any():
             return math.inf

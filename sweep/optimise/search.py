@@ -19,7 +19,7 @@ FIRST = 2  # looks that give a start its scale and its first design
 
 
 def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool], allowed: float = math.inf) -> Result:
-    """Search from one start on one BLAS thread, as the systems are small and the bits must not depend on the process.
+    """Search from one start.
 
     Parameters
     ----------
@@ -29,24 +29,20 @@ def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool
     asked : true ends the search with the best checked design so far; the first one is reached in any case
     allowed : looks at designs after which it ends in the same way, wherever and however fast it runs
     """
-    import scipy.optimize  # noqa: F401  (brings its own BLAS, which has to be there to be limited)
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1, user_api="blas"):
-        program = Program(problem)
-        descent = Descent(problem, program, start, _after_first(asked), max(allowed, FIRST))
-        ended = ""
-        try:
-            descent.run()
-        except LooksUsedUp:
-            ended = "looks"
-        except Stopped:
-            ended = "time"
-        except KeyboardInterrupt:
-            ended = "interrupted"
-        looks = descent.model.looks
-        descent.model.stop, descent.model.allowed = (lambda: False), math.inf
-        return replace(_result(number, problem, program, descent, ended), looks=looks)
+    program = Program(problem)
+    descent = Descent(problem, program, start, _after_first(asked), max(allowed, FIRST))
+    ended = ""
+    try:
+        descent.run()
+    except LooksUsedUp:
+        ended = "looks"
+    except Stopped:
+        ended = "time"
+    except KeyboardInterrupt:
+        ended = "interrupted"
+    looks = descent.model.looks
+    descent.model.stop, descent.model.allowed = (lambda: False), math.inf
+    return replace(_result(number, problem, program, descent, ended), looks=looks)
 
 
 def _after_first(asked: Callable[[], bool]) -> Callable[[], bool]:

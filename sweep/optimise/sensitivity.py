@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from sweep.families.base import Accuracy, Array, Family
+from sweep.optimise.dense import times
 from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
@@ -77,7 +78,7 @@ def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
     nothing = np.full(len(problem.variables), math.nan)
     if not own.any() or not math.isfinite(value):
         return math.nan, nothing, nothing
-    inner = -(state.form.constant + state.form.matrix @ state.atoms)[own] * model.scale
+    inner = -(state.form.constant + times(state.form.matrix, state.atoms))[own] * model.scale
     jacobian = -model.jacobian(state.fractions, state.form, state.form.points)[own] * model.scale
     shared = jacobian[inner >= inner.max() - TIE * abs(inner.max())] * _outward(program.objective, float(inner.max()))
     return value, shared.min(axis=0), shared.max(axis=0)

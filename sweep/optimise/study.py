@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,21 +19,21 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Angles, Array, Parameter
 from sweep.families.domain import Interval
 from sweep.jobs.progress import Say, unsaid
+from sweep.optimise.brake import Brake
 from sweep.optimise.candidates import ranking
 from sweep.optimise.certificate import Result
 from sweep.optimise.coordinates import LocusCoordinates
 from sweep.optimise.discrete import listed, with_neighbours
-from sweep.optimise.filling import filled, kinds
+from sweep.optimise.filling import filled
 from sweep.optimise.form import Program
-from sweep.optimise.linear import NEEDED, elimination
+from sweep.optimise.globally import insensitive, proportion_starts
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
-from sweep.optimise.proportions import from_proportions, widened
 from sweep.optimise.robust import robust, yields
 from sweep.optimise.sensitivity import sensitivities
 from sweep.optimise.solve import explore
 from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn, of_task
-from sweep.optimise.survey import CUT, Survey
+from sweep.optimise.survey import CUT, Survey, later
 from sweep.optimise.tolerance import tolerance_rows
 from sweep.optimise.written import certificates, outputs, write
 
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study
 
 POSES = 720
-SWEPT = 6  # of so many starts one comes from the sweep where there is a global search
 WHOLE_TURN = 2.0 * np.pi - 1e-9
+SHORTEST = 0.02  # of its upper limit is a length without a lower one
 TAILS = (2.0, 98.0)  # percent; beyond are needles that hardly moved and were scaled up to the stroke
 
 
@@ -107,6 +107,9 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
     parameter = next(p for p in (*study.family.parameters, *_prescribed(study)) if p.name == name)
     if parameter.choices is not None:
         return None
+    ends = _limited(study, name)
+    if name in study.rescaled and ends is not None:
+        return ends
     if name in (*study.made, *study.rescaled):
         low, high = (float(end) for end in np.percentile(designs[:, names.index(name)], TAILS))
         reach = 0.5 * max(abs(low), abs(high)) if parameter.unit == "length" else 0.5
@@ -126,27 +129,35 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
     return low, high
 
 
+def _limited(study: Study, name: str) -> tuple[float, float] | None:
+    """Ends of a length of a guide whose proportions are searched globally: its limits, not what the sweep reached."""
+    limits = [x for x in study.parameter_limits if x.output == name and x.maximum is not None]
+    if study.optimise is None or study.optimise.globally != "proportions" or not limits:
+        return None
+    high = min(x.maximum for x in limits if x.maximum is not None)
+    return max((x.minimum for x in limits if x.minimum is not None), default=SHORTEST * high), high
+
+
 def _prescribed(study: Study) -> tuple[Parameter, ...]:
     return () if study.locus is None else study.locus.prescribed
 
 
 def problem_and_starts(
-    study: Study, folder: Path, stop: Callable[[], bool] = lambda: False
+    study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1
 ) -> tuple[OptimiseSettings, Problem, Array]:
     """Settings, problem and starts: the diverse best of the dataset, filled up from samples where they are too few.
 
     Where no row of the dataset is feasible, the first starts are the best of random designs.  The mechanisms that do
-    the study's [task] come before all others.  With
-    ``optimise.global = "proportions"`` five of six starts come from the search over proportions instead; ``stop`` ends
-    it early.
+    the study's [task] come before all others.  With ``optimise.global = "proportions"`` five of six starts come from
+    the search over proportions instead, in ``jobs`` processes; ``stop`` ends it early.
     """
-    settings, problem, starts = _problem_and_starts(study, folder, stop)
+    settings, problem, starts = _problem_and_starts(study, folder, stop, jobs)
     first = of_task(study, settings.starts, settings.seed)
     return settings, problem, np.concatenate([first, starts])[: max(len(starts), len(first))]
 
 
 def _problem_and_starts(
-    study: Study, folder: Path, stop: Callable[[], bool]
+    study: Study, folder: Path, stop: Callable[[], bool], jobs: int
 ) -> tuple[OptimiseSettings, Problem, Array]:
     if study.optimise is None or study.objective is None:
         raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
@@ -155,7 +166,7 @@ def _problem_and_starts(
     designs, merit = best_rows(study.family, study.objective.output, folder)
     if settings.globally == "proportions":
         known = designs if len(designs) else drawn(study, count, seed)
-        return settings, *_from_proportions(study, settings, known, merit, stop)
+        return settings, *proportion_starts(study, settings, problem_of(study, known), known, merit, stop, jobs)
     if len(designs):
         problem = problem_of(study, designs)
         return settings, problem, filled(study, problem, diverse(problem, designs, merit, count, ALIKE), count, seed)
@@ -167,26 +178,6 @@ def _problem_and_starts(
     # Half of them from the space itself: a sample of the problem's variables may miss what [locus] or [fit] makes.
     own = diverse(problem, designs, ranking(problem, designs), -(-count // 2), ALIKE)
     return settings, problem, filled(study, problem, own, count, seed)
-
-
-def _from_proportions(
-    study: Study, settings: OptimiseSettings, known: Array, merit: Array, stop: Callable[[], bool]
-) -> tuple[Problem, Array]:
-    """Problem and starts: those of the global search, before them a few of the sweep."""
-    count = settings.starts
-    problem = problem_of(study, known)
-    linear = elimination(problem)
-    if linear is None:
-        raise InputError("optimise.global", "proportions", NEEDED, str(study.path))
-    own = diverse(problem, known, merit, count // SWEPT, ALIKE) if len(merit) else known[:0]
-    found = from_proportions(linear, kinds(study, problem, own), count - len(own), settings.seed, stop)
-    starts = np.concatenate([own, found])
-    problem = widened(problem, found, [n for n in problem.variables if n in study.made])
-    if not len(starts):
-        raise InputError(
-            "design space", study.space.count, "proportions with which the mechanism turns", str(study.path)
-        )
-    return problem, starts
 
 
 def optimise_study(
@@ -222,19 +213,24 @@ def optimise_study(
         if the search was stopped, after the best so far was written.
     """
     place = Path(folder)
-    settings, problem, starts = problem_and_starts(study, place, stop or (lambda: False))
+    brake = Brake(None if study.optimise is None else study.optimise.time_budget, stop)
+    settings, problem, starts = problem_and_starts(study, place, brake, jobs)
+    settings = replace(settings, time_budget=None)  # one brake for all that follows
     results, found = explore(
-        problem, starts, settings, stop, jobs, lambda done, most: say("optimum", done, most, "starts")
+        problem, starts, settings, brake, jobs, lambda done, most: say("optimum", done, most, "starts")
     )
     catalogue = listed(study)
     if catalogue and found.ended not in CUT:
         say("neighbours in the catalogue", 0, 0, "steps")
-        results = with_neighbours(problem, results, catalogue, settings, stop, jobs)
+        results = with_neighbours(problem, results, catalogue, settings, brake, jobs)
     nominal = results[0]
     if study.tolerance is not None and study.tolerance.robust is not None and found.ended not in CUT:
         say("robust design", 0, 0, "steps")
-        made = robust(problem, results, study.tolerance, settings, stop, jobs)
+        whole, more = insensitive(study, settings, problem, brake, jobs)
+        made = robust(whole, results, study.tolerance, settings, brake, jobs, more)
         results = results if made is None else [made.result, *results]
+    if brake.pulled and found.ended not in CUT:
+        found = later(found)
     side = store.beside(place)
     parts = 3 if study.tolerance is None else 4
     after = "curves, sensitivities" if study.tolerance is None else "yield, curves, sensitivities, tolerances"

@@ -38,6 +38,7 @@ class Survey:
     wanted : what ``unseen`` should fall below
     ended : "enough" where the rule was fulfilled, "starts" where none was left, "time" or "interrupted"
     kinds : starts and basins for each combination of signs, as ``(("branch = 1", 7, 3), ...)``
+    late : whether all starts were searched, and time ran out over what follows them
     """
 
     starts: int
@@ -49,6 +50,7 @@ class Survey:
     wanted: float
     ended: str
     kinds: tuple[tuple[str, int, int], ...] = ()
+    late: bool = False
 
     @property
     def enough(self) -> bool:
@@ -70,7 +72,9 @@ class Survey:
         found = []
         if self.ended in CUT:
             why = "time ran out" if self.ended == "time" else "interrupted"
-            found.append(f"{why}: {self.starts} of {started(min(self.asked, self.offered))}")
+            of = started(min(self.asked, self.offered))
+            after = ", but not all that follows them: neighbouring values, robust designs" if self.late else ""
+            found.append(f"{why}: {self.starts} of {of}{after}")
         elif self.starts < self.asked and not self.enough:
             found.append(
                 f"only {started(self.starts)} of the {self.asked} asked: no more were found in the design space"
@@ -114,6 +118,11 @@ def survey(
         len(whole), settings.starts, len(starts), w, best, _unseen(n, met), settings.unseen, ended,
         _kinds(problem, starts, numbered),
     )  # fmt: skip
+
+
+def later(found: Survey) -> Survey:
+    """The survey of a search whose time ran out when its starts had been searched."""
+    return replace(found, ended="time", late=True)
 
 
 def with_basins(results: Sequence[Result]) -> list[Result]:

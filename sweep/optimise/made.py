@@ -1,0 +1,36 @@
+"""What tolerances do to a curve: the derivative of an output by every toleranced dimension, all along the turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sweep.families.base import Angles, Array, Family
+from sweep.optimise.points import STEP
+
+
+def changes(family: Family, designs: Array, sigma: Array, outputs: Sequence[str], phi: Array) -> dict[str, Array]:
+    """How much outputs change when one dimension is off by its standard deviation, by the complex step.
+
+    Parameters
+    ----------
+    family : of the designs
+    designs : (n, P)
+    sigma : (P,) standard deviations; what is exact has none and no row
+    outputs : names of pose outputs
+    phi : (m,) crank angles
+
+    Returns
+    -------
+    For each output (n, q, m), one row per dimension that is not exact.  The root of the sum of their squares is the
+    standard deviation of the curve there, to first order and for independent dimensions.
+    """
+    own = np.flatnonzero(sigma)
+    stepped = np.repeat(designs.astype(np.complex128), len(own), axis=0)
+    stepped[np.arange(len(stepped)), np.tile(own, len(designs))] += 1j * STEP * np.tile(sigma[own], len(designs))
+    angles = Angles.of(phi[None, :].astype(np.complex128))
+    with np.errstate(all="ignore"):  # a design may not reach every pose; its nan is answered by the caller
+        found = family.poses(np.ascontiguousarray(stepped), angles, frozenset(outputs))
+    shape = (len(designs), len(own), len(phi))
+    return {name: np.asarray(found[name].imag / STEP, np.float64).reshape(shape) for name in outputs}

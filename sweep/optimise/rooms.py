@@ -1,0 +1,109 @@
+"""Room that tolerances need along a curve: a function of the crank angle, and of the design to first order."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kernels.waves import trigonometric_sum
+from sweep.families.base import Array
+from sweep.optimise.dense import least_squares, times
+from sweep.optimise.form import Program
+from sweep.optimise.made import changes
+from sweep.optimise.problem import Problem
+
+POSES, HARMONICS = 64, 16  # per turn at which the room is known, and of the sum that runs through it
+STEP = 1e-4  # of the variables' bounds: a deviation from exact derivatives, so its difference is good to 1e-4
+
+
+@dataclass(frozen=True)
+class Room:
+    """Trigonometric sum whose (M,) coefficients are ``constant + slopes (values of the columns - place)``.
+
+    ``columns`` (V,) of the design matrix, ``place`` (V,) their values where the sum is exact, ``slopes`` (M, V).
+    """
+
+    columns: tuple[int, ...]
+    place: Array
+    constant: Array
+    slopes: Array
+
+    def at(self, designs: Any, phi: Array) -> Any:
+        """Room (n, m) of designs (n, P), which may carry the imaginary step, at crank angles (m,)."""
+        moved = designs[:, list(self.columns)] - self.place
+        room = _summed(self.constant + times(moved.real, self.slopes.T), phi)
+        if np.iscomplexobj(moved):
+            return room + 1j * _summed(times(moved.imag, self.slopes.T), phi)
+        return room
+
+    def slope(self, design: Array, phi: Array) -> Array:
+        """Derivative (m,) of the room of one design (P,) by the crank angle."""
+        moved = design[list(self.columns)] - self.place
+        return np.asarray(_summed((self.constant + times(self.slopes, moved))[None, :], phi, True)[0], np.float64)
+
+
+def _summed(coefficients: Array, phi: Array, derivative: bool = False) -> Array:
+    out = np.empty((len(coefficients), len(phi)))
+    trigonometric_sum(np.ascontiguousarray(coefficients), np.ascontiguousarray(phi, np.float64), derivative, out)
+    return out
+
+
+def curves_with_room(problem: Problem) -> dict[str, str]:
+    """Pose outputs whose limits can have a room along the turn, by the names of these limits.
+
+    Those of largest and smallest values, as long as no other kind of limit is made of the same curve.
+    """
+    program = Program(problem)
+    measures = [program.objective, *(r.measure for r in program.requirements)]
+    plain = {m.name: m.series[0].output for m in measures if m.kind in ("max_abs", "max", "min") and len(m.series) == 1}
+    others = {s.output for m in measures if m.name not in plain for s in m.series}
+    limits = {r.measure.name: r.measure.series[0] for r in program.requirements if r.measure.name in plain}
+    return {
+        name: s.output
+        for name, s in limits.items()
+        if s.output not in others and not s.pressure and not s.wrapped and name != problem.objective
+    }
+
+
+def rooms(problem: Problem, design: Array, sigma: Array, level: float, outputs: set[str]) -> dict[str, Room]:
+    """``level`` standard deviations of pose outputs along the turn, and how they change with the variables.
+
+    Parameters
+    ----------
+    problem : its variables are the ones that may change
+    design : (P,)
+    sigma : (P,) standard deviations of the dimensions
+    level : of them
+    outputs : names of pose outputs
+    """
+    fractions = problem.scaled(design[None, :])[0]
+    n = len(fractions)
+    around = np.concatenate([np.zeros((1, n)), STEP * np.eye(n), -STEP * np.eye(n)])
+    designs = problem.placed(design, fractions + around)
+    turn: Array = np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
+    found = changes(problem.family, designs, sigma, tuple(outputs), turn)
+    columns = tuple(problem.columns)
+    # Parameters that follow from coordinates move together: the slopes by the parameters that reproduce those seen.
+    moved = np.stack([designs[1 : n + 1, k] - designs[n + 1 :, k] for k in columns], axis=1)
+    waves = np.array([_summed(row[None, :], turn)[0] for row in np.eye(2 * HARMONICS + 1)])
+    weights = waves * (np.where(np.arange(len(waves)) == 0, 1.0, 2.0) / POSES)[:, None]
+    out = {}
+    for name in outputs:
+        spread = level * np.sqrt((found[name] ** 2).sum(axis=1))
+        if not np.isfinite(spread).all():
+            continue
+        coefficients = times(spread, weights.T)
+        change = coefficients[1 : n + 1] - coefficients[n + 1 :]
+        slopes = np.array([_shortest(moved, change[:, k]) for k in range(change.shape[1])])
+        out[name] = Room(columns, design[list(columns)], coefficients[0], slopes)
+    return out
+
+
+def _shortest(moved: Array, change: Array) -> Array:
+    """Slopes (V,) by the columns that explain the changes (n,) seen with the moves (n, V)."""
+    size = np.abs(moved).max(axis=0)
+    size[size == 0.0] = 1.0
+    return np.asarray(least_squares(moved / size, change, 1e-10) / size, np.float64)

@@ -1,0 +1,108 @@
+"""Room for tolerances along the turn: against differences, as part of a curve's extrema, and in a robust search."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kernels.waves import trigonometric_sum
+from sweep.families import family
+from sweep.families.base import Angles
+from sweep.optimise import Problem
+from sweep.optimise.gradients import gradients, stepped
+from sweep.optimise.made import changes
+from sweep.optimise.points import Curves
+from sweep.optimise.rooms import curves_with_room, rooms
+from sweep.reductions.measures import Series
+from sweep.study import Limit
+
+GUIDE = family("guide")
+DESIGN = np.array([1.0, 3.3, 3.1, 3.0, 4.2, 0.8, 1.1, -0.6, 1.0])
+SIGMA = np.array([0.01, 0.01, 0.02, 0.01, 0.01, 0.01, 0.002, 0.01, 0.0])
+LEVEL = 2.0
+
+
+def problem(**more: object) -> Problem:
+    names = ("a", "b", "c", "e", "xi", "eta", "lam", "h")
+    low, high = DESIGN[:8] - 0.3, DESIGN[:8] + 0.3
+    limits = (Limit("max_abs_dev", None, 4.0), Limit("stroke", 1.0, 3.0))
+    return Problem(GUIDE, names, low, high, {"branch": 1.0}, "max_abs_d2s", limits, **more)  # type: ignore[arg-type]
+
+
+def spread(design: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """Standard deviation of the deviation at crank angles, by central differences of the family's poses."""
+    total = np.zeros(len(phi))
+    for k in np.flatnonzero(SIGMA):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = design.copy()
+            moved[k] += sign * 1e-5
+            ends.append(GUIDE.poses(moved[None, :], Angles.of(phi[None, :]), frozenset({"dev"}))["dev"][0])
+        total += (SIGMA[k] * (ends[0] - ends[1]) / 2e-5) ** 2
+    return np.sqrt(total)
+
+
+def test_changes_are_the_derivatives_times_the_standard_deviations() -> None:
+    phi = np.linspace(0.0, 6.0, 7)
+    found = changes(GUIDE, DESIGN[None, :], SIGMA, ("dev",), phi)["dev"]
+    assert found.shape == (1, 8, 7)
+    # Central differences over 1e-5 are good to 1e-10 of the lengths, of which the root of eight squares is taken.
+    np.testing.assert_allclose(np.sqrt((found[0] ** 2).sum(axis=0)), spread(DESIGN, phi), rtol=1e-7)
+
+
+def test_room_is_the_spread_along_the_turn_and_follows_the_design_to_first_order() -> None:
+    room = rooms(problem(), DESIGN, SIGMA, LEVEL, {"dev"})["dev"]
+    phi = np.linspace(0.1, 6.2, 40)
+    # Sixteen harmonics of a curve as smooth as this leave 1e-6 of it.
+    np.testing.assert_allclose(room.at(DESIGN[None, :], phi)[0], LEVEL * spread(DESIGN, phi), rtol=1e-4)
+    step = np.array([1.0, -2.0, 1.5, 0.5, -1.0, 2.0, 0.3, 1.0, 0.0]) * 1e-3
+    before, after = room.at(np.array([DESIGN - step, DESIGN + step]), phi)
+    true = LEVEL * (spread(DESIGN + step, phi) - spread(DESIGN - step, phi))
+    np.testing.assert_allclose(after - before, true, rtol=0.0, atol=2e-3 * np.abs(true).max())
+    h = 1e-5
+    slope = (room.at(DESIGN[None, :], phi + h) - room.at(DESIGN[None, :], phi - h))[0] / (2.0 * h)
+    np.testing.assert_allclose(room.slope(DESIGN, phi), slope, rtol=0.0, atol=1e-8)
+
+
+def test_extrema_with_room_are_those_of_the_curve_and_its_room_together() -> None:
+    own = problem(rooms=rooms(problem(), DESIGN, SIGMA, LEVEL, {"dev"}))
+    points, turns = Curves(own, (Series("dev"),)).scan(DESIGN, 64)
+    assert turns
+    phi = np.linspace(0.0, 2.0 * np.pi, 20001)
+    dev = GUIDE.poses(DESIGN[None, :], Angles.of(phi[None, :]), frozenset({"dev"}))["dev"][0]
+    room = own.rooms["dev"].at(DESIGN[None, :], phi)[0]
+    # A grid of 20 000 angles misses a maximum by half the curvature times 1.6e-4 squared.
+    assert points.value[points.sense > 0].max() == pytest.approx((dev + room).max(), abs=1e-7)
+    assert points.value[points.sense < 0].min() == pytest.approx((dev - room).min(), abs=1e-7)
+    assert points.value.max() > dev.max() + 0.5 * room.min()
+
+
+def test_gradients_with_room_equal_differences() -> None:
+    own = problem(rooms=rooms(problem(), DESIGN, SIGMA, LEVEL, {"dev"}))
+    curves = Curves(own, (Series("dev"),))
+    points, _ = curves.scan(DESIGN, 64)
+    fractions = own.scaled(DESIGN[None, :])[0]
+    values, _ = gradients(curves, stepped(own, DESIGN, fractions), points, False)
+    for j in range(8):
+        moved = np.repeat(fractions[None, :], 2, axis=0)
+        moved[:, j] += [1e-5, -1e-5]
+        ends = [curves.follow(own.placed(DESIGN, x), points).value for x in moved]
+        np.testing.assert_allclose(values[:, j], (ends[0] - ends[1]) / 2e-5, rtol=0.0, atol=1e-7)
+
+
+def test_only_limits_on_largest_values_have_a_room_along_the_turn() -> None:
+    assert curves_with_room(problem()) == {"max_abs_dev": "dev"}  # the stroke is a difference, the objective no limit
+
+
+def test_trigonometric_sum_and_its_slope_equal_numpys() -> None:
+    rng = np.random.default_rng(0)
+    coefficients, phi = rng.standard_normal((3, 33)), rng.uniform(-10.0, 10.0, 50)
+    k = np.arange(1, 17)
+    cosines, sines = np.cos(np.outer(k, phi)), np.sin(np.outer(k, phi))
+    even, odd = coefficients[:, 1::2], coefficients[:, 2::2]
+    out = np.empty((3, 50))
+    trigonometric_sum(coefficients, phi, False, out)
+    # Sixteen products of the addition theorem: 16 eps per wave, on sums of 33 terms.
+    np.testing.assert_allclose(out, coefficients[:, :1] + even @ cosines + odd @ sines, rtol=0.0, atol=1e-13)
+    trigonometric_sum(coefficients, phi, True, out)
+    np.testing.assert_allclose(out, (odd * k) @ cosines - (even * k) @ sines, rtol=0.0, atol=2e-12)
