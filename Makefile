@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-effects bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -27,6 +27,9 @@ test: $(VENV)/ready  ## run the tests
 
 test-long: $(VENV)/ready  ## the tests that take minutes: thousands of hostile tables
 	$(BIN)/python -m pytest -m long
+
+test-faults: $(VENV)/ready  ## kills, signals, full disks, damage: 150 kills and 170 other faults, a table; about 15 minutes
+	$(BIN)/python -m tests.faults
 
 lint: $(VENV)/ready  ## ruff
 	$(BIN)/ruff check .
@@ -70,21 +73,33 @@ bench-peers: $(VENV)/ready  ## the planar case next to pylinkage, which gets an 
 	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable . 'pylinkage[numba]'
 	.venv-peers/bin/python -m studies.accuracy.peers --out results/accuracy
 
+bench-object-store: $(VENV)/ready  ## a dataset by way of an object store; its server gets an environment of its own
+	$(PYTHON) -m venv .venv-store
+	.venv-store/bin/python -m pip install --quiet 'moto[server]'
+	.venv-store/bin/moto_server -H 127.0.0.1 -p 5005 & server=$$!; trap "kill $$server" EXIT; sleep 5; \
+	$(BIN)/python -m tests.bench.object_store 127.0.0.1:5005
+
 search-worse: $(VENV)/ready  ## look for poses with larger errors than any known; appends to tests/oracle/worst_found.json
 	$(BIN)/python -m tests.search.worse
 
-bench: $(VENV)/ready  ## ns per sample against numpy and C, one run; what each effect costs
+bench: $(VENV)/ready  ## ns per sample against numpy and C; what everything takes, into sweep/costs.toml and docs
 	$(BIN)/python -m tests.bench.kernels
-	$(BIN)/python -m tests.bench.effects --dry
-
-docs: $(VENV)/ready  ## make docs/effects.md from the register
+	$(BIN)/python -m tests.bench.costs
 	$(SWEEP) effects --markdown > docs/effects.md
+
+docs: $(VENV)/ready  ## make docs/effects.md and docs/study.schema.json from the register
+	$(SWEEP) effects --markdown > docs/effects.md
+	$(SWEEP) schema --out docs/study.schema.json
+
+site: $(VENV)/ready  ## the docs as a site, into build/site; no network
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+	$(BIN)/python docs/site/links.py build/site
+
+notebooks: $(VENV)/ready  ## run the notebooks of docs/notebooks in place
+	$(BIN)/python docs/site/notebooks.py
 
 frames: $(VENV)/ready  ## draw the frames of all families for docs/frames.md
 	$(BIN)/python docs/frames.py
-
-bench-effects: $(VENV)/ready  ## cost of every effect, written into the register; then make docs
-	$(BIN)/python -m tests.bench.effects
 
 bench-estimates: $(VENV)/ready  ## what sweep check expects of every study against what a slice of it takes
 	$(BIN)/python -m tests.bench.estimates
@@ -93,7 +108,7 @@ bench-extrema: $(VENV)/ready  ## errors and times of the search for true extrema
 	$(BIN)/python -m tests.bench.extrema
 
 bench-scene: $(VENV)/ready  ## all effects on 10^5 designs x 360 angles: rate, its parts, memory; about 5 minutes
-	$(BIN)/python -m tests.bench.effects --scene 100000
+	$(BIN)/python -m tests.bench.effects
 
 bench-optimise: $(VENV)/ready  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 15 minutes
 	$(BIN)/python -m tests.bench.optimise --out docs/optimise-marks.md

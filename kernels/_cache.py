@@ -37,7 +37,7 @@ from typing import Any
 import numba
 import platformdirs
 from filelock import FileLock
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 
 SOURCES = Path(__file__).resolve().parent
 PACKAGE = __name__.partition(".")[0]
@@ -46,8 +46,9 @@ PACKAGE = __name__.partition(".")[0]
 PYC_HEADER = 16
 # A .pyc is younger than its source if it was written so much later [ns].
 YOUNGER = 2_000_000_000
-# What reading a file that is empty or ends too soon raises; numba does not wait for its files to reach the disk.
-DAMAGED = (EOFError, pickle.UnpicklingError)
+# What reading a file that is not whole raises; numba does not wait for its files to reach the disk.
+DAMAGED = (EOFError,)
+HASH_BYTES = hashlib.sha256().digest_size
 # What a file system answers that has no locks.
 UNLOCKABLE = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOLCK)
 # The folder of the cache and its parent are made by this package.
@@ -177,7 +178,7 @@ class _Place(UserProvidedCacheLocator):
         return place
 
     def get_source_stamp(self) -> str:
-        """What the code is of; the folder's name says it already."""
+        """Nothing: the folder's name is made of the sources' hash already, so numba need not compare them."""
         return CACHE_DIR.name
 
 
@@ -186,7 +187,7 @@ _said: set[str] = set()
 
 @contextmanager
 def _locked() -> Iterator[None]:
-    """One process at a time; where there are no locks nothing is kept, and that is said once."""
+    """Let one process at a time write.  Where the file system has no locks nothing is kept, and one warning says so."""
     try:
         with FileLock(CACHE_DIR / "_lock", fallback_to_soft=False):
             yield
@@ -202,13 +203,56 @@ class _Form(CompileResultCacheImpl):
     _locator_classes = [_Place]  # noqa: RUF012 (as numba has it)
 
 
+class _Checked(IndexDataCacheFile):
+    """numba's index and machine code in files that begin with a hash of the rest: a changed bit would be run."""
+
+    def _load_index(self) -> dict[Any, str]:
+        path = Path(self._index_path)
+        version, stamp, overloads = pickle.loads(_checked(path)) if path.exists() else (None, None, {})
+        return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        self._write(self._index_path, (self._version, self._source_stamp, overloads))
+
+    def _load_data(self, name: str) -> Any:
+        return pickle.loads(_checked(Path(self._data_path(name))))  # type: ignore[no-untyped-call]
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._write(self._data_path(name), data)  # type: ignore[no-untyped-call]
+
+    def _write(self, path: str, content: Any) -> None:
+        data = self._dump(content)  # type: ignore[no-untyped-call]
+        with self._open_for_write(path) as file:
+            file.write(hashlib.sha256(data).digest() + data)
+
+
+def _checked(path: Path) -> bytes:
+    """What stands behind the hash at the beginning of a file.
+
+    Raises
+    ------
+    EOFError
+        if it is not what was hashed.
+    """
+    content = path.read_bytes()
+    data = content[HASH_BYTES:]
+    if hashlib.sha256(data).digest() != content[:HASH_BYTES]:
+        raise EOFError(f"{path} is damaged")
+    return data
+
+
 class KernelCache(FunctionCache):
     """numba's cache of one function, in our folder."""
 
     _impl_class = _Form
 
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        base, stamp = self._impl.filename_base, self._impl.locator.get_source_stamp()
+        self._cache_file = _Checked(self._cache_path, base, stamp)  # type: ignore[no-untyped-call]
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled code of one signature, or None; of files that a power cut left short nothing is kept."""
+        """The compiled code of one signature, or None; of files that are damaged nothing is kept."""
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except DAMAGED:
@@ -231,5 +275,5 @@ def kept(dispatcher: Any) -> Any:
     file = dispatcher.py_func.__code__.co_filename
     ours = Path(file).resolve().is_relative_to(SOURCES)
     if ours and _IMPORTED.as_hashed() and _Place.from_function(dispatcher.py_func, file):
-        dispatcher._cache = KernelCache(dispatcher.py_func)  # type: ignore[no-untyped-call]
+        dispatcher._cache = KernelCache(dispatcher.py_func)
     return dispatcher

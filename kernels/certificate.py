@@ -1,19 +1,21 @@
-"""Proof that no peak of a curve over the whole turn was missed: cells of crank angle, each with an enclosure.
+"""Proof that a search has missed no peak of a curve y(phi) over the whole turn.
 
-The turn is covered cell by cell.  In each the family encloses its motion in a jet (:mod:`kernels.enclosure`), and the
-cell is closed when the bound of |y| in it does not exceed the best value known by more than the wanted relative error;
-otherwise a shorter cell is tried, and where a higher peak shows the search climbs it and goes on with that.  So what is
-left at the end is a value that |y| takes and a bound that it exceeds nowhere.
+The turn is divided into cells of crank angle.  In each cell the family encloses its motion in a jet
+(:mod:`kernels.enclosure`), which bounds |y| there.  A cell is closed when this bound exceeds the best known value by no
+more than the wanted relative error.  Otherwise a shorter cell is tried; where |y| turns out to be higher than the best
+known value, the peak is climbed first and becomes the best known value.  At the end there is a value that |y| takes
+somewhere, and a bound that it exceeds nowhere.
 
-The state is a small array, so that each family can write its own short loop around its own enclosure::
+The walk is a state machine whose state is a small array, so that each family can write its own short loop around its
+own enclosure::
 
     begin(state, place, target, most)
     while state[MODE] != DONE:
         encloses = ...  # jet of the curve about state[CENTRE] with reach state[REACH]
         judge(state, encloses, at, jet, order, y)
 
-Truncation decides whether a cell is closed, rounding does not: it is added to the bound, so a motion that float64 knows
-badly gets a wide bound instead of endless cells.
+Only the truncation of the jet decides whether a cell is closed.  The rounding errors are added to the bound afterwards:
+a motion that float64 knows badly then gets a wide bound, and the cells do not become shorter without end.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ from kernels.enclosure import EPS, GUARD, ORDER, Array, ceiling, derivative, rem
 STATE = 14
 CLIMB, COVER, MARCH, DONE = 0.0, 1.0, 2.0, 3.0
 TURN = 2.0 * math.pi
+# CLIMB goes to the summit of a peak, COVER closes the first cell about it, MARCH goes from there round the turn.
 SHARE = 0.67  # half a cell's width in reaches of its jet
 WIDEST, GROWTH, FIRST, NARROWEST = 1.0, 1.5, 0.5, 1e-12
 # Cells overlap by far more than angles below 16 are rounded by.
@@ -35,7 +38,7 @@ OVERLAP, SLACK = 1.0 + 2.0**-20, 2.0**-47
 
 @inline
 def begin(state: Array, place: float, target: float, most: int) -> None:
-    """Start at a place where the search found the maximum; at most so many enclosures."""
+    """Prepare a walk from the crank angle ``place`` of the maximum found, with ``most`` enclosures at most."""
     state[MODE], state[CENTRE], state[REACH], state[EDGE], state[END] = CLIMB, place, FIRST, math.nan, math.nan
     state[BEST], state[PLACE], state[NOISE], state[UPPER] = -1.0, place, 0.0, 0.0
     state[TARGET], state[LEFT], state[BARREN], state[HERE], state[THERE] = target, most, 0.0, -1.0, place
@@ -43,12 +46,12 @@ def begin(state: Array, place: float, target: float, most: int) -> None:
 
 @kernel
 def judge(state: Array, encloses: bool, at: Array, jet: int, order: int, y: Array) -> None:
-    """Learn from the enclosure asked for, and ask for the next one.
+    """Take the enclosure that the state asked for, decide about its cell, and ask for the next one.
 
     Parameters
     ----------
     state : of :func:`begin`
-    encloses : whether the family could enclose its motion there
+    encloses : whether the family could enclose its motion about state[CENTRE] with reach state[REACH]
     at, jet : the jet whose derivative of that ``order`` is the curve
     y : (ORDER + 1,) scratch
     """
@@ -70,7 +73,7 @@ def judge(state: Array, encloses: bool, at: Array, jet: int, order: int, y: Arra
 
 @inline
 def _shorter(state: Array, factor: float) -> None:
-    """The same place again with less reach; in a march the near edge of the cell stays."""
+    """Ask for a jet of less reach at the same place; a cell of the march keeps the edge at which it begins."""
     state[REACH] *= factor
     if state[MODE] == MARCH:
         state[CENTRE] = state[EDGE] + SHARE * state[REACH]
@@ -80,10 +83,13 @@ def _shorter(state: Array, factor: float) -> None:
 
 @inline
 def _climbed(state: Array, y: Array, noise: float) -> bool:
-    """A step of Newton's method to the summit of |y|; whether it is reached and the first cell may be about it."""
+    """Make one step of Newton's method towards the summit of |y|.
+
+    Returns true when the summit is reached and the first cell can be centred at it, so that it can be closed at once.
+    """
     here, sign = abs(y[0]), 1.0 if y[0] >= 0.0 else -1.0
     slope, bend = sign * y[1], 2.0 * sign * y[2]
-    first = state[EDGE] != state[EDGE]  # nan until there is a cell
+    first = state[EDGE] != state[EDGE]  # the edge is nan until a first cell has been closed
     if here > state[BEST]:
         state[BEST], state[PLACE], state[NOISE] = here, state[CENTRE], noise
     if here > state[HERE]:
@@ -101,7 +107,7 @@ def _climbed(state: Array, y: Array, noise: float) -> bool:
     at_summit = state[CENTRE] == state[THERE]
     state[CENTRE], state[MODE] = state[THERE], COVER if first else MARCH
     if not first:
-        # A cell about the summit has the sharpest bound, if it can begin at the edge.
+        # A cell centred at the summit has the sharpest bound. It must begin at the edge, which fixes its reach.
         reach = (state[CENTRE] - state[EDGE]) / SHARE
         if 0.1 * state[REACH] < reach <= WIDEST:
             state[REACH] = reach
@@ -111,8 +117,8 @@ def _climbed(state: Array, y: Array, noise: float) -> bool:
 
 @inline
 def _close(state: Array, y: Array, count: int, share: float, noise: float, tail: float) -> None:
-    """Close the cell if its bound allows, else climb a peak in it, else ask for a shorter cell."""
-    # Values about other places are rounded otherwise than the best one.
+    """Close the cell if its bound is low enough; otherwise climb a higher peak in it, or ask for a shorter cell."""
+    # The best value was computed about another place: its own rounding errors must not keep a cell open.
     rounded = state[NOISE] if state[MODE] == MARCH else 0.0
     limit = state[BEST] * (1.0 + state[TARGET]) + rounded
     bound = ceiling(y, count, share, tail) * GUARD
@@ -125,7 +131,7 @@ def _close(state: Array, y: Array, count: int, share: float, noise: float, tail:
         state[BARREN] = 0.0
         if state[EDGE] >= state[END]:
             state[MODE] = DONE
-        # Not farther than to the end, beyond which the highest peak itself stands.
+        # The last cell ends where the first one began, at the foot of the highest peak.
         last = OVERLAP * (state[END] - state[EDGE]) / (2.0 * SHARE)
         state[REACH] = max(min(GROWTH * state[REACH], WIDEST, last), NARROWEST)
         state[CENTRE] = state[EDGE] + SHARE * state[REACH]

@@ -1,4 +1,4 @@
-"""Mechanisms in series: the output angle of one stage drives the next; the equation numbers are of docs/chain.md.
+"""Mechanisms in series: the output angle of one stage drives the next.  The equation numbers are of docs/chain.md.
 
 The kernels work on (n, m) blocks of poses and know no family.  All arrays may be complex128 (exact gradients by the
 complex step).

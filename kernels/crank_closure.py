@@ -91,7 +91,7 @@ def reduce_scaled(a: Any, b: Any, c: Any, e: Any, f: Any, g: Any, alpha: Any, br
 
 @inline
 def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
-    """Rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (sheet 1.2)."""
+    """Rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64."""
     mx, my, mw = abs(r.e.real) + 1.0, abs(r.y0.real) + 1.0, r.w_size
     t = 8.0 * EPS
     return t * (abs(x.real) * mx + abs(y.real) * my + abs(w.real) * mw) + t * t * (mx * mx + my * my + mw * mw)

@@ -14,6 +14,7 @@ import numpy as np
 from kernels import status as st
 from kernels._jit import inline
 from kernels.vectors import Vector, dot
+from kernels.verdict import pose_status
 
 Path: TypeAlias = tuple[Vector, Vector, Vector, Vector]  # a place and its three derivatives
 EPS = 2.0**-53
@@ -60,15 +61,7 @@ def swing(path: Path, size: float, b: Any, c: Any, branch: float) -> Swung:
     tolerance = t * ((abs(x.real) + abs(y.real)) * size + abs(w.real) * w_size) + t * t * (
         2.0 * size * size + w_size * w_size
     )
-    code = st.OK
-    if c.real == 0.0:
-        code = st.SINGULAR
-    elif delta.real != delta.real:
-        code = st.INVALID_INPUT
-    elif delta.real < -tolerance:
-        code = st.NOT_ASSEMBLED
-    elif delta.real <= tolerance:
-        code = st.DEAD_POINT if rr.real > tolerance else st.SINGULAR
+    code = st.SINGULAR if c.real == 0.0 else pose_status(True, delta.real, tolerance, rr.real)
     moving = code == st.OK
     has_angle = moving or code == st.DEAD_POINT
     root = branch * np.sqrt(delta) if moving else 0.0 * delta

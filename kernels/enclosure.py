@@ -1,16 +1,19 @@
-"""Enclosures of analytic functions of the crank angle, with proven remainders (docs/extrema.md, section 5).
+"""Enclosures of analytic functions of the crank angle: polynomials with proven remainders.
+
+docs/extrema.md, section 5, explains the method.
 
 A jet encloses a function f(phi + z) on the complex disc |z| <= reach.  In x = z/reach it is a polynomial of degree
-ORDER plus two remainders of which only the size is known: ``noise``, any power series (rounding, inputs that are known
-to rounding), and ``tail``, a power series that begins with x^(ORDER + 1) (truncation).  The size of a power series is
-the sum of the magnitudes of its coefficients.  That sum of a product is at most the product of the sums, so every rule
-here is a few lines; it also bounds the function itself and, on a smaller disc, its derivatives.
+ORDER plus two remainders of which only the size is known.  ``noise`` is any power series; it stands for rounding errors
+and for inputs that are known to rounding.  ``tail`` is a power series that begins with x^(ORDER + 1); it stands for
+truncation.  The size of a power series is the sum of the magnitudes of its coefficients.  The size of a product is at
+most the product of the sizes, which keeps every rule here short.  The size also bounds the function itself and, on a
+smaller disc, its derivatives.
 
-Rounding to nearest is all that is needed: every operation adds what it can have rounded by.  Numbers that bound
-something are sums and products of non-negative numbers; GUARD covers their own rounding.  Whatever overflows or is nan
-ends as a failed operation, never as an enclosure.
+The processor's rounding mode is left at nearest: every operation adds to ``noise`` what it can have rounded by.  Bounds
+are sums and products of non-negative numbers only, and the factor GUARD covers their own rounding.  An operation whose
+numbers overflow or become nan reports failure; it never returns an enclosure.
 
-Jets lie in one plain array, WIDTH numbers each; functions take the offsets of their operands.
+All jets lie in one plain array, WIDTH numbers each, and functions take the offsets of their operands in it.
 """
 
 from __future__ import annotations
@@ -32,7 +35,11 @@ _DOT = (ORDER + 5) * EPS  # rounding of a sum of up to ORDER + 1 products, divid
 
 
 def _trigonometric_table() -> tuple[Array, Array, Array]:
-    """Taylor coefficients of 1, s = sin z, m = 1 - cos z, s m, m^2, s m^2, m^3; sums of magnitudes, whole and tail."""
+    """Tabulate the Taylor coefficients of 1, s, m, s m, m^2, s m^2, m^3 with s = sin z and m = 1 - cos z.
+
+    Returns the coefficients up to ORDER, then per function the sum of the magnitudes of all coefficients, and of those
+    beyond ORDER.
+    """
     harmonics = (  # of sin z, sin 2z, sin 3z or of cos z, cos 2z, cos 3z; the constants of the even ones cancel
         (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (1.0, -0.5, 0.0), (-2.0, 0.5, 0.0), (1.25, -1.0, 0.25), (-3.75, 1.5, -0.25),
     )  # fmt: skip
@@ -52,7 +59,7 @@ _TABLE, _SIZE, _REST = _trigonometric_table()
 
 @inline
 def settle(at: Array, j: int) -> None:
-    """The size of a jet's polynomial."""
+    """Write the size of a jet's polynomial, which all bounds are made of, behind its coefficients."""
     total = 0.0
     for k in range(ORDER + 1):
         total += abs(at[j + k])
@@ -61,7 +68,7 @@ def settle(at: Array, j: int) -> None:
 
 @inline
 def size(at: Array, j: int) -> float:
-    """Bound of a jet's function on its disc."""
+    """Bound the magnitude of a jet's function on its disc."""
     bound: float = (at[j + NORM] + at[j + NOISE] + at[j + TAIL]) * GUARD
     return bound
 
@@ -71,9 +78,9 @@ def trigonometric(
     at: Array, out: int, reach: float, c0: float, c1: float, c2: float, c3: float, c4: float, c5: float, c6: float,
     error: float,
 ) -> None:  # fmt: skip
-    """c0 + c1 s + c2 m + c3 s m + c4 m^2 + c5 s m^2 + c6 m^3 with s = sin z, m = 1 - cos z; reach <= 1.
+    """Enclose c0 + c1 s + c2 m + c3 s m + c4 m^2 + c5 s m^2 + c6 m^3 with s = sin z and m = 1 - cos z.
 
-    ``error`` bounds the size of what the coefficients themselves are off by.
+    ``reach`` is 1 at most.  ``error`` bounds the size of the function that the errors of c0 ... c6 themselves make.
     """
     at[out] = c0
     power = reach
@@ -96,7 +103,7 @@ def trigonometric(
 
 @inline
 def add(at: Array, a: int, b: int, out: int) -> None:
-    """Sum; ``out`` may be one of the two."""
+    """Enclose the sum a + b; ``out`` may be a or b."""
     noise, tail = at[a + NOISE] + at[b + NOISE], at[a + TAIL] + at[b + TAIL]
     noise += EPS * (at[a + NORM] + at[b + NORM])
     for k in range(ORDER + 1):
@@ -107,7 +114,7 @@ def add(at: Array, a: int, b: int, out: int) -> None:
 
 @kernel
 def combine(at: Array, c: float, p: float, a: int, q: float, b: int, error: float, out: int) -> None:
-    """A sum c + p a + q b; ``error`` bounds the size of what the constants are off by; ``out`` may be a or b."""
+    """Enclose c + p a + q b; ``error`` bounds what the errors of c, p, q make of it; ``out`` may be a or b."""
     noise = abs(p) * at[a + NOISE] + abs(q) * at[b + NOISE] + error
     noise += 3.0 * EPS * (abs(c) + abs(p) * at[a + NORM] + abs(q) * at[b + NORM])
     tail = abs(p) * at[a + TAIL] + abs(q) * at[b + TAIL]
@@ -120,7 +127,7 @@ def combine(at: Array, c: float, p: float, a: int, q: float, b: int, error: floa
 
 @inline
 def beyond(at: Array, a: int, b: int) -> float:
-    """Size of the part of the product of two polynomials that begins with x^(ORDER + 1)."""
+    """Bound the size of those terms of the product of two polynomials whose degree is beyond ORDER."""
     total, last = 0.0, 0.0
     for i in range(1, ORDER + 1):
         last += abs(at[b + ORDER + 1 - i])
@@ -130,7 +137,7 @@ def beyond(at: Array, a: int, b: int) -> float:
 
 @kernel
 def multiply(at: Array, a: int, b: int, out: int) -> None:
-    """Product; ``out`` must be neither of the two."""
+    """Enclose the product a b; ``out`` must be neither a nor b."""
     for n in range(ORDER + 1):
         total = at[a] * at[b + n]
         for i in range(1, n + 1):
@@ -144,10 +151,10 @@ def multiply(at: Array, a: int, b: int, out: int) -> None:
 
 @kernel
 def inverse(at: Array, a: int, out: int) -> bool:
-    """1/a; false if that cannot be enclosed, as where a may have a zero on the disc.
+    """Enclose 1/a; the result is false if that is impossible, as where a may have a zero on the disc.
 
-    The recurrence makes the product of the two polynomials 1 up to x^ORDER, but for the rounding of its sums.  What is
-    left of 1 - a out is small; if its size d is below 1, 1/a = out (1 + ...) with what follows bounded by d/(1 - d).
+    The recurrence makes the product of both polynomials equal to 1 up to x^ORDER, but for the rounding of its sums.  So
+    d, the size of 1 - a out, is small.  Where d < 1, 1/a = out (1 + r), and the size of r is at most d/(1 - d).
     """
     first = 1.0 / at[a]
     at[out] = first
@@ -168,10 +175,10 @@ def inverse(at: Array, a: int, out: int) -> bool:
 
 @kernel
 def root(at: Array, a: int, out: int, per: int) -> bool:
-    """The positive square root of a and its inverse; false if they cannot be enclosed.
+    """Enclose the positive square root of a and its inverse; the result is false if that is impossible.
 
-    With t the polynomial of the root, a = t^2 (1 + q); the size of q = (a - t^2)/t^2 decides, and the power series of
-    sqrt(1 + q) and its inverse bound the rest.
+    Let t be the polynomial of the root, so that a = t^2 (1 + q) with q = (a - t^2)/t^2.  If the size of q is small
+    enough, the power series of sqrt(1 + q) and of its inverse bound both remainders.
     """
     if not at[a] > 0.0:
         return False
@@ -204,7 +211,7 @@ def root(at: Array, a: int, out: int, per: int) -> bool:
 
 @inline
 def derivative(at: Array, a: int, order: int, reach: float, y: Array) -> None:
-    """Coefficients in x of the derivative of that order by z, ORDER + 1 - order of them, into y."""
+    """Write into y the coefficients in x of the derivative of that order by z; there are ORDER + 1 - order of them."""
     scale = 1.0
     for _ in range(order):
         scale /= reach
@@ -217,9 +224,10 @@ def derivative(at: Array, a: int, order: int, reach: float, y: Array) -> None:
 
 @inline
 def remainders(at: Array, a: int, order: int, reach: float, share: float) -> tuple[float, float]:
-    """Bounds of noise and tail of the derivative of that order <= 3 on the disc |z| <= share reach, share <= 0.75.
+    """Bound noise and tail of the derivative of that order <= 3 on the smaller disc |z| <= share reach, share <= 0.75.
 
-    A coefficient of x^k contributes k (k-1) ... (k-order+1) share^(k-order)/reach^order, falling from k = 2 ORDER on.
+    A coefficient of x^k contributes k (k-1) ... (k-order+1) share^(k-order)/reach^order.  That falls with k from
+    k = 2 ORDER on, so the largest factor is found among the k below.
     """
     scale, factor, power = 1.0, 1.0, 1.0
     for i in range(order):
@@ -237,9 +245,10 @@ def remainders(at: Array, a: int, order: int, reach: float, share: float) -> tup
 
 @inline
 def ceiling(y: Array, count: int, share: float, tail: float) -> float:
-    """Bound of |y(x) + tail| for real |x| <= share, from y's coefficients; sharp to third order about a maximum.
+    """Bound |y(x) + tail| for real |x| <= share from the coefficients of y.
 
-    y0 + y1 x + q x^2 with q made of all higher coefficients; if q < 0 the parabola has a summit.
+    The bound is that of the parabola |y0| + |y1| |x| + q x^2, whose q holds all higher coefficients at their worst.
+    Where q < 0 the parabola has a summit.  About a maximum of |y| the bound is sharp to third order.
     """
     rest, power = tail / (share * share), share
     for k in range(3, count):

@@ -20,10 +20,18 @@ NOTHING = 1e-14  # share of the largest coefficient that the rotations' drift le
 
 @kernel
 def coefficients(values: Array, turn: Array, cosines: Array, sines: Array) -> None:
-    """Fourier coefficients of N = 2 K + 1 samples: mean in cosines[0], harmonics 1..K in cosines[k], sines[k].
+    """Compute the Fourier coefficients of N = 2 K + 1 samples of one period.
 
-    ``turn`` (4, K + 1) is room for the rotations of all harmonics, which go side by side so that the loop vectorises;
-    they drift by 1e-14 at most for N < 1000.
+    Parameters
+    ----------
+    values : (N,) samples at 2 pi j/N
+    turn : (4, K + 1) scratch: cosine and sine of each harmonic at the current sample, and of its step to the next
+    cosines, sines : (K + 1,) out; the mean in cosines[0], harmonic k in cosines[k] and sines[k]
+
+    Notes
+    -----
+    The harmonics are advanced by rotations instead of library calls, all of them side by side, so that the loop
+    vectorises.  The rotations drift by 1e-14 at most for N < 1000.
     """
     n, half = values.size, cosines.size
     for k in range(half):
@@ -43,7 +51,14 @@ def coefficients(values: Array, turn: Array, cosines: Array, sines: Array) -> No
 
 @kernel
 def on_grid(cosines: Array, sines: Array, turn: Array, values: Array) -> None:
-    """Values of a series at 2 pi j / M, j = 0 .. M - 1, M = values.size; ``turn`` (4, M) is room, as above."""
+    """Evaluate a Fourier series at M equidistant angles 2 pi j/M.
+
+    Parameters
+    ----------
+    cosines, sines : (K + 1,) of :func:`coefficients`
+    turn : (4, M) scratch for the rotations, as there
+    values : (M,) out
+    """
     for j in range(values.size):
         angle = 2.0 * math.pi * j / values.size
         turn[2, j], turn[3, j] = math.cos(angle), math.sin(angle)
@@ -57,10 +72,10 @@ def on_grid(cosines: Array, sines: Array, turn: Array, values: Array) -> None:
 
 @inline
 def series(cosines: Array, sines: Array, phi: float) -> tuple[float, float]:
-    """Value and derivative at any angle of the function with these coefficients."""
+    """Evaluate the series with these coefficients, and its derivative, at any angle phi [rad]."""
     value, slope = cosines[0], 0.0
     step_c, step_s = math.cos(phi), math.sin(phi)
-    # the multiples by rotation: two calls of the library for all harmonics
+    # cos k phi and sin k phi come by rotation, so that one cosine and one sine serve all harmonics
     c, s = step_c, step_s
     for k in range(1, cosines.size):
         value += cosines[k] * c + sines[k] * s
@@ -71,7 +86,7 @@ def series(cosines: Array, sines: Array, phi: float) -> tuple[float, float]:
 
 @inline
 def significant(cosines: Array, sines: Array) -> int:
-    """Number of leading coefficients beyond which there is only rounding (1e-14 of the largest), which costs time."""
+    """Count the coefficients worth keeping: all behind them are rounding, below 1e-14 of the largest one."""
     largest = 0.0
     for k in range(cosines.size):
         largest = max(largest, math.hypot(cosines[k], sines[k]))
@@ -83,11 +98,11 @@ def significant(cosines: Array, sines: Array) -> int:
 
 @inline
 def tail(cosines: Array, sines: Array, size: float) -> float:
-    """Size of the two highest harmonics in proportion to the largest or to ``size``: what the grid may miss."""
+    """Estimate what the grid misses: the two highest harmonics, divided by the largest one or by ``size`` if larger."""
     largest = size
     for k in range(cosines.size):
         largest = max(largest, math.hypot(cosines[k], sines[k]))
     last = cosines.size - 1
-    # two of them: of a function with symmetry every other harmonic is zero
+    # Two harmonics are looked at, because a function with symmetry has zeros in every other one.
     highest = math.hypot(cosines[last], sines[last]) + math.hypot(cosines[last - 1], sines[last - 1])
     return highest / largest if largest > 0.0 else 0.0

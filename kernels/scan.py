@@ -1,4 +1,6 @@
-"""Reductions over sampled turns: what the search for extrema needs from a block of (n, m) samples.
+"""Reductions of sampled turns, (n, m): a row is a design, its samples are a curve over the crank angle.
+
+The search for extrema, the windows and the events are made of them.
 
 The samples of a row stand at equidistant crank angles of one full turn, so a row is periodic: the neighbour of the last
 sample is the first.  ``mode`` chooses the quantity that is made large: 0 the magnitude, +1 the value, -1 its negative.
@@ -32,7 +34,7 @@ def _measured(value: float, mode: int) -> float:
 
 @kernel
 def worst_status(status: Status, worst: Status) -> None:
-    """The status that speaks for a whole turn: the gravest of the row in the order in which causes act.
+    """Choose one status for the whole turn: of those in the row, the one whose cause comes before the others.
 
     Parameters
     ----------
@@ -83,7 +85,7 @@ def unwrap(angles: Array, winding: Index) -> None:
 
 @kernel
 def best_sample(values: Array, mode: int, allowed: Mask | None, best: Array, column: Index) -> None:
-    """Largest measured sample of each row and its column; nan and -1 where no sample is allowed.
+    """Find the largest measured sample of each row and its column; nan and -1 where no sample is allowed.
 
     Parameters
     ----------
@@ -114,7 +116,7 @@ def best_sample(values: Array, mode: int, allowed: Mask | None, best: Array, col
 def peaks(
     values: Array, mode: int, share: float, allowed: Mask | None, scale: Array, rough: Array, row: Index, column: Index
 ) -> int:
-    """Every local maximum of each row that can be the highest of the turn, and how well the samples resolve the row.
+    """Collect the local maxima of each row that can be the highest, and judge how well the samples resolve the row.
 
     Parameters
     ----------
@@ -172,7 +174,7 @@ def peaks(
 
 @kernel
 def nearest_singularity(discriminant: Array, distance: Array) -> None:
-    """Distance of the nearest complex zero of the discriminant from the real crank angles [rad]; 0 if it may be real.
+    """Estimate how near the discriminant has a complex zero to the real crank angles [rad]; 0 if it may be a real one.
 
     The parabola through each local minimum and its neighbours gives the zero phi0 +- i rho with
     rho^2 = D / (D''/2).  There the derivatives of the motion are singular, so it says how dense samples must stand.
@@ -202,7 +204,7 @@ def nearest_singularity(discriminant: Array, distance: Array) -> None:
 
 @kernel
 def crossings(values: Array, level: Array, row: Index, column: Index) -> int:
-    """Where each row passes its level: between ``column`` and the next sample.
+    """List where each row passes its level: between the sample at ``column`` and the next one.
 
     Parameters
     ----------
@@ -227,7 +229,7 @@ def crossings(values: Array, level: Array, row: Index, column: Index) -> int:
 
 @kernel
 def grazes(values: Array, level: Array, doubtful: Mask) -> None:
-    """Rows with a turning point between samples that may lie beyond a level which the samples do not pass.
+    """Mark rows that may touch their level between samples, though no sample lies beyond it.
 
     Parameters
     ----------
@@ -251,7 +253,7 @@ def grazes(values: Array, level: Array, doubtful: Mask) -> None:
 
 @kernel
 def quartic_peak(z: Array, place: Array, height: Array, ripple: Array, blur: Array) -> None:
-    """Highest point of the quartic through five equidistant samples, sought from the best sample.
+    """Find the highest point of the quartic through five equidistant samples, starting at the best of them.
 
     Parameters
     ----------
@@ -302,7 +304,7 @@ def quartic_peak(z: Array, place: Array, height: Array, ripple: Array, blur: Arr
 
 @kernel
 def best_candidate(row: Index, height: Array, best: Array, which: Index) -> None:
-    """Highest candidate of each row.
+    """Find the highest candidate of each row.
 
     Parameters
     ----------

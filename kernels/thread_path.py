@@ -1,6 +1,6 @@
 """The thread from a fixed guide over one moving point to a second fixed guide: its length and its wrap angle.
 
-Dynamics sheet, section 7; the equation numbers are those of docs/takeup.md.  With d_i = E - N_i, r_i = |d_i|,
+The equation numbers are those of docs/takeup.md.  With d_i = E - N_i, r_i = |d_i|,
 
     L = r1 + r2,   L' = sum d_i . E' / r_i,   L'' = sum (d_i . E'' + |d_i x E'|^2 / r_i^2) / r_i               (2)-(4)
 

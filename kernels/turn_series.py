@@ -51,7 +51,7 @@ def turn_extremes(
 
 @inline
 def _peak(c: Array, s: Array, sign: float, look: Array) -> float:
-    """Crank angle in [0, 2 pi) where sign times the series is largest: best of the finer looks, then bisection."""
+    """Find the crank angle in [0, 2 pi) where sign times the series is largest: the best sample, then bisection."""
     step = 2.0 * math.pi / look.size
     best, where = -math.inf, 0.0
     for j in range(look.size):

@@ -1,8 +1,8 @@
-"""Numbers of twice the working precision: pairs (high, low) of float64 whose unrounded sum is meant.
+"""Arithmetic with twice the working precision: a number is the unrounded sum of a pair (high, low) of float64.
 
 Error-free transformations of Knuth, Dekker and Ogita, Rump and Oishi (Accurate sum and dot product, SIAM J. Sci.
 Comput. 26, 2005).  Results carry a relative error of a few 2^-104 as long as nothing leaves float64 and no low part
-becomes subnormal.  Without a branch, so that loops vectorise; for real numbers only.
+becomes subnormal.  No function has a branch, so that loops over them vectorise.  Numbers must be real.
 """
 
 from __future__ import annotations
@@ -34,62 +34,66 @@ def _fused_typed(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     return types.float64(types.float64, types.float64, types.float64), codegen
 
 
-# a b + c rounded once; where the processor cannot, the library does it, with the same bits.
+# fused(a, b, c) is a b + c rounded once; a processor without such an instruction takes a library, with the same bits.
 fused: Any = intrinsic(_fused_typed)
 
 
 @inline
 def two_sum(a: float, b: float) -> Twofold:
-    """Rounded sum and its error; exact."""
+    """Give the rounded sum of a and b and its rounding error, which is exact (Knuth)."""
     s = a + b
+    # t is the part of b that arrived in s; what is lacking of a and of b is the error, whichever of them is larger.
     t = s - a
     return s, (a - (s - t)) + (b - t)
 
 
 @inline
 def normal(high: float, low: float) -> Twofold:
-    """The same sum with the rounded sum first; needs |high| >= |low| or high = 0."""
+    """Make a pair whose high part is its rounded sum; it needs |high| >= |low| or high = 0 (Dekker)."""
     s = high + low
     return s, low - (s - high)
 
 
 @inline
 def two_product(a: float, b: float) -> Twofold:
-    """Rounded product and its error; exact while the error is a normal number."""
+    """Give the rounded product of a and b and its rounding error, exact while the error is a normal number."""
     p = a * b
     return p, fused(a, b, -p)
 
 
 @inline
 def add(a: Twofold, b: Twofold) -> Twofold:
-    """A + b; its error is relative to |a| + |b|."""
+    """Give the sum a + b; its error is relative to |a| + |b|, not to the sum."""
     s, e = two_sum(a[0], b[0])
     return normal(s, e + (a[1] + b[1]))
 
 
 @inline
 def subtract(a: Twofold, b: Twofold) -> Twofold:
-    """A - b; its error is relative to |a| + |b|."""
+    """Give the difference a - b; its error is relative to |a| + |b|, not to the difference."""
     return add(a, (-b[0], -b[1]))
 
 
 @inline
 def multiply(a: Twofold, b: Twofold) -> Twofold:
-    """A b."""
+    """Give the product a b."""
     p, e = two_product(a[0], b[0])
     return normal(p, fused(a[0], b[1], fused(a[1], b[0], e)))
 
 
 @inline
 def scale(a: Twofold, b: float) -> Twofold:
-    """A b for a plain number b."""
+    """Give the product a b for a plain number b."""
     p, e = two_product(a[0], b)
     return normal(p, fused(a[1], b, e))
 
 
 @inline
 def divide(a: Twofold, b: Twofold, per_b: float) -> Twofold:
-    """a/b, given 1/b as a plain number (several quotients share it)."""
+    """Give the quotient a/b; ``per_b`` is 1/b as a plain number, which several quotients share.
+
+    One step of long division: the remainder of the rounded quotient corrects it.
+    """
     q = a[0] * per_b
     rest = fused(-q, b[0], a[0])
     return normal(q, fused(-q, b[1], rest + a[1]) * per_b)
@@ -97,14 +101,15 @@ def divide(a: Twofold, b: Twofold, per_b: float) -> Twofold:
 
 @inline
 def root(a: Twofold) -> Twofold:
-    """Square root of a positive number."""
+    """Give the square root of a positive number: one step of Newton's method on the rounded root."""
     q = math.sqrt(a[0])
     return normal(q, (fused(-q, q, a[0]) + a[1]) / (q + q))
 
 
 @inline
 def unit_vector(x: float, y: float) -> tuple[Twofold, Twofold]:
-    """The vector of length 1 in the direction of (x, y), whose length is 1 but for rounding."""
+    """Bring (x, y), whose length is 1 but for rounding, to length 1 in twice the precision."""
+    # The length is so near 1 that sqrt(1 + 2 excess) - 1 is the excess itself to the precision of the pairs.
     xx, yy = two_product(x, x), two_product(y, y)
     square = two_sum(xx[0], yy[0])
     excess = 0.5 * ((square[0] - 1.0) + (square[1] + (xx[1] + yy[1])))
@@ -113,9 +118,9 @@ def unit_vector(x: float, y: float) -> tuple[Twofold, Twofold]:
 
 @inline
 def sine_cosine(x: float) -> tuple[Twofold, Twofold]:
-    """Sine and cosine for |x| <= 1e5, with a relative error below 2^-84; nan for nan and infinity.
+    """Give sine and cosine for |x| <= 1e5 with a relative error below 2^-84; nan for nan and infinity.
 
-    Taylor's series after the reduction of :mod:`kernels.sincos`, the first five terms in twice the precision.
+    The angle is reduced as in :mod:`kernels.sincos`; of Taylor's series the first five terms have twice the precision.
     """
     n = (x * _TWO_PER_PI + _ROUND) - _ROUND
     w, e = two_product(n, _P3)

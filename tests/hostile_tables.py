@@ -53,14 +53,19 @@ def spoilt(r: np.random.Generator, column: np.ndarray[Any, Any]) -> Any:
     return thing
 
 
-def case(seed: int) -> tuple[Any, dict[str, Any], list[str], dict[str, Any], bool]:
-    """Family, table, wanted design outputs, settings, and whether the table was spoilt."""
-    r = np.random.default_rng(seed)
+def case(seed: int, requests: int | None = None) -> tuple[Any, dict[str, Any], list[str], dict[str, Any], bool]:
+    """Family, table, wanted design outputs, settings, and whether the table was spoilt.
+
+    ``requests`` is how many different families and outputs there are; None leaves it to chance.
+    """
+    r = np.random.default_rng(seed if requests is None else seed % requests)
     chosen = FAMILIES[r.integers(len(FAMILIES))]
     bare = family(chosen)
     poses = [o.name for o in bare.pose_outputs] + [o.name for o in offered(bare)] * (r.random() < 0.5)
     names = [f"{r.choice(BASES)}_{r.choice(poses)}" for _ in range(r.integers(1, 4))]
     full = extended(bare, names)
+    if requests is not None:
+        r = np.random.default_rng(seed)
     rows = int(r.integers(1, 5))
     scale = 10.0 ** r.uniform(-100.0, 100.0) if r.random() < 0.1 else 1.0
     table: dict[str, Any] = {}
@@ -76,15 +81,15 @@ def case(seed: int) -> tuple[Any, dict[str, Any], list[str], dict[str, Any], boo
     return chosen, table, names, settings, bad
 
 
-def faults(seed: int) -> list[str]:
+def faults(seed: int, requests: int | None = None) -> list[str]:
     """What is wrong with the answer to one hostile table; nothing, as a rule."""
-    chosen, table, names, settings, _ = case(seed)
+    chosen, table, names, settings, _ = case(seed, requests)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
             frame = sweep.summarise(chosen, table, names, **settings)
             bare = family(chosen)
-            poses = [o.name for o in bare.pose_outputs[: 1 + seed % 4]]
+            poses = [o.name for o in bare.pose_outputs[: 1 + (seed if requests is None else seed % requests) % 4]]
             own = {k: v for k, v in table.items() if k in bare.parameter_names}
             frames = [frame, sweep.evaluate(chosen, own, poses, phi=[0.0, 1.0, np.pi])]
         except InputError as error:

@@ -250,7 +250,7 @@ def test_other_limits_compare_signed_values_and_nan_never_meets_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("argument", "value"), [("jobs", 0), ("jobs", 1.5), ("jobs", True), ("backend", "threads"), ("backend", "dask")]
+    ("argument", "value"), [("jobs", 0), ("jobs", 1.5), ("jobs", True), ("backend", "threads"), ("backend", "dusk")]
 )
 def test_bad_argument_is_named(study: Study, tmp_path: Path, argument: str, value: object) -> None:
     with pytest.raises(InputError, match=argument):

@@ -20,7 +20,8 @@ from sweep.chunks.plan import make_plan
 from sweep.dataset import store
 from sweep.engine.worker import ChunkTask
 from sweep.errors import InputError
-from sweep.jobs.executors import EXECUTORS, Here, Task, Threads, executor
+from sweep.jobs.executors import EXECUTORS, Here, Threads, at_work, executor
+from sweep.jobs.flow import Task
 from sweep.jobs.signals import Stop
 from sweep.study import load_study
 from tests.engine_study import ROOT, SMALL_CHUNKS, chunk_bytes, write_study
@@ -52,7 +53,7 @@ sys.stdout.buffer.write(pickle.dumps(task(number, lambda: False)))
 
 def test_a_third_executor_is_a_line_in_the_register(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     study = load_study(write_study(tmp_path / "study", count=20))
-    monkeypatch.setitem(EXECUTORS, "strangers", Strangers())
+    monkeypatch.setitem(EXECUTORS, "strangers", Strangers)
     out = sweep.run(study, tmp_path / "strangers", jobs=2, backend="strangers")
     assert sweep.is_complete(out) and len(chunk_bytes(out)) == 3
     assert chunk_bytes(out) == chunk_bytes(sweep.run(study, tmp_path / "here", jobs=1))
@@ -95,12 +96,13 @@ def test_tasks_stop_when_they_are_asked_to(name: str) -> None:
     stop = Stop()
     found = []
     begin = time.monotonic()
-    for number, process in EXECUTORS[name].outcomes(slow, iter(range(100)), 2, stop):
-        found.append(number)
-        assert (process == os.getpid()) == (name == "threading")
-        if len(found) == 3:
-            stop.set()
-            begin = time.monotonic()
+    with at_work(EXECUTORS[name]()) as place:
+        for number, process in place.outcomes(slow, iter(range(100)), 2, stop):
+            found.append(number)
+            assert (process == os.getpid()) == (name == "threading")
+            if len(found) == 3:
+                stop.set()
+                begin = time.monotonic()
     assert time.monotonic() - begin < 5.0 and len(found) <= 6, found
 
 
@@ -126,3 +128,9 @@ def test_a_number_of_workers_that_makes_no_sense_is_refused(jobs: int) -> None:
         executor("loky", jobs)
     with pytest.raises(InputError, match="did you mean 'threading'"):
         executor("thread", 2)
+
+
+@pytest.mark.parametrize("name", ["threading=tcp://10.0.0.1:8786", "dask="])
+def test_an_address_where_none_belongs_is_refused(name: str) -> None:
+    with pytest.raises(InputError, match="an address after dask= only"):
+        executor(name, 2)

@@ -13,11 +13,6 @@ from tests.hostile_tables import FAMILIES, case, faults
 FEW, MANY = 200, 2500
 
 
-def test_hostile_tables_have_an_answer_a_status_or_an_error_of_ours() -> None:
-    wrong = {seed: found for seed in range(FEW) if (found := faults(seed))}
-    assert not wrong
-
-
 @pytest.mark.long
 def test_many_hostile_tables_have_an_answer_a_status_or_an_error_of_ours() -> None:
     wrong = {seed: found for seed in range(FEW, FEW + MANY) if (found := faults(seed))}

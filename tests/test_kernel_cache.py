@@ -82,6 +82,17 @@ def test_files_that_end_too_soon_are_made_anew(tree: Path) -> None:
     assert report(tree) == ["2.0", "1", "KernelCache"]
 
 
+@pytest.mark.parametrize("kind", ["nbc", "nbi"])
+def test_a_changed_bit_anywhere_in_a_file_is_found_and_the_code_made_anew(tree: Path, kind: str) -> None:
+    report(tree)
+    (file,) = (tree.parents[1] / "cache").rglob(f"*run-*.{kind}")
+    data = bytearray(file.read_bytes())
+    for place in (0, len(data) // 2, len(data) - 1):
+        file.write_bytes(data[:place] + bytes([data[place] ^ 16]) + data[place + 1 :])
+        assert report(tree) == ["2.0", "0", "KernelCache"]
+        assert report(tree) == ["2.0", "1", "KernelCache"]
+
+
 def test_a_kernel_outside_of_the_package_is_compiled_and_not_kept(tree: Path) -> None:
     (tree.parent / "bench.py").write_text(KERNEL)
     program = "from bench import run; print(run(1.0), len(run.stats.cache_hits), type(run._cache).__name__)"
@@ -149,7 +160,7 @@ def test_processes_that_compile_at_the_same_time_do_not_mix_their_signatures(tre
     """A slow disk between looking for a free name and taking it; afterwards each signature loads its own code."""
     slow = """
     import numpy, time
-    from numba.core.caching import IndexDataCacheFile as File
+    from kernels._cache import _Checked as File
     from kernels.loop import run
     save = File._save_index
     File._save_index = lambda *given: (time.sleep(2), save(*given))
@@ -169,14 +180,15 @@ def test_where_nothing_can_be_written_kernels_run_all_the_same(tree: Path, tmp_p
 
 
 PAYLOAD = """
-import pathlib, pickle, sys
+import hashlib, pathlib, pickle, sys
 
 class Planted:
     def __reduce__(self):
         return exec, ("import pathlib; pathlib.Path({mark!r}).touch()",)
 
 for path in pathlib.Path({cache!r}).rglob("*.nb[ic]"):
-    path.write_bytes(pickle.dumps(Planted()))
+    data = pickle.dumps(Planted())
+    path.write_bytes(hashlib.sha256(data).digest() + data)
 """
 
 

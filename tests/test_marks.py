@@ -15,6 +15,7 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 import kernels
+from sweep.families import NAMES
 
 ROOT = Path(kernels.__file__).parent.parent
 LIMITS = {"kernels": (80, 14), "sweep": (60, 10)}  # lines and arguments of a function, by room
@@ -87,3 +88,27 @@ def test_every_kernel_and_helper_names_its_own_floating_point_flags():
         found |= {id(x): x for x in vars(importlib.import_module(name)).values() if isinstance(x, CPUDispatcher)}
     assert len(found) > 150
     assert [str(x) for x in found.values() if x.targetoptions.get("fastmath") not in (False, {"contract"})] == []
+
+
+def test_no_code_asks_for_a_familys_name():
+    """What an effect, a proof or a drawing needs of a family is a capability; a comparison with a name is not."""
+    asked = []
+    for path in (*sources("sweep"), *sources("kernels")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Compare):
+                words = {c.value for c in ast.walk(node) if isinstance(c, ast.Constant) and isinstance(c.value, str)}
+                asked += [f"{path}:{node.lineno}: {word}" for word in words.intersection(NAMES)]
+    assert asked == []
+
+
+def test_drawing_of_the_house_has_every_room_and_every_kernel():
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    drawn = page.split("    kernels/ ")[1].split("    studies/ ")[0]
+    kernels_drawn, sweep_drawn = drawn.split("    sweep/ ")
+    for text, room in ((kernels_drawn, "kernels"), (sweep_drawn, "sweep")):
+        there = {path.name for path in (ROOT / room).iterdir() if path.suffix == ".py" or path.is_dir()}
+        missing = [name for name in there - {"__init__.py", "__main__.py", "__pycache__"} if name not in text]
+        assert missing == [], room
+        named = {word.rstrip(",;") for word in text.split() if word.rstrip(",;").endswith((".py", "/"))}
+        gone = [x for x in named if "/X" not in x and not list((ROOT / room).rglob(x.rstrip("/")))]
+        assert gone == [], room

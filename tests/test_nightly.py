@@ -24,6 +24,8 @@ from sweep.nights.chosen import chosen, in_order
 from sweep.nights.night import exit_code
 from sweep.nights.records import NightRecord, StudyRecord, append_history, read_history, read_night, write_night
 from sweep.study import load_study
+from tests.faults.ground import SLOW_DISK
+from tests.test_optimise_study import STUDY as OPTIMUM
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -141,14 +143,50 @@ def test_of_a_killed_night_its_datasets_tell_what_was_not_finished(tmp_path: Pat
     assert [one.name for one in in_order(chosen(paths, smoke=False), [killed])] == ["b", "a"]
 
 
-def test_a_night_whose_time_is_over_ends_with_124_and_latest_stays(tmp_path: Path) -> None:
+def test_a_night_whose_time_is_over_ends_with_124_and_latest_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = written(tmp_path / "one")
     first, _ = night(tmp_path / "nights", [path])
     assert (first.exit_code, first.good) == (0, True)
-    second, said = night(tmp_path / "nights", [written(tmp_path / "one", count=7)], budget=0.2)
+    monkeypatch.setenv("PYTHONPATH", str(SLOW_DISK))
+    monkeypatch.setenv("FAULTS_PAUSE", "30")  # the run is at work when its time is over, however fast it is
+    second, said = night(tmp_path / "nights", [written(tmp_path / "one", count=1000)], budget=0.2)
     assert (second.exit_code, second.good, second.studies["tiny"].state) == (124, False, "cut")
     assert "cut off" in said[1]
     assert (tmp_path / "nights" / "latest").readlink() == Path(first.name)
+
+
+def test_a_search_that_time_has_cut_short_is_said_and_made_again_the_next_night(tmp_path: Path) -> None:
+    study = tmp_path / "small" / "study.toml"
+    study.parent.mkdir()
+    whole = OPTIMUM.format(swing=40)
+    study.write_text(whole.replace("starts = 3\n", 'starts = 3\ntime_budget = "1e-9 s"\n'))
+    first, _ = night(tmp_path / "nights", [study])
+    record = first.studies["small"]
+    assert record.state == "complete" and "0 of 3 starts" in record.message and "time_budget" in record.message
+    old = tmp_path / "nights" / first.name
+    again = carry(load_study(study), [old], tmp_path / "second" / "small")
+    assert again is not None and again.chunks == record.computed and not again.whole
+    study.write_text(whole)
+    sweep.run(study, tmp_path / "third" / "small" / "designs", jobs=1)
+    found = carry(load_study(study), [tmp_path / "third", old], tmp_path / "fourth" / "small")
+    assert found is not None and found.whole
+
+
+def test_the_command_of_the_user_has_the_night_the_code_and_the_log(tmp_path: Path) -> None:
+    script = tmp_path / "tell.sh"
+    script.write_text(f'echo "$LINKSWEEP_CODE $LINKSWEEP_NIGHT" > {tmp_path}/told; cat >> {tmp_path}/told\n')
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    (broken / "study.toml").write_text("[study")
+    said: list[str] = []
+    settings = Settings(tmp_path / "nights", 100.0, jobs=1, on_change=f"sh {script}")
+    result = nightly([broken], settings, said.append)
+    head, *log = (tmp_path / "told").read_text().splitlines()
+    assert head == f"2 {(tmp_path / 'nights' / result.name).resolve()}" and result.exit_code == 2
+    assert any("broken: failed with 2" in line for line in log)
+    assert said[-1].endswith("--on-change ran")
 
 
 def test_chunks_of_a_night_that_was_cut_off_are_taken_over_and_damaged_ones_are_not(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -228,7 +229,16 @@ def test_one_fault_gives_one_message_with_file_key_value_and_what_is_allowed(nam
     old, new, pieces = FAULTS[name]
     assert RIGHT.count(old) >= 1
     (message,) = faults_of(RIGHT.replace(old, new, 1), tmp_path)
-    assert message.startswith("study.toml: ")
+    at = RIGHT.index(old)
+    first = RIGHT.count("\n", 0, at) + 1
+    heading = RIGHT.count("\n", 0, RIGHT.rfind("\n[", 0, at) + 1) + 1
+    if name == "objective missing":  # a table that is missing stands nowhere
+        first = number = 0
+        assert message.startswith("study.toml: ")
+    else:
+        number = int(re.match(r"study\.toml:(\d+): ", message)[1])
+    assert number == heading or first <= number <= first + new.count("\n")
+    assert number == first or "missing" in message or "\n" in new or new == ""
     assert "allowed: " in message or "needed: " in message
     for piece in pieces:
         assert piece in message
@@ -275,7 +285,7 @@ def test_a_misspelt_family_does_not_hide_the_other_faults(tmp_path: Path) -> Non
 def test_a_table_that_is_a_number(table: str, tmp_path: Path) -> None:
     blocks = [block for block in RIGHT.split("\n[") if not block.startswith((f"{table}]", f"{table}."))]
     messages = faults_of(f"{table} = 3\n" + "\n[".join(blocks), tmp_path)
-    assert any(message.startswith(f"study.toml: {table} = 3; allowed: a table") for message in messages)
+    assert any(message.startswith(f"study.toml:1: {table} = 3; allowed: a table") for message in messages)
 
 
 @pytest.mark.parametrize("table", ["study", "mechanism", "design"])
@@ -372,4 +382,5 @@ def test_a_fault_is_told_of_the_file_it_stands_in(tmp_path: Path) -> None:
     with pytest.raises(StudyError) as caught:
         load_study(tmp_path, smoke=True)
     places = [" ".join(fault.split()[:2]).rstrip(":") for fault in caught.value.faults]
-    assert places == ["study.toml: optimise.starts", "smoke.toml: design.h", "smoke.toml: design.c.count"]
+    line = RIGHT.count("\n", 0, RIGHT.index("starts = 10")) + 1
+    assert places == [f"study.toml:{line}: optimise.starts", "smoke.toml:3: design.h", "smoke.toml:2: design.c.count"]

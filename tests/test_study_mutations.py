@@ -9,6 +9,7 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 
@@ -47,20 +48,21 @@ def no_longer_than(seconds: int) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def outcome(text: str, folder: Path) -> str:
+def outcome(text: str, folder: Path, *, searched: int = 1, drawn: int = 4) -> str:
     """What becomes of a study file: "answered", "refused", or what is wrong with the answer.
 
-    A second time nothing has to be compiled.
+    A second time nothing has to be compiled.  Optimum and front are searched for one in ``searched`` of the studies,
+    figures are drawn for one in ``drawn``; the rest is computed and gathered.
     """
-    begin = time.monotonic()
+    begin = time.process_time()
     try:
-        return _outcome(text, folder, COMPILING)
+        return _outcome(text, folder, COMPILING, searched, drawn)
     finally:
-        if time.monotonic() - begin > SECONDS:
-            _outcome(text, folder.with_name(f"{folder.name}-again"), SECONDS)
+        if time.process_time() - begin > SECONDS:
+            _outcome(text, folder.with_name(f"{folder.name}-again"), SECONDS, searched, drawn)
 
 
-def _outcome(text: str, folder: Path, seconds: int) -> str:
+def _outcome(text: str, folder: Path, seconds: int, searched: int, drawn: int) -> str:
     folder.mkdir()
     (folder / "study.toml").write_bytes(text.encode("utf-8", "surrogatepass"))
     try:
@@ -69,8 +71,11 @@ def _outcome(text: str, folder: Path, seconds: int) -> str:
             check_budget(study, estimate(study, 1))
             if study.space.count > MOST_DESIGNS:
                 return "large"
+            lot = zlib.crc32(text.encode("utf-8", "surrogatepass"))
+            if lot % searched:
+                study = replace(study, optimise=None, pareto=None)
             rows = sweep.load(run(study, folder / "designs", jobs=1))
-            if zlib.crc32(text.encode("utf-8", "surrogatepass")) % 4:
+            if lot % drawn:
                 gather(folder / "designs")
             else:  # figures take most of the time
                 write_report(folder / "designs")
@@ -108,12 +113,6 @@ def test_the_files_that_are_mutated_are_sound(tmp_path: Path) -> None:
 def test_numbers_at_the_ends_of_what_a_number_can_be(text: str, old: str, new: str, tmp_path: Path) -> None:
     assert text.count(old) == 1
     assert outcome(text.replace(old, new), tmp_path / "study") in ("answered", "refused")
-
-
-def test_mutated_study_files_are_answered_or_refused(tmp_path: Path) -> None:
-    found, ends = wrong(range(200), tmp_path)
-    assert not found, "\n".join(found)
-    assert ends["answered"] > 10 and ends["refused"] > 100, ends
 
 
 @pytest.mark.long

@@ -307,7 +307,7 @@ def test_complex_step_gives_the_gradients_of_the_locus(family):
     ("family", "change", "words"),
     [
         ("rssr", {"swing": 0.0}, "column swing, row 0"),
-        ("rssr", {"swing": 7.0}, "between 0 and 2 pi"),
+        ("rssr", {"swing": 7.0}, "at most 2 pi"),
         ("rssr", {"phi0": -1.0}, "column phi0, row 0"),
         ("rssr", {"alpha": math.nan}, "finite"),
         ("rssr", {"phi1": None}, "phi1.*or swing, phi0, psi1"),

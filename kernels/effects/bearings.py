@@ -1,8 +1,8 @@
 """B1, B2: sliding and rolling bearings of the rocker shaft under the coupler force, and the angles they permit.
 
-Dynamics sheet, section 4 (Polukhin 1971, (15)-(17) as corrected).  Only the direction of the coupler force enters: its
-in-plane part P has the tangential and radial shares cos(theta1), sin(theta1), and ``axial`` = sin(theta1) tan(theta2)
-is the axial force in units of P.  That product stays finite where theta2 does not (no radial force).
+Polukhin 1971, (15)-(17), with his misprints corrected.  Only the direction of the coupler force enters: its in-plane
+part P has the tangential and radial shares cos(theta1), sin(theta1), and ``axial`` = sin(theta1) tan(theta2) is the
+axial force in units of P.  The product stays finite where theta2 does not, which is where there is no radial force.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """C0: orientation of the coupler, its rates, and the motion of a point on it.
 
 A ball joint with a finger is a universal joint: its first axis ``w`` is fixed in the neighbouring link, its second axis
-``n`` in the coupler, normal to w and to the coupler (spatial-linkages sheet, section 4; Polukhin 1971, 2.6).
+``n`` in the coupler, normal to w and to the coupler (Polukhin 1971, 2.6).
 
 * finger on the driven joint C: w = rho (the line D-C; on a slider the common perpendicular, which is ours),
   n = branch (w x s)/|w x s|; degenerates only at a dead point, |w x s| >= cos(pressure angle);
@@ -46,7 +46,7 @@ class Coupler(NamedTuple):
 
 @inline
 def orientation(j: Joints, construction: float) -> Coupler:
-    """Orientation and rates of the coupler for one pose (sheet 4.1, 4.2, primes with respect to the crank angle)."""
+    """Orientation and rates of the coupler for one pose; primes are derivatives with respect to the crank angle."""
     v_b, a_b = scale(j.a, j.tau_b), scale(-j.a, j.rho_b)
     v_c = scale(j.c * j.dpsi, j.tau)
     a_c = mix(j.c * j.d2psi, j.tau, -j.turns * j.c * j.dpsi * j.dpsi, j.rho)
@@ -77,7 +77,7 @@ def orientation(j: Joints, construction: float) -> Coupler:
 
 @inline
 def euler_angles(j: Joints, body: Coupler, construction: float) -> tuple[float, float]:
-    """Euler angles of the coupler but for its precession (sheet 4.3), in all quadrants.
+    """Euler angles of the coupler but for its precession, in all quadrants.
 
     Finger on C: Rz(psi) Rx(Theta) Rz(Phi) turns x to s and z to n.  Finger on B: the precession is 90 deg - alpha about
     x, which brings z to u; Theta turns about u, Phi about the new x, and y becomes s.

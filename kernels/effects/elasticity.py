@@ -1,6 +1,7 @@
 """E1, E2: longitudinal elasticity of the coupler: quasi-static lag of the follower and its periodic steady state.
 
-Dynamics sheet, section 5.  With p = c t_tau (signed) and eta = psi - psi_0 of the rigid linkage
+The numbered formulas are those of docs/effects.md.  With p = c t_tau (signed) and eta = psi - psi_0 of the rigid
+linkage
 
     J w^2 eta'' + h w p^2 eta' + (k p^2 + h w p p') eta = M - J w^2 psi_0''
 

@@ -1,13 +1,13 @@
 """D2: friction of ball joints, crank shaft and follower's guidance (shaft or way), by successive approximations.
 
-Dynamics sheet, section 2.1.  Couples follow from the latest reactions, the dyad is solved again with them, and so on;
-the reactions are affine in the couples and the couples are norms of reactions, so the iteration contracts for ordinary
-lubrication (6-15 passes) and diverges where the linkage jams.  A pass that fails to shrink the correction five times
-in a row, or the cap, ends in JAMMED: the last iterate is never given out.  Close to jamming the corrections form a slow
-geometric series, whose rest is added every tenth pass.
+The friction couples follow from the latest reactions, the reactions are solved again with these couples, and so on.
+Reactions are linear in the couples, and couples are norms of reactions, so the iteration contracts for ordinary
+lubrication (6 to 15 passes) and diverges where the linkage jams.  If five passes in a row do not shrink the correction,
+or the largest number of passes is reached, the status is JAMMED; the last iterate is never given out.  Near jamming the
+corrections form a slow geometric series, whose remainder is added every tenth pass.
 
-As the reactions are affine, the answers to the three couples (B, C, guidance) are found once per pose and a pass is
-a sum of four vectors.  Their norms bound the contraction: rho(L) < 1 proves a unique solution.
+Because the reactions are linear, those to each of the three couples (B, C, guidance) are found once per pose, and a
+pass is a sum of four vectors.  Their norms bound the contraction: rho(L) < 1 proves that the solution is unique.
 """
 
 from __future__ import annotations
@@ -69,9 +69,10 @@ def _columns(friction: Array, i: int) -> Friction:
 
 @inline
 def _of_moving(f: Friction, load: Loads) -> Friction:
-    """The columns with no friction at a ball joint whose links turn together: there is no direction it could have.
+    """Set the friction of a ball joint to zero where its links turn together, since it has no direction there.
 
-    In planar linkages coupler and rocker do so where the crank points along the frame; what is left is rounding.
+    In planar linkages coupler and rocker turn together where the crank points along the frame; their relative speed is
+    rounding then.
     """
     size1, size2, size3 = norm(load.omega1), norm(load.omega2), norm(load.omega3)
     at_b = norm(sub(load.omega2, load.omega1)) > STILL * (size1 + size2)
@@ -180,7 +181,7 @@ def friction_loads(
 def _answers(
     j: Joints, coupler: Coupler, load: Loads, finger: float, f: Friction, speed_d: float, answers: Array
 ) -> Vector:
-    """The reactions without friction and those to each of the three couples alone, whose sizes are returned."""
+    """Solve the reactions without friction, then those to each couple alone; return the three couples' sizes."""
     turn_b = _unit(sub(load.omega2, load.omega1))
     turn_c = _unit(sub(load.omega2, load.omega3))
     unit_b, unit_c, unit_d = 0.0, 0.0, 0.0
@@ -202,7 +203,7 @@ def _answers(
 
 
 class Couples(NamedTuple):
-    """Where the iteration ended: the couples of B, C and the guidance, first in units of their first guesses."""
+    """Result of the iteration: couples of B, C, guidance as multiples of their first guesses, then their sizes."""
 
     x: float
     y: float
@@ -218,7 +219,7 @@ class Couples(NamedTuple):
 def _settled(
     assembled: bool, answers: Array, f: Friction, axis: Vector, speed_d: float, unit: Vector, total: Array
 ) -> Couples:
-    """Find the couples that make the reactions they follow from, by successive approximations."""
+    """Find by successive approximations the couples that agree with the reactions which they cause."""
     x, y, z, size_b, size_c, t_d = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     dx0, dy0, dz0, last, least = 0.0, 0.0, 0.0, math.inf, math.inf
     stalled, count, converged = 0, 0, False
@@ -253,7 +254,7 @@ def _share(size: float, unit: float) -> float:
 
 @inline
 def _total(answers: Array, x: float, y: float, z: float, total: Array) -> None:
-    """Everything under the three couples in units of their first guesses."""
+    """Sum the reactions without friction and those to the three couples, given as multiples of their first guesses."""
     for at in range(ANSWER):
         total[at] = answers[0, at] + x * answers[1, at] + y * answers[2, at] + z * answers[3, at]
 
@@ -266,7 +267,7 @@ def _guidance(total: Array, axis: Vector, f: Friction) -> tuple[float, float, fl
 
 @inline
 def _contraction(answers: Array, m: Array, f: Friction, axis: Vector, units: Vector) -> float:
-    """Spectral radius of m = L, L_ij = mu_i r_i |d reaction_i / d couple_j|."""
+    """Compute the spectral radius of L, L_ij = mu_i r_i |d reaction_i / d couple_j|; L is written into m."""
     for which in range(3):
         unit = abs(units[which])
         per = 1.0 / unit if unit > 0.0 else 0.0
@@ -297,7 +298,10 @@ def _contraction(answers: Array, m: Array, f: Friction, axis: Vector, units: Vec
 
 @inline
 def _leap(along: float, square: float) -> float:
-    """Steps that lie ahead if each is the share along/square of the one before: 1/(1 - share); 1 unless they shrink."""
+    """Sum what remains of a geometric series of steps, in units of the next one: 1/(1 - q) with q = along/square.
+
+    It is 1, the plain step, where the steps do not shrink.
+    """
     return square / (square - along) if abs(along) < square else 1.0
 
 

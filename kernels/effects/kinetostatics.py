@@ -1,9 +1,9 @@
 """D1, D3: joint reactions, finger couple, driving torque and reduced inertia of crank, coupler and follower.
 
-The dyad solution of the dynamics sheet, section 2: the coupler's moment balance gives the finger couple and the part of
-the force at B normal to the coupler, the follower's gives the axial force: a rocker's about its axis, a slider's along
-its way.  Friction couples enter affinely, so the
-friction effect calls :func:`solve` again with its couples.
+Coupler and follower are solved together, by the numbered formulas of docs/effects.md.  The coupler's balance of moments
+gives the finger couple and the part of the force at B across the coupler.  The part along the coupler follows from the
+follower: of a rocker from the moments about its axis, of a slider from the forces along its way.  Friction couples
+enter linearly, so the friction effect calls :func:`solve` again with its couples.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """B1: how far the bearings of the rocker are used, and the radial pressure angle they permit.
 
-Dynamics sheet, section 4: at a given axial angle theta2 the loads grow with the radial angle theta1; the permissible
-one is the first crossing of utilisation = 1.  Utilisation is the largest mean pressure, or equivalent load, over its
+At a given axial angle theta2 the loads grow with the radial angle theta1.  The permissible theta1 is the first at which
+the utilisation passes 1.  Utilisation is the largest mean pressure, or equivalent load, over its
 permissible value; it is infinite where friction locks.
 """
 

@@ -1,7 +1,7 @@
 """P2, P3: direction of the coupler force at the follower and at the crank.
 
-Dynamics sheet, section 1.1.  t = components of the unit coupler vector along (tangential, radial, axial) directions of
-the follower; angles are formed from them by arctangents for reporting only: theta2 is undetermined where t_rho = 0.
+t_tau, t_rho, t_k are the components of the coupler's unit vector along the tangential, radial and axial direction of
+the follower.  Angles are formed from them by arctangents for reporting only: theta2 is undetermined where t_rho = 0.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """P1: every extremum of the pressure angle over a turn, in closed form but for the roots of a quartic.
 
-The component of the coupler's unit vector across the velocity of the driven joint draws an ellipse
-(r0 + rc cos + rs sin, k0 + kc cos + ks sin) whose distance from the origin is sin(pressure angle), so the extrema are
-the feet of the normals from a point to an ellipse: 2 or 4 (dynamics sheet, sections 1.2 and 1.3).  With the sheet's
-names, half the derivative of the squared distance is a1 cos + b1 sin + a2 cos 2phi + b2 sin 2phi.
+The component of the coupler's unit vector across the velocity of the driven joint draws an ellipse (r0 + rc cos + rs
+sin, k0 + kc cos + ks sin) whose distance from the origin is sin(pressure angle), so the extrema are the feet of the
+normals from a point to an ellipse, 2 or 4 of them (docs/effects.md, P1).  Half the derivative of the squared distance
+is a1 cos + b1 sin + a2 cos 2phi + b2 sin 2phi.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ ROUNDING = 16.0
 
 @inline
 def slope_coefficients(r0: float, rc: float, rs: float, k0: float, kc: float, ks: float) -> tuple[float, ...]:
-    """a1, b1, a2, b2 of the sheet."""
+    """Give a1, b1, a2, b2, the coefficients of half the derivative of the squared distance."""
     a1, b1 = r0 * rs + k0 * ks, -(r0 * rc + k0 * kc)
     a2, b2 = rc * rs + kc * ks, 0.5 * ((rs - rc) * (rs + rc) + (ks - kc) * (ks + kc))
     return a1, b1, a2, b2
@@ -38,7 +38,10 @@ def slope_coefficients(r0: float, rc: float, rs: float, k0: float, kc: float, ks
 
 @inline
 def extrema_expected(a1: float, b1: float, a2: float, b2: float) -> float:
-    """4 inside the astroid, 2 outside, 3 on it, 0 if the curve is constant."""
+    """Say how many extrema there are: 4 if the origin lies inside the ellipse's evolute, 2 outside, 3 on it.
+
+    0 if the curve is a point.
+    """
     size = math.hypot(a2, b2)
     if size == 0.0:
         return 0.0 if a1 == 0.0 and b1 == 0.0 else 2.0
@@ -154,7 +157,7 @@ def pressure_extrema(
 
 @inline
 def _order(phi: Array, theta: Array, number: int, sign: float, out: Array) -> None:
-    """The outermost extremum of one kind, then the other of that kind: kinds alternate over the turn."""
+    """Sort the extrema: the outermost of one kind, then the other of that kind; the kinds alternate over the turn."""
     best = 0
     for k in range(1, number):
         if sign * theta[k] > sign * theta[best]:

@@ -1,9 +1,9 @@
 """D4: fluctuation of the crank speed over a turn in the steady state of a drive of constant mean speed.
 
-Dynamics sheet, section 3: W is the zero-mean primitive of the torque excess, omega = sqrt(2 (E + W)/J), and E follows
-from the mean speed in time, 2 pi / omega_mean = the integral of d phi / omega, which falls strictly with E.
+W is the integral of the excess of torque over the crank angle, less its mean.  The speed is omega = sqrt(2 (E + W)/J).
+The constant E follows from the mean speed in time: 2 pi / omega_mean is the integral of d phi / omega, which falls
+strictly with E.  The effect needs the whole turn and takes samples on a uniform odd grid.
 A motor whose torque falls with the speed answers to it: kernels/effects/motor_line.py.
-A whole-turn effect: it takes samples on a uniform odd grid.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ def speed_fluctuation(
 def _settled(
     jc: Array, js: Array, wc: Array, ws: Array, inertia: Array, work: Array, mean_speed: float, e: float, still: float
 ) -> float:
-    """E on finer and finer grids until it stands still; nan where the machine all but stands for a moment (stall).
+    """Find E on finer and finer grids until it no longer changes; nan where the machine nearly stands still (stall).
 
     The slower it gets, the sharper the peak of 1/omega: a grid that resolves J and W may miss it.
     """
@@ -146,7 +146,7 @@ def _settled(
 
 @inline
 def _energy(inertia: Array, work: Array, mean_speed: float, e: float) -> float:
-    """Newton on the period from E = e, kept above -min W; nan where the period stays too short even there (stall)."""
+    """Find E by Newton's method on the period, from e; E stays above -min W, and nan says that the machine stalls."""
     n, low = work.size, -math.inf
     for j in range(n):
         low = max(low, -work[j])
@@ -175,7 +175,7 @@ def _energy(inertia: Array, work: Array, mean_speed: float, e: float) -> float:
 
 @inline
 def _extreme(jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float, inertia: Array, work: Array) -> float:
-    """Largest (sign +1) or smallest (-1) speed: best of the finer samples, then bisection on the slope beside it."""
+    """Find the largest (sign +1) or smallest (-1) speed: the best sample first, then its slope's zero by bisection."""
     best, where, step = -math.inf, 0.0, 2.0 * math.pi / work.size
     for j in range(work.size):
         value = sign * (e + work[j]) / inertia[j]

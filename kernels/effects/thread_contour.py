@@ -1,6 +1,7 @@
-"""T1: tension of a thread that is pulled over a contour of radius R; the law of the source, restored.
+"""T1: tension of a thread that is pulled over a contour of radius R.
 
-Dynamics sheet, section 6.1; the equation numbers are those of docs/thread.md.  The two-term law of friction
+The law is that of the source with its misprints corrected; the equation numbers are those of docs/thread.md.  The
+two-term law of friction
 
     dT/dtheta = beta (T + B/(R + r)^2) + alpha R,      r = 1/sqrt(pi gamma N)                                (1), (2)
 

@@ -1,6 +1,6 @@
 """T2: what the speed of the thread makes of the tension behind the disc tensioner.
 
-Dynamics sheet, section 6.2; docs/thread.md (7), (8).
+The equation numbers are those of docs/thread.md: (7), (8).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """U3: a tool on the coupler, such as a needle bar: its inertia, weight and working force as a load of the coupler.
 
-Additions sheet 5; the equation numbers are those of docs/tool.md.  A rod of mass m moves along a fixed direction lam
+The equation numbers are those of docs/tool.md.  A rod of mass m moves along a fixed direction lam
 with the point M of the coupler that it hangs on.  Its momentum along lam gives the force of the rod on the coupler,
 
     F_M = -(m (s'' omega^2 + s' eps - g . lam) - F) lam,      s' = v_M . lam, s'' = a_M . lam                 (1), (2)

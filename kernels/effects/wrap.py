@@ -1,6 +1,6 @@
 """W1, U1: thread over a point that moves in any way: wrap angle, length and the derivatives of the length.
 
-Dynamics sheet, section 7, additions 13: the direct length L = |E - N1| + |E - N2| holds for an eyelet on any link.
+The thread runs from guide N1 over E to guide N2; its length L = |E - N1| + |E - N2| holds for an eyelet on any link.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Crank-rockers (RSSR) from swing and crank angle between the limits; equations (1)-(8a) of docs/synthesis.md.
+"""Link lengths of crank-rockers (RSSR) from the swing and the crank angle between the limit positions.
 
-Position 1 is extended, position 2 folded; X, Y are the coordinates of the rocker ball about the rocker axis, h = g sin
-alpha.  In both positions the ball lies in the plane of crank axis and crank: two linear equations for X1, Y1 once the
-crank angles phi1 and phi2 = phi1 + phi0 are given.  All differences that vanish with the swing are written with
+Equations (1)-(8a) of docs/synthesis.md, in the frame of the family (docs/rssr.md).  Position 1 is the extended one,
+position 2 the folded one.  X, Y are the coordinates of the rocker ball measured from the rocker axis, and h = g sin
+alpha.  In both positions the ball lies in the plane of crank axis and crank.  These are two linear equations for X1, Y1
+once the crank angles phi1 and phi2 = phi1 + phi0 are given.  Differences that vanish with the swing are written with
 sin(swing/2), so a swing of 1e-9 rad costs no digit.
 """
 
@@ -20,7 +21,7 @@ from kernels.synthesis.angles import PI, sine_cosine
 
 
 class _Requirement(NamedTuple):
-    """One row of the requirements and the sines it needs."""
+    """One row of the requirements with the sines and cosines that the equations need."""
 
     e: float
     f: float
@@ -52,12 +53,12 @@ def _requirement(requirements: Array, i: int, e: float, f: float, g: float) -> _
     sa, ca = sine_cosine(alpha)
     valid = 0.0 < abs(swing.real) < 2.0 * PI and 0.0 < phi0.real < 2.0 * PI and abs(alpha.real) < 1e5
     valid = valid and abs(requirements[i, 2].real) < 1e5 and abs(e.real) + abs(f.real) + abs(g.real) < 1e150
-    branch = -1.0 if swing.real > 0.0 else 1.0  # sheet (3-sgn)
+    branch = -1.0 if swing.real > 0.0 else 1.0  # (3) of docs/synthesis.md and its sign
     return _Requirement(e, f, g, alpha, g * sa, sa, ca, sh, ch, 2.0 * sh * ch, 2.0 * sh * sh, s0, c0, branch, valid)
 
 
 class _Point(NamedTuple):
-    """A point of the locus: the ball at the extended position, its projections on the crank at both limits."""
+    """A point of the locus: the extended ball's x and y, and the ball's projections on the crank at both limits."""
 
     x: float
     y: float
@@ -68,7 +69,8 @@ class _Point(NamedTuple):
 
 @inline
 def _point(r: _Requirement, u1: float, v1: float) -> _Point:
-    """Equations (1)-(3): the two linear equations solved, with every difference that vanishes written out."""
+    """Solve the two linear equations (1)-(3) in a form without cancellation for small swings."""
+    # Differences of both positions are written with sin(swing) and 1 - cos(swing), which vanish with the swing.
     u2, v2 = u1 * r.cos_phi0 - v1 * r.sin_phi0, v1 * r.cos_phi0 + u1 * r.sin_phi0
     ss, q, ca = r.sin_swing, r.versed, r.ca
     along = ca * (1.0 - q) * r.sin_phi0
@@ -87,13 +89,13 @@ def _finish(
     r: _Requirement, point: bool, x1: float, y1: float, ahead: float, back: float, u1: float, v1: float,
     i: int, status: Status, failed: Status, designs: Array,
 ) -> None:  # fmt: skip
-    """Crank and coupler of (6), (7), the tests (i)-(iii), and the row of the design matrix."""
+    """Compute crank and coupler by (6), (7), make the tests (i)-(iii), and write the row of the design matrix."""
     c = np.sqrt(x1 * x1 + y1 * y1)
     x_mid, y_mid = x1 * r.cos_half - y1 * r.sin_half, y1 * r.cos_half + x1 * r.sin_half
     a = 2.0 * r.sin_half * (r.e * y_mid + r.f * r.sa * x_mid) / (ahead - back)
     axial, radial = r.g * r.ca + y1 * r.sa - r.f, ahead - a
     b = np.sqrt(axial * axial + radial * radial)
-    # c dF/dpsi/(2 c) = -X sin psi - Y cos psi at both limits
+    # t1, t2 have the sign of dF/dpsi, the assembly mode: c dF/dpsi/(2 c) = -X sin psi - Y cos psi at both limits
     x2, y2 = x_mid * r.cos_half - y_mid * r.sin_half, y_mid * r.cos_half + x_mid * r.sin_half
     u2, v2 = u1 * r.cos_phi0 - v1 * r.sin_phi0, v1 * r.cos_phi0 + u1 * r.sin_phi0
     t1 = -(r.e - a * u1) * y1 - (r.f * r.sa + a * r.ca * v1) * x1
@@ -112,7 +114,7 @@ def _finish(
 
 @kernel
 def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: Array, psi1: Array | None) -> None:
-    """Crank-rockers at given crank angles of the extended position: the linear parametrisation of the locus.
+    """Find the crank-rockers whose extended position is at given crank angles: on this way the locus is linear.
 
     Equations (1)-(7) of docs/synthesis.md.
 
@@ -141,7 +143,9 @@ def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: 
 
 @kernel
 def rssr_of_size(requirements: Array, status: Status, failed: Status, designs: Array, psi1: Array | None) -> None:
-    """Crank-rockers of given rocker length: e and g follow from their ratio, as c grows with both and f is not in it.
+    """Find the crank-rockers of given rocker length; e and g are computed from their ratio.
+
+    That is possible because the rocker's length grows in proportion to both, and f does not enter it.
 
     Equations (1)-(7) of docs/synthesis.md at e = cos(direction), g = sin(direction), then scaled.
 
@@ -177,7 +181,7 @@ def rssr_of_size(requirements: Array, status: Status, failed: Status, designs: A
 
 @kernel
 def rssr_points(requirements: Array, points: Array) -> None:
-    """Points of the locus alone, before any link is chosen: they do not depend on f.
+    """Compute points of the locus alone, before links are chosen; they do not depend on f.
 
     Parameters
     ----------
@@ -200,7 +204,7 @@ def rssr_points(requirements: Array, points: Array) -> None:
 def rssr_at_direction(
     requirements: Array, root: Array, status: Status, failed: Status, designs: Array, phi1: Array | None
 ) -> None:
-    """Crank-rockers at given rocker angles of the extended position: a quadratic equation for the rocker length.
+    """Find the crank-rockers whose extended position is at given rocker angles, by a quadratic for the rocker length.
 
     Equations (5)-(8a) of docs/synthesis.md.
 
@@ -238,7 +242,8 @@ def rssr_at_direction(
         rho1, rho2 = math.sqrt(qx1 * qx1 + qy1 * qy1), math.sqrt(qx2 * qx2 + qy2 * qy2)
         u1, v1 = qx1 / rho1, qy1 / rho1
         if rho1 < 0.5 * (abs(r.e) + abs(r.h)):
-            # close to the crank axis the ball does not tell phi1 well: (8a) does, up to half a turn
+            # Near the crank axis the ball's direction has few digits. There (8a) gives phi1 but for half a turn,
+            # and the ball decides about that.
             apart = -root[i] * far
             twice = math.atan2(big_a * apart - big_b * big_d, big_a * big_d + big_b * apart)
             sine, cosine = sine_cosine(0.5 * (twice - requirements[i, 1]))

@@ -13,7 +13,7 @@ PARAMETERS = ("a", "b", "c", "e", "f", "g", "alpha")
 
 @inline
 def _at_limit(designs: Array, i: int, psi: float, phi: float, rates: Array, place: int) -> None:
-    """Into rates[i, :, place] dpsi/dp, into rates[i, :, place + 1] dphi/dp for the seven parameters p."""
+    """Write dpsi/dp into rates[i, :, place] and dphi/dp into rates[i, :, place + 1], for the seven parameters p."""
     a, b, c, e = designs[i, 0], designs[i, 1], designs[i, 2], designs[i, 3]
     f, g = designs[i, 4], designs[i, 5]
     sa, ca = sine_cosine(designs[i, 6])

@@ -158,7 +158,7 @@ def _outputs(m: Measured) -> list[str]:
         "",
         *prose(
             "Every output and every effect of the register in one run, 360 poses a turn: outputs of the",
-            "crank-rocker alone with all they need; effects (`make bench-effects`) on the first family named, all",
+            "crank-rocker alone with all they need; effects (`make bench`) on the first family named, all",
             "their outputs together, the motion they share apart. Pose outputs, and how many times the angle psi:",
         ),
         "",

@@ -1,7 +1,8 @@
-"""Designs through the outputs of a study, cheapest first; only those within every limit so far go on.
+"""Designs through the outputs of a study, quick routes first; only those within every limit so far go on.
 
 Few designs survive the first limits, and the dear routes cost a millisecond or more however few they are given.  So
-survivors wait before each route until there are enough of them, or until no more come.
+survivors wait before each route until there are enough of them, or until no more come.  Measured times say how many
+are enough, and nothing else: a design's row does not depend on them.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as codes
+from sweep.costs import nanoseconds
 from sweep.effects import called_for
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array, Columns
 from sweep.families.chain import stages_of
 from sweep.quantities.names import by_magnitude, error_of, parts
-from sweep.synthesis.fit import NS_FIT, fit_line
+from sweep.synthesis.fit import fit_line
 
 if TYPE_CHECKING:
     from sweep.study import Limit, Study
@@ -35,8 +37,6 @@ CALL_SECONDS = 1e-3
 
 Number = TypeVar("Number", float, Array)
 
-# A clockwise and an anticlockwise follower of the same amplitude meet the same requirement.
-
 # With these one output is missing or rough, the others are worth having where all rows are kept.
 PARTIAL = (
     codes.NOT_OSCILLATING, codes.NOT_CONVERGED, codes.JAMMED, codes.NOT_LINEAR, codes.SINGULAR, codes.INVALID_INPUT,
@@ -44,19 +44,19 @@ PARTIAL = (
 
 
 class Dropped(Exception):
-    """The work was given up half way because the run was asked to stop."""
+    """Raised where work is given up half way because the run was asked to stop."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """One stop of the cascade: a route, or without one the fit and the limits on parameters; its cost."""
+    """One level of the cascade with its cost: a route; where it is None, the fit and the limits on parameters."""
 
     route: Route | None
     ns_per_design: float
 
     @property
     def batch(self) -> int:
-        """Designs that are worked on at once."""
+        """How many designs are worked on at once."""
         return int(min(max(1e9 * BATCH_SECONDS / max(self.ns_per_design, 1.0), FEWEST), BLOCK))
 
 
@@ -70,19 +70,19 @@ class Batch:
     status: NDArray[np.uint8]
 
     def only(self, which: NDArray[np.bool_] | slice) -> Batch:
-        """Some of them."""
+        """Take some of the designs."""
         outputs = {name: values[which] for name, values in self.outputs.items()}
         return Batch(self.index[which], self.designs[which], outputs, self.status[which])
 
     def ordered(self) -> Batch:
-        """The same designs in the order of their index."""
+        """Sort the designs by their index."""
         order = np.argsort(self.index, kind="stable")
         outputs = {name: values[order] for name, values in self.outputs.items()}
         return Batch(self.index[order], self.designs[order], outputs, self.status[order])
 
     @classmethod
     def joined(cls, batches: Sequence[Batch]) -> Batch:
-        """All designs of some batches with the same outputs."""
+        """Join batches that have the same outputs."""
         if len(batches) == 1:
             return batches[0]
         return cls(
@@ -97,7 +97,7 @@ class Batch:
 class Cascade:
     """The designs of a study on their way through its levels.
 
-    What a design gets does not depend on those it waits with, so neither on how it is fed.
+    A design's row does not depend on the designs that wait beside it, so it does not depend on how they are fed.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ class Cascade:
         self._work(0, whole=False)
 
     def end(self, names: Sequence[str]) -> Batch:
-        """Nothing more comes: everything that waits is done.
+        """Finish every design that still waits, and hand out the results.
 
         Returns
         -------
@@ -155,7 +155,7 @@ class Cascade:
         return result.ordered()
 
     def _work(self, number: int, whole: bool) -> None:
-        """Do what waits at a level, and at those behind it: full batches, or everything."""
+        """Work on what waits at a level and at those behind it: on full batches only, or on everything."""
         if number == len(self._levels):
             return
         level, waiting = self._levels[number], self._waiting[number]
@@ -175,7 +175,7 @@ class Cascade:
             self._work(number + 1, whole=False)
 
     def _computed(self, route: Route, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
-        """A batch with the outputs of a route, and which of its designs go on."""
+        """Add the outputs of a route to a batch, and say which of its designs go on."""
         study = self.study
         found = self._found(route, batch)
         status = np.where(batch.status == codes.OK, found["status"], batch.status)
@@ -190,7 +190,7 @@ class Cascade:
         return design_outputs(self.study.family, batch.designs, route.outputs, self.study.accuracy, self.study.window)
 
     def _fitted(self, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
-        """A batch with its fitted parameters, and which of its designs keep the limits on parameters."""
+        """Fit the parameters of a batch, and say which of its designs keep the limits on parameters."""
         study, designs, status = self.study, batch.designs, batch.status.copy()
         goes_on = np.ones(status.size, np.bool_)
         if study.fit is not None:
@@ -208,7 +208,7 @@ class Cascade:
         self.missed[limit.output] += int(exceeds.sum())
 
     def _sort(self, batch: Batch, goes_on: NDArray[np.bool_], number: int) -> None:
-        """Designs that go on wait at a level, if there is one more; the others leave."""
+        """Let the designs that go on wait at the next level, if there is one; the others leave."""
         if number == len(self._levels):
             goes_on = np.zeros(batch.index.size, np.bool_)
         elif goes_on.any():
@@ -223,7 +223,7 @@ class Cascade:
 
 @dataclass
 class Recalled(Cascade):
-    """A cascade whose designs have been through all levels once, and had every output.
+    """A cascade for designs whose outputs are all known from an earlier run with other limits.
 
     Parameters
     ----------
@@ -239,16 +239,16 @@ class Recalled(Cascade):
 
 
 def levels(study: Study) -> tuple[Level, ...]:
-    """The cascade of a study: its routes, cheapest first, those that must wait for [fit] behind it."""
+    """The levels of a study: its routes in the order of `Work`; those that need fitted parameters come after [fit]."""
     found = [Level(route, route.ns_per_design) for route in ordered_routes(study)]
     if study.fit is not None or study.parameter_limits:
         before = sum(_before_fit(study, route) for route in ordered_routes(study))
-        found.insert(before, Level(None, NS_FIT if study.fit is not None else 0.0))
+        found.insert(before, Level(None, nanoseconds("work", "fit") if study.fit is not None else 0.0))
     return tuple(found)
 
 
 def ordered_routes(study: Study) -> tuple[Route, ...]:
-    """The routes of a study, cheapest first, those that must wait for [fit] behind the others."""
+    """The routes of a study in the order of `Work`; those that need the fitted parameters come last."""
     found = routes(study.family, study.want, study.accuracy)
     return tuple(sorted(found, key=lambda route: not _before_fit(study, route)))
 
@@ -266,7 +266,7 @@ def _before_fit(study: Study, route: Route) -> bool:
 
 
 def compared(name: str, values: Number) -> Number:
-    """What limits and objectives compare: of a swing and a stroke the magnitude, of anything else the value itself."""
+    """Give what limits and objectives compare: the magnitude of a swing or stroke, the value of any other output."""
     return abs(values) if by_magnitude(name) else values
 
 

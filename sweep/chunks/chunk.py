@@ -1,4 +1,4 @@
-"""One chunk of a sweep: a run of consecutive designs, their parameters, and the rows that come of them."""
+"""One chunk of a sweep: consecutive designs of the space, their parameters, and the rows computed from them."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kernels.status import OK
 from sweep.chunks.cascade import BLOCK, Batch, Cascade, Recalled, levels
+from sweep.costs import nanoseconds
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
@@ -23,18 +24,12 @@ from sweep.synthesis.fit import fit_line
 if TYPE_CHECKING:
     from sweep.study import Study
 
-# Measured on one core of a Zen 4 [ns per design]: per parameter, per swept one of a lattice and of a sample (more where
-# its scale is logarithmic), and for what [locus] makes.
-NS_PARAMETER = 6.0
-NS_LATTICE, NS_SAMPLE, NS_SAMPLE_LOG = 3.0, 12.0, 130.0
-NS_LOCUS = 140.0
-
 
 @dataclass(frozen=True)
 class ChunkResult:
-    """Rows of a chunk, how many of its designs ended with which status (dropped rows included), and on which limit.
+    """Rows of a chunk, and the number of its designs by status and by missed limit; designs without a row count too.
 
-    A design counts with the first limit it misses, in the order in which they are tested.
+    A design counts with the first limit that it misses, in the order in which limits are tested.
     """
 
     columns: Columns
@@ -75,10 +70,12 @@ def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArra
 
 def parameter_ns(study: Study) -> float:
     """Estimated cost of the parameters of a design [ns]."""
-    own = NS_PARAMETER * len(study.family.parameters) + (NS_LOCUS if study.locus is not None else 0.0)
+    own = nanoseconds("work", "parameter") * len(study.family.parameters)
+    own += nanoseconds("work", "locus") if study.locus is not None else 0.0
     if study.space.kind == "product":
-        return own + NS_LATTICE * len(study.space.axes)
-    return own + sum(NS_SAMPLE_LOG if axis.scale == "log" else NS_SAMPLE for axis in study.space.axes)
+        return own + nanoseconds("work", "axis of a lattice") * len(study.space.axes)
+    plain, log = nanoseconds("work", "axis of a sample"), nanoseconds("work", "axis of a sample, log")
+    return own + sum(log if axis.scale == "log" else plain for axis in study.space.axes)
 
 
 def warm(study: Study) -> None:
@@ -102,9 +99,9 @@ def compute_chunk(
     should_stop: Callable[[], bool] = lambda: False,
     known: Columns | None = None,
 ) -> ChunkResult:
-    """Rows of the designs start, ..., stop - 1: index, parameters, wanted outputs, status.
+    """Compute the rows of the designs start, ..., stop - 1: index, parameters, wanted outputs, status.
 
-    The work goes block by block, so memory is a few blocks and the rows that are kept.
+    Designs are made and worked on in blocks, so memory holds a few blocks and the rows that are kept.
 
     Parameters
     ----------
@@ -150,7 +147,7 @@ def compute_chunk(
 
 
 def _result(study: Study, cascades: Sequence[Cascade]) -> ChunkResult:
-    """The rows and counts of cascades that have been fed all designs of a chunk."""
+    """Collect rows and counts from cascades that have been fed all designs of a chunk."""
     types = output_columns(study)
     found = Batch.joined([cascade.end(tuple(types)) for cascade in cascades]).ordered()
     columns: Columns = {"design": found.index}

@@ -59,7 +59,7 @@ class Column:
 
 
 class Pilot(NamedTuple):
-    """What a few designs tell of all: cost of one design on one core [s], share of those within every limit."""
+    """Estimates from a few designs: time of one design on one core [s], and the share of designs within every limit."""
 
     seconds_per_design: float
     feasible: float
@@ -67,7 +67,7 @@ class Pilot(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """The cut of a sweep and all that makes its chunks what they are; equal plans give equal bytes."""
+    """The cut of a sweep into chunks and everything that decides their content: equal plans give equal bytes."""
 
     name: str
     study: str
@@ -121,14 +121,14 @@ def make_plan(study: Study, chunk_size: int | None = None) -> Plan:
 
 
 def _repetitive(study: Study) -> tuple[str, ...]:
-    """Parameters whose values recur from design to design: what the store writes as a dictionary."""
+    """List the parameters whose values recur from design to design; the store writes them with a dictionary."""
     names = study.space.fixed if study.space.kind == "sobol" else study.space.names
     own = study.family.parameter_names
     return tuple(name for name in names if name in own and name not in (*study.made, *study.rescaled))
 
 
 def designs_fingerprint(study: Study) -> str:
-    """The study's fingerprint without what concerns only the optimum, so that a change there keeps the designs."""
+    """Hash the study without what concerns only the optimum, so that a change there leaves the designs valid."""
     output = replace(study.output, curves="none")
     return replace(study, optimise=None, pareto=None, tolerance=None, reference=None, output=output).fingerprint
 

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from sweep.cli.listing import ANGLES
+
+if TYPE_CHECKING:
+    from sweep.evaluation.angles import AngleUnit
 
 OF_DATASETS = ("map", "front", "tolerance", "sensitivity")
 OF_DESIGNS = ("motion", "mechanism", "polar_load")
@@ -23,6 +28,7 @@ ENDINGS = (".svg", ".png", ".pdf")
 @click.option("--row", type=click.IntRange(min=0), default=0, show_default=True, help="Of TABLE.")
 @click.option("--want", help="Of motion: outputs, separated by commas.")
 @click.option("--phi", type=float, default=0.0, show_default=True, help="Of mechanism: crank angle [rad].")
+@ANGLES
 @click.option("--view", help="Of mechanism: space, xy, zy or xz.")
 def draw(
     what: str,
@@ -34,15 +40,17 @@ def draw(
     want: str | None,
     phi: float,
     view: str | None,
+    angles: AngleUnit | None,
 ) -> None:
     """Draw one picture.
 
-    SOURCE is a FOLDER that `sweep run` left behind, or FAMILY with a TABLE of designs (.parquet or .csv, ANGLES IN
-    RAD), of which --row is drawn.  map, front, tolerance and sensitivity are pictures of a folder; motion, mechanism
-    and polar_load of one design.
+    SOURCE is a FOLDER that `sweep run` left behind, or FAMILY with a TABLE of designs (.parquet or .csv, angles in rad
+    unless --angles or a header such as `alpha [deg]` says otherwise), of which --row is drawn.  map, front, tolerance
+    and sensitivity are pictures of a folder; motion, mechanism and polar_load of one design.
     """
     import sweep.plot as plot
     from sweep.errors import InputError
+    from sweep.evaluation.angles import grid_in_radians
 
     if out.suffix.lower() not in ENDINGS:
         raise InputError("--out", str(out), f"a file name ending in {' or '.join(ENDINGS)}", "command line")
@@ -52,8 +60,11 @@ def draw(
         drawn: Any = getattr(plot, what)(source)
     else:
         mechanism, columns = _of_one(source, table, design, row)
+        unit: AngleUnit | None = "rad" if table is None else angles
         known: dict[str, dict[str, Any]] = {"motion": {"want": want}, "mechanism": {"phi": phi, "view": view}}
-        options = known.get(what, {})
+        options = known.get(what, {}) | {"angles": unit}
+        if table is None:
+            grid_in_radians("phi", "rad", phi, None)  # a design out of a folder is in rad, --phi may not be
         drawn = getattr(plot, what)(mechanism, columns, **options)
     axes = drawn if what in ("front", "tolerance", "sensitivity", "polar_load") else drawn[0]
     out.parent.mkdir(parents=True, exist_ok=True)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sweep.cli import completion
 from sweep.cli.listing import aligned, echo_columns
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=completion.effects)
 @click.option("--markdown", is_flag=True, help="The whole register as docs/effects.md.")
 def effects(name: str | None, markdown: bool) -> None:
     """List the effects a scene can call for, or explain one: outputs, inputs, cost, when it matters."""
@@ -116,7 +117,7 @@ def page() -> str:
         "dwells have no effects, sliders no shaft bearings.",
         "",
         "Units are any consistent set; in studies and datasets mm, t, s, hence N, N mm, MPa. Costs are measured on one",
-        "core (`make bench-effects`), each effect alone with all its outputs, the motion it needs not counted.",
+        "core (`make bench`), each effect alone with all its outputs, the motion it needs not counted.",
         "",
         "| effect | key | families | what | needs | cost |",
         "|---|---|---|---|---|---|",

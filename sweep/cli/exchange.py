@@ -6,11 +6,13 @@ from pathlib import Path
 
 import click
 
+from sweep.cli import completion
+
 FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 
 
 @click.command()
-@click.argument("family")
+@click.argument("family", shell_complete=completion.families)
 @FILE
 @click.option("--tolerance", type=float, help="Largest residual as a part of the drawing's size; default 1e-4.")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A table for `sweep eval`: one design.")
@@ -54,12 +56,16 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     law: the motion over one turn with units, .csv or .parquet.  dxf needs `pip install 'linksweep[cad]'`.
     """
     from sweep.dataset.store import beside
+    from sweep.evaluation.angles import grid_in_radians
     from sweep.exchange.export import FORMATS
     from sweep.exchange.export import export as write
     from sweep.exchange.folder import chosen
 
+    grid_in_radians("phi", "rad", phi, None)  # --phi is in rad, whatever the design is
     found = chosen(folder, design)
     if out is None:
         out = beside(folder) / "export" / f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
         out.parent.mkdir(exist_ok=True)
-    click.echo(f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed)}")
+    click.echo(
+        f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed, angles='rad')}"
+    )

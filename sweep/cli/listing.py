@@ -8,8 +8,17 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sweep.cli import completion
+
 if TYPE_CHECKING:
     from sweep.families.base import Family
+
+
+ANGLES = click.option(
+    "--angles",
+    type=click.Choice(["rad", "deg"]),
+    help="Unit of the angles in TABLE; a header such as `alpha [deg]` says it of one column. Default: rad.",
+)
 
 
 def family_names(text: str) -> str | list[str]:
@@ -19,7 +28,7 @@ def family_names(text: str) -> str | list[str]:
 
 
 @click.command()
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=completion.families)
 def families(name: str | None) -> None:
     """List the mechanism families, or the parameters and outputs of one (or of a chain: rssr+guide)."""
     from sweep.families import NAMES, family
@@ -51,6 +60,7 @@ def capability_words(family: Family) -> list[str]:
         OutputLink,
         Points,
         PressureEllipse,
+        ProvableLocus,
     )
 
     words = [
@@ -59,6 +69,7 @@ def capability_words(family: Family) -> list[str]:
         (PressureEllipse, "pressure extrema"),
         (CrankRockerLoop, "proofs"),
         (LimitLocus, "limit locus"),
+        (ProvableLocus, "proven optimum"),
         (GuidedPoint, "line fit"),
         (Points, "points"),
         (OutputLink, "tip"),

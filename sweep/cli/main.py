@@ -10,6 +10,7 @@ from typing import Any, TextIO
 
 import click
 
+from sweep.cli.begin import init, schema
 from sweep.cli.draw import draw
 from sweep.cli.effects import effects
 from sweep.cli.exchange import export, points
@@ -90,6 +91,7 @@ def main() -> None:
 
 
 for verb in (
+    init,
     run,
     check,
     evaluate_table,
@@ -107,5 +109,6 @@ for verb in (
     export,
     draw,
     task,
+    schema,
 ):
     main.add_command(verb)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from sweep.cli.studies import BACKEND
 from sweep.errors import InputError
 
 
@@ -18,7 +19,7 @@ from sweep.errors import InputError
 @click.option("--budget", default="6h", show_default=True, help="Time for the whole night, such as 6h or 90 min.")
 @click.option("--keep", type=click.IntRange(min=1), default=14, show_default=True, help="Nights that are kept.")
 @click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers.")
-@click.option("--backend", type=click.Choice(["threading", "loky"]), default="threading", show_default=True)
+@BACKEND
 @click.option("--smoke", is_flag=True, help="The tiny version of every study.")
 @click.option("--on-change", metavar="CMD", help="Command to run unless the exit code is 0; the log is its input.")
 def nightly(

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
 import click
 
 STUDY = click.argument("study", type=click.Path(exists=True, path_type=Path))
+BACKEND = click.option(
+    "--backend",
+    default="threading",
+    show_default=True,
+    help="threading, loky (processes), dask (processes of a local cluster) or dask=tcp://HOST:8786 (docs/cluster.md).",
+)
 
 
 @click.command()
@@ -16,7 +21,7 @@ STUDY = click.argument("study", type=click.Path(exists=True, path_type=Path))
     "--out", type=click.Path(file_okay=False, path_type=Path), help="Dataset folder; default results/<study>/designs."
 )
 @click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers.")
-@click.option("--backend", type=click.Choice(["threading", "loky"]), default="threading", show_default=True)
+@BACKEND
 @click.option("--accuracy", type=float, help="Relative error of the extrema, instead of the study's own target.")
 @click.option("--certify", is_flag=True, help="Prove that no peak of the wanted maxima is missed.")
 @click.option("--smoke", is_flag=True, help="The tiny version: smoke.toml beside the study.")
@@ -29,7 +34,7 @@ def run(
     study: Path,
     out: Path | None,
     jobs: int,
-    backend: Literal["threading", "loky"],
+    backend: str,
     accuracy: float | None,
     certify: bool,
     smoke: bool,

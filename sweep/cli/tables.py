@@ -9,17 +9,24 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sweep.cli.listing import family_names
+from sweep.cli import completion
+from sweep.cli.listing import ANGLES, family_names
 from sweep.errors import InputError, StoreError
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from sweep.evaluation.angles import AngleUnit
+
 FORMATS = (".parquet", ".csv")
-FAMILY = click.argument("family")
+FAMILY = click.argument("family", shell_complete=completion.families)
 TABLE = click.argument("table", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 WANT = click.option(
-    "--want", multiple=True, required=True, help="Outputs, separated by commas; see `sweep families FAMILY`."
+    "--want",
+    multiple=True,
+    required=True,
+    shell_complete=completion.outputs,
+    help="Outputs, separated by commas; see `sweep families FAMILY`.",
 )
 OUT = click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), help="A .parquet or .csv file; default: CSV to stdout."
@@ -37,6 +44,7 @@ TEXT = click.option("--status-text", is_flag=True, help="Add a column that says 
 @click.option(
     "--poses", type=click.IntRange(min=1), help="Equally spaced crank angles over one turn, for every design."
 )
+@ANGLES
 @KEEP
 @TEXT
 @OUT
@@ -45,31 +53,34 @@ def evaluate_table(
     table: Path,
     want: tuple[str, ...],
     poses: int | None,
+    angles: AngleUnit | None,
     keep: tuple[str, ...],
     status_text: bool,
     out: Path | None,
 ) -> None:
     """Pose outputs of the designs in TABLE (.parquet or .csv), one row per pose.
 
-    TABLE has a column for each parameter of FAMILY, in one length unit, ANGLES IN RAD, and a column phi (then each row
-    is one pose) unless --poses is given (then each row is a design).  FAMILY is a family or a chain such as rssr+guide.
-    A value that is nan has a status that says why.
+    TABLE has a column for each parameter of FAMILY, in one length unit, ANGLES IN RAD unless --angles or a header such
+    as `alpha [deg]` says otherwise, and a column phi (then each row is one pose) unless --poses is given (then each row
+    is a design).  FAMILY is a family or a chain such as rssr+guide.  A value that is nan has a status that says why.
     """
     out = checked_format(out)
     import numpy as np
 
     from sweep.evaluation.poses import evaluate
 
-    phi = None if poses is None else np.arange(poses) * (2.0 * np.pi / poses)
+    whole = 2.0 * np.pi if angles != "deg" else 360.0
+    phi = None if poses is None else np.arange(poses) * (whole / poses)
     designs = read_table(table)
-    if poses is None and "phi" not in designs.columns:
+    has_phi = any(str(name).split("[")[0].strip() == "phi" for name in designs.columns)
+    if poses is None and not has_phi:
         raise InputError(
             "column", "phi", "a column phi [rad], or --poses N for N crank angles over the turn", str(table)
         )
-    if poses is not None and "phi" in designs.columns:
+    if poses is not None and has_phi:
         raise InputError("--poses", poses, f"either --poses or a column phi in {table}, not both", "command line")
     names, chosen = family_names(family), kept(keep)
-    write_table(evaluate(names, designs, wanted(want), phi, keep=chosen, status_text=status_text), out)
+    write_table(evaluate(names, designs, wanted(want), phi, keep=chosen, status_text=status_text, angles=angles), out)
 
 
 @click.command("summarise")
@@ -84,6 +95,7 @@ def evaluate_table(
 @click.option(
     "--window", type=(float, float), help="Part of the stroke that max_abs_dev covers, two fractions such as 0 0.6."
 )
+@ANGLES
 @KEEP
 @TEXT
 @OUT
@@ -95,14 +107,16 @@ def summarise_table(
     accuracy: float | None,
     certify: bool,
     window: tuple[float, float] | None,
+    angles: AngleUnit | None,
     keep: tuple[str, ...],
     status_text: bool,
     out: Path | None,
 ) -> None:
     """Design outputs of the designs in TABLE (.parquet or .csv), one row per design.
 
-    TABLE has a column for each parameter of FAMILY, in one length unit, ANGLES IN RAD.  FAMILY is a family or a chain
-    such as rssr+guide.  A value that is nan has a status that says why.
+    TABLE has a column for each parameter of FAMILY, in one length unit, ANGLES IN RAD unless --angles or a header such
+    as `alpha [deg]` says otherwise.  FAMILY is a family or a chain such as rssr+guide.  A value that is nan has a
+    status that says why.
     """
     out = checked_format(out)
     from sweep.evaluation.summaries import summarise
@@ -118,6 +132,7 @@ def summarise_table(
         window=window,
         keep=kept(keep),
         status_text=status_text,
+        angles=angles,
     )
     write_table(found, out)
 

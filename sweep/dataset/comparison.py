@@ -155,6 +155,13 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
         if a folder holds no dataset, or ``rtol`` or ``slower`` is out of range
     StoreError
         if a chunk is damaged, or lies under another chunk's name.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> found = sweep.compare("results/press/designs", "results/press/designs")
+    >>> found.exit_code, found.lines()[1]
+    (0, 'no value changed')
     """
     if not rtol >= 0.0:
         raise InputError("rtol", rtol, "a relative change from 0", "compare")

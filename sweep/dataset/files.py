@@ -46,7 +46,10 @@ def write_atomically(path: Path, data: bytes, where: Path | None = None) -> None
     StoreError
         if the disk is full or refuses; nothing half-written is left.
     """
-    temporary = (path.parent if where is None else where) / f"{TEMPORARY}{os.getpid()}-{path.name}"
+    # Containers of a cluster that share a folder may share process numbers too.
+    temporary = (
+        path.parent if where is None else where
+    ) / f"{TEMPORARY}{os.getpid()}-{os.urandom(4).hex()}-{path.name}"
     with store_errors(path):
         temporary.parent.mkdir(parents=True, exist_ok=True)
         try:

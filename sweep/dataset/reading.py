@@ -47,6 +47,13 @@ def scan(folder: str | Path) -> ds.Dataset:
         if the folder holds no chunks
     StoreError
         if a chunk lies under another chunk's name, is there twice, or belongs to other data.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> source = sweep.scan("results/press/designs")
+    >>> source.count_rows(), source.schema.field("stroke").metadata[b"unit"]
+    (25, b'mm')
     """
     import pyarrow.dataset as ds
 

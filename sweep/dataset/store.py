@@ -60,6 +60,7 @@ from sweep.dataset.parts import (
     part_of,
     parts,
 )
+from sweep.dataset.tables import metadata
 from sweep.errors import IncompleteWarning, InputError, StoreError
 
 if TYPE_CHECKING:
@@ -214,7 +215,23 @@ def totals(folder: Path) -> tuple[dict[str, int], dict[str, int]]:
 
 
 def is_complete(folder: str | Path) -> bool:
-    """Whether every chunk of the dataset's plan is there and whole, and the optimum too if the study asks for one."""
+    """Whether every chunk of the dataset's plan is there and whole, and the optimum too if the study asks for one.
+
+    Parameters
+    ----------
+    folder : what ``sweep run`` wrote
+
+    Returns
+    -------
+    bool
+        False as well for a folder that is no dataset
+
+    Examples
+    --------
+    >>> import sweep
+    >>> sweep.is_complete("results/press/designs"), sweep.is_complete("results/none")
+    (True, False)
+    """
     place = located(folder)
     plan = read_plan(place)
     if plan is None:
@@ -227,21 +244,13 @@ def is_complete(folder: str | Path) -> bool:
 
 def front_is_complete(path: Path) -> bool:
     """Whether the search of the front in this file has ended."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        about = (pq.read_schema(path).metadata or {}) if path.is_file() else {}
-    except pa.ArrowException:
-        return False
+    about = metadata(path)
     return about.get(b"complete") == b"true" or about.get(b"ended") == b"time"
 
 
 def front_cut_short(path: Path) -> str | None:
     """``5 of 28`` steps of a front whose search time has cut short; None for a whole one, or where there is none."""
-    import pyarrow.parquet as pq
-
-    about = (pq.read_schema(path).metadata or {}) if path.is_file() else {}
+    about = metadata(path)
     return None if about.get(b"complete") != b"false" else about.get(b"steps", b"").decode() or None
 
 
@@ -255,8 +264,8 @@ def load(folder: str | Path) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``design``, parameters [mm, rad], outputs, ``status``; units and definitions stand in the Parquet field
-        metadata and in ``_plan.json``.
+        ``design``, parameters [mm, rad], outputs, ``status``; ``attrs["units"]`` names the unit of each column.  Units
+        and definitions stand in the Parquet field metadata and in ``_plan.json``, too.
 
     Raises
     ------
@@ -269,6 +278,15 @@ def load(folder: str | Path) -> pd.DataFrame:
     -----
     IncompleteWarning
         if chunks are missing.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> rows = sweep.load("results/press/designs")
+    >>> len(rows), rows.attrs["units"]["max_pressure_angle"]
+    (25, 'rad')
+    >>> rows.nsmallest(1, "max_abs_d2s")[["a", "b", "max_abs_d2s"]].round(4).values.tolist()
+    [[0.95, 3.15, 1.2455]]
     """
     import pandas as pd
 
@@ -288,4 +306,14 @@ def load(folder: str | Path) -> pd.DataFrame:
         text = f"{place}: incomplete, {len(missing)} of {len(missing) + len(chunks)} chunks are missing"
         text += f" (the first is {missing[0]}); run the study again to have them computed"
         warnings.warn(text, IncompleteWarning, stacklevel=2)
-    return pd.concat(frames, ignore_index=True)
+    found = pd.concat(frames, ignore_index=True)
+    found.attrs["units"] = units(chunks[0])
+    return found
+
+
+def units(part: Part) -> dict[str, str]:
+    """The unit of every column of a chunk that has one, as its field metadata say."""
+    import pyarrow.parquet as pq
+
+    schema = pq.read_schema(part.path)
+    return {field.name: field.metadata[b"unit"].decode() for field in schema if b"unit" in (field.metadata or {})}

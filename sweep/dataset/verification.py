@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from sweep.dataset import store
 from sweep.dataset.rowcheck import row_faults, spread, unequal
+from sweep.dataset.tables import TABLES, altered
 from sweep.errors import InputError, LinksweepError, StoreError
 
 if TYPE_CHECKING:
@@ -98,6 +99,13 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
         if the folder is no dataset, or ``designs`` is negative
     StoreError
         if the disk refuses to read.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> found = sweep.verify("results/press/designs", designs=4)
+    >>> found.exit_code, found.lines()[1]
+    (0, '4 designs computed again')
     """
     if isinstance(designs, bool) or not isinstance(designs, int) or designs < 0:
         raise InputError("designs", designs, "a whole number from 0", "verify")
@@ -118,7 +126,7 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
     whole = _whole_chunks(found, chunks, about, study)
     _missing(found, place, plan, about, whole)
     _totals(found, place, plan, whole)
-    _side_files(found, place)
+    _side_files(found, place, plan or {})
     if study is not None and designs and whole:
         _recompute(found, study, about, whole, designs)
     return found
@@ -236,17 +244,21 @@ def _totals(found: Verification, place: Path, plan: dict[str, Any] | None, whole
         found.findings.append(Finding(path, words, "the next run writes the right ones"))
 
 
-def _side_files(found: Verification, place: Path) -> None:
-    """The tables beside the chunks: the checksums of their pages."""
+def _side_files(found: Verification, place: Path, plan: dict[str, Any]) -> None:
+    """The tables beside the chunks: the checksums of their pages, and the hashes that the plan notes."""
     for name in SIDE_FILES:
         path = store.beside(place) / name
         if not path.is_file():
+            if name in (plan.get(TABLES) or {}) and path not in {finding.path for finding in found.findings}:
+                found.findings.append(Finding(path, "not there any more", "the next run searches it anew"))
             continue
         try:
             store.read_table(path)
+            if altered(store.beside(place), plan, [name]):
+                raise StoreError(f"{path}: not as its search has written it")
         except StoreError as error:
             words = str(error).removeprefix(f"{path}: ").split("; delete it")[0]
-            found.findings.append(Finding(path, words, "delete it; then the next run searches it anew"))
+            found.findings.append(Finding(path, words, "the next run searches it anew"))
 
 
 def _recompute(

@@ -16,7 +16,8 @@ from types import MappingProxyType
 from sweep.effects.base import CURVED, Effect
 from sweep.effects.evaluation import effect_poses, on_own_columns, run_design
 from sweep.effects.placing import Placed, stages_of
-from sweep.families.base import Family, Output, Parameter, Step
+from sweep.errors import InputError
+from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work
 from sweep.families.chain import Chain
 from sweep.families.members import Machine
 from sweep.numerics.curves import Curve
@@ -162,9 +163,21 @@ def extended(family: Family, wanted: Iterable[str], curves: Mapping[str, Curve] 
             )
             for m in family.members
         }
+        _check_even(family, found)
         same = all(found[m.name] is m.family for m in family.members)
         return family if same else family.with_families(found)
     return with_effects(family, called_for(family, wanted), curves)
+
+
+def _check_even(machine: Machine, found: Mapping[str, Family]) -> None:
+    """Refuse effects that need a speed of a member that another drives: its crank does not turn evenly."""
+    for m in machine.members:
+        added = found[m.name].parameter_names[len(m.family.parameter_names) :]
+        if m.driver is not None and "speed" in added:
+            allowed = (
+                f"geometry alone, as {'.'.join(m.driver)} drives it unevenly: make one chain of both for its forces"
+            )
+            raise InputError("outputs", f"of loads of {m.name}", allowed, f"machine.{m.name}")
 
 
 def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
@@ -174,7 +187,7 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     names |= {about for name in places for about in reduced(name, machine.domain)}
     for relation in machine.relations:
         if not names.isdisjoint(o.name for o in relation.outputs):
-            names |= relation.needs
+            names |= relation.needs(frozenset(names))
     return names
 
 
@@ -189,7 +202,8 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
             name=placed.name,
             provides=placed.design_outputs,
             run=partial(run_design, family, placed, added, curves, own),
-            ns_per_design=placed.entry.ns_per_design,
+            work=Work.EFFECT,
+            cost=partial(_design_ns, placed.entry),
         )
         for placed in effects
         if placed.design_outputs
@@ -203,6 +217,10 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
         dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )
+
+
+def _design_ns(entry: Effect, accuracy: Accuracy) -> float:
+    return entry.ns_per_design
 
 
 def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:

@@ -7,15 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sweep.costs import nanoseconds
 from sweep.effects import applicable, called_for, effect, inputs
 from sweep.effects.base import Advice, Effect
-from sweep.effects.measured import COSTS
 from sweep.effects.placing import Placed, first_scene
 from sweep.families.base import Angles, Array, Family
 
 SAMPLES = 64
-# The motion with the joint records made of it [ns per pose].
-MOTION_NS = COSTS["motion"][0]
 
 
 class Finding(NamedTuple):
@@ -60,9 +58,10 @@ def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str,
     """
     names = frozenset(wanted)
     own = called_for(family, names)
+    motion = nanoseconds("work", "joint records")
     costs = {placed.name: cost(placed, names, poses) for placed in own}
-    total = poses * MOTION_NS + sum(costs.values())
-    rows = [("motion", "K0", f"{MOTION_NS:.3g} ns per pose", f"{100.0 * poses * MOTION_NS / total:.0f} %")]
+    total = poses * motion + sum(costs.values())
+    rows = [("motion", "K0", f"{motion:.3g} ns per pose", f"{100.0 * poses * motion / total:.0f} %")]
     for placed in own:
         whole = costs[placed.name] > poses * placed.entry.ns_per_pose
         per_pose = f"{placed.entry.ns_per_pose:.0f} ns per pose"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.joints import PER_DESIGN, PER_POSE
-from sweep.effects.measured import COSTS
+from sweep.costs import nanoseconds
 from sweep.families import NAMES as FAMILY_NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
@@ -20,7 +20,6 @@ from sweep.families.capabilities import JointRecords, ToolPoint
 from sweep.families.chain import drive, driving_names
 from sweep.numerics.curves import Curve
 
-UNMEASURED = (0.0, 0.0)
 # Loads that a curve over the turn of the crank can add to.
 CURVED = ("load_torque", "load_force", "tool_force")
 # Inputs that stand in [loads] of a study; the others but the speed stand in [bodies].
@@ -281,13 +280,13 @@ class Effect:
 
     @property
     def ns_per_pose(self) -> float:
-        """Measured cost of all pose outputs together; 0 where there are none, and until `make bench-effects`."""
-        return COSTS.get(self.name, UNMEASURED)[0]
+        """Measured time of all pose outputs together, without the motion; 0 where there are none."""
+        return nanoseconds("effects", self.name) if self.outputs else 0.0
 
     @property
     def ns_per_design(self) -> float:
-        """Measured cost of all design outputs together; 0 where there are none, and until `make bench-effects`."""
-        return COSTS.get(self.name, UNMEASURED)[1]
+        """Measured time of all design outputs together; 0 where there are none."""
+        return nanoseconds("effects_design", self.name) if self.design_result is not None else 0.0
 
 
 def take_over(status: Status, later: NDArray[np.generic]) -> None:

@@ -1,6 +1,6 @@
-"""What the effects cost: the one place that measures it, for the register, `make bench-effects` and docs/accuracy.md.
+"""What the effects cost: the one place that measures it, for `make bench` and docs/accuracy.md.
 
-:func:`costs` times effects on a few ordinary linkages; :mod:`sweep.effects.measured` keeps what it found last.
+:func:`costs` times effects on a few ordinary linkages; sweep/costs.toml keeps what it found last.
 """
 
 from __future__ import annotations

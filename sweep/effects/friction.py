@@ -124,7 +124,7 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     friction_loads(
         poses, designs, bodies(scene), load, data, finger, status, out[0], out[1], out[2], contraction, wrench
     )  # fmt: skip
-    columns = vector_columns(out[0], wanted, SUFFIX)
+    columns = vector_columns(out[0], scene.records, wanted, SUFFIX)
     for names, values in ((tuple(_COUPLES), out[1]), (losses, out[2])):
         if values is not None:
             columns |= {name: values[:, :, k] for k, name in enumerate(names) if name in wanted}

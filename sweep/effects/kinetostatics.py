@@ -53,14 +53,17 @@ INERTIAS = {
 
 
 def force_outputs(follower: str, suffix: str = "", text: str = "", equation: str = EQUATION) -> tuple[Output, ...]:
-    """Magnitude and components of the six vectors, and the force on the frame."""
+    """Magnitude and components of the six vectors, and the force and the moment on the frame."""
     found = []
     for name, meaning in forces(follower).items():
         unit = name.split("_")[0].replace("moment", "torque")
         found.append(Output(f"{name}{suffix}", unit, f"magnitude: {meaning}{text}", equation))
         found += [Output(f"{name}{suffix}_{axis}", unit, f"{axis}: {meaning}{text}", equation) for axis in "xyz"]
-    shaking = Output(f"shaking_force{suffix}", "force", f"magnitude of the force on the frame{text}", equation)
-    return (*found, shaking)
+    found.append(Output(f"shaking_force{suffix}", "force", f"magnitude of the force on the frame{text}", equation))
+    about = f"moment on the frame about the origin of the family's frame, drive torque included{text}"
+    found.append(Output(f"shaking_moment{suffix}", "torque", f"magnitude: {about}", equation))
+    found += [Output(f"shaking_moment{suffix}_{axis}", "torque", f"{axis}: {about}", equation) for axis in "xyz"]
+    return tuple(found)
 
 
 def _outputs(follower: str) -> tuple[Output, ...]:
@@ -72,13 +75,19 @@ def _outputs(follower: str) -> tuple[Output, ...]:
 
 def wanted_groups(wanted: frozenset[str], suffix: str = "") -> tuple[bool, bool, bool]:
     """Whether any force or moment, any couple, any inertia is wanted: what is not is not compiled."""
-    vectors = (f"{name}{suffix}{tail}" for name in (*FORCES, "shaking_force") for tail in ("", "_x", "_y", "_z"))
+    vectors = (
+        f"{name}{suffix}{tail}"
+        for name in (*FORCES, "shaking_force", "shaking_moment")
+        for tail in ("", "_x", "_y", "_z")
+    )
     couples, inertias = ({f"{name}{suffix}" for name in names} for names in (COUPLES, INERTIAS))
     return not wanted.isdisjoint(vectors), not wanted.isdisjoint(couples), not wanted.isdisjoint(inertias)
 
 
-def vector_columns(forces: Array | None, wanted: frozenset[str], suffix: str = "") -> Columns:
-    """Wanted magnitudes and components of the six vectors, (n, m, 18), and of the force on the frame."""
+def vector_columns(
+    forces: Array | None, records: tuple[Array, Array], wanted: frozenset[str], suffix: str = ""
+) -> Columns:
+    """Wanted magnitudes and components of the six vectors, (n, m, 18), and of force and moment on the frame."""
     columns: Columns = {}
     if forces is None:
         return columns
@@ -91,7 +100,25 @@ def vector_columns(forces: Array | None, wanted: frozenset[str], suffix: str = "
                 columns[f"{name}{suffix}_{axis}"] = values[:, :, at]
     if f"shaking_force{suffix}" in wanted:
         columns[f"shaking_force{suffix}"] = magnitude(forces[:, :, 0:3] + forces[:, :, 9:12])
-    return columns
+    moment = f"shaking_moment{suffix}"
+    if not wanted.isdisjoint((moment, *(f"{moment}_{axis}" for axis in "xyz"))):
+        found = frame_moment(forces, records)
+        columns |= {moment: magnitude(found)} | {f"{moment}_{axis}": found[:, :, k] for k, axis in enumerate("xyz")}
+    return {name: values for name, values in columns.items() if name in wanted}
+
+
+def frame_moment(forces: Array, records: tuple[Array, Array]) -> Array:
+    """Moment of crank and follower on the frame about the origin of the family's frame, (n, m, 3).
+
+    The moments of the bearings are about A, and about D or, where a slider moves, about C; each force adds its arm.
+    """
+    poses, designs = (joints[..., None, :] if joints.ndim == 2 else joints for joints in records)
+    turns = designs[..., 16:17] == 1.0
+    follower = np.where(turns, designs[..., 9:12], poses[..., 3:6])
+    on_links = forces[:, :, 12:15] + np.cross(designs[..., 6:9], forces[:, :, 0:3])
+    on_links += forces[:, :, 15:18] + np.cross(follower, forces[:, :, 9:12])
+    moment: Array = -on_links
+    return moment
 
 
 def magnitude(vectors: Array) -> Array:
@@ -147,7 +174,7 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
             inertia += _carried(scene, handed_back)
     if forces is not None:
         scene.memo["forces"] = forces, status
-    columns = vector_columns(forces, wanted)
+    columns = vector_columns(forces, scene.records, wanted)
     for names, values in ((COUPLES, couples), (INERTIAS, inertia)):
         if values is not None:
             columns |= {name: values[:, :, k] for k, name in enumerate(names) if name in wanted}

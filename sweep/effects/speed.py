@@ -142,7 +142,7 @@ def turn(
 
 
 def advise(scene: Scene) -> Advice | None:
-    """Small-fluctuation estimate [max - min of W - (J - mean J) w^2/2]/(mean J w^2), sheet section 3."""
+    """Estimate the unevenness for small fluctuations: [max - min of W - (J - mean J) w^2/2]/(mean J w^2)."""
     inertia, excess = samples(scene.on_grid(GRIDS[0]))
     turning = np.isfinite(excess).all(axis=1)
     if not turning.any():

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from sweep.chunks.plan import NOT_IN_CHUNKS
 from sweep.dataset import store
 from sweep.dataset.layout import outside
+from sweep.dataset.tables import TABLES
 from sweep.engine.conflict import differences
 from sweep.errors import InputError
 
@@ -150,6 +151,7 @@ def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
         "counts": noted.get("counts"),
         "missed": noted.get("missed"),
         "known": noted.get("known"),
+        TABLES: noted.get(TABLES),
         **({"part": noted["part"]} if "part" in noted else {}),
         "complete": False,
     }

@@ -13,16 +13,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sweep.dataset import store
+from sweep.dataset.tables import TABLES, altered, digests, metadata
 from sweep.engine.log import circumstances, command
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
+from sweep.engine.proving import prove
 from sweep.errors import Interrupted, SearchCutShort, StoreError, TimeUsedUp, WorkerDied
-from sweep.jobs.executors import Here, executor
+from sweep.jobs.executors import at_work, executor, for_tasks
 from sweep.jobs.signals import Stop, stop_on_signal
 
 if TYPE_CHECKING:
     from sweep.chunks.plan import Plan
     from sweep.engine.worker import Done
+    from sweep.jobs.flow import Executor
     from sweep.study import Study
+
+# What is written together with the optimum.
+OF_OPTIMUM = (store.CURVES, store.SENSITIVITY, store.TOLERANCE)
 
 # So often chunks are computed that somebody removes or damages while the run goes on.
 ROUNDS = 3
@@ -50,7 +56,8 @@ def run(
     out : folder of the chunks; default ``results/<name>/designs`` (``results/smoke/<name>/designs``).  The rest lies
         beside it: in the parent of a folder called ``designs``, in ``<out>.meta`` next to any other
     jobs : workers
-    backend : "threading" (the kernels release the lock), "loky" (processes), or another of
+    backend : "threading" (the kernels release the lock), "loky" (processes), "dask" (a cluster of processes on this
+        machine), "dask=tcp://HOST:8786" (the Dask cluster at that address, docs/cluster.md), or another of
         ``sweep.jobs.executors.EXECUTORS``
     smoke : take the study's tiny version
     force : run whatever the budget says, and set data of another study or code in the folder aside into ``_old/``
@@ -72,22 +79,36 @@ def run(
     WorkerDied, StoreError, LockedError, TimeUsedUp, Interrupted
         worker killed (70), disk full or forbidden (74), folder in use (75), the budget's time or that of the optimiser
         over (124), signal (130, 143); finished chunks and what was found of the optimum stay.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> folder = sweep.run("press", out="results/small/designs", smoke=True, jobs=1)
+    >>> len(sweep.load(folder))
+    4
     """
-    executor(backend, jobs)  # refuses what there is not
+    place = executor(backend, jobs)  # refuses what there is not
     model = _model(study, smoke, accuracy, certify)
     _check_budget(model, jobs, force)
     default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
     folder = default if out is None else store.located(out)
     refuse_or_clear_older(folder, force)
-    with store.locked(folder), _logged(folder, command(model, folder, smoke, accuracy, certify), jobs, backend) as end:
-        computed = _sweep(model, folder, jobs, backend, force, progress)
+    said = command(model, folder, smoke, accuracy, certify)
+    with store.locked(folder), _logged(folder, said, jobs, backend) as end, at_work(place):
+        computed = _sweep(model, folder, jobs, place, force, progress)
         if not is_part(folder):
-            if model.optimise is not None:
-                _optimise(replace(model, pareto=None), folder, jobs, progress)
-            _front(model, folder, jobs)
-            _raise_if_cut_short(folder)
+            _search(model, folder, jobs, backend, progress)
         end.append(f"{computed} chunks computed")
     return folder
+
+
+def _search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> None:
+    """Optimum, proof and front, as far as the study asks for them."""
+    if study.optimise is not None:
+        _optimise(replace(study, pareto=None), folder, jobs, progress)
+    prove(study, folder, jobs, backend, progress)
+    _front(study, folder, jobs)
+    _raise_if_cut_short(folder)
 
 
 @contextmanager
@@ -120,7 +141,7 @@ def _check_budget(study: Study, jobs: int, force: bool) -> None:
         check_budget(study, estimate(study, jobs))
 
 
-def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, progress: bool) -> int:
+def _sweep(study: Study, folder: Path, jobs: int, place: Executor, force: bool, progress: bool) -> int:
     """Compute the missing chunks and note the totals; returns the number of chunks computed."""
     computed = 0
     with stop_on_signal() as stop:
@@ -135,7 +156,7 @@ def _sweep(study: Study, folder: Path, jobs: int, backend: str, force: bool, pro
             missing = [index for index in part_range(folder, plan.chunks) if index not in finished]
             if not missing:
                 break
-            computed += _compute(study, plan, folder, missing, jobs, backend, stop, force, progress)
+            computed += _compute(study, plan, folder, missing, jobs, place, stop, force, progress)
         else:
             raise StoreError(f"{folder}: somebody removes or damages chunks while this run writes them; run again")
         _raise_if_signalled(stop, folder)
@@ -151,7 +172,7 @@ def _compute(
     folder: Path,
     missing: list[int],
     jobs: int,
-    backend: str,
+    place: Executor,
     stop: Stop,
     force: bool,
     progress: bool,
@@ -164,7 +185,7 @@ def _compute(
     done = plan.designs - sum(len(range(*plan.bounds(index))) for index in missing)
     with Progress(study.name, plan.designs, done, progress) as shown:
         results = 0
-        for result in _results(study, plan, folder, missing, jobs, backend, stop, allowed):
+        for result in _results(study, plan, folder, missing, jobs, place, stop, allowed):
             results += not result.dropped
             if result.error is not None:
                 failure = failure or result.error
@@ -186,7 +207,7 @@ def _results(
     folder: Path,
     missing: list[int],
     jobs: int,
-    backend: str,
+    place: Executor,
     stop: Stop,
     allowed: float,
 ) -> Iterator[Done]:
@@ -198,9 +219,9 @@ def _results(
         warm(study)  # one process compiles, the others load the machine code
     deadline = time.monotonic() + allowed  # compiling does not count, so that every run gets on
     todo = (index for index in missing if not stop and time.monotonic() < deadline)
-    place = Here() if jobs == 1 or len(missing) < 2 else executor(backend, jobs)
+    task = ChunkTask(study, plan, folder.absolute(), known_folder(folder.absolute()))
     try:
-        yield from place.outcomes(ChunkTask(study, plan, folder, known_folder(folder)), todo, jobs, stop)
+        yield from for_tasks(place, len(missing)).outcomes(task, todo, jobs, stop)
     except WorkerDied as error:
         _raise_if_signalled(stop, folder)
         raise WorkerDied(f"{folder}: {error}; finished chunks are kept, run again to continue") from error
@@ -226,9 +247,11 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
 
     note = store.read_plan(folder) or {}
     key = optimum_key(study, note)
-    place = store.beside(folder) / store.OPTIMUM
-    found = read_survey(place)
-    if note.get("optimised") == key and place.is_file() and (found is None or found.ended != "time"):
+    place = store.beside(folder)
+    found = read_survey(place / store.OPTIMUM)
+    noted = [name for name in OF_OPTIMUM if name in (note.get(TABLES) or {})]
+    whole = not altered(place, note, [store.OPTIMUM, *noted])
+    if note.get("optimised") == key and whole and (found is None or found.ended != "time"):
         return
     assert study.optimise is not None
     store.write_plan(folder, note | {"optimised": None})
@@ -239,7 +262,7 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
             raise Interrupted(number, text) from None
-    store.write_plan(folder, note | {"optimised": key})
+    store.write_plan(folder, note | {"optimised": key, TABLES: digests(place, [store.OPTIMUM, *OF_OPTIMUM])})
 
 
 def _raise_if_cut_short(folder: Path) -> None:
@@ -261,6 +284,13 @@ def _front(study: Study, folder: Path, jobs: int) -> None:
 
     note = store.read_plan(folder) or {}
     key = optimum_key(study, note)
+    place, known = store.beside(folder), dict(note.get(TABLES) or {})
+    damaged = altered(place, note, [store.PARETO])
+    if damaged:
+        (place / store.PARETO).unlink(missing_ok=True)
+    if store.PARETO in known and (damaged or metadata(place / store.PARETO).get(b"key") != key.encode()):
+        del known[store.PARETO]  # of a front that is over: the new one grows step by step
+        store.write_plan(folder, note | {TABLES: known})
     with stop_on_signal() as stop:
         try:
             front_study(study, folder, key, lambda: bool(stop), jobs)
@@ -268,6 +298,8 @@ def _front(study: Study, folder: Path, jobs: int) -> None:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while searching the front; run again to continue"
             raise Interrupted(number, text) from None
+    if digests(place, [store.PARETO]).items() - known.items():
+        store.write_plan(folder, note | {TABLES: known | digests(place, [store.PARETO])})
 
 
 def _end(begin: float, outcome: str, text: str) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kernels.status import OK
 from sweep.errors import InputError
+from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.tables import design_matrix, numbers
 from sweep.families import Mechanism
 from sweep.families import family as find_family
@@ -84,7 +85,7 @@ class _Where:
     tip: Array | None = None
 
 
-def joints(mechanism: Mechanism, design: Table, phi: ArrayLike) -> pd.DataFrame:
+def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: AngleUnit | None = None) -> pd.DataFrame:
     """Joint coordinates of every stage and member of one design, fixed pivots included.
 
     Parameters
@@ -92,6 +93,7 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike) -> pd.DataFrame:
     mechanism : a family's name, a list of them for a chain, a table of members for a machine
     design : the parameters of one design, in one length unit and rad
     phi : angles of the driving shaft [rad], one or a plain list
+    angles : the unit of the angles given, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
@@ -129,7 +131,9 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike) -> pd.DataFrame:
     columns: dict[str, list[Any]] = {
         name: [] for name in ("member", "stage", "frame", "joint", "kind", "phi", "x", "y", "z", "status")
     }
-    for part in parts(mechanism, design, phi):
+    family = find_family(mechanism)
+    phi = grid_in_radians("phi", "rad", phi, angles)
+    for part in parts(mechanism, in_radians(family, design, angles), phi):
         m = part.phi.size
         for name, path in part.joints.items():
             fixed = name in part.kinds

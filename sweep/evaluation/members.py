@@ -14,7 +14,7 @@ import numpy as np
 from kernels import status as st
 from sweep.errors import InputError
 from sweep.evaluation.route import Part, Route
-from sweep.families.base import Accuracy, Array, Columns
+from sweep.families.base import Accuracy, Array, Columns, Work
 from sweep.families.capabilities import Assembly
 from sweep.families.members import Machine, Member
 from sweep.families.relations import Timing
@@ -23,6 +23,7 @@ from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.margins import NAMES as MARGINS
 from sweep.reductions.margins import combined, margins
 from sweep.reductions.sampling import TWO_PI
+from sweep.reductions.work import group_ns
 
 
 def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) -> tuple[list[Route], list[str]]:
@@ -51,9 +52,11 @@ def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) 
     for m in machine.members:
         for inner in routes(m.family, own.get(m.name, ()), accuracy):
             names = tuple(f"{m.name}.{name}" for name in inner.outputs)
-            found.append(Route(f"{m.name}: {inner.name}", names, inner.ns_per_design, partial(_of_member, m, inner)))
+            run = partial(_of_member, m, inner)
+            found.append(Route(f"{m.name}: {inner.name}", names, inner.ns_per_design, run, order=inner.order))
     if margin:
-        found.append(Route("margins", tuple(margin), 100.0 * len(machine.members), partial(_margins, machine)))
+        cost = sum(group_ns(m.family, "margin", (), accuracy) for m in machine.members)
+        found.append(Route("margins", tuple(margin), cost, partial(_margins, machine), order=(Work.QUICK, 0)))
     return found, left
 
 
@@ -121,8 +124,9 @@ def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part)
 def _timing(machine: Machine, timing: Timing, accuracy: Accuracy) -> Route:
     from sweep.evaluation.routes import routes
 
-    cost = sum(route.ns_per_design for route in routes(machine, timing.places, accuracy))
-    return Route(f"timing {timing.name}", (timing.name,), cost, partial(_difference, machine, timing))
+    both = routes(machine, timing.places, accuracy)
+    cost, order = sum(route.ns_per_design for route in both), max(route.order for route in both)
+    return Route(f"timing {timing.name}", (timing.name,), cost, partial(_difference, machine, timing), order=order)
 
 
 def _difference(machine: Machine, timing: Timing, designs: Array, accuracy: Accuracy, window: Part) -> Columns:

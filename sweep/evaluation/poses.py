@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sweep.effects import elsewhere, extended, input_names, offered
 from sweep.effects.wanted import expanded
 from sweep.errors import InputError, nearest
+from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, wanted_names
@@ -35,6 +36,7 @@ def evaluate(
     keep: bool | str | Sequence[str] = False,
     status_text: bool = False,
     loads: Loads | None = None,
+    angles: AngleUnit | None = None,
 ) -> pd.DataFrame:
     """Pose outputs of mechanisms at given crank angles, one row per pose, in the order of the input.
 
@@ -42,25 +44,41 @@ def evaluate(
     ----------
     family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1
-    want : names of pose outputs (see ``sweep families``); the name of an effect stands for all of its own
+    want : names of pose outputs (see ``sweep families``), in a list or in one text between commas; the name of an
+        effect stands for all of its own
     phi : crank angles [rad], one or a plain list of them, for every design; without it the table must have a column
         ``phi``, and with it none.  A family over an interval takes values of its own variable here, or in a column of
         that name; one whose poses depend on those before takes equal steps of one turn from 0, in order
     keep : columns of the table that the result repeats in front: names, or True for all of them
     status_text : add a column ``status_text``, the meaning of ``status`` in words
     loads : loads over the turn, as for `summarise`
+    angles : the unit of angles in ``table`` and ``phi``, "rad" or "deg"; a header such as ``alpha [deg]`` says it of
+        one column.  Left out, it is rad, and what reads as degrees is refused: a parameter above 2 pi, crank angles
+        whose largest is a whole or half number between 4 pi and 720.  Results are in rad
 
     Returns
     -------
     DataFrame
         the wanted columns and ``status``; with ``phi=`` preceded by ``design`` (row of the table, from 0) and ``phi``.
         Each row has the index label of its design.  Where a value is nan, ``status`` says why (see
-        :mod:`kernels.status`).
+        :mod:`kernels.status`).  ``attrs["units"]`` names the unit of each output; "length" is that of the table.
 
     Raises
     ------
     InputError
-        for an unknown name or a bad value, with column and row.
+        for an unknown name or a bad value, with column and row; for angles that read as degrees.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> crank_rocker = {"a": [10.0, 12.0], "b": 40.0, "c": 25.0, "e": 35.0, "f": 5.0, "g": -3.0}
+    >>> crank_rocker |= {"alpha [deg]": 60.0}
+    >>> sweep.evaluate("rssr", crank_rocker, "psi, dpsi", phi=[0.0, 90.0], angles="deg").round(4)
+       design     phi     psi    dpsi  status
+    0       0  0.0000 -1.5027 -0.1602       0
+    1       0  1.5708 -2.0241 -0.2706       0
+    2       1  0.0000 -1.4108 -0.2124       0
+    3       1  1.5708 -2.0680 -0.3104       0
     """
     import pandas as pd
 
@@ -68,25 +86,32 @@ def evaluate(
     names = expanded(bare, wanted_names(want, f"pose outputs of {bare.name}"), poses=True)
     mechanism = extended(bare, names, curves_of(bare, loads))
     wanted = pose_wants(mechanism, names)
+    table = in_radians(mechanism, given := table, angles, input_names(bare), mechanism.domain)
+    phi = None if phi is None else grid_in_radians(mechanism.domain.name, mechanism.domain.unit, phi, angles)
     variable = mechanism.domain.name
     extra = () if phi is not None else (variable,)
     matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))
     index = table.index if isinstance(table, pd.DataFrame) else None
     if phi is None:
         _check_column(mechanism, extras)
-        angles, head, repeats = np.ascontiguousarray(extras[variable])[:, None], {}, 1
+        at, head, repeats = np.ascontiguousarray(extras[variable])[:, None], {}, 1
     else:
         grid = _grid(mechanism, table, phi)
-        angles, repeats = grid[None, :], grid.size
+        at, repeats = grid[None, :], grid.size
         head = {"design": np.repeat(np.arange(len(matrix)), repeats), variable: np.tile(grid, len(matrix))}
         index = None if index is None else index.repeat(repeats)
     with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
-        columns = explained(mechanism.poses(matrix, Angles.of(angles), frozenset(wanted)), wanted)
+        columns = explained(mechanism.poses(matrix, Angles.of(at), frozenset(wanted)), wanted)
     made = head | {name: columns[name].ravel() for name in [*wanted, "status"]}
     if status_text:
         made["status_text"] = np.array(meanings(made["status"]), dtype=object)
-    result = pd.DataFrame(made, index=index)
-    return _beside(kept_columns(table, keep, made, len(matrix)), result, len(matrix), repeats)
+    result = _beside(
+        kept_columns(given, keep, made, len(matrix)), pd.DataFrame(made, index=index), len(matrix), repeats
+    )
+    result.attrs["units"] = {mechanism.domain.name: mechanism.domain.unit} | {
+        name: mechanism.pose_output[name].unit for name in wanted
+    }
+    return result
 
 
 def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> pd.DataFrame:

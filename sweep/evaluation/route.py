@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from sweep.families.base import Accuracy, Array, Columns
+from sweep.families.base import Accuracy, Array, Columns, Work
 from sweep.reductions.turn import Group
 
 Part: TypeAlias = tuple[float, float] | None
@@ -22,9 +22,10 @@ class Route:
     ----------
     name : what computes them
     outputs : their names
-    ns_per_design : estimate of the cost
+    ns_per_design : estimate of the time that it takes
     run : ``run(designs, accuracy, window)`` gives the outputs, perhaps their ``err_``, and ``status``, each (n,)
     general : which general reduction it is; "" for a family's own step or an effect
+    order : kind of work, and its place among routes of that kind
     """
 
     name: str
@@ -32,3 +33,4 @@ class Route:
     ns_per_design: float
     run: RunFunction | None = None
     general: Group | Literal[""] = ""
+    order: tuple[Work, int] = (Work.SEARCH, 0)

@@ -20,12 +20,13 @@ from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.events import event_outputs
 from sweep.reductions.means import mean_squares
 from sweep.reductions.precise import sharpen_maxima
-from sweep.reductions.steps import applying_step
-from sweep.reductions.turn import Group, group_ns, limits_and_reductions, margin_group
+from sweep.reductions.steps import applying_step, step_ns, steps_of
+from sweep.reductions.turn import Group, limits_and_reductions, margin_group
+from sweep.reductions.work import group_ns, group_order
 
 
 def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
-    """What will be computed and how, cheapest first; each route's outputs can be asked of `design_outputs` alone.
+    """What will be computed and how, in order; each route's outputs can be asked of `design_outputs` alone.
 
     Raises
     ------
@@ -62,7 +63,7 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
             raise InputError("output", name, allowed, f"design outputs of {family.name}")
     found += [_own(family, step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
     found += [_general(family, *key, tuple(names), accuracy) for key, names in groups.items()]
-    return tuple(sorted(found, key=lambda route: route.ns_per_design))
+    return tuple(sorted(found, key=lambda route: (*route.order, route.name)))
 
 
 def _check_domain(family: Family, accuracy: Accuracy) -> None:
@@ -73,13 +74,17 @@ def _check_domain(family: Family, accuracy: Accuracy) -> None:
 
 def _own(family: Family, step: Step, stage: Stage | None, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
     name = f"stage {stage.number}: {step.name}" if stage else step.name
-    return Route(name, outputs, step.cost(accuracy), partial(_run_step, family, step, stage, outputs))
+    owner = stage.family if stage else family
+    place = [own.name for own in steps_of(owner)].index(step.name)
+    run, cost = partial(_run_step, family, step, stage, outputs), step_ns(owner, step, accuracy)
+    return Route(name, outputs, cost, run, order=(step.work, place))
 
 
 def _general(family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
     run = partial(_run_general, family, general, outputs)
     cost = group_ns(family, general, outputs, accuracy)
-    return Route(f"{general} {effect}".rstrip(), outputs, cost, run, general)
+    order = group_order(family, general, outputs)
+    return Route(f"{general} {effect}".rstrip(), outputs, cost, run, general, order)
 
 
 def _run_general(

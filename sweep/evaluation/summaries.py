@@ -13,6 +13,7 @@ from kernels import status as st
 from sweep.effects import extended, input_names
 from sweep.effects.wanted import expanded
 from sweep.errors import InputError
+from sweep.evaluation.angles import AngleUnit, in_radians
 from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.route import Part, Route
 from sweep.evaluation.routes import routes
@@ -62,6 +63,7 @@ def summarise(
     keep: bool | str | Sequence[str] = False,
     status_text: bool = False,
     loads: Loads | None = None,
+    angles: AngleUnit | None = None,
 ) -> pd.DataFrame:
     """Design outputs of mechanisms, one row per design, in the order of the input.
 
@@ -72,7 +74,7 @@ def summarise(
         ``want`` calls for; missing ``branch`` means +1
     want : names of design outputs: ``rotatable``, ``margin``, ``stroke``, ``max_abs_d2s`` ... (see ``sweep families``),
         ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``); the name of an effect, as
-        ``friction``, stands for its outputs
+        ``friction``, stands for its outputs; a list, or one text between commas
     samples : extrema on a dense grid of so many crank angles
     accuracy : true extrema, refined to this relative error; 1e-8 if neither is given.  A family whose poses depend on
         those before (a march) has no true extrema: 720 samples if neither is given
@@ -84,6 +86,8 @@ def summarise(
     status_text : add a column ``status_text``, the meaning of ``status`` in words
     loads : loads over the turn, by the input that each adds to (``load_torque``, ``tool_force2``): a pair (crank angles
         [rad], values), joined by periodic monotone cubics, or ``{"mean": m, "cos": [...], "sin": [...]}``
+    angles : the unit of angles in ``table``, "rad" or "deg"; a header such as ``alpha [deg]`` says it of one column.
+        Left out, it is rad, and a parameter above 2 pi is refused.  Results are in rad
 
     Returns
     -------
@@ -91,12 +95,26 @@ def summarise(
         the wanted columns in order, with ``accuracy`` an ``err_<name>`` for each (estimate of its absolute error, same
         unit), and ``status``; indexed like the table.  Where a value is nan, ``status`` says why (see
         :mod:`kernels.status`); a maximum that ``certify`` could not prove keeps the searched value, with NOT_CONVERGED
-        and nan as its error.
+        and nan as its error.  ``attrs["units"]`` names the unit of each output; "length" is that of the table.
 
     Raises
     ------
     InputError
-        for an unknown name or a bad value, with column and row; for ``certify`` with a maximum that cannot be proven.
+        for an unknown name or a bad value, with column and row; for ``certify`` with a maximum that cannot be proven;
+        for angles that read as degrees.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> crank_rocker = {"a": [10.0, 12.0], "b": 40.0, "c": 25.0, "e": 35.0, "f": 5.0, "g": -3.0}
+    >>> crank_rocker |= {"alpha [deg]": 60.0}
+    >>> found = sweep.summarise("rssr", crank_rocker, "margin, max_abs_d2psi")
+    >>> found[["margin", "max_abs_d2psi", "status"]].round(4)
+       margin  max_abs_d2psi  status
+    0  0.3793         0.6276       0
+    1  0.3026         0.8978       0
+    >>> found.attrs["units"]["margin"]
+    '1'
     """
     import pandas as pd
 
@@ -107,13 +125,18 @@ def summarise(
     chosen = _accuracy(mechanism.domain, samples, accuracy, certify)
     if certify:
         check_certifiable(mechanism, wanted, chosen)
+    given = table
+    table = in_radians(mechanism, table, angles, input_names(bare))
     matrix, _ = design_matrix(mechanism, table, unused=input_names(bare))
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
     made: dict[str, Any] = {name: columns[name] for name in (*_with_errors(wanted, chosen), "status")}
     if status_text:
         made["status_text"] = np.array(meanings(columns["status"]), dtype=object)
     index = table.index if isinstance(table, pd.DataFrame) else None
-    return pd.DataFrame(kept_columns(table, keep, made, len(matrix)) | made, index=index)
+    found = pd.DataFrame(kept_columns(given, keep, made, len(matrix)) | made, index=index)
+    units = {name: output(mechanism, name).unit for name in wanted}
+    found.attrs["units"] = units | {error_of(name): unit for name, unit in units.items() if error_of(name) in made}
+    return found
 
 
 def design_outputs(

@@ -62,14 +62,20 @@ def design_matrix(
 
 
 def wanted_names(want: str | Sequence[str], place: str) -> list[str]:
-    """The names of wanted outputs without repetition.
+    """The names of wanted outputs without repetition, from a list or from one text between commas.
 
     Raises
     ------
     InputError
         if it is neither a name nor a list of names.
     """
-    names = [want] if isinstance(want, str) else list(want) if isinstance(want, Iterable) else [want]
+    names = (
+        [name.strip() for name in want.split(",")]
+        if isinstance(want, str)
+        else list(want)
+        if isinstance(want, Iterable)
+        else [want]
+    )
     for name in names:
         if not isinstance(name, str):
             raise InputError("want", name, "a name, or a list of names", place)

@@ -8,7 +8,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sweep.errors import InputError, StoreError
+from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.exchange.scene import turn
 from sweep.families import Mechanism
 from sweep.families import family as find_family
@@ -31,6 +34,7 @@ def export(
     poses: int = 120,
     unit: str = "mm",
     speed: float | None = None,
+    angles: AngleUnit | None = None,
 ) -> Path:
     """Write one design to a file that other programs read.
 
@@ -48,6 +52,7 @@ def export(
     poses : steps of a turn
     unit : what a length of the design is, "mm" or "m"
     speed : of the driving shaft [rad/s]: gives the law a column of time and the animation its duration
+    angles : the unit of the angles of ``design`` and ``phi``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
@@ -61,6 +66,14 @@ def export(
         that is not installed (``pip install 'linksweep[cad]'``).
     StoreError
         if the file cannot be written.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> design = {"a": 20.0, "b": 70.0, "e": 5.0}
+    >>> file = sweep.export("slider_crank", design, "drive.csv", phi=0.0)
+    >>> print(file.read_text().splitlines()[2])
+    ,,slider_crank,D,0.0,5.0,0.0,mm
     """
     target = Path(path)
     kind = _format(target, format)
@@ -70,6 +83,8 @@ def export(
         raise InputError("poses", poses, "at least 3", "export")
     if speed is not None and not (math.isfinite(speed) and speed > 0.0):
         raise InputError("speed", speed, "a positive number of rad/s", "export")
+    design = in_radians(find_family(mechanism), design, angles)
+    phi = float(np.asarray(grid_in_radians("phi", "rad", phi, angles)))
     write = _writer(kind, mechanism, design, phi, poses, unit, speed)
     partial = target.with_name(f"_tmp-{os.getpid()}-{target.name}")
     try:

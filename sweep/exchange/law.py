@@ -30,7 +30,7 @@ def write_law(
     family = find_family(mechanism)
     names = list(dict.fromkeys(motion_curves(family)))
     angles = phi + np.arange(poses) * (2.0 * math.pi / poses)
-    found = evaluate(mechanism, design, names, phi=angles)
+    found = evaluate(mechanism, design, names, phi=angles, angles="rad")
     units = {"phi": "rad"} | {o.name: o.unit.replace("length", unit) for o in family.pose_outputs}
     texts = {"phi": "angle of the driving shaft"} | {o.name: o.text for o in family.pose_outputs}
     columns = {"phi": angles}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from functools import cached_property
 from typing import Literal, NamedTuple, TypeAlias, TypeVar
 
@@ -136,26 +137,39 @@ StepFunction: TypeAlias = Callable[[Array, frozenset[str], Accuracy], Columns]
 Capability = TypeVar("Capability")
 
 
+class Work(IntEnum):
+    """What kind of work a route is; routes are taken in this order.
+
+    The order decides which limit a design meets first, and what is no longer computed of it then.  So it is part of the
+    sources, like everything that decides values, and no matter of measured times.
+    """
+
+    PARAMETERS = 0  # reads parameters only
+    QUICK = 1  # a family's own, a few microseconds at most: closed forms, a few roots
+    SEARCH = 2  # extrema, means and events over poses
+    EFFECT = 3  # the same with an effect at every pose
+    LONG = 4  # a family's own that takes tens of microseconds or more: curves, motion in time
+    PROOF = 5
+
+
 @dataclass(frozen=True)
 class Step:
     """A family's own route to some design outputs: exact, or faster than the general reductions over sampled poses.
 
     ``run(designs, wanted, accuracy)`` returns the wanted ones of ``provides`` and ``status``, each of shape (n,).
     ``applies`` says for which accuracy it serves (a dense kernel does not serve ``accuracy=``).  ``certifies``: its
-    maxima are proven, and serve ``Accuracy.certify`` only.
+    maxima are proven, and serve ``Accuracy.certify`` only.  Steps of the same kind of work are taken in the order in
+    which the family lists them.  ``cost`` estimates its time [ns per design]; without it the row "family: step" of
+    sweep/costs.toml does.
     """
 
     name: str
     provides: tuple[Output, ...]
     run: StepFunction
-    ns_per_design: float
     applies: Callable[[Accuracy], bool] = field(default=lambda accuracy: True)
-    ns_per_sample: float = 0.0
+    work: Work = Work.QUICK
     certifies: bool = False
-
-    def cost(self, accuracy: Accuracy) -> float:
-        """Estimated time [ns per design]; a step that works through the samples says what each one costs."""
-        return self.ns_per_design + self.ns_per_sample * (accuracy.samples or 0)
+    cost: Callable[[Accuracy], float] | None = None
 
 
 @dataclass(frozen=True)
@@ -179,7 +193,8 @@ class Family:
     analytic : whether poses take complex designs and angles, for exact gradients by the complex step
     capabilities : typed objects that effects, proofs, drawings and fits ask for (:mod:`sweep.families.capabilities`)
     example : an ordinary design, by parameter, whose poses all exist; hard inputs are made from it
-    dear : for pose outputs that cost far more than the motion, what they are computed by and its cost [ns per pose]
+    dear : for pose outputs that cost far more than the motion, what they are computed by and its cost [ns per pose],
+        in the order in which such routes are taken
     precise_poses : slower poses whose errors are a few roundings of what is given, where the family has them
     """
 
@@ -273,6 +288,17 @@ def filled(
     kernel(*arguments, status, *outputs)
     columns: Columns = {name: out for name, out in zip(names, outputs, strict=True) if out is not None}
     return columns | {"status": status}
+
+
+def poses_of(kernel: Callable[..., object], names: tuple[str, ...]) -> PoseFunction:
+    """The poses of a kernel(designs, cos, sin, status, one array or None per output)."""
+
+    def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+        status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
+        dtype = np.result_type(designs, angles.cos)
+        return filled(kernel, (designs, angles.cos, angles.sin), names, wanted, status, dtype)
+
+    return poses
 
 
 def filled_with_places(

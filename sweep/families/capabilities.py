@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sweep.families.base import Angles, Columns
 
 Array: TypeAlias = NDArray[np.float64]
+Numbers: TypeAlias = NDArray[Any]
 DesignMap: TypeAlias = Callable[[Array], Array]
 FillFunction: TypeAlias = "Callable[[Array, Angles, Columns, Array, Array], None]"
 Coordinates: TypeAlias = tuple[str | None, str | None, str | None]
@@ -42,7 +43,7 @@ class JointRecords:
     """Positions, directions and their rates at the joints, from which the effects of loads work.
 
     ``fill(designs, angles, motion, per_pose, per_design)`` writes the records that :mod:`kernels.joints` describes,
-    from the pose outputs ``needs`` in ``motion``.  ``follower`` is what the coupler drives.
+    from the pose outputs ``needs`` in ``motion``, in the frame of the family.  ``follower`` is what the coupler drives.
     """
 
     fill: FillFunction
@@ -72,8 +73,9 @@ class GuidedPoint:
     """A coupler point that runs along a line: its position is linear in the directions of crank, coupler and rocker.
 
     ``shares(designs)``, (n, 6), are the factors that the proof of its maxima takes (:mod:`sweep.reductions.travel`).
-    The coupler point, the line and the scale can be fitted: ``fitted`` are the parameters of point and line, ``scaled``
-    the lengths that grow with the stroke, ``direction`` the parameter of the line's direction.
+    The coupler point, the line and the scale can be fitted: ``fitted`` are the parameters of the point along and across
+    the coupler, of the line's direction and of its distance from the origin, ``scaled`` the lengths that grow with the
+    stroke, ``direction`` the third of the fitted ones.
     """
 
     shares: DesignMap
@@ -93,6 +95,46 @@ class LimitLocus:
 
     travel: str
     sized: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What a search over boxes of designs is given; lengths in one unit, angles in rad.
+
+    ``branch``; the number of the ``objective``; least ``cos2`` of the pressure angle; least and most of all ``links``;
+    the ``target`` of the objective; low and high ends and known bounds of the boxes it ``starts`` from; widths of the
+    ``whole`` space; numbers of the ``free`` coordinates, and all of them as ``given``; the share of the whole below
+    which a box is not halved; the ``most`` boxes to judge.
+    """
+
+    branch: float
+    objective: int
+    cos2: float
+    links: Array
+    target: float
+    starts: tuple[Array, Array, Array]
+    whole: Array
+    free: Array
+    given: Array
+    smallest: float
+    most: int
+
+
+@dataclass(frozen=True)
+class ProvableLocus:
+    """Bounds of an output can be proven for whole boxes of designs on the locus of limit positions.
+
+    ``coordinates`` are what a box is made of, the swing first; ``links`` the lengths that follow and may have limits.
+    ``objectives`` has the outputs that can be proven, with the numbers by which the kernels know them; ``rows`` says
+    for each kind of row what it is about.  ``explore(searched, leaves)`` fills arrays (low, high, outcome, bound,
+    kinds, theta, factors) with the boxes that were not halved; it gives their number and that of the boxes judged.
+    """
+
+    coordinates: tuple[str, ...]
+    links: tuple[str, ...]
+    objectives: Mapping[str, int]
+    rows: tuple[str, ...]
+    explore: Callable[[Searched, tuple[Numbers, ...]], tuple[int, int]]
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,10 @@ def _outputs(family: Family) -> list[str]:
     for name, of in family.derivative_of.items():
         missing = [one for one in (name, of) if one not in names]
         faults += [f"derivative_of names {one!r}, which is no pose output: add it or leave it out" for one in missing]
+    steps = [step.name for step in family.steps]
+    faults += [f"two steps are called {name!r}: rename one" for name in set(steps) if steps.count(name) > 1]
+    if "size" in steps:
+        faults.append("a step is called 'size', as one that every family is given: rename it")
     if family.outward:
         sign = next((p for p in family.parameters if p.name == family.outward), None)
         if sign is None or sign.choices != (-1.0, 1.0):

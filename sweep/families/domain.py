@@ -13,6 +13,19 @@ Array: TypeAlias = NDArray[np.float64]
 EndsFunction: TypeAlias = Callable[[Array], tuple[Array, Array]]
 
 TWO_PI = 2.0 * np.pi
+TWO_TURNS, TWO_TURNS_DEG = 2.0 * TWO_PI * (1.0 + 1e-9), 720.0
+
+
+def reads_as_degrees(largest: float) -> bool:
+    """Whether crank angles, the largest of which is given, were written in degrees though rad were expected.
+
+    Crank angles may run on over many turns.  Between two turns in rad and two turns in degrees a grid whose largest
+    value is a whole or half number was written in degrees: one in rad ends at a multiple of pi.
+
+    >>> reads_as_degrees(180.0), reads_as_degrees(12.5), reads_as_degrees(62.83185)
+    (True, False, False)
+    """
+    return TWO_TURNS < abs(largest) <= TWO_TURNS_DEG and (2.0 * largest).is_integer()
 
 
 @dataclass(frozen=True)

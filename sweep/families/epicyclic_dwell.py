@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.families import epicyclic_dwell
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, Work, poses_of
 from sweep.families.capabilities import Link, Made, Points, Skeleton
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
@@ -38,12 +38,8 @@ DWELL_OUTPUTS = (
 
 _NAMES = tuple(o.name for o in POSE_OUTPUTS)
 
-
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its carrier angles, each (n, m)."""
-    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-    arguments = designs, angles.cos, angles.sin
-    return filled(epicyclic_dwell.poses, arguments, _NAMES, wanted, status, np.result_type(designs, angles.cos))
+# Wanted pose outputs and status of every design at its angles, each (n, m).
+poses = poses_of(epicyclic_dwell.poses, _NAMES)
 
 
 def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -70,7 +66,7 @@ FAMILY = Family(
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
     example={"k": 1.3, "a": 0.2, "n": 3.0},
-    steps=(Step("dwell", DWELL_OUTPUTS, dwell, 20000.0),),
+    steps=(Step("dwell", DWELL_OUTPUTS, dwell, work=Work.LONG),),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     uses_phi=False,
     capabilities=(

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from kernels.families import eyelet
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled
+from sweep.families.base import Family, Output, Parameter, poses_of
 from sweep.families.capabilities import Points, ThreadPath
 
 PARAMETERS = (
@@ -35,12 +33,8 @@ POSE_OUTPUTS = (
 )
 _NAMES = tuple(o.name for o in POSE_OUTPUTS)
 
-
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-    dtype = np.result_type(designs, angles.cos)
-    return filled(eyelet.poses, (designs, angles.cos, angles.sin), _NAMES, wanted, status, dtype)
+# Wanted pose outputs and status of every design at its angles, each (n, m).
+poses = poses_of(eyelet.poses, _NAMES)
 
 
 FAMILY = Family(

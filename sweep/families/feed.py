@@ -7,7 +7,7 @@ import numpy as np
 from kernels.families import feed
 from kernels.families.feed.events import OUTPUTS as _EVENTS
 from kernels.families.feed.motion import OUTPUTS as _POSES
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import Link, Points, Skeleton
 from sweep.families.skeletons import standing
 
@@ -124,7 +124,7 @@ FAMILY = Family(
     position="x_t",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
-    steps=(Step("feeding", FEEDING_OUTPUTS, events, 150_000.0),),
+    steps=(Step("feeding", FEEDING_OUTPUTS, events, work=Work.LONG),),
     example=EXAMPLE,
     derivative_of={
         "psi_plus_dh": "dpsi", "dpsi": "d2psi", "chi": "dchi", "dchi": "d2chi", "x_t": "dx_t", "dx_t": "d2x_t",

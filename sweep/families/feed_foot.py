@@ -7,7 +7,7 @@ import numpy as np
 from kernels.families import feed as kernels
 from kernels.families.feed.motion import OUTPUTS as _RACK
 from sweep.families import feed
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Step, guarded
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Step, Work, guarded
 from sweep.families.domain import March
 from sweep.families.foot import EVENT_OUTPUTS, FOOT, NODES, POSE_OUTPUTS, RESTITUTION, TURNS, chosen, marched, nodes_for
 
@@ -73,8 +73,8 @@ FAMILY = Family(
     poses=guarded(poses),
     domain=March(turns=TURNS),
     steps=(
-        Step("feeding", feed.FEEDING_OUTPUTS, feeding, 150_000.0),
-        Step("march", EVENT_OUTPUTS, events, 2_000_000.0),
+        Step("feeding", feed.FEEDING_OUTPUTS, feeding, work=Work.LONG),
+        Step("march", EVENT_OUTPUTS, events, work=Work.LONG),
     ),
     example=EXAMPLE,
     analytic=False,

@@ -9,7 +9,7 @@ from kernels.effects.foot import march
 from kernels.families import foot
 from kernels.families.foot.harmonic import OUTPUTS as _CLOSED
 from kernels.status import NO_EVENT, OK
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, guarded
+from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, Work, guarded
 from sweep.families.domain import March
 
 FOOT = (
@@ -139,8 +139,8 @@ FAMILY = Family(
     poses=guarded(poses),
     domain=March(turns=TURNS),
     steps=(
-        Step("closed forms", CLOSED_OUTPUTS, closed, 20_000.0),
-        Step("march", EVENT_OUTPUTS, events, 1_500_000.0),
+        Step("closed forms", CLOSED_OUTPUTS, closed, work=Work.LONG),
+        Step("march", EVENT_OUTPUTS, events, work=Work.LONG),
     ),
     example=EXAMPLE,
     analytic=False,

@@ -143,9 +143,9 @@ FAMILY = Family(
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
     steps=(
-        Step("dwell", DWELL_OUTPUTS, dwell, 600.0),
-        Step("stationary points", MAX_OUTPUTS, exact_maxima, 1500.0, lambda accuracy: accuracy.target is not None),
-        Step("grid", _SAMPLED_OUTPUTS, sampled_maxima, 50.0, lambda accuracy: accuracy.samples is not None, 0.8),
+        Step("dwell", DWELL_OUTPUTS, dwell),
+        Step("stationary points", MAX_OUTPUTS, exact_maxima, lambda accuracy: accuracy.target is not None),
+        Step("grid", _SAMPLED_OUTPUTS, sampled_maxima, lambda accuracy: accuracy.samples is not None),
     ),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     capabilities=(

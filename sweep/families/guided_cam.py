@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.families import guided_cam
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
+from sweep.families.base import (
+    Accuracy,
+    Angles,
+    Array,
+    Columns,
+    Family,
+    Output,
+    Parameter,
+    Step,
+    Work,
+    filled_with_places,
+)
 from sweep.families.capabilities import Points, ThreadPath
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
@@ -85,7 +96,7 @@ FAMILY = Family(
     position="S",
     pose_outputs=(*VALUE_OUTPUTS, *PROFILE_OUTPUTS, CURVATURE, WRAP),
     poses=poses,
-    steps=(Step("size", DESIGN_OUTPUTS, size, 40_000.0),),
+    steps=(Step("cam body", DESIGN_OUTPUTS, size, work=Work.LONG),),
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},
     uses_phi=False,
     example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},

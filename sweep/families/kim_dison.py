@@ -15,6 +15,7 @@ from kernels.families import rssr
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
 from sweep.families.capabilities import Assembly, CrankRockerLoop, JointRecords, Points, PressureEllipse, Skeleton
+from sweep.families.placing import move_records
 from sweep.families.skeletons import CRANK_ROCKER, standing
 
 PARAMETERS = (
@@ -27,6 +28,9 @@ PARAMETERS = (
     Parameter("epsilon1", "angular_acceleration", "angular acceleration of the crank", default=0.0),
     Parameter("branch", "sign", "assembly mode: +1 or -1, the source's sign s", default=1.0, choices=(-1.0, 1.0)),
 )
+
+# The crank-rocker's x runs from axis to axis, its z along the rocker's axis, its origin stands b above this one.
+_FROM_CRANK_ROCKER = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 MOTION_OUTPUTS = (
     Output("alpha", "rad", "rocker angle in (-pi, pi]", "(4)", wraps=True),
@@ -170,10 +174,13 @@ def _as_ours(step: Step) -> Step:
 
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from, in the frame of the crank-rocker."""
+    """Fill the joint records that effects work from."""
     matrix = as_crank_rocker(designs)
     turned = crank_rocker.poses(matrix, angles, frozenset(crank_rocker.JOINT_NEEDS))
     crank_rocker.joint_records(matrix, angles, turned, per_pose, per_design)
+    origin = np.zeros((len(designs), 3))
+    origin[:, 2] = designs[:, 4]
+    move_records(_FROM_CRANK_ROCKER, origin, per_pose, per_design)
 
 
 def ellipse(designs: Array) -> Array:
@@ -190,7 +197,7 @@ FAMILY = Family(
     poses=poses,
     example={"r": 1.0, "l": 6.0, "h": 3.2, "a": 2.9, "b": 4.0, "branch": -1.0},
     steps=(
-        Step("swing", SWING_OUTPUTS, swing, 700.0),
+        Step("swing", SWING_OUTPUTS, swing),
         *(_as_ours(step) for step in crank_rocker.FAMILY.steps if step.name != "limit positions"),
     ),
     derivative_of={"alpha": "dalpha", "dalpha": "d2alpha", "d2alpha": "d3alpha"},

@@ -20,8 +20,7 @@ EYE = "eye"  # on the coupler, the link between the points b and c
 
 def coordinates(m: Member, point: str, designs: Array, own_designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
     """Coordinates of a point in the machine's frame, (n, m)."""
-    start = m.columns.stop + 1
-    at = designs[:, start : start + 3]
+    start, at = m.columns.stop + 1, m.origin(designs)
     if point == TIP:
         link = m.family.find(OutputLink)
         assert link is not None

@@ -15,7 +15,7 @@ from sweep.families.base import Angles, Array, Columns, Event, Family, Output, P
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.located import EYE, TIP, coordinates, coupler_joints, velocity
 from sweep.families.placing import AXES, Place
-from sweep.families.relations import Relation, Timing
+from sweep.families.relations import Frame, Relation, Timing
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,11 @@ class Member:
     def designs(self, designs: Array) -> Array:
         """The design matrix of this member's family."""
         return np.ascontiguousarray(designs[:, self.columns])
+
+    def origin(self, designs: Array) -> Array:
+        """Where the origin of its frame stands in the machine's frame, (n, 3)."""
+        start = self.columns.stop + 1  # behind its own parameters and the phase
+        return designs[:, start : start + 3]
 
     def own(self, name: str) -> str:
         """A dotted name as the member's family knows it; "" for a name of another member."""
@@ -224,7 +229,7 @@ def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: fro
 def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted outputs of members and relations, and the first status that is not OK, in the order of the members."""
     relations = [r for r in machine.relations if not wanted.isdisjoint(o.name for o in r.outputs)]
-    needed = set(wanted).union(*(r.needs for r in relations))
+    needed = set(wanted).union(*(r.needs(wanted) for r in relations))
     for m in reversed(machine.members):
         needed |= _driving(m, needed)
     shape = (len(designs), angles.cos.shape[1])
@@ -239,8 +244,9 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
     found["phi"] = angles.phi
     columns_of = machine.parameter_names
     found |= {p.name: designs[:, [columns_of.index(p.name)]] for r in relations for p in r.parameters}
+    frames = {m.name: Frame(m.place.rotation, m.origin(designs)) for m in machine.members} if relations else {}
     for relation in relations:
-        found |= relation.compute(found, {m.name: m.place.rotation for m in machine.members}, wanted)
+        found |= relation.compute(found, frames, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
 
 

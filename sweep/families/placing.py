@@ -38,6 +38,26 @@ class Place:
         return np.column_stack([x, np.cross(z, x), z])
 
 
+# Where a record per pose and one per design have points; the other vectors of both are directions (kernels/joints.py).
+_PLACES_OF_POSE, _PLACES_OF_DESIGN = (0, 3), (6, 9)
+
+
+def move_records(rotation: Array, origin: Array, per_pose: Array, per_design: Array) -> None:
+    """Bring joint records that were filled in the frame of another family into a family's own frame, in place.
+
+    A vector v of the other frame is ``rotation`` v in the own one, (3, 3), and its origin stands at ``origin``, (n, 3).
+    Quarter turns, which have one 1 or -1 a row, change no digit.
+    """
+    for vectors, places, shift in (
+        (per_pose, _PLACES_OF_POSE, origin[:, None, :]),
+        (per_design, _PLACES_OF_DESIGN, origin),
+    ):
+        for k in range(0, 21 if vectors is per_pose else 12, 3):
+            vectors[..., k : k + 3] = vectors[..., k : k + 3] @ rotation.T
+        for k in places:
+            vectors[..., k : k + 3] += shift
+
+
 def place(member: str, given: Place | dict[str, Any] | None) -> Place:
     """A member's place from what a user gives, checked.
 

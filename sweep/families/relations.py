@@ -1,15 +1,26 @@
-"""What two or more members of a machine are to each other, pose by pose: distances, torques on the shaft, shaking."""
+"""What two or more members of a machine are to each other, pose by pose: distances, speeds, torques, shaking."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from sweep.families.base import Array, Output, Parameter
 from sweep.families.placing import AXES
+
+
+class Frame(NamedTuple):
+    """A member's frame in the machine's frame: v of the member is ``rotation`` v, from the origin ``at``, (n, 3)."""
+
+    rotation: Array
+    at: Array
+
+    def turned(self, vector: list[Any]) -> list[Any]:
+        """Components in the machine's frame of a vector of the member's frame, each (n, m)."""
+        return [sum(self.rotation[k, j] * vector[j] for j in range(3)) for k in range(3)]
 
 
 class Relation(Protocol):
@@ -21,11 +32,11 @@ class Relation(Protocol):
     def outputs(self) -> tuple[Output, ...]: ...  # noqa: D102
     @property
     def parameters(self) -> tuple[Parameter, ...]: ...  # noqa: D102
-    @property
-    def needs(self) -> frozenset[str]: ...  # noqa: D102
+
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]: ...  # noqa: D102
 
     def compute(  # noqa: D102
-        self, found: Mapping[str, Any], rotations: Mapping[str, Array], wanted: frozenset[str]
+        self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]
     ) -> dict[str, Any]: ...
 
 
@@ -69,19 +80,15 @@ class Distance:
         """It has none of its own."""
         return ()
 
-    @property
-    def needs(self) -> frozenset[str]:
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Coordinates of both points."""
         return frozenset(f"{point}_{axis}" for point in self.points for axis in AXES)
 
-    def compute(
-        self, found: Mapping[str, Any], rotations: Mapping[str, Array], wanted: frozenset[str]
-    ) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
         """Distance and components, (n, m)."""
         a, b = self.points
         parts = [found[f"{b}_{axis}"] - found[f"{a}_{axis}"] for axis in AXES]
-        columns = {f"{self.name}_{axis}": part for axis, part in zip(AXES, parts, strict=True)}
-        return columns | {self.name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)}
+        return _vector(self.name, parts)
 
 
 @dataclass(frozen=True)
@@ -105,14 +112,11 @@ class Speed:
         """It has none of its own."""
         return ()
 
-    @property
-    def needs(self) -> frozenset[str]:
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Velocities of the points."""
         return frozenset(velocity for point in self.points for velocity in _velocities(point))
 
-    def compute(
-        self, found: Mapping[str, Any], rotations: Mapping[str, Array], wanted: frozenset[str]
-    ) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
         """The speed, (n, m)."""
         parts = [found[name] for name in _velocities(self.points[-1])]
         if len(self.points) == 2:
@@ -146,35 +150,37 @@ class ShaftTorque:
         """It has none of its own."""
         return ()
 
-    @property
-    def needs(self) -> frozenset[str]:
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """The drive torques."""
         return frozenset(name for name, _ in self.torques)
 
-    def compute(
-        self, found: Mapping[str, Any], rotations: Mapping[str, Array], wanted: frozenset[str]
-    ) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
         """The torque, (n, m): equal power on both sides of every gear."""
         return {self.name: sum(ratio * found[name] for name, ratio in self.torques)}
 
 
 @dataclass(frozen=True)
 class Shaking:
-    """Resultant force of the members on the frame of the machine; ``members`` by name and stage number."""
+    """Resultant force and moment of the members on the frame of the machine; ``members`` by name and stage number.
+
+    The moment is about the origin of the machine's frame.  The frame of a chain's stage counts as that of the member.
+    """
 
     name: str
     members: tuple[tuple[str, str], ...]
 
     @property
     def outputs(self) -> tuple[Output, ...]:
-        """Magnitude and components in the machine's frame."""
+        """Magnitude and components in the machine's frame, of the force and of the moment."""
         words = ", ".join(f"{member} {stage}".strip() for member, stage in self.members)
-        size = Output(self.name, "force", f"magnitude of the force of {words} on the frame", "ours")
-        parts = (
-            Output(f"{self.name}_{x}", "force", f"{x} of the force of {words} on the frame, machine's frame", "ours")
-            for x in AXES
-        )
-        return size, *parts
+        found = []
+        for name, unit, what in (
+            (self.name, "force", f"the force of {words} on the frame"),
+            (self._moment, "torque", f"the moment of {words} on the frame about the machine's origin"),
+        ):
+            found.append(Output(name, unit, f"magnitude of {what}", "ours"))
+            found += [Output(f"{name}_{x}", unit, f"{x} of {what}, machine's frame", "ours") for x in AXES]
+        return tuple(found)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -182,20 +188,38 @@ class Shaking:
         return ()
 
     @property
-    def needs(self) -> frozenset[str]:
-        """The frame's forces on crank and follower of every member."""
+    def _moment(self) -> str:
+        return f"{self.name}_moment"
+
+    def _turning(self, wanted: frozenset[str]) -> bool:
+        return not wanted.isdisjoint((self._moment, *(f"{self._moment}_{axis}" for axis in AXES)))
+
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
+        """The frame's forces on crank and follower of every member, and the members' moments where one is wanted."""
+        kinds = ["force_a{}_{}", "force_d{}_{}", *(["shaking_moment{}_{}"] if self._turning(wanted) else [])]
         return frozenset(
-            f"{member}.force_{joint}{stage}_{axis}" for member, stage in self.members for joint in "ad" for axis in AXES
+            f"{member}.{kind.format(stage, axis)}" for member, stage in self.members for kind in kinds for axis in AXES
         )
 
-    def compute(
-        self, found: Mapping[str, Any], rotations: Mapping[str, Array], wanted: frozenset[str]
-    ) -> dict[str, Any]:
-        """The force on the frame is minus the force of the frame, (n, m)."""
-        total: list[Any] = [0.0, 0.0, 0.0]
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+        """Force and moment on the frame, (n, m); the force is minus that of the frame."""
+        force: list[Any] = [0.0, 0.0, 0.0]
+        moment: list[Any] = [0.0, 0.0, 0.0]
         for member, stage in self.members:
-            own = [-(found[f"{member}.force_a{stage}_{x}"] + found[f"{member}.force_d{stage}_{x}"]) for x in AXES]
-            turn = rotations[member]
-            total = [total[k] + sum(turn[k, j] * own[j] for j in range(3)) for k in range(3)]
-        columns = {f"{self.name}_{axis}": part for axis, part in zip(AXES, total, strict=True)}
-        return columns | {self.name: np.sqrt(total[0] ** 2 + total[1] ** 2 + total[2] ** 2)}
+            frame = frames[member]
+            own = frame.turned(
+                [-(found[f"{member}.force_a{stage}_{x}"] + found[f"{member}.force_d{stage}_{x}"]) for x in AXES]
+            )
+            force = [total + part for total, part in zip(force, own, strict=True)]
+            if self._turning(wanted):
+                about = frame.turned([found[f"{member}.shaking_moment{stage}_{x}"] for x in AXES])
+                x, y, z = (frame.at[:, [k]] for k in range(3))
+                arm = (y * own[2] - z * own[1], z * own[0] - x * own[2], x * own[1] - y * own[0])
+                moment = [total + a + b for total, a, b in zip(moment, about, arm, strict=True)]
+        return _vector(self.name, force) | (_vector(self._moment, moment) if self._turning(wanted) else {})
+
+
+def _vector(name: str, parts: list[Any]) -> dict[str, Any]:
+    """Magnitude and components."""
+    columns = {f"{name}_{axis}": part for axis, part in zip(AXES, parts, strict=True)}
+    return columns | {name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)}

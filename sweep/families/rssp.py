@@ -157,8 +157,8 @@ FAMILY = Family(
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
     poses=poses,
     steps=(
-        Step("margin", MARGIN_OUTPUTS, margins, 200.0),
-        Step("limit positions", LIMIT_OUTPUTS, limit_positions, 500.0),
+        Step("margin", MARGIN_OUTPUTS, margins),
+        Step("limit positions", LIMIT_OUTPUTS, limit_positions),
     ),
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
     outward="branch",

@@ -19,6 +19,7 @@ from sweep.families.base import (
     Output,
     Parameter,
     Step,
+    Work,
     filled,
     optional_outputs,
 )
@@ -33,6 +34,7 @@ from sweep.families.capabilities import (
     Skeleton,
 )
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
+from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, crank_axis, standing
 
 PARAMETERS = (
@@ -311,11 +313,11 @@ FAMILY = Family(
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
     steps=(
-        Step("margin", MARGIN_OUTPUTS, margin, 40.0),
-        Step("limit positions", LIMIT_OUTPUTS, limits, 700.0),
-        Step("true maxima", MAXIMA_OUTPUTS, true_maxima, 250.0, _refined),
-        Step("certified maxima", MAXIMA_OUTPUTS, certified_maxima, 2500.0, _certified, certifies=True),
-        Step("grid", MAXIMA_OUTPUTS, sampled_maxima, 50.0, _sampled, ns_per_sample=1.7),
+        Step("margin", MARGIN_OUTPUTS, margin),
+        Step("true maxima", MAXIMA_OUTPUTS, true_maxima, _refined),
+        Step("limit positions", LIMIT_OUTPUTS, limits),
+        Step("grid", MAXIMA_OUTPUTS, sampled_maxima, _sampled),
+        Step("certified maxima", MAXIMA_OUTPUTS, certified_maxima, _certified, Work.PROOF, certifies=True),
     ),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     outward="branch",
@@ -326,6 +328,8 @@ FAMILY = Family(
         PressureEllipse(ellipse),
         CrankRockerLoop(np.ascontiguousarray),
         LimitLocus("swing", sized=("c", "e", "g")),
+        CRANK_ROCKER_BY_AXES,
+        CRANK_ROCKER_BY_ROCKER,
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(rocker_origin),
         CRANK_ROCKER_POINTS,

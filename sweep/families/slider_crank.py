@@ -13,6 +13,7 @@ from sweep.families import rssp
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
 from sweep.families.capabilities import Assembly, JointRecords, Points, Skeleton
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS
+from sweep.families.placing import move_records
 from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, X, standing
 
 PARAMETERS = (
@@ -38,6 +39,7 @@ POSE_OUTPUTS = (
 # The spatial linkage has its slide line along y: its x is minus this y, and its crank angle a quarter turn more.
 _THEIRS = {"x_b": "y_b", "y_b": "x_b", "x_c": "y_c", "y_c": "x_c"}
 _ANGLES = ("phi_ext", "phi_fold")
+_FROM_SPATIAL = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def as_spatial(designs: Array) -> Array:
@@ -85,9 +87,10 @@ def _as_ours(step: Step) -> Step:
 
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from, in the frame of the spatial linkage."""
+    """Fill the joint records that effects work from."""
     names = ("s", "ds", "d2s", "discriminant")
     rssp.joint_records(as_spatial(designs), turned(angles), {n: motion[n] for n in names}, per_pose, per_design)
+    move_records(_FROM_SPATIAL, np.zeros((len(designs), 3)), per_pose, per_design)
 
 
 FAMILY = Family(

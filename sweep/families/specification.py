@@ -12,7 +12,7 @@ from sweep.errors import InputError, nearest
 from sweep.families import Specification
 from sweep.families.base import Event, Family
 from sweep.families.capabilities import OutputLink
-from sweep.families.domain import Turn
+from sweep.families.domain import Turn, reads_as_degrees
 from sweep.families.located import coupler_joints, is_planar
 from sweep.families.members import Machine, Member, assemble
 from sweep.families.placing import place, vector
@@ -115,6 +115,10 @@ def _member(name: str, table: dict[str, Any], earlier: Mapping[str, Member], fin
     offset = table.get("offset", 0.0)
     if isinstance(offset, bool) or not isinstance(offset, int | float) or not math.isfinite(offset):
         raise InputError("offset", offset, "an angle in rad", where)
+    if reads_as_degrees(float(offset)):
+        raise InputError(
+            "offset", offset, "an angle in rad, which this does not look like; math.radians makes it one", where
+        )
     tip = None if table.get("tip") is None else vector(table["tip"], f"{where}.tip")
     if tip is not None and family.find(OutputLink) is None:
         raise InputError("tip", tip, f"a member whose output link turns; {family.name} has none", where)
@@ -195,7 +199,10 @@ def _relation(name: str, table: dict[str, Any], members: Mapping[str, Member]) -
         return ShaftTorque(
             name, tuple((f"{known[x][0]}.drive_torque{known[x][1]}", members[known[x][0]].ratio) for x in given)
         )
-    return Shaking(name, tuple(known[part] for part in given))
+    placed = [known[part] for part in given]
+    if len({member for member, _ in placed}) < len(placed):
+        raise InputError(kind, given, "each member once: the stages of a chain have different frames", where)
+    return Shaking(name, tuple(placed))
 
 
 def _stages(family: Family) -> list[str]:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from sweep.errors import InputError, nearest
-from sweep.families.base import Array, Output, Parameter
+from sweep.families.base import Output, Parameter
 from sweep.families.capabilities import ThreadPath
 from sweep.families.placing import AXES, vector
 from sweep.families.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY
@@ -31,6 +31,7 @@ from sweep.numerics.curves import TableCurve, table_curve
 
 if TYPE_CHECKING:
     from sweep.families.members import Member
+    from sweep.families.relations import Frame
 
 KEYS = ("thread", "stock", "tension", "stiffness", "radius", "allowed")
 GF = 9.80665e-3  # N
@@ -95,16 +96,17 @@ class ThreadBalance:
         text = f"thread {self.name} between tensioner and stitch when nothing is taken up"
         return (Parameter(f"{self.name}_stock", "length", text, default=self.stock),)
 
-    @property
-    def needs(self) -> frozenset[str]:
-        """Coordinates of the moving points, and what the take-ups give."""
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
+        """Coordinates of the moving points, and what the take-ups give; where they are bent too if that is wanted."""
         names = [f"{place}_{axis}" for place in self.path if isinstance(place, str) for axis in AXES]
-        taken = [name for place in self.path if isinstance(place, TakeUp) for name in (place.taken, place.wrap)]
-        return frozenset((*names, *taken))
+        taken = [place.taken for place in self.path if isinstance(place, TakeUp)]
+        wraps = [place.wrap for place in self.path if isinstance(place, TakeUp) and self._bent(wanted)]
+        return frozenset((*names, *taken, *wraps))
 
-    def compute(
-        self, found: Mapping[str, Any], rotations: Mapping[str, Array], wanted: frozenset[str]
-    ) -> dict[str, Any]:
+    def _bent(self, wanted: frozenset[str]) -> bool:
+        return not wanted.isdisjoint((f"{self.name}_wrap", f"{self.name}_tension"))
+
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
         """The outputs, (n, m); ``found`` has the main shaft's angle as "phi", and the stock."""
         needed: Any = 0.0 * found[PHI]
         taken: Any = 0.0 * found[PHI]
@@ -114,13 +116,13 @@ class ThreadBalance:
         for place in self.path:
             if isinstance(place, TakeUp):
                 taken, before, along = taken + found[place.taken], None, None
-                wraps.append(found[place.wrap])
+                wraps += [found[place.wrap]] if self._bent(wanted) else []
                 continue
             point = _point(place, found)
             if before is not None:
                 length, direction = _piece(before, point)
                 needed = needed + length
-                if along is not None:
+                if along is not None and self._bent(wanted):
                     wraps.append(bend(along, direction))
                 along = direction
             before = point

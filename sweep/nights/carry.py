@@ -77,11 +77,18 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
 
 
 def searched(study: Study, folder: Path) -> bool:
-    """Whether optimum and front in a folder, as far as the study asks for them, are its own and of these sources."""
+    """Whether optimum and front in a folder, as far as the study asks for them, are its own and of these sources.
+
+    A search that time has cut short is made again.
+    """
+    from sweep.optimise import read_survey
     from sweep.optimise.front import saved
 
     note = store.read_plan(folder / store.DESIGNS) or {}
     if study.optimise is not None and note.get("optimised") != optimum_key(replace(study, pareto=None), note):
+        return False
+    found = read_survey(folder / store.OPTIMUM)
+    if found is not None and found.ended == "time":
         return False
     if study.pareto is None:
         return True

@@ -151,7 +151,7 @@ class _Night:
 
     def finished(self, study: Study, target: Path, carried: Carried | None, ended: Ended) -> StudyRecord:
         """Report, figures and comparison of a complete dataset."""
-        message = ""
+        message, cut = "", ended.message if ended.code == TimeUsedUp.exit_code else ""
         if not (target / REPORT).is_file():
             message = call(["report", str(target)], target / RUN_LOG, max(self.left, 0.0)).message
         reported = (target / REPORT).is_file()
@@ -178,7 +178,7 @@ class _Night:
             changes=found.lines,
             moved=found.moved,
             report=reported,
-            message="" if reported else f"no report: {message}",
+            message="; ".join(filter(None, [cut, "" if reported else f"no report: {message}"])),
         )
 
     def figures(

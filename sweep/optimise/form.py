@@ -1,6 +1,8 @@
-"""The epigraph program of one design: rows ``c = constant + matrix @ atoms + slack * t``, to be >= 0 or = 0.
+"""The program that is solved at one design, in epigraph form: make t small, so that all rows are >= 0 or = 0.
 
-Atoms are what the gradients know: the curves at K points, the crank angles of these points, and plain numbers.
+A row is ``c = constant + matrix @ atoms + slack * t``.  Rows of the objective bound it by t; those of limits have no t.
+The atoms are the quantities whose gradients are computed: the values of curves at K points, which are extrema or
+ends of windows, the crank angles of these points, and plain numbers such as lengths.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ FAR = 1e3  # stands for a row that cannot be computed at a trial design: far out
 
 @dataclass(frozen=True)
 class Requirement:
-    """One limit in inner values; ``minimum == maximum`` is an equation."""
+    """One limit in the optimiser's inner values (`Measure`); it is an equation where ``minimum == maximum``."""
 
     measure: Measure
     minimum: float | None
@@ -41,7 +43,7 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Label:
-    """What a row stands for: an output and its side, "objective", "minimum", "maximum" or "equal".
+    """The output that a row is about, and which bound of it: "objective", "minimum", "maximum" or "equal".
 
     ``per`` turns the row's multiplier into one per relative change of the bound: the bound over the row's scale.
     """
@@ -70,26 +72,26 @@ class Form:
     reaches: bool
 
     def rows(self, atoms: Array, t: float) -> Array:
-        """The rows' values; a row that is nan counts as far outside."""
+        """Evaluate the rows; a row that is nan counts as far outside."""
         if np.isfinite(atoms).all():
             return np.asarray(self.constant + self.matrix @ atoms + self.slack * t)
         return np.nan_to_num(self.constant + self.matrix @ np.nan_to_num(atoms, nan=1e30) + self.slack * t, nan=-FAR)
 
     def objective(self, atoms: Array) -> float:
-        """Largest of the objective's rows: the smallest t they allow."""
+        """Give the objective: the smallest t that its rows allow; infinite where there is no such row."""
         own = np.array([label.side == "objective" for label in self.labels], dtype=np.bool_)
         if not own.any():
             return math.inf
         return float(-(self.constant + self.matrix @ atoms)[own].min())
 
     def violation(self, atoms: Array) -> float:
-        """Largest scaled violation of the limits; infinite where one of them does not exist for this design."""
+        """Give the largest scaled violation of a limit; infinite where this design lacks a limited output."""
         if not self.complete:
             return math.inf
         return self.known_violation(atoms)
 
     def known_violation(self, atoms: Array) -> float:
-        """Largest scaled violation of those limits that exist for this design; infinite where it reaches nowhere."""
+        """Give the largest scaled violation of the limits on outputs that exist; infinite if no stage closes."""
         if not self.reaches:
             return math.inf
         c = self.constant + self.matrix @ atoms
@@ -99,7 +101,7 @@ class Form:
         return float(np.maximum(np.where(self.equal, np.abs(c), -c)[own], 0.0).max(initial=0.0))
 
     def near(self, atoms: Array, t: float) -> Form:
-        """The form without the rows that are far inside: no short step reaches them."""
+        """Leave out the rows that are far from their bound, which no short step reaches."""
         keep = (self.rows(atoms, t) < AT_HAND) | self.equal
         labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
         return replace(
@@ -108,7 +110,7 @@ class Form:
         )  # fmt: skip
 
     def relaxed(self, hard: set[str]) -> Form:
-        """The elastic program: smallest t by which all limits but the ``hard`` ones have to give way."""
+        """Make the elastic program: its t is the amount by which all limits but the ``hard`` ones have to give way."""
         keep = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
         soft = np.array([label.name not in hard for label in self.labels], dtype=np.float64)[keep]
         both = self.equal[keep]
@@ -125,7 +127,7 @@ class Form:
 
 
 def measured_in(size: float) -> float:
-    """What violations of a limit of that size are divided by: 1 where it is so small that they would overflow."""
+    """Give the divisor of violations of a limit of that size; it is 1 where the quotient would overflow."""
     return size if size > SMALLEST else 1.0
 
 
@@ -164,7 +166,7 @@ class Program:
         self.places = any(m.is_angle for m in measures)
 
     def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
-        """Rows for a design; ``points`` are its extrema, ``scale`` divides the objective."""
+        """Lay out the rows for a design; ``points`` are its extrema, ``scale`` divides the objective."""
         layout = _Layout(curves, points, design, self.scalars)
         complete = turns
         for requirement in self.requirements:
@@ -175,14 +177,14 @@ class Program:
         return layout.form(complete and layout.has_objective, reaches)
 
     def value(self, found: Measure, form: Form, curves: Curves, design: Array, atoms: Array) -> float:
-        """A measure's value in its own unit; nan where it does not exist."""
+        """Give the value of a measure in its own unit; nan where it does not exist."""
         layout = _Layout(curves, form.points, design, self.scalars)
         inner = [sum(w * atoms[k] for k, w in term.items()) + shift for term, shift in layout.upper(found)]
         return found.from_inner(float(max(inner))) if inner else math.nan
 
 
 def _label(r: Requirement, side: str, bound: float, size: float) -> Label:
-    """Label of a limit's row; pressure angles and margins are measured by themselves, whatever the bound is."""
+    """Make the label of a limit's row; violations of pressure angles and margins are not divided by the bound."""
     own = r.measure.inner == "pressure" or any(s.pressure for s in r.measure.series)
     return Label(r.measure.name, side, 1.0 if own else abs(bound) / size)
 
@@ -205,7 +207,7 @@ class _Layout:
         self.rest.append((weight * shift + bound, slack, equal, label))
 
     def require(self, r: Requirement) -> bool:
-        """Rows of one limit; false where the design has none of the extrema it is about."""
+        """Add the rows of one limit; the result is false where the design has none of the extrema that it is about."""
         found = True
         if r.equal and r.minimum is not None:
             for term, shift in self.lower(r.measure)[:1]:
@@ -228,11 +230,11 @@ class _Layout:
         return found
 
     def upper(self, m: Measure) -> list[tuple[Term, float]]:
-        """Sums of atoms that all have to stay below a bound for the inner value to do so."""
+        """List sums of atoms: the inner value is below a bound if and only if all of them are."""
         return self._bounded(m, above=m.sign > 0.0)
 
     def lower(self, m: Measure) -> list[tuple[Term, float]]:
-        """Sums of atoms that all have to stay above a bound for the inner value to do so."""
+        """List sums of atoms: the inner value is above a bound if and only if all of them are."""
         return self._bounded(m, above=m.sign < 0.0)
 
     def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
@@ -271,7 +273,7 @@ class _Layout:
         return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
 
     def _difference(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
-        """The second angle minus the first, in (-pi, pi] at the present points."""
+        """Give the second angle minus the first, with whole turns so that it is in (-pi, pi] at the present points."""
         ends = [self._bounded(part, above)[:1] for part in m.parts]
         if not all(ends):
             return []
@@ -283,7 +285,10 @@ class _Layout:
         return [(second | {k: -w for k, w in first.items()}, other - shift - turns)]
 
     def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
-        """A plain number, or every length with both signs; only the largest length has to stay above a bound."""
+        """Give the sums for a plain number, or for the largest of some lengths.
+
+        The largest length is below a bound if every length is, with both signs; above one if the largest of them is.
+        """
         first = 2 * len(self.points)
         if m.kind == "scalar":
             return [({first + self.scalars.index(m.name): m.sign}, 0.0)]
@@ -304,7 +309,7 @@ class _Layout:
         return -2.0 * math.pi * math.floor(float(self.points.phi[k]) / (2.0 * math.pi))
 
     def _ends(self, series: Sequence[Series]) -> tuple[list[int], list[int]]:
-        """Points that are maxima, highest first, and minima, lowest first, of some series."""
+        """List the points that are maxima, highest first, and those that are minima, lowest first, of some series."""
         numbers = [self.curves.series.index(s) for s in series]
         own = np.isin(self.points.series, numbers)
         value, sense = self.points.value, self.points.sense
@@ -313,9 +318,9 @@ class _Layout:
         return maxima, minima
 
     def _size(self, r: Requirement, bound: float) -> float:
-        """What a violation is measured in: the bound itself, unless it is tiny against the curve; 1 for margins.
+        """Give the divisor of a limit's violations: its bound, unless that is tiny against the curve; 1 for margins.
 
-        A plain number has no curve: the larger of its bounds says how large it is.
+        For a plain number, which has no curve, it is the larger of both bounds.
         """
         if r.measure.inner == "pressure":
             return 1.0 + bound  # sin^2 of the limit: a few degrees are as hard a limit as forty

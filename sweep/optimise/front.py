@@ -13,6 +13,7 @@ import numpy as np
 
 from kernels import status as st
 from sweep.dataset import store
+from sweep.dataset.tables import metadata
 from sweep.errors import InputError, SearchCutShort
 from sweep.families.base import Array
 from sweep.optimise.certificate import Result
@@ -86,17 +87,16 @@ def front_study(
 
 def saved(path: Path, key: str) -> Front | None:
     """The front a file holds, as its search left it; None where there is no file, or one with another key."""
-    import pyarrow.parquet as pq
-
-    if not path.is_file():
-        return None
-    about = pq.read_schema(path).metadata
+    about = metadata(path)
     if about.get(KEY) != key.encode():
         return None
-    state = json.loads(about[STATE])
-    return Front(
-        tuple(state["bounds"]), tuple(_result(r) for r in state["results"]), tuple(state["found"]), state["taken"]
-    )
+    try:
+        state = json.loads(about[STATE])
+        return Front(
+            tuple(state["bounds"]), tuple(_result(r) for r in state["results"]), tuple(state["found"]), state["taken"]
+        )
+    except (ValueError, KeyError, TypeError):  # damaged: the search begins anew
+        return None
 
 
 def _result(noted: dict[str, Any] | None) -> Result | None:

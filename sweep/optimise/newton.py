@@ -1,4 +1,4 @@
-"""The next design from near by: sequential quadratic programming with the exact Hessian of the Lagrangian.
+"""The next design near a solution: sequential quadratic programming with the exact Hessian of the Lagrangian.
 
 SLSQP learns curvature from the steps it makes; in a narrow curved valley (a straightness of 0.05 mm on links of 50 mm)
 it needs hundreds.  Here the curvature comes from differences of exact gradients, so a few steps do.
@@ -70,7 +70,10 @@ def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index
 
 
 def _holding(jacobian: Array, form: Form, found: Multipliers) -> Array:
-    """Gradients whose null space keeps active limits and bounds and changes the active rows of the objective alike."""
+    """Give gradients whose null space are the steps that keep the active set.
+
+    Such a step changes no active limit and no bound, and it changes all active rows of the objective alike.
+    """
     active = found.weights != 0.0
     slack, weights = form.slack[active], found.weights[active]
     sinking = weights * slack @ jacobian[active] / max(float(weights @ slack), 1e-300)

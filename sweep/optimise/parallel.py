@@ -1,25 +1,50 @@
-"""Starts spread over processes (the search is Python at heart, threads would wait for each other)."""
+"""Starts spread over processes: most of a search runs in Python, where threads would wait for each other."""
 
 from __future__ import annotations
 
 import math
-import os
-import tempfile
-import time
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
 
-from sweep.errors import WorkerDied
+from sweep.chunks.plan import optimiser_hash
+from sweep.errors import InputError, WorkerDied
 from sweep.families.base import Array
-from sweep.jobs.executors import worker_processes
-from sweep.jobs.signals import depend_on_parent, unheard
+from sweep.jobs.executors import place_of_searches
+from sweep.jobs.signals import Stop
 from sweep.optimise.certificate import Result
 from sweep.optimise.problem import Problem
 from sweep.optimise.search import search
 
-POLL = 0.05  # between two looks at whether to stop [s]
-GRACE = 1.0  # for workers to hand back what they have once they are to stop [s]
+
+class _Asked(Stop):
+    """A flag that is set as soon as somebody who looks at it finds that a function answers true."""
+
+    def __init__(self, asked: Callable[[], bool]) -> None:
+        self._asked = asked
+        super().__init__()
+
+    def __bool__(self) -> bool:
+        if not super().__bool__() and self._asked():
+            self.set()
+        return super().__bool__()
+
+
+@dataclass(frozen=True)
+class SearchTask:
+    """Search from one of the starts; a worker whose sources are not those of the process that asks does nothing."""
+
+    problem: Problem
+    starts: Array
+    allowed: float
+    code: str
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Result | None:
+        """The result from that start, None if it is not to be begun any more."""
+        own = optimiser_hash()
+        if own != self.code:
+            allowed = f"{self.code}, the sources and libraries of the process that searches"
+            raise InputError("code", own, allowed, "worker")
+        return None if should_stop() else search(number, self.problem, self.starts[number], should_stop, self.allowed)
 
 
 def in_processes(
@@ -32,13 +57,13 @@ def in_processes(
 ) -> list[Result]:
     """Results of the starts ``numbers`` that were begun before ``asked`` became true, in their order.
 
-    Each is what a serial search finds, to the bit.
+    Each is what a serial search finds, to the bit.  They run on the cluster of the run, if it has one.
 
     Parameters
     ----------
     problem, starts : as for ``minimise``
     numbers : which of the starts
-    asked : looked at in this process; workers learn of it by a file, and those that do not answer soon are ended
+    asked : looked at in this process; workers learn of it, and what does not answer soon is given up
     jobs : how many workers
     allowed : looks at designs that each start may take
 
@@ -47,41 +72,14 @@ def in_processes(
     WorkerDied
         if a worker process was killed.
     """
-    from concurrent.futures import FIRST_COMPLETED, wait
-    from concurrent.futures.process import BrokenProcessPool
-
-    workers = min(jobs, len(numbers))
-    with tempfile.TemporaryDirectory(prefix="linksweep-") as folder:
-        flag = Path(folder, "stop")
-        executor = worker_processes(workers)
-        todo, begun, late = list(reversed(numbers)), list[Any](), math.inf
-        waiting: set[Any] = set()
-        try:
-            while (todo or waiting) and time.monotonic() < late:
-                # One more than there are workers, so that none of them waits for its next start.
-                while todo and len(waiting) <= workers:
-                    number = todo.pop()
-                    with unheard():
-                        task = _task, number, problem, starts[number], flag, os.getpid(), allowed
-                        begun.append(executor.submit(*task))
-                    waiting.add(begun[-1])
-                waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED).not_done
-                if not flag.exists() and asked():
-                    flag.touch()
-                    todo, late = [], time.monotonic() + GRACE
-            if waiting:  # still starting up, or busy with something that does not ask
-                executor.shutdown(kill_workers=True)
-            found = [future.result() for future in begun if future not in waiting]
-        except BrokenProcessPool as error:
-            if asked():  # the signal that stops us may have hit them too
-                done = [future for future in begun if future.done() and future.exception() is None]
-                return [result for result in (future.result() for future in done) if result is not None]
-            raise WorkerDied(f"optimiser: a worker process died ({error}); run again") from error
-    return [result for result in found if result is not None]
-
-
-def _task(number: int, problem: Problem, start: Array, flag: Path, parent: int, allowed: float) -> Result | None:
-    if os.getpid() != parent:
-        depend_on_parent(parent)
-    # A parent that was killed leaves no folder to look into, but then this process ends as well.
-    return None if flag.exists() else search(number, problem, start, flag.exists, allowed)
+    stop = _Asked(asked)
+    task = SearchTask(problem, starts, allowed, optimiser_hash())
+    found: dict[int, Result] = {}
+    try:
+        for result in place_of_searches().outcomes(task, iter(numbers), min(jobs, len(numbers)), stop):
+            if result is not None:
+                found[result.start] = result
+    except WorkerDied as error:
+        if not stop:  # the signal that stops us may have hit them too
+            raise WorkerDied(f"optimiser: {error}; run again") from error
+    return [found[number] for number in numbers if number in found]

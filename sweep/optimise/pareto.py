@@ -37,7 +37,7 @@ class Front:
 
     @classmethod
     def of(cls, settings: ParetoSettings) -> Front:
-        """Nothing known yet."""
+        """A front of which nothing is known yet."""
         bounds = tuple(sorted(set(settings.bounds), reverse=not settings.at_least))
         return cls(bounds, (None,) * len(bounds), (-1,) * len(bounds))
 
@@ -61,7 +61,10 @@ class Step:
 
 
 def steps(count: int) -> tuple[Step, ...]:
-    """Towards the tighter bounds, back, and there again: a good design spreads to every bound it serves."""
+    """List the steps of a front: from the loosest bound to the tightest, back, and to the tightest again.
+
+    Each search starts from its neighbour's result, so a good design reaches every bound that it keeps.
+    """
     there = [Step(k, k - 1, first=True) for k in range(count)]
     back = [Step(k, k + 1, first=False) for k in range(count - 2, -1, -1)]
     again = [Step(k, k - 1, first=False) for k in range(1, count)]

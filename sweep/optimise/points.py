@@ -294,7 +294,7 @@ def _extrema(
 
 
 def _without_repetition(points: Points) -> Points:
-    """Two grid maxima that climbed to the same angle are one."""
+    """Keep one of several grid maxima that refinement has brought to the same crank angle."""
     key = np.stack([points.series, points.sense, points.how, np.round(np.mod(points.phi, 2.0 * math.pi), 5)])
     _, first = np.unique(key, axis=1, return_index=True)
     return points.take(np.sort(first))

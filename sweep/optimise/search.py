@@ -18,7 +18,7 @@ FIRST = 2  # looks that give a start its scale and its first design
 
 
 def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool], allowed: float = math.inf) -> Result:
-    """Search from one start, on one BLAS thread: the systems are small, and the bits stay those of any other process.
+    """Search from one start on one BLAS thread, as the systems are small and the bits must not depend on the process.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""scipy's SLSQP on the epigraph program: the next design, from far away."""
+"""The next design far from a solution: scipy's SLSQP on the epigraph program."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from kernels import status as st
 from sweep.dataset import store
+from sweep.dataset.tables import metadata
 from sweep.errors import InputError
 from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.evaluation.tables import design_matrix
@@ -237,11 +238,7 @@ def optimise_study(
 
 def read_survey(path: Path) -> Survey | None:
     """What the starts told of the search that a ``_optimum.parquet`` comes from; None where there is no such file."""
-    import pyarrow.parquet as pq
-
-    if not path.is_file():
-        return None
-    noted = (pq.read_schema(path).metadata or {}).get(b"search")
+    noted = metadata(path).get(b"search")
     if noted is None:
         return None
     content = json.loads(noted)

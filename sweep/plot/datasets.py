@@ -41,6 +41,13 @@ def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArr
     ------
     InputError
         for parameters the study does not sweep, a study without a map.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> best, share = sweep.plot.map("results/press/designs", "a", "b")
+    >>> best.get_xlabel(), best.get_ylabel()
+    ('a [mm]', 'b [mm]')
     """
     data, found, cells = gather(Path(folder))
     pair = None
@@ -61,10 +68,25 @@ def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArr
 def front(folder: str | Path) -> Axes:
     """The objective against a second criterion: designs of the sweep, and the front where one was searched.
 
+    Parameters
+    ----------
+    folder : what ``sweep run`` left behind
+
+    Returns
+    -------
+    Axes
+        the second criterion over the objective
+
     Raises
     ------
     InputError
         for a study without objective or second criterion.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> sweep.plot.front("results/press/designs").get_xlabel()
+    'largest acceleration max |s″| [mm/rad²]'
     """
     data, found, _ = gather(Path(folder))
     with house_style():
@@ -75,10 +97,26 @@ def front(folder: str | Path) -> Axes:
 def tolerance(folder: str | Path) -> Axes:
     """Spread of the optimum's outputs as it is made, each in parts of its nominal value; the dot is the mean.
 
+    Parameters
+    ----------
+    folder : what ``sweep run`` left behind
+
+    Returns
+    -------
+    Axes
+        a bar for each output
+
     Raises
     ------
     InputError
         for a study without tolerances.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> axes = sweep.plot.tolerance("results/press/designs")
+    >>> axes.get_xlabel()
+    'change from the nominal value [%]'
     """
     data = read_dataset(Path(folder))
     rows = [
@@ -107,10 +145,26 @@ def tolerance(folder: str | Path) -> Axes:
 def sensitivity(folder: str | Path) -> Axes:
     """By how much a small change of each dimension changes the objective at the optimum, the most telling first.
 
+    Parameters
+    ----------
+    folder : what ``sweep run`` left behind
+
+    Returns
+    -------
+    Axes
+        two bars for each dimension: made larger, made smaller
+
     Raises
     ------
     InputError
         for a dataset without sensitivities.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> axes = sweep.plot.sensitivity("results/press/designs")
+    >>> len(axes.get_yticklabels())  # a, b, e
+    3
     """
     data = read_dataset(Path(folder))
     ranked = slopes(data)

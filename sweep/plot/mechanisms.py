@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.errors import InputError
+from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.joints import parts
 from sweep.evaluation.poses import evaluate, pose_wants
@@ -35,6 +36,7 @@ def motion(
     *,
     unit: str = "mm",
     speed: float | None = None,
+    angles: AngleUnit | None = None,
 ) -> NDArray[Any]:
     """Curves over one turn, one panel for each.
 
@@ -45,11 +47,19 @@ def motion(
         and pressure angles
     unit : the length unit of the design, for the axes
     speed : of the driving shaft [rad/s]: adds scales of velocity, acceleration and jerk in time
+    angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
     array of Axes
         in the order of ``want``.  Crank angles count from the lowest position where the follower has one
+
+    Examples
+    --------
+    >>> import sweep
+    >>> axes = sweep.plot.motion("slider_crank", {"a": 20.0, "b": 70.0, "e": 5.0}, "s, d2s")
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['displacement s [mm]', 'acceleration s″ [mm/rad²]']
     """
     import pandas as pd
 
@@ -59,7 +69,8 @@ def motion(
         list(dict.fromkeys(motion_curves(family))) if asked is None else pose_wants(family, [n.strip() for n in asked])
     )
     phi = np.arange(POSES) * (2.0 * math.pi / POSES)
-    found = evaluate(mechanism, design, list(dict.fromkeys([*names, family.position])), phi=phi)
+    design = in_radians(family, design, angles)
+    found = evaluate(mechanism, design, list(dict.fromkeys([*names, family.position])), phi=phi, angles="rad")
     if found["design"].iloc[-1] != 0:
         raise InputError("design", "several rows", "the parameters of one design", f"table of {family.name}")
     curves = pd.DataFrame(found.assign(role="design"))
@@ -70,7 +81,13 @@ def motion(
 
 
 def mechanism(
-    mechanism: Mechanism, design: Table, phi: float = 0.0, *, view: str | None = None, unit: str = "mm"
+    mechanism: Mechanism,
+    design: Table,
+    phi: float = 0.0,
+    *,
+    view: str | None = None,
+    unit: str = "mm",
+    angles: AngleUnit | None = None,
 ) -> NDArray[Any]:
     """The mechanism in one position with the paths of its joints, axes and senses; a panel for each frame.
 
@@ -80,15 +97,25 @@ def mechanism(
     phi : angle of the driving shaft [rad]
     view : "space", from a corner with z upwards, or "xy", "zy", "xz"; if left out "space" for what is spatial
     unit : the length unit of the design, for the axes
+    angles : the unit of the angles of ``design`` and ``phi``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
     array of Axes
         one for each frame: stages of a chain have their own, placed members of a machine one in common
+
+    Examples
+    --------
+    >>> import sweep
+    >>> (axes,) = sweep.plot.mechanism("slider_crank", {"a": 20.0, "b": 70.0, "e": 5.0}, phi=0.8)
+    >>> axes.get_xlabel()
+    'x [mm]'
     """
     if view is not None and view != "space" and view not in VIEWS:
         raise InputError("view", view, f"space, {', '.join(VIEWS)}", "plot")
-    found = parts(mechanism, design, phi + np.linspace(0.0, 2.0 * math.pi, 181))
+    design = in_radians(find_family(mechanism), design, angles)
+    start = np.asarray(grid_in_radians("phi", "rad", phi, angles), np.float64)
+    found = parts(mechanism, design, start + np.linspace(0.0, 2.0 * math.pi, 181))
     frames = list(dict.fromkeys(part.frame for part in found))
     with house_style():
         figure = new_figure(5.4 * len(frames), 4.6)
@@ -108,7 +135,15 @@ def mechanism(
     return np.array(panels, dtype=object)
 
 
-def polar_load(mechanism: Mechanism, design: Table, joint: str = "a", *, member: str = "", stage: str = "") -> Axes:
+def polar_load(
+    mechanism: Mechanism,
+    design: Table,
+    joint: str = "a",
+    *,
+    member: str = "",
+    stage: str = "",
+    angles: AngleUnit | None = None,
+) -> Axes:
     """The force on a link at a fixed axis over one turn, its direction as the angle and its size as the radius.
 
     Parameters
@@ -117,6 +152,7 @@ def polar_load(mechanism: Mechanism, design: Table, joint: str = "a", *, member:
     design : its parameters with masses, inertias and ``speed`` of the load effects, docs/effects.md
     joint : "a", the frame's force on the crank, or "d", that on the rocker
     member, stage : name of the member of a machine, number of the stage of a chain
+    angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
@@ -128,7 +164,16 @@ def polar_load(mechanism: Mechanism, design: Table, joint: str = "a", *, member:
     ------
     InputError
         for a joint that has no axis, a family without joint loads, a missing mass or speed.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> design = {"a": 10.0, "b": 40.0, "c": 25.0, "e": 35.0, "f": 5.0, "g": -3.0, "alpha": 1.0}
+    >>> masses = {"m_crank": 1e-4, "m_coupler": 2e-4, "m_rocker": 1.5e-4, "speed": 100.0}  # t, rad/s
+    >>> sweep.plot.polar_load("rssr", design | masses, "a").get_title(loc="left")
+    'force at A [N], marks: crank angle'
     """
+    design = in_radians(find_family(mechanism), design, angles)
     found = [
         part
         for part in parts(mechanism, _plain(mechanism, design), 0.0)
@@ -145,7 +190,7 @@ def polar_load(mechanism: Mechanism, design: Table, joint: str = "a", *, member:
     prefix = f"{member}." if member else ""
     names = [f"{prefix}force_{joint}_{letter}{stage}" for letter in "xyz"]
     phi = np.arange(POSES) * (2.0 * math.pi / POSES)
-    force = evaluate(mechanism, design, names, phi=phi)[names].to_numpy(np.float64)
+    force = evaluate(mechanism, design, names, phi=phi, angles="rad")[names].to_numpy(np.float64)
     along, across = force @ first, force @ np.cross(axis, first)
     with house_style():
         figure = new_figure(5.0, 5.0)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from sweep.costs import nanoseconds
 from sweep.effects import input_names
-from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step
+from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work
 from sweep.families.members import Machine
 
 SIZE = Output("size", "length", "largest length of the mechanism, offsets by magnitude")
-NS_SIZE = 10.0
 
 
 def lengths(family: Family) -> tuple[str, ...]:
@@ -32,4 +32,4 @@ def size_step(family: Family) -> Step | None:
         found: Columns = {name: np.abs(designs[:, columns]).max(axis=1) for name in wanted & {SIZE.name}}
         return found | {f"err_{SIZE.name}": np.zeros(n), "status": np.zeros(n, np.uint8)}
 
-    return Step("size", (SIZE,), run, NS_SIZE)
+    return Step("size", (SIZE,), run, work=Work.PARAMETERS, cost=lambda accuracy: nanoseconds("work", "size"))

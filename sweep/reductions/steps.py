@@ -1,9 +1,10 @@
-"""A family's own routes to design outputs, the cheapest that serves an accuracy, and what can be proven."""
+"""A family's own routes to design outputs, the one that serves an accuracy, and what can be proven."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sweep.costs import nanoseconds
 from sweep.families.base import Accuracy, Family, Output, Step
 from sweep.families.chain import Chain, Stage
 from sweep.quantities.names import at_stage
@@ -30,9 +31,17 @@ def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | Non
 
 
 def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
-    """The cheapest own route to an output that serves this accuracy."""
-    able = [(step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy.of(name))]
-    return min(able, key=lambda pair: pair[0].cost(accuracy), default=None)
+    """The own route to an output that serves this accuracy; there is one at most (tests/test_costs.py)."""
+    able = ((step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy.of(name)))
+    return next(able, None)
+
+
+def step_ns(family: Family, step: Step, accuracy: Accuracy) -> float:
+    """Estimated time of a family's own step [ns per design]."""
+    if step.cost is not None:
+        return step.cost(accuracy)
+    row = f"{family.name}: {step.name}"
+    return nanoseconds("steps", row) + nanoseconds("samples", row) * (accuracy.samples or 0)
 
 
 def certified_names(family: Family) -> tuple[str, ...]:

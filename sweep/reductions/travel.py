@@ -8,7 +8,8 @@ import numpy as np
 
 from kernels import status as st
 from kernels.families import rssr
-from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step
+from sweep.costs import nanoseconds
+from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work
 from sweep.families.capabilities import CrankRockerLoop, GuidedPoint
 from sweep.families.chain import Stage, stages_of
 from sweep.reductions.extrema import Request, true_extrema
@@ -29,8 +30,10 @@ def certified_travel(family: Family) -> Step | None:
         outputs.append(Output(f"max_abs_{pose.name}", pose.unit, words, pose.equation))
         place = f"crank angle of the largest magnitude of {pose.name}: {pose.text}"
         outputs.append(Output(f"phi_max_abs_{pose.name}", "rad", place, pose.equation))
-    run, cost = partial(_proven, family, stages, names), 8000.0 + 7000.0 * len(stages)
-    return Step("certified maxima", tuple(outputs), run, cost, _certified, certifies=True)
+    return Step(
+        "certified maxima", tuple(outputs), partial(_proven, family, stages, names), _certified, Work.PROOF,
+        certifies=True, cost=lambda accuracy: len(stages) * nanoseconds("work", "certified travel"),
+    )  # fmt: skip
 
 
 def derivatives(family: Family) -> tuple[str, ...]:

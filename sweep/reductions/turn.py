@@ -11,12 +11,11 @@ from kernels import scan
 from kernels import status as st
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.families.chain import Chain
 from sweep.reductions.catalogue import STAY, Quantity, quantity
 from sweep.reductions.closing import variable
 from sweep.reductions.dwell import window_angle
 from sweep.reductions.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
-from sweep.reductions.margins import combined, margin_suffixes, margins, own_step
+from sweep.reductions.margins import combined, margin_suffixes, margins
 from sweep.reductions.sampling import TWO_PI, Mask, Status, blocks, sample_turn
 from sweep.reductions.window import Window
 
@@ -26,7 +25,7 @@ Found: TypeAlias = dict[Request, Extremum]
 
 def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
     """Rotatability, margins and largest pressure angles; only the stages that the names need, all if there are none."""
-    asked = _quantities(family, names)
+    asked = quantities(family, names)
     known = margin_suffixes(family)
     last = max((known.index(one.stage) if one.stage else len(known) - 1 for one in asked), default=len(known) - 1)
     suffixes = known[: last + 1]
@@ -57,7 +56,7 @@ def limits_and_reductions(
     Columns
         the names and ``err_<name>`` (nan on samples), each (n,), and ``status``
     """
-    asked = _quantities(family, names)
+    asked = quantities(family, names)
     windowed = part is not None
     requests = list(dict.fromkeys(r for one in asked for r in one.requests(family, windowed)))
     window, status = None, np.zeros(len(designs), np.uint8)
@@ -91,44 +90,8 @@ def _stay(
     return window_angle(family, designs, Window.of_stroke(least.value, most.value, err, part))
 
 
-def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy) -> float:
-    """Estimated cost of a general route [ns per design], from measurements of chains and single families."""
-    stages = len(family.stages) if isinstance(family, Chain) else 1
-    if group == "margin":
-        followed = enumerate(margin_suffixes(family), start=1)
-        return sum(100.0 if own_step(family, s, accuracy) else NS_MARGIN * stage for stage, s in followed)
-    asked = _quantities(family, names)
-    if group == "events":
-        return POSES_EVENT * NS_POSE * stages
-    requests = {r for one in asked for r in one.requests(family, False)}
-    # What effects add is paid once per effect and pose, and far outweighs the motion.
-    effects = sum(dict(family.dear[one.of] for one in asked if one.of in family.dear).values())
-    if accuracy.samples is not None:
-        scans = len(asked) if group == "means" else len(requests)
-        return accuracy.samples * (NS_POSE * stages + NS_SCAN * scans + effects)
-    if group == "means":
-        return POSES_MEAN * (NS_POSE * stages + NS_SCAN * len(asked) + effects)
-    assert accuracy.target is not None
-    dearer = 0.5 - np.log10(accuracy.target) / 16.0
-    poses = POSES_SEARCH + POSES_PEAK * dearer * len(requests)
-    return float(stages * (NS_SEARCH + NS_PEAK * dearer * len(requests)) + poses * effects)
-
-
-# Measured on one core of a Zen 4 (docs/extrema.md): per sample and stage, per sample and extremum, per design and
-# stage, per refined extremum at a target of 1e-8, per stage followed for a margin without a step.
-NS_POSE = 5.0
-NS_SCAN = 2.0
-NS_SEARCH = 800.0
-NS_PEAK = 2200.0
-NS_MARGIN = 1600.0
-# Poses per design on average: of a mean, of a search without its peaks, per refined extremum.
-POSES_MEAN = 110.0
-POSES_EVENT = 340.0
-POSES_SEARCH = 180.0
-POSES_PEAK = 30.0
-
-
-def _quantities(family: Family, names: Sequence[str]) -> list[Quantity]:
+def quantities(family: Family, names: Sequence[str]) -> list[Quantity]:
+    """The quantities of design outputs that general routes compute."""
     asked = [quantity(family, name) for name in names]
     assert all(one is not None for one in asked)
     return [one for one in asked if one is not None]

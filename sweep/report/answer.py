@@ -9,6 +9,7 @@ from kernels import status as codes
 from sweep.chunks.cascade import compared
 from sweep.report.front import front_sentence
 from sweep.report.limits import LimitState, Row, limit_state, limit_states, limited, value_of
+from sweep.report.proof import proof_sentence
 from sweep.report.quantities import Quantity, change, number, quantity
 from sweep.report.tables import fates, parameter_rows
 
@@ -172,7 +173,9 @@ def _proof(data: Dataset, found: Scan) -> str:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
     starts, agree = data.starts, value_of(data.optimum, "agree")
     kind = "" if found.feasible else "random "
-    text = f"{NO_PROOF}: the optimiser started from {starts} {kind}design{'s' if starts != 1 else ''} of the sweep"
+    proven = proof_sentence(data)
+    head = f"{proven[0].upper()}{proven[1:]}. The" if proven else f"{NO_PROOF}: the"
+    text = f"{head} optimiser started from {starts} {kind}design{'s' if starts != 1 else ''} of the sweep"
     if math.isfinite(agree):
         text += f", {number(agree)} of which ended at this value"
     if data.survey is not None:

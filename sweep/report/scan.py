@@ -1,4 +1,7 @@
-"""One pass over the parts of a dataset with bounded memory: what the map, the trade-off and the counts need."""
+"""Read a dataset once, part by part, and collect what the maps, the trade-off and the counts of the report need.
+
+Memory is bounded by a batch of rows, whatever the size of the dataset.  Values are in stored units: mm, rad.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ SCATTER_POINTS = 40_000
 
 @dataclass(frozen=True)
 class Cells:
-    """How one axis of the design space is divided: a cell per value, or per run of values where there are many.
+    """The division of one axis of the design space into cells: one per value, or per run of values if there are many.
 
     ``edges`` are the boundaries in stored units; ``weights`` the share of the axis that falls into each cell.
     """
@@ -30,7 +33,7 @@ class Cells:
 
     @classmethod
     def of_values(cls, name: str, values: Array, most: int) -> Cells:
-        """Cells of a lattice axis; neighbouring values share a cell where there are more than ``most``."""
+        """Divide a lattice axis; where it has more than ``most`` values, neighbouring values share a cell."""
         ordered = np.unique(values)
         if ordered.size == 1:
             reach = 0.5 * abs(ordered[0]) or 0.5
@@ -48,18 +51,18 @@ class Cells:
 
     @classmethod
     def of_range(cls, name: str, low: float, high: float, count: int) -> Cells:
-        """Equal cells of a sampled axis."""
+        """Divide a sampled axis into equal cells."""
         return cls(name, np.linspace(low, high, count + 1), np.full(count, 1.0 / count))
 
     def placed(self, value: float) -> float:
-        """A value of this axis; an angle swept over a whole turn comes back into it."""
+        """Bring a value onto the axis: an angle that is swept over a whole turn is reduced by whole turns."""
         low, high = float(self.edges[0]), float(self.edges[-1])
         if abs(high - low - 2.0 * np.pi) > 1e-6 * np.pi:
             return value
         return low + (value - low) % (2.0 * np.pi)
 
     def index(self, values: Array) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-        """Cell of each value."""
+        """Give the number of the cell in which each value lies; values beyond the ends count to the outer cells."""
         return np.clip(np.searchsorted(self.edges, values, side="right") - 1, 0, self.edges.size - 2)
 
 
@@ -73,7 +76,12 @@ class Grid:
 
 @dataclass
 class Scan:
-    """What one pass found; ``best_row`` is the feasible design with the smallest objective."""
+    """Result of one pass over the rows.
+
+    ``grids`` and ``lines`` are cells over two axes and over one.  ``scatter`` holds a few points (objective, second
+    output) for the picture, ``front`` those of all points that no other beats.  ``errors`` has the largest error
+    estimate of each output, absolute and relative.  ``best_row`` is the feasible design with the smallest objective.
+    """
 
     rows: int = 0
     feasible: int = 0
@@ -87,7 +95,7 @@ class Scan:
 
 
 def scan(parts: Sequence[Path], cells: Sequence[Cells], objective: str | None, second: str | None) -> Scan:
-    """Read every part once.
+    """Read every part of the dataset once.
 
     Parameters
     ----------
@@ -155,7 +163,7 @@ def _note_errors(found: Scan, name: str, errors: Array, values: Array) -> None:
 
 
 def non_dominated(points: Array) -> Array:
-    """The points no other point beats in both coordinates (smaller is better), sorted by the first."""
+    """Keep the points that no other point beats in both coordinates, sorted by the first; smaller is better."""
     if not len(points):
         return points
     ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
@@ -164,13 +172,17 @@ def non_dominated(points: Array) -> Array:
 
 
 def most_telling(found: Scan) -> tuple[str, str] | None:
-    """The pair of axes over whose cells the best attainable objective, or else the feasible share, varies most."""
+    """Choose the pair of axes whose map tells most.
+
+    That is the pair over whose cells the best objective varies most; of equal pairs, the one over whose cells the share
+    of feasible designs does.
+    """
     scores: dict[tuple[str, str], tuple[float, float]] = {}
     for pair, grid in found.grids.items():
         reached = np.isfinite(grid.best)
         if not reached.any():
             continue
-        # A cell without a feasible design tells as much as the worst one that has.
+        # A cell without a feasible design counts as the worst cell that has one.
         filled = np.where(reached, grid.best, grid.best[reached].max())
         share = grid.count / max(float(grid.count.max()), 1.0)
         scores[pair] = float(filled.std()), float(share.std())

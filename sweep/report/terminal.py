@@ -14,10 +14,12 @@ import numpy as np
 from kernels import status as codes
 from sweep.chunks.cascade import compared
 from sweep.dataset import store
+from sweep.evaluation.statuses import meaning
 from sweep.optimise import read_survey
 from sweep.optimise.survey import started
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.limits import bound_words, limit_states, limited
+from sweep.report.proof import proof_sentence
 from sweep.report.quantities import quantity
 
 if TYPE_CHECKING:
@@ -60,6 +62,7 @@ def ending(folder: Path) -> Ending:
             kinds = [f"{words}: {started(n)}, {b} basin{'' if b == 1 else 's'}" for words, n, b in found.kinds]
             lines += [f"signs: {'; '.join(kinds)}"] if kinds else []
             lines += [f"warning: {text}" for text in found.warnings]
+        lines += [sentence] if (sentence := proof_sentence(data)) else []
     else:
         missed = feasible == 0
         lines += _nearest_of_space(data.study, data) if missed else []
@@ -121,7 +124,10 @@ def _nearest(data: Dataset) -> list[str]:
 
 
 def _nearest_of_space(study: Study, data: Dataset) -> list[str]:
-    """The nearest miss among some designs of the space."""
+    """The nearest miss among some designs of the space; where there are no limits, what most designs fail by."""
+    if not study.limits:
+        status, count = max(((s, n) for s, n in data.counts.items() if s != codes.OK), key=lambda item: item[1])
+        return [f"no design has all that is wanted; {count} of {data.designs}: {meaning(status)}"]
     from sweep.chunks.plan import spread_designs
     from sweep.evaluation.summaries import design_outputs
     from sweep.synthesis.fit import fit_line

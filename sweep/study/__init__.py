@@ -12,6 +12,7 @@ from sweep.study.study import (
     OptimiseSettings,
     OutputSettings,
     ParetoSettings,
+    ProveSettings,
     Study,
     Tolerance,
 )
@@ -28,6 +29,7 @@ __all__ = [
     "OptimiseSettings",
     "OutputSettings",
     "ParetoSettings",
+    "ProveSettings",
     "Study",
     "Tolerance",
     "load_study",

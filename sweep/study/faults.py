@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sweep.errors import closest, nearest
@@ -20,11 +21,14 @@ class Faults:
     """The list of faults, and the files in which keys are looked up, the last one first.
 
     A key that is missing because it is misspelt is one fault, so unknown keys are reported before missing ones.
+    ``places`` are the lines of keys by file (:func:`sweep.study.lines.key_lines`); a missing key has that of its table.
     """
 
-    def __init__(self, files: Mapping[str, Mapping[str, Any]]) -> None:
+    def __init__(
+        self, files: Mapping[str, Mapping[str, Any]], places: Mapping[str, Mapping[str, int]] = MappingProxyType({})
+    ) -> None:
         self.lines: list[str] = []
-        self._files = files
+        self._files, self._places = files, places
         self._misspelt: set[Key] = set()
 
     def value(self, key: Key, value: object, allowed: str) -> None:
@@ -55,7 +59,11 @@ class Faults:
         self._add(key, f"{spelled(key)}: unknown {what}; allowed: {allowed}")
 
     def _add(self, key: Key, text: str) -> None:
-        line = f"{self._file_of(key)}: {text}"
+        file = self._file_of(key)
+        places = self._places.get(file, {})
+        known = (places.get(spelled(key[:depth])) for depth in range(len(key), 0, -1))
+        number = next((number for number in known if number is not None), None)
+        line = f"{file}: {text}" if number is None else f"{file}:{number}: {text}"
         if line not in self.lines:
             self.lines.append(line)
 

@@ -55,7 +55,7 @@ def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple
 
 
 def check_fitted_stroke(fit: LineFit, family: Family, raw: Mapping[str, Any], faults: Faults) -> None:
-    """Report an optimum whose stroke nothing holds: [fit] scales the designs of the sweep, not those of the search."""
+    """Report an optimum without a bound on its stroke: [fit] scales the designs of the sweep, not of the search."""
     names = ("stroke", f"stroke{len(family.stages)}") if isinstance(family, Chain) else ("stroke",)
     if fit.stroke is not None and not any(name in raw for name in names):
         words = f'{{ min = {fit.stroke * 0.999:g}, max = {fit.stroke * 1.001:g}, unit = "mm" }}'

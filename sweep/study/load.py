@@ -5,9 +5,11 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from sweep.study.faults import Faults
+from sweep.study.lines import key_lines
 from sweep.study.machine import flattened
 from sweep.study.model import OutputSection
 from sweep.study.reading import Reading
@@ -15,7 +17,7 @@ from sweep.study.study import Study
 from sweep.study.tables import READERS, REQUIRED_TABLES, TABLES
 from sweep.study.tables.accuracy import accuracy_table
 from sweep.study.tables.bodies import Besides
-from sweep.study.toml import read_toml
+from sweep.study.toml import read_toml, toml_text
 
 
 def load_study(path: str | Path, smoke: bool = False) -> Study:
@@ -29,16 +31,16 @@ def load_study(path: str | Path, smoke: bool = False) -> Study:
     Raises
     ------
     StudyError
-        lists every fault with file, key, value and what is allowed.
+        lists every fault with file, line, key, value and what is allowed.
     """
     file = Path(path)
     file = file / "study.toml" if file.is_dir() else file
-    files = {file.name: read_toml(file)}
-    if smoke:
-        beside = file.with_name("smoke.toml")
-        files[beside.name] = read_toml(beside)
-        return _build(merged(files[file.name], files[beside.name]), file, files)
-    return _build(files[file.name], file, files)
+    beside = file.with_name("smoke.toml")
+    files = [file, beside] if smoke else [file]
+    read = {f.name: read_toml(f) for f in files}
+    places = {f.name: key_lines(toml_text(f)) for f in files}
+    data = merged(read[file.name], read[beside.name]) if smoke else read[file.name]
+    return _build(data, file, read, places)
 
 
 def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
@@ -86,10 +88,15 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...
     return result
 
 
-def _build(data: Mapping[str, Any], path: Path, files: Mapping[str, Mapping[str, Any]]) -> Study:
+def _build(
+    data: Mapping[str, Any],
+    path: Path,
+    files: Mapping[str, Mapping[str, Any]],
+    places: Mapping[str, Mapping[str, int]] = MappingProxyType({}),
+) -> Study:
     members = data.get("machine")
     data = flattened(data, members)
-    faults = Faults({name: flattened(content, members) for name, content in files.items()})
+    faults = Faults({name: flattened(content, members) for name, content in files.items()}, places)
     for name in data:
         if name not in TABLES:
             faults.unknown((name,), [t for t in TABLES if t not in data], "table")

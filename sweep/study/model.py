@@ -19,7 +19,7 @@ def _proofs(value: object) -> object:
     raise ValueError("neither a truth value nor names")
 
 
-Proofs = Annotated[bool | list[str], PlainValidator(_proofs)]
+Proofs = Annotated[bool | list[str], PlainValidator(_proofs, json_schema_input_type=bool | list[str])]
 
 
 class Section(BaseModel):
@@ -131,6 +131,16 @@ class AccuracySection(Section):
     certify: Proofs = Field(False, description="true or false, or a list of the wanted maxima to prove")
 
 
+class ProveTable(Section):
+    """optimise.prove"""
+
+    required = ("gap",)
+    gap: str | None = Field(None, description='a share as a text, as "1 %"')
+    boxes: Annotated[int, Field(ge=64, le=10**9)] = Field(1_000_000, description="a whole number, 64 to 10^9")
+    smallest: str = Field("0.00001 %", description='a share of every range as a text, as "0.1 %"')
+    time: str | None = Field(None, description='a time as a text, as "60 s"')
+
+
 class OptimiseSection(Section):
     """[optimise]"""
 
@@ -142,6 +152,7 @@ class OptimiseSection(Section):
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
     variables: Literal["parameters", "locus"] | None = Field(None, description='"parameters" or "locus"')
     globally: Literal["none", "proportions"] = Field("none", alias="global", description='"none" or "proportions"')
+    prove: ProveTable | None = Field(None, description='{ gap = "1 %", boxes = 1000000, time = "10 min" }')
 
 
 class ParetoSection(Section):

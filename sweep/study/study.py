@@ -42,6 +42,21 @@ class Objective:
 
 
 @dataclass(frozen=True)
+class ProveSettings:
+    """The gap between optimum and proven bound that is wanted, and the boxes of designs that may be judged for it.
+
+    A box is not halved once all its sides are below the share ``smallest`` of their ranges; what it holds stays open,
+    as an exception that the answer names.  ``seconds`` is an emergency brake: no round of boxes begins after it, and
+    the answer says so.
+    """
+
+    gap: float
+    boxes: int = 1_000_000
+    smallest: float = 1e-7
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
 class OptimiseSettings:
     """The most starts of the local search, seed of their choice, what ends it earlier, and what is varied.
 
@@ -50,7 +65,7 @@ class OptimiseSettings:
     often enough; ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from
     evolution strategies over what is not linear; ``finalists`` is the number of starts that go on after a first heat,
     None for all.  ``time_budget`` [s] is an emergency brake: what it stops says so, and no result that was not stopped
-    depends on it.
+    depends on it.  ``prove`` asks for a proof that nothing in the space is better.
     """
 
     starts: int = 20
@@ -61,6 +76,7 @@ class OptimiseSettings:
     looks: int = 20_000
     globally: Literal["none", "proportions"] = "none"
     finalists: int | None = None
+    prove: ProveSettings | None = None
 
 
 @dataclass(frozen=True)

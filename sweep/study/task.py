@@ -11,7 +11,8 @@ from sweep.errors import InputError, StudyError, nearest
 from sweep.families import family
 from sweep.study import units
 from sweep.study.faults import Faults, Key
-from sweep.study.toml import read_toml
+from sweep.study.lines import key_lines
+from sweep.study.toml import read_toml, toml_text
 from sweep.synthesis import tasks
 from sweep.synthesis.tasks.positions import Position
 from sweep.synthesis.tasks.problem import Problem
@@ -41,11 +42,11 @@ def load_task(path: str | Path) -> Problem:
     Raises
     ------
     StudyError
-        lists every fault with file, key, value and what is allowed.
+        lists every fault with file, line, key, value and what is allowed.
     """
     file = Path(path)
     data = read_toml(file)
-    faults = Faults({file.name: data})
+    faults = Faults({file.name: data}, {file.name: key_lines(toml_text(file))})
     for name in data:
         if name not in ("task", "study"):
             faults.unknown((name,), ("task", "study"))

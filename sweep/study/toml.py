@@ -26,15 +26,7 @@ def read_toml(file: Path) -> dict[str, Any]:
     StudyError
         if it cannot be read, is no TOML, or is nested too deeply.
     """
-    try:
-        text = file.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise _fault(file, f"cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise _fault(file, f"line {line} is no UTF-8 text") from None
-    except ValueError as error:  # a path with a null byte
-        raise _fault(file, f"cannot be read: {error}") from None
+    text = toml_text(file)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -51,12 +43,31 @@ def read_toml(file: Path) -> dict[str, Any]:
     return data
 
 
+def toml_text(file: Path) -> str:
+    """The text of a file.
+
+    Raises
+    ------
+    StudyError
+        if it cannot be read, or is no UTF-8.
+    """
+    try:
+        return file.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise _fault(file, f"cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise _fault(file, f"line {line} is no UTF-8 text") from None
+    except ValueError as error:  # a path with a null byte
+        raise _fault(file, f"cannot be read: {error}") from None
+
+
 def _fault(file: Path, text: str) -> StudyError:
     return StudyError(str(file), [f"{file.name}: {text}"])
 
 
 def _said(text: str, message: str) -> str:
-    """What tomllib says, with the line of the other place where something stands twice."""
+    """Repeat what tomllib says; for a key that stands twice, add the line of the first one."""
     line, column = text.count("\n") + 1, len(text) - text.rfind("\n")
     message = message.replace("at end of document", f"at line {line}, column {column}, the end of the file")
     place = _PLACE.search(message)

@@ -151,7 +151,7 @@ def _powers(unit: pint.Unit) -> dict[str, int]:
 
 
 def _dimensions(unit: pint.Unit, wanted: pint.Unit) -> dict[str, int]:
-    """Exponents; an angle below the fraction line does not count unless the wanted unit is made of angles alone."""
+    """Give the exponents of the base units; angles in a denominator count only if the wanted unit has angles alone."""
     powers = _powers(unit)
     free = _power(wanted, "[angle]") <= 0 and powers.get("[angle]", 0) <= 0
     return {name: power for name, power in powers.items() if not (free and name == "[angle]")}

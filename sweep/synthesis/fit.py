@@ -21,15 +21,10 @@ from sweep.families.base import Accuracy, Angles, Array, Family
 from sweep.families.capabilities import GuidedPoint
 from sweep.families.chain import Chain, stages_of
 
-FITTED = ("xi", "eta", "lam", "h")
-SCALED = ("a", "b", "c", "e", "xi", "eta", "h")
-
 # The deviation is a smooth function of the input: 48 Chebyshev points of a swing miss 1e-4 of its extremes, 256 of a
 # whole turn 4e-4 at most (48: up to 2e-2), which is far below what the optimiser moves afterwards.
 SWING_SAMPLES, TURN_SAMPLES = 48, 256
 SWING_ACCURACY = Accuracy(target=1e-6)
-# Measured on one core of a Zen 4 [ns per design], the limit positions of the driving stage included.
-NS_FIT = 7000.0
 
 
 @dataclass(frozen=True)
@@ -44,12 +39,14 @@ class LineFit:
 
     def parameters(self, family: Family) -> tuple[str, ...]:
         """Names of the parameters the fit sets, xi2, eta2 ... in a chain; lam only if its direction is free."""
-        suffix = _suffix(family)
-        return tuple(f"{name}{suffix}" for name in FITTED if self.free_direction or name != "lam")
+        guided, suffix = _guided(family)
+        free = (name for name in guided.fitted if self.free_direction or name != guided.direction)
+        return tuple(f"{name}{suffix}" for name in free)
 
     def rescaled(self, family: Family) -> tuple[str, ...]:
         """Names of the parameters whose given values are proportions only."""
-        return () if self.stroke is None else tuple(f"{name}{_suffix(family)}" for name in SCALED)
+        guided, suffix = _guided(family)
+        return () if self.stroke is None else tuple(f"{name}{suffix}" for name in guided.scaled)
 
 
 def fit_line(
@@ -75,7 +72,7 @@ def fit_line(
     InputError
         if the mechanism has no guided coupler point.
     """
-    suffix = _suffix(family)
+    guided, suffix = _guided(family)
     column = {name: k for k, name in enumerate(family.parameter_names)}
     fitted = designs.copy()
     guide = family.stages[-1].family if isinstance(family, Chain) else family
@@ -88,28 +85,30 @@ def fit_line(
     pins = guide.poses(np.ascontiguousarray(own), Angles.of(angles[alive]), wanted)
     missing = pins["status"] != codes.OK
     parts = [np.where(missing, np.nan, pins[name].astype(np.float64)) for name in ("x_b", "y_b", "x_c", "y_c")]
-    values = {name: np.ascontiguousarray(own[:, guide.parameter_names.index(name)]) for name in FITTED}
+    values = {name: np.ascontiguousarray(own[:, guide.parameter_names.index(name)]) for name in guided.fitted}
+    along, across, direction, offset = values.values()
     deviation, travel, found = np.empty(alive.size), np.empty(alive.size), np.empty(alive.size, np.uint8)
     limits = np.array(window or (0.0, 1.0), dtype=np.float64)
     line_fit(
-        parts[0], parts[1], parts[2], parts[3], limits, values["lam"], fit.free_direction,
-        values["xi"], values["eta"], values["h"], deviation, travel, found,
+        parts[0], parts[1], parts[2], parts[3], limits, direction, fit.free_direction,
+        along, across, offset, deviation, travel, found,
     )  # fmt: skip
     status[alive] = found
-    for name in FITTED:
+    for name in guided.fitted:
         fitted[alive, column[f"{name}{suffix}"]] = values[name]
     if fit.stroke is not None:
         factor = fit.stroke / travel
-        for name in SCALED:
+        for name in guided.scaled:
             fitted[alive, column[f"{name}{suffix}"]] *= factor
     return fitted, status
 
 
-def _suffix(family: Family) -> str:
-    """What follows the names of the guided stage's parameters: its number in a chain."""
+def _guided(family: Family) -> tuple[GuidedPoint, str]:
+    """The guided point, and what follows the names of its stage's parameters: the stage's number in a chain."""
     last = stages_of(family)[-1]
-    if last.family.find(GuidedPoint) is not None:
-        return str(last.number) if isinstance(family, Chain) else ""
+    guided = last.family.find(GuidedPoint)
+    if guided is not None:
+        return guided, str(last.number) if isinstance(family, Chain) else ""
     raise InputError("fit", family.name, "a guide, or a chain that ends in one", "mechanism")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.synthesis import acceptance
 from sweep.errors import InputError
+from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array
@@ -26,7 +27,9 @@ _EXACT = Accuracy(target=1e-12)
 _OF_THEIR_OWN: dict[str, Callable[[Table], pd.DataFrame]] = {CentralSlot.name: central_slots}
 
 
-def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = None) -> pd.DataFrame:
+def synthesise(
+    family: str, table: Table, *, max_pressure_angle: float | None = None, angles: AngleUnit | None = None
+) -> pd.DataFrame:
     """Mechanisms that meet requirements, one row per solution, in the order of the table.
 
     Parameters
@@ -40,6 +43,7 @@ def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = 
         Swing and stroke are signed, folded minus extended.  Where psi1 or e is given there are two solutions, told
         apart by ``root``; without such a column both are returned, one row each.
     max_pressure_angle : limit for test (v) [rad]; none if not given
+    angles : the unit of the angles given, "rad" or "deg", as of :func:`sweep.evaluate`; results are in rad
 
     Returns
     -------
@@ -55,14 +59,26 @@ def synthesise(family: str, table: Table, *, max_pressure_angle: float | None = 
     ------
     InputError
         for a missing or misspelt column, a bad number, a swing or stroke of zero, angles outside one turn.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> task = {"swing": [0.785, 1.047], "phi0": 3.403, "phi1": 0.0, "e": 100.0, "f": 0.0, "g": 10.0, "alpha": 1.047}
+    >>> sweep.synthesise("rssr", task)[["a", "b", "c", "branch", "failed", "status"]].round(2)
+           a       b       c  branch failed  status
+    0  12.59  246.56  159.28    -1.0              0
+    1  18.51  173.10   92.09    -1.0              0
     """
     import pandas as pd
 
+    if max_pressure_angle is not None and angles == "deg":
+        max_pressure_angle = np.radians(max_pressure_angle)
     if max_pressure_angle is not None and not 0.0 < max_pressure_angle <= 0.5 * np.pi:
         raise InputError("max_pressure_angle", max_pressure_angle, "an angle between 0 and pi/2", "synthesise")
     if family in _OF_THEIR_OWN:
-        return _OF_THEIR_OWN[family](table)
-    way = locus(family, tuple(str(name) for name in table))
+        return _OF_THEIR_OWN[family](in_radians(CentralSlot(), table, angles))
+    way = locus(family, plain_names(table))
+    table = in_radians(way, table, angles)
     matrix = way.read(table)
     index = table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(len(matrix))
     if way.has_roots and "root" not in table:

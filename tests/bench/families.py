@@ -1,31 +1,47 @@
-"""Speed of every family's poses on this machine: ``python -m tests.bench.families``.
+"""Time of every family's poses and own steps on this machine, next to the crank-rocker's in the same run.
 
-ns per (design, angle) of position and all its derivatives, on random changes of one ordinary design, next to the
-crank-rocker's in the same run; families take turns, and each counts with its fastest round.
+Poses: position and all its derivatives, on random changes of one ordinary design.  Families take turns, and each counts
+with its fastest round.
 """
 
 from __future__ import annotations
 
-import sys
 import time
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from sweep.families import NAMES, family
-from sweep.families.base import Angles, Family
-from sweep.families.domain import Turn
+from sweep.families.base import Accuracy, Angles, Array, Family
+from sweep.families.domain import March
+from sweep.reductions.closing import on_closed_turn
+from sweep.reductions.margins import margin_suffixes, own_step
+from sweep.reductions.turn import margin_group
 
-DESIGNS, SAMPLES, ROUNDS = 500, 360, 7
+SAMPLES, ROUNDS, MOST = 360, 7, 4096
+SECONDS = 0.02  # of one run
+ACCURACIES = (Accuracy(samples=720), Accuracy(target=1e-8), Accuracy(target=1e-8, certify=True))
+FEWER_SAMPLES = 180
+WIDE = 0.6
 
 
-def designs_of(mechanism: Family) -> np.ndarray:  # type: ignore[type-arg]
-    """Designs within 2 % of the ordinary one in every parameter that has no choices."""
+class Run(NamedTuple):
+    """Something to be timed, and how many units one call makes."""
+
+    call: Callable[[], object]
+    units: int
+
+
+def designs_of(mechanism: Family, count: int = MOST, spread: float = 0.02) -> Array:
+    """Designs within a share of the ordinary one in every parameter that has no choices."""
     given, random = mechanism.example, np.random.default_rng(1)
     columns = []
     for parameter in mechanism.parameters:
         value = given.get(parameter.name, parameter.default if parameter.default is not None else 0.0)
-        spread = 0.0 if parameter.choices is not None else 0.02
-        columns.append(value * (1.0 + spread * random.uniform(-1.0, 1.0, DESIGNS)))
+        share = 0.0 if parameter.choices is not None else spread
+        columns.append(value * (1.0 + share * random.uniform(-1.0, 1.0, count)))
     return np.column_stack(columns)
 
 
@@ -37,28 +53,91 @@ def ladder(mechanism: Family) -> list[str]:
     return names
 
 
-def measure(rounds: int) -> dict[str, float]:
-    """Least ns per pose of every family over a turn."""
-    angles = Angles.of(np.arange(SAMPLES)[None, :] * (2.0 * np.pi / SAMPLES))
-    ready = [mechanism for name in NAMES if isinstance((mechanism := family(name)).domain, Turn)]
-    runs = {m.name: (m, designs_of(m), frozenset(ladder(m))) for m in ready}
+def sized(designs: Array, work: Callable[[Array], object], per_design: int = 1) -> Run:
+    """The work on as many of the designs as take about `SECONDS`."""
+    count, took = 2, 0.0
+    work(designs[:count])  # compiles
+    while took < 0.5 * SECONDS and count < len(designs):
+        count = min(2 * count, len(designs))
+        start = time.process_time()
+        work(designs[:count])
+        took = time.process_time() - start
+    chosen = designs[:count]
+    return Run(lambda: work(chosen), count * per_design)
+
+
+def least(runs: dict[str, Run], rounds: int = ROUNDS) -> dict[str, float]:
+    """Least processor time of every run [ns per unit] over interleaved rounds."""
     best = dict.fromkeys(runs, np.inf)
-    for turn in range(rounds + 1):
-        for name, (mechanism, designs, wanted) in runs.items():
+    for _ in range(rounds):
+        for name, run in runs.items():
             start = time.process_time()
-            mechanism.poses(designs, angles, wanted)
-            spent = (time.process_time() - start) / (DESIGNS * SAMPLES) * 1e9
-            best[name] = min(best[name], spent) if turn else np.inf  # the first round compiles
+            run.call()
+            best[name] = min(best[name], (time.process_time() - start) / run.units * 1e9)
     return best
 
 
-def main(rounds: int = ROUNDS) -> None:
-    """Print ns per pose and how many times the crank-rocker's that is."""
-    best = measure(rounds)
-    print(f"{'family':24}{'outputs':>8}{'ns per pose':>13}{'of rssr':>9}")
-    for name, ns in best.items():
-        print(f"{name:24}{len(ladder(family(name))):8d}{ns:13.1f}{ns / best['rssr']:9.1f}")
+def pose_runs() -> dict[str, Run]:
+    """By family: poses over a turn, an interval there and back, or the grid of a march."""
+    angles = Angles.of(np.arange(SAMPLES)[None, :] * (2.0 * np.pi / SAMPLES))
+    runs = {}
+    for name in NAMES:
+        bare = family(name)
+        mechanism, wanted = on_closed_turn(bare), frozenset(ladder(bare))
+        runs[name] = sized(designs_of(bare), lambda some, m=mechanism, w=wanted: m.poses(some, angles, w), SAMPLES)  # type: ignore[misc]
+    return runs
 
 
-if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else ROUNDS)
+def margin_runs() -> dict[str, Run]:
+    """By family that has no own step for it: the margin over poses, of designs many of which do not turn."""
+    runs = {}
+    for mechanism in map(family, NAMES):
+        for suffix in margin_suffixes(mechanism):
+            if own_step(mechanism, suffix, ACCURACIES[1]) is None:
+                work = partial(_margin, mechanism)
+                runs[mechanism.name] = sized(designs_of(mechanism, spread=WIDE), work)
+    return runs
+
+
+def _margin(mechanism: Family, designs: Array) -> object:
+    return margin_group(mechanism, designs, (), ACCURACIES[1])
+
+
+def step_runs() -> dict[str, Run]:
+    """By "family: step": all outputs of a family's own step, at the first accuracy that it serves.
+
+    A step that serves some accuracies only and samples has a second row, "... fewer", on fewer samples.
+    """
+    runs = {}
+    for name in NAMES:
+        mechanism = family(name)
+        for step in mechanism.steps:
+            outputs = frozenset(o.name for o in step.provides)
+            served = [a for a in ACCURACIES if step.applies(a)]
+            if isinstance(mechanism.domain, March) or served[0].samples is None or len(served) > 1:
+                shown = {f"{name}: {step.name}": served[0]}
+            else:
+                fewer = Accuracy(samples=FEWER_SAMPLES)
+                shown = {f"{name}: {step.name}": served[0], f"{name}: {step.name}, fewer": fewer}
+            for row, accuracy in shown.items():
+                runs[row] = sized(
+                    designs_of(mechanism),
+                    lambda some, s=step, o=outputs, a=accuracy: s.run(some, o, a),  # type: ignore[misc]
+                )
+    return runs
+
+
+def step_costs(rounds: int = ROUNDS) -> tuple[dict[str, float], dict[str, float]]:
+    """Per own step its time per design, and what each sample adds where it works through them [ns]."""
+    best = least(step_runs(), rounds)
+    fixed, samples = {}, {}
+    for row, ns in best.items():
+        if row.endswith(", fewer"):
+            continue
+        fewer = best.get(f"{row}, fewer")
+        if fewer is None:
+            fixed[row] = ns
+        else:
+            samples[row] = (ns - fewer) / (ACCURACIES[0].samples - FEWER_SAMPLES)  # type: ignore[operator]
+            fixed[row] = max(fewer - FEWER_SAMPLES * samples[row], 1.0)
+    return fixed, samples

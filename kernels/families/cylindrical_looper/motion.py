@@ -10,9 +10,13 @@ import numpy as np
 from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.complex_step import magnitude
-from kernels.driven_ball import EPS, Path, Swung, rotated, swing
+from kernels.driven_ball import Path, Swung, rotated, swing
 from kernels.families.cylindrical_looper.closure import Numbers, Reduced, Status, reduce_design
+from kernels.looper_drive import pin_path
 from kernels.looper_outputs import put_angle, put_loop, put_point
+from kernels.slider_closure import Reduced as Slider
+from kernels.slider_closure import derivatives, place, tolerance
+from kernels.verdict import pose_status
 
 
 class Slide(NamedTuple):
@@ -29,44 +33,28 @@ class Slide(NamedTuple):
 
 
 @inline
-def _slide(r: Reduced, u: float, v: float) -> Slide:
+def _slide(r: Slider, u: float, v: float) -> Slide:
     """The slider-crank that moves the shaft along, (1)."""
     y = r.k0 + r.ka * v
-    m, n = r.e2 - r.a2 * u, r.n0 - r.na * v
-    q = (r.b2 - m) * (r.b2 + m) - n * n
-    t = 8.0 * EPS
-    tolerance = t * (abs(m.real) * r.m_size + abs(n.real) * r.n_size)
-    tolerance += t * t * (r.m_size * r.m_size + r.n_size * r.n_size)
-    code = st.OK
-    if q.real != q.real:
-        code = st.INVALID_INPUT
-    elif q.real < -tolerance:
-        code = st.NOT_ASSEMBLED
-    elif q.real <= tolerance:
-        code = st.DEAD_POINT
+    at = place(r, u, v)
+    code = pose_status(True, at.q.real, tolerance(r, at), None)
     moving = code == st.OK
-    root = np.sqrt(q) if moving else 0.0 * q
+    root = np.sqrt(at.q) if moving else 0.0 * at.q
     has_place = moving or code == st.DEAD_POINT
-    w = r.branch2 * root if has_place else math.nan * q
-    per_w = 1.0 / w if moving else math.nan * q
-    # with cos^2 + sin^2 = 1 taken out: as it stands it cancels for alpha2 near 90 deg
-    q1 = r.ka * u * y - r.a2 * v * r.e2
-    w1 = q1 * per_w
-    w2 = (r.ka * (r.ka * u * u - v * y) - r.a2 * u * r.e2 - w1 * w1) * per_w
-    w3 = (-q1 - 3.0 * r.ka * r.ka * u * v - 3.0 * w1 * w2) * per_w
-    across = m * m + n * n if has_place else math.nan * q
-    return Slide(code, y + w, r.ka * u + w1, w2 - r.ka * v, w3 - r.ka * u, q, root, across)
+    w = r.branch * root if has_place else math.nan * at.q
+    first, second, third = derivatives(r, u, v, y, 1.0 / w if moving else math.nan * at.q)
+    across = at.m * at.m + at.n * at.n if has_place else math.nan * at.q
+    return Slide(code, y + w, first, second, third, at.q, root, across)
 
 
 @inline
 def _first_crank(r: Reduced, slide: Slide, u: float, v: float) -> Path:
     """Ball of crank 1 from the foot of the shaft's rocker, which slides with the shaft or does not, (2)."""
-    hu, hv, tu, tv = r.a1 * (r.ca * u), r.a1 * (r.ca * v), r.a1 * (r.sa * u), r.a1 * (r.sa * v)
-    s, s1, s2, s3 = 0.0 * slide.delta, 0.0 * slide.delta, 0.0 * slide.delta, 0.0 * slide.delta
+    m, m1, m2, m3 = pin_path(r.swings, u, v)
     if r.slides == 1.0:
-        s, s1, s2, s3 = slide.s, slide.first, slide.second, slide.third
-    pin = (r.a1 * u - r.e1, r.y0 + hv, r.lift - r.g1 - tv - s)
-    return pin, (-r.a1 * v, hu, -tu - s1), (-r.a1 * u, -hv, tv - s2), (r.a1 * v, -hu, tu - s3)
+        m, m1 = (m[0], m[1], m[2] - slide.s), (m1[0], m1[1], m1[2] - slide.first)
+        m2, m3 = (m2[0], m2[1], m2[2] - slide.second), (m3[0], m3[1], m3[2] - slide.third)
+    return m, m1, m2, m3
 
 
 @kernel
@@ -113,9 +101,10 @@ def poses(
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
-            two = _slide(r, u * r.cos_offset - v * r.sin_offset, v * r.cos_offset + u * r.sin_offset)
+            two = _slide(r.moves, u * r.cos_offset - v * r.sin_offset, v * r.cos_offset + u * r.sin_offset)
             first = _first_crank(r, two, u, v)
-            one = swing(first, r.size1, r.b1, r.c1, r.branch1)
+            drive = r.swings
+            one = swing(first, r.size1, drive.b, drive.c, drive.branch)
             slide_counts, shaft_counts = r.slides == 1.0, False
             if slide is not None or slide_loop is not None:
                 slide_counts = True
@@ -135,7 +124,7 @@ def poses(
                 put_loop(shaft_loop, i, j, one.delta, magnitude(one.root), one.across, r.unit, undefined)
             if slide_loop is not None:
                 put_loop(slide_loop, i, j, two.delta, two.root, two.across, r.unit, undefined)
-            foot = (r.e1, 0.0 * r.e1, r.g1)
+            foot = (drive.e, 0.0 * drive.e, drive.g)
             path = _carried(r, one, two)
             put_point(point, velocity, acceleration, jerk, magnitudes, i, j, foot, path, scale)
             if joints is not None:
@@ -167,7 +156,7 @@ def _put_slide(slide: Numbers | None, i: int, j: int, two: Slide, scale: Any) ->
 def _carried(r: Reduced, one: Swung, two: Slide) -> Path:
     """The working point from the shaft's foot: fixed to the shaft, which turns and slides, (4)."""
     # zeros of the design's own kind: complex where the design is, or the tuples would mix two types
-    none = 0.0 * r.e1
+    none = 0.0 * r.swings.e
     along = (
         (r.point[0], r.point[1], r.point[2] + two.s),
         (none, none, two.first),
@@ -183,9 +172,10 @@ def _put_joints(
 ) -> None:
     """Write x y z of crank pin 1 and of the rocker's ball [length]."""
     # not from the path's own z, which the slide has been taken off
-    pin = (first[0][0] + r.e1, first[0][1], r.lift - r.a1 * (r.sa * v))
-    lift = r.g1 + two.s if r.slides == 1.0 else r.g1 + 0.0 * r.e1
-    ball = (r.e1 + r.c1 * one.cos, r.c1 * one.sin, lift)
+    drive = r.swings
+    pin = (first[0][0] + drive.e, first[0][1], drive.lift - drive.a * (drive.sa * v))
+    lift = drive.g + two.s if r.slides == 1.0 else drive.g + 0.0 * drive.e
+    ball = (drive.e + drive.c * one.cos, drive.c * one.sin, lift)
     for k in range(3):
         joints[k, i, j] = pin[k] * scale
         joints[3 + k, i, j] = ball[k] * scale

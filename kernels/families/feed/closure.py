@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels._jit import inline
 from kernels.complex_step import arctan2, hypotenuse
+from kernels.verdict import pose_status
 
 Array: TypeAlias = NDArray[np.float64]
 Status: TypeAlias = NDArray[np.uint8]
@@ -144,13 +145,7 @@ def rocker_angle(r: Rocker, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
     w_size += (abs(x.real) * r.reach + abs(y.real) * r.y_reach + abs(z.real) * r.z_reach) / r.c.real
     tolerance = band * (abs(x.real) * r.reach + abs(y.real) * r.y_reach + abs(w.real) * w_size)
     tolerance += band * band * (r.reach * r.reach + r.y_reach * r.y_reach + w_size * w_size)
-    code = st.OK
-    if delta.real != delta.real:
-        code = st.INVALID_INPUT
-    elif delta.real < -tolerance:
-        code = st.NOT_ASSEMBLED
-    elif delta.real <= tolerance:
-        code = st.DEAD_POINT if rr.real > tolerance else st.SINGULAR
+    code = pose_status(True, delta.real, tolerance, rr.real)
     t = r.sigma * (np.sqrt(delta) if code == st.OK else 0.0 * delta)
     per_rr = 1.0 / rr if code in (st.OK, st.DEAD_POINT) else math.nan * rr
     cos, sin = -(x * w + y * t) * per_rr, (y * w - x * t) * per_rr

@@ -1,4 +1,4 @@
-"""All rocker angles that close the five-link at one crank angle, by a scan: the slow road, for what Newton leaves.
+"""All rocker angles that close the five-link at one crank angle, found by a scan where Newton's method does not serve.
 
 G5 is defined where the coupler reaches the rocker's plane of motion along the crank axis, rho^2 >= 0: on the whole
 circle, on one arc or on two.  An arc is traversed as psi = centre - half cos(tau), so that the root of rho at its ends
@@ -36,7 +36,7 @@ def _angle(centre: float, half: float, tau: float) -> float:
 
 @inline
 def _closure(joint: Joint, x: float, y: float, w: float, psi: float) -> float:
-    """G5 with rho^2 < 0 by rounding at the end of an arc taken as 0."""
+    """Evaluate G5; at the end of an arc a rho^2 that rounding made negative counts as 0."""
     c, s = math.cos(psi), math.sin(psi)
     _, square = axial_reach(joint, s)
     return float(x * c - y * s + (w - joint.shift) - joint.share * math.sqrt(max(square, 0.0)))
@@ -46,7 +46,7 @@ def _closure(joint: Joint, x: float, y: float, w: float, psi: float) -> float:
 def _bracketed(
     joint: Joint, x: float, y: float, w: float, centre: float, half: float, lo: float, hi: float, f_lo: float
 ) -> float:
-    """Rocker angle of the root between two places of opposite sign: bisection, which no shape misleads."""
+    """Find the rocker angle of the root between two places of opposite sign, by bisection, which never fails."""
     # 52 halvings of a cell come to its last bits; what they leave the caller's Newton steps take away
     for _ in range(52):
         mid = 0.5 * (lo + hi)
@@ -62,7 +62,7 @@ def _bracketed(
 def _dip(
     joint: Joint, x: float, y: float, w: float, centre: float, half: float, lo: float, hi: float, sign: float
 ) -> tuple[float, float]:
-    """Place and value of the least of sign * G5 between two places, by the golden section."""
+    """Find where sign * G5 is least between two places, and its value there, by the golden section."""
     p, q = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
     f_p = sign * _closure(joint, x, y, w, _angle(centre, half, p))
     f_q = sign * _closure(joint, x, y, w, _angle(centre, half, q))
@@ -83,7 +83,7 @@ def _dip(
 def _scan_arc(
     joint: Joint, x: float, y: float, w: float, centre: float, half: float, noise: float, count: int, at: Array
 ) -> int:
-    """Append the roots on one arc to ``at``; the number of all."""
+    """Append the roots on one arc to ``at`` and return how many there are now."""
     whole = half >= math.pi
     begin, width = (-math.pi, 2.0 * math.pi) if whole else (0.0, math.pi)
     step = width / SAMPLES
@@ -119,7 +119,7 @@ def _scan_arc(
 
 @kernel
 def _extremes_of_arc(joint: Joint, x: float, y: float, w: float, centre: float, half: float) -> tuple[Place, Place]:
-    """Places of the smallest and the largest G5 on one arc."""
+    """Find the places of the smallest and the largest G5 on one arc."""
     whole = half >= math.pi
     begin, width = (-math.pi, 2.0 * math.pi) if whole else (0.0, math.pi)
     step = width / SAMPLES

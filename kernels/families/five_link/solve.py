@@ -1,4 +1,4 @@
-"""The rocker angle of the five-link at one crank angle: Newton from the crank-rocker's, or the scan of all roots."""
+"""The rocker angle of the five-link at one crank angle, by Newton's method from the crank-rocker's or by a scan."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def pull_of(ratio: float, along: float, across: float) -> Pull:
 
 @inline
 def _usable(friction: Array) -> bool:
-    """Whether a tension ratio and two coefficients of friction can be meant."""
+    """Say whether tension ratio and coefficients of friction are numbers that a thread can have."""
     return bool(1e-6 < friction[0] < 1e6 and 0.0 <= friction[1] < 100.0 and 0.0 <= friction[2] < 1e6)
 
 
@@ -169,7 +169,10 @@ def limit_points(
 
 @inline
 def slid(cam: Cam, pull: Pull, before: float) -> float:
-    """Where the thread comes to rest that lay at ``before``: there, or slid to the next limit point that holds it."""
+    """Give the place where a thread that lay at ``before`` rests now.
+
+    It stays there, or it slides to the next limit point that holds it.
+    """
     along, whole = lean(cam, pull, before)
     most = FAR * (reach(cam) + 1e-3)
     if along > pull.sine * whole:

@@ -41,7 +41,7 @@ class Half(NamedTuple):
 
 
 class Reduced(NamedTuple):
-    """Both halves, 4 a k, the turns of the output per turn of the carrier, and what psi departs from at phi = 0."""
+    """Constants of both halves of the turn, 4 a k, output turns per carrier turn, and the output angle at phi = 0."""
 
     front: Half
     back: Half

@@ -58,7 +58,10 @@ def quadratic(p: Array, x: float) -> float:
 
 @inline
 def _bend(s2: Array, q: Array, d: Array, bend: Array) -> None:
-    """Polynomial s2'/2 q d + s2 (q' d - 2 q d'): psi'' is stationary where it vanishes, psi''' is it over d^3."""
+    """Write the polynomial s2'/2 q d + s2 (q' d - 2 q d').
+
+    psi'' is stationary where it vanishes, and psi''' is this polynomial divided by d^3.
+    """
     # The derivative of a product of powers is their product times a sum of exponents.
     bend[:] = 0.0
     for x in range(3):
@@ -71,7 +74,7 @@ def _bend(s2: Array, q: Array, d: Array, bend: Array) -> None:
 
 @inline
 def _slope(bend: Array, d: Array, slope: Array) -> None:
-    """Polynomial bend' d - 3 bend d', which vanishes where psi''' is stationary."""
+    """Write the polynomial bend' d - 3 bend d', which vanishes where psi''' is stationary."""
     slope[:] = 0.0
     for x in range(6):
         for z in range(3):

@@ -56,7 +56,7 @@ def law(designs: Array, i: int, u: float, v: float) -> tuple[float, float, float
 
 @inline
 def lowest(designs: Array, i: int) -> tuple[float, float]:
-    """Cosine and sine of the cam angle where P is least: the best of some looks, then its slope's zero by bisection."""
+    """Find cosine and sine of the cam angle where P is least: the best of LOOKS samples, then its slope's zero."""
     best, where, step = math.inf, 0.0, 2.0 * math.pi / LOOKS
     for j in range(LOOKS):
         # real part only: where P is least its slope is zero, so a complex step of the place moves the value by nothing
@@ -76,7 +76,7 @@ def lowest(designs: Array, i: int) -> tuple[float, float]:
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Constants of one design; its least displacement is a number of the whole turn."""
+    """Constants of one design; one of them, the least displacement, needs a search over the whole turn."""
     size = 0.0
     for k in range(COLUMNS):
         if k != 5 and k != 6:  # the coefficients of friction are no lengths

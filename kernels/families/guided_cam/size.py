@@ -58,7 +58,7 @@ def least_radius(designs: Array, status: Status, radius: Array, place: Array, an
 
 @inline
 def _need(designs: Array, i: int, r: Reduced, cotangent: float, phi: float) -> tuple[float, float]:
-    """S' cot - S, the radius asked for less a constant, and its derivative."""
+    """Evaluate S' cot - S, which is the radius needed at a cam angle but for a constant, and its derivative."""
     value, first, second = law(designs, i, math.cos(phi), math.sin(phi))
     thread = r.store + value / r.unit
     s = math.sqrt(displacement(thread, r.across_z, r.across_x))
@@ -68,7 +68,7 @@ def _need(designs: Array, i: int, r: Reduced, cotangent: float, phi: float) -> t
 
 @inline
 def _largest(designs: Array, i: int, r: Reduced, cotangent: float) -> tuple[float, float]:
-    """Largest need over the turn and its place: best of the looks, then its slope's zero by bisection."""
+    """Find the largest radius needed over the turn and its place: the best sample, then its slope's zero."""
     best, where, step = -math.inf, 0.0, 2.0 * math.pi / LOOKS
     for j in range(LOOKS):
         value = _need(designs, i, r, cotangent, step * j)[0]

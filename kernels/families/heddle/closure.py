@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline
+from kernels.verdict import pose_status
 
 Array: TypeAlias = NDArray[np.float64]
 Status: TypeAlias = NDArray[np.uint8]
@@ -124,14 +125,8 @@ def driven(bar: FourBar, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
     band = 8.0 * EPS
     tolerance = band * (abs(x.real) * bar.x_size + abs(y.real) * bar.a.real + abs(w.real) * bar.w_size)
     tolerance += band * band * (bar.x_size * bar.x_size + bar.a.real * bar.a.real + bar.w_size * bar.w_size)
-    code = st.OK
-    if delta.real != delta.real:
-        code = st.INVALID_INPUT
-    elif delta.real < -tolerance:
-        code = st.NOT_ASSEMBLED
-    elif delta.real <= tolerance:
-        # The driving pin on the driven pivot leaves the arm free; a dead point has one position.
-        code = st.DEAD_POINT if rr.real > tolerance else st.SINGULAR
+    # SINGULAR: the driving pin on the driven pivot leaves the arm free; a dead point has one position.
+    code = pose_status(True, delta.real, tolerance, rr.real)
     t = bar.side * (np.sqrt(delta) if code == st.OK else 0.0 * delta)
     per_rr = 1.0 / rr if code in (st.OK, st.DEAD_POINT) else math.nan * rr
     return -(x * w + y * t) * per_rr, (x * t - y * w) * per_rr, t, delta, code

@@ -1,4 +1,4 @@
-"""Does the crank turn fully, by what margin, and how large does the pressure angle get: one exact minimum.
+"""Whether the crank turns fully, by what margin, and the largest pressure angle: all three from one exact minimum.
 
 Q(phi) = (b - m)(b + m) - n^2 is a trigonometric polynomial of degree 2 without a sin 2 phi term and Q/b^2 =
 cos^2(pressure angle), so its minimum answers all three; equation (4) of docs/rssp.md.

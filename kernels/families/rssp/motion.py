@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import inline, kernel
+from kernels._jit import kernel
 from kernels.complex_step import arctan2
-from kernels.families.rssp.closure import EPS, Array, Reduced, Status, place, reduce_design
+from kernels.families.rssp.closure import Array, Status, derivatives, place, reduce_design, tolerance
 from kernels.verdict import pose_status
 
 
@@ -53,11 +52,9 @@ def poses(
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
             y = r.k0 + r.ka * v
-            m, n, q = place(r, u, v)
-            error = 8.0 * EPS
-            tolerance = error * (abs(m.real) * r.m_size + abs(n.real) * r.n_size)
-            tolerance += error * error * (r.m_size * r.m_size + r.n_size * r.n_size)
-            code = pose_status(r.valid, q.real, tolerance, None)
+            at = place(r, u, v)
+            m, n, q = at
+            code = pose_status(r.valid, q.real, tolerance(r, at), None)
             status[i, j] = code
 
             if discriminant is not None:
@@ -78,26 +75,10 @@ def poses(
                 joints[4, i, j] = (y + w) * r.unit
                 joints[5, i, j] = 0.0 if assembled else math.nan
             if ds is not None or d2s is not None or d3s is not None:
-                _put_derivatives(ds, d2s, d3s, i, j, r, u, v, y, w, code == st.OK)
-
-
-@inline
-def _put_derivatives(
-    ds: Array | None, d2s: Array | None, d3s: Array | None, i: int, j: int,
-    r: Reduced, u: Any, v: Any, y: Any, w: Any, regular: bool,
-) -> None:  # fmt: skip
-    """Write the wanted transfer functions up to the highest of them; (3)."""
-    per_w = 1.0 / w if regular else math.nan * w
-    # m m' + n n' with cos^2(phi) + sin^2(phi) = 1 taken out: as it stands it cancels for alpha near 90 deg.
-    q1 = r.ka * u * y - r.a * v * r.e
-    w1 = q1 * per_w
-    if ds is not None:
-        ds[i, j] = (r.ka * u + w1) * r.unit
-    if d2s is not None or d3s is not None:
-        q2 = r.ka * (r.ka * u * u - v * y) - r.a * u * r.e
-        w2 = (q2 - w1 * w1) * per_w
-        if d2s is not None:
-            d2s[i, j] = (w2 - r.ka * v) * r.unit
-        if d3s is not None:
-            q3 = -q1 - 3.0 * r.ka * r.ka * u * v
-            d3s[i, j] = ((q3 - 3.0 * w1 * w2) * per_w - r.ka * u) * r.unit
+                one, two, three = derivatives(r, u, v, y, 1.0 / w if code == st.OK else math.nan * w)
+                if ds is not None:
+                    ds[i, j] = one * r.unit
+                if d2s is not None:
+                    d2s[i, j] = two * r.unit
+                if d3s is not None:
+                    d3s[i, j] = three * r.unit

@@ -1,4 +1,4 @@
-"""True maximum of one transfer function by marching and bracketing: for the few designs near a change point.
+"""True maximum of one transfer function by marching and bracketing, for the few designs near a change point.
 
 The motion changes fastest near the complex zeros of Delta.  The steps of the march are proportional to the distance
 from them, so a design whose discriminant comes within d of zero takes about log(1/d) steps.  A maximum is bracketed

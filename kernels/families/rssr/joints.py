@@ -34,7 +34,7 @@ def joints(
     Notes
     -----
     The component t_tau of the coupler's direction along the rocker's motion has the sign of the branch.  It is taken
-    from the discriminant, which keeps its digits near a dead point (dynamics sheet, rule 3).
+    from the discriminant, which keeps its digits near a dead point.
     """
     for i in range(designs.shape[0]):
         a, b, c = designs[i, 0], designs[i, 1], designs[i, 2]

@@ -11,6 +11,7 @@ from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.complex_step import arctan2, hypotenuse, magnitude
 from kernels.families.slotted.closure import EPS, Numbers, Reduced, Status, reduce_design
+from kernels.verdict import pose_status
 
 
 class Slide(NamedTuple):
@@ -60,12 +61,7 @@ def _closure(r: Reduced, u: Any, v: Any, is_bar: bool) -> Ball:
     tolerance = error * (abs(x.real) * r.x_size + abs(y.real) * r.y_size + abs(q.real) * q_size)
     tolerance += error * error * (r.x_size * r.x_size + r.y_size * r.y_size + q_size * q_size)
     if code == st.OK:
-        if delta.real != delta.real:
-            code = st.INVALID_INPUT
-        elif delta.real < -tolerance:
-            code = st.NOT_ASSEMBLED
-        elif delta.real <= tolerance:
-            code = st.DEAD_POINT if rr.real > tolerance else st.SINGULAR
+        code = pose_status(True, delta.real, tolerance, rr.real)
     return Ball(code, x, y, z, arm, q, rr, delta)
 
 

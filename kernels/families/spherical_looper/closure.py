@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels._jit import inline
+from kernels.looper_drive import Crank, reduce_crank
 from kernels.vectors import Vector, cross, dot, mix, scale
 
 Numbers: TypeAlias = NDArray[Any]  # float64, or complex128 for exact gradients by the complex step
@@ -53,17 +54,7 @@ class Design(NamedTuple):
 class Reduced(NamedTuple):
     """Per-design numbers in units of ``unit``."""
 
-    a1: float
-    b1: float
-    c1: float
-    e1: float
-    sa: float
-    ca: float
-    y0: float  # crank pin 1 from the origin: (a u, y0 + a ca v, lift - a sa v)
-    lift: float
-    g1: float
-    branch1: float
-    size1: float  # sums of the magnitudes whose rounding errors make up the driving balls' coordinates
+    swings: Crank  # what swings the carrier
     o: float
     radial: Vector  # triad of the looper's axis at psi = 0: towards its ball, across, along the axis
     across: Vector
@@ -90,8 +81,7 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     d = designs[i]
     _, exponent = math.frexp(d[0].real)
     unit, per = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
-    a1, b1, c1, e1, f1, g1 = d[0] * per, d[1] * per, d[2] * per, d[3] * per, d[4] * per, d[5] * per
-    sa, ca = np.sin(d[6]), np.cos(d[6])
+    swings = reduce_crank(d, per)
     o = d[8] * per
     sd, cd, sg, cg = np.sin(d[9]), np.cos(d[9]), np.sin(d[10]), np.cos(d[10])
     axis = (sd * cg, sd * sg, cd)
@@ -106,22 +96,19 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     across = cross(axis, radial)
     point = (dot(tip, radial), dot(tip, across), dot(tip, axis))
     a2, b2 = d[17] * per, d[18] * per
-    centre = (d[19] * per - e1, d[20] * per, d[21] * per - o)
+    centre = (d[19] * per - swings.e, d[20] * per, d[21] * per - o)
     st, ct, sb, cb = np.sin(d[22]), np.cos(d[22]), np.sin(d[23]), np.cos(d[23])
     # magnitudes, not the sums themselves: where those cancel, the errors of their parts stay
-    size1 = a1.real + abs(e1.real) + abs(f1.real) + abs(g1.real)
-    size2 = a2.real + abs((d[19] * per).real) + abs(e1.real) + abs(centre[1].real) + abs((d[21] * per).real)
+    size2 = a2.real + abs((d[19] * per).real) + abs(swings.e.real) + abs(centre[1].real) + abs((d[21] * per).real)
     size2 += abs(o.real) + ball_size
     tip_size = abs(tip[0].real) + abs(tip[1].real) + abs(tip[2].real)
-    valid = 0.0 < a1.real <= 1.0 and 0.0 < b1.real < 1e140 and 0.0 < c1.real < 1e140 and size1 < 1e140
-    valid = valid and 0.0 < a2.real < 1e140 and 0.0 < b2.real < 1e140 and size2 < 1e140 and tip_size < 1e140
-    for k in (6, 9, 10, 22, 23, 24):
+    valid = swings.valid and 0.0 < a2.real < 1e140 and 0.0 < b2.real < 1e140 and size2 < 1e140 and tip_size < 1e140
+    for k in (9, 10, 22, 23, 24):
         valid = valid and abs(d[k].real) < 1e5
-    branch1, branch2 = d[7].real, d[25].real
-    valid = valid and branch1 * branch1 == 1.0 and branch2 * branch2 == 1.0 and unit < math.inf
+    branch2 = d[25].real
+    valid = valid and branch2 * branch2 == 1.0 and unit < math.inf
     return Reduced(
-        a1, b1, c1, e1, sa, ca, f1 * sa, f1 * ca, g1, branch1, size1,
-        o, radial, across, axis, c2 if hinged else 0.0 * c2, along, point,
+        swings, o, radial, across, axis, c2 if hinged else 0.0 * c2, along, point,
         a2, b2, centre, (ct * cb, ct * sb, -st), (-sb, cb, 0.0 * cb), np.cos(d[24]), np.sin(d[24]), branch2, size2,
         unit, valid,
     )  # fmt: skip

@@ -10,16 +10,9 @@ from kernels._jit import inline, kernel
 from kernels.complex_step import magnitude
 from kernels.driven_ball import Path, Swung, rotated, swing
 from kernels.families.spherical_looper.closure import Numbers, Reduced, Status, reduce_design
+from kernels.looper_drive import pin_path
 from kernels.looper_outputs import put_angle, put_loop, put_point
 from kernels.vectors import Vector, add, dot, mix, turned
-
-
-@inline
-def _first_crank(r: Reduced, u: float, v: float) -> Path:
-    """Ball of crank 1 from the foot D of the carrier's rocker, (1)."""
-    hu, hv, tu, tv = r.a1 * (r.ca * u), r.a1 * (r.ca * v), r.a1 * (r.sa * u), r.a1 * (r.sa * v)
-    pin = (r.a1 * u - r.e1, r.y0 + hv, r.lift - r.g1 - tv)
-    return pin, (-r.a1 * v, hu, -tu), (-r.a1 * u, -hv, tv), (r.a1 * v, -hu, tu)
 
 
 @inline
@@ -106,8 +99,9 @@ def poses(
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
-            first, second = _first_crank(r, u, v), _second_crank(r, u, v)
-            one = swing(first, r.size1, r.b1, r.c1, r.branch1)
+            first, second = pin_path(r.swings, u, v), _second_crank(r, u, v)
+            drive = r.swings
+            one = swing(first, drive.size, drive.b, drive.c, drive.branch)
             two = swing(_seen_from_carrier(r, one, second), r.size2, r.b2, r.c2, r.branch2)
             code = one.status if r.valid else st.INVALID_INPUT
             if (
@@ -123,7 +117,7 @@ def poses(
                 put_loop(carrier_loop, i, j, one.delta, magnitude(one.root), one.across, r.unit, undefined)
             if looper_loop is not None:
                 put_loop(looper_loop, i, j, two.delta, magnitude(two.root), two.across, r.unit, undefined)
-            centre = (r.e1, 0.0 * r.e1, r.o)
+            centre = (drive.e, 0.0 * drive.e, r.o)
             scale = r.unit + undefined
             path = _carried(r, one, two, r.point)
             put_point(point, velocity, acceleration, jerk, magnitudes, i, j, centre, path, scale)
@@ -136,11 +130,12 @@ def _put_joints(
     joints: Numbers, i: int, j: int, r: Reduced, first: Path, second: Path, one: Swung, two: Swung, v: float, scale: Any
 ) -> None:
     """Write x y z of crank pin 1, carrier's ball, crank pin 2 and looper's ball [length]."""
-    centre = (r.e1, 0.0 * r.e1, r.o)
+    drive = r.swings
+    centre = (drive.e, 0.0 * drive.e, r.o)
     ball, _, _, _ = _carried(r, one, two, (r.c2, 0.0 * r.c2, r.along))
-    rocker = (r.e1 + r.c1 * one.cos, r.c1 * one.sin, r.g1)
+    rocker = (drive.e + drive.c * one.cos, drive.c * one.sin, drive.g)
     # the height anew: the path's own is taken from the rocker's plane, and adding that again would round twice
-    pin = (first[0][0] + r.e1, first[0][1], r.lift - r.a1 * (r.sa * v))
+    pin = (first[0][0] + drive.e, first[0][1], drive.lift - drive.a * (drive.sa * v))
     for k in range(3):
         joints[k, i, j] = pin[k] * scale
         joints[3 + k, i, j] = rocker[k] * scale

@@ -83,6 +83,14 @@ def wrap(table: Table) -> pd.DataFrame:
         L; wrap [rad], 0 for a straight thread; x, distance of the eyelet from the line of the guides; y, its place
         along the line from the middle of the guides; half_distance_c of the guides; status: SINGULAR where the eyelet
         is at a guide, or where both guides are at one place, so that x and y have no meaning (L and wrap stay)
+
+    Examples
+    --------
+    >>> import sweep
+    >>> guides = {"X1": 0.0, "Y1": 0.0, "Z1": 0.0, "X2": 4.0, "Y2": 0.0, "Z2": 0.0}
+    >>> sweep.thread.wrap(guides | {"X_E": 2.0, "Y_E": 2.0, "Z_E": 0.0})[["L", "wrap", "status"]].round(4)
+            L    wrap  status
+    0  5.6569  1.5708       0
     """
     given = columns_of(_WRAP, table)
     guides, place = side_by_side(given, GUIDES), side_by_side(given, POINT)
@@ -108,6 +116,15 @@ def feed(table: Table) -> pd.DataFrame:
     -------
     DataFrame
         L, dL_dphi, d2L_dphi2 [length]; wrap [rad]; status: SINGULAR where the point is at a guide
+
+    Examples
+    --------
+    >>> import sweep
+    >>> guides = {"X1": 0.0, "Y1": 0.0, "Z1": 0.0, "X2": 4.0, "Y2": 0.0, "Z2": 0.0}
+    >>> found = sweep.thread.feed(guides | {"X_E": 2.0, "Y_E": 2.0, "Z_E": 0.0, "dY_E": 1.0})
+    >>> found[["L", "dL_dphi", "status"]].round(4)
+            L  dL_dphi  status
+    0  5.6569   1.4142       0
     """
     given = columns_of(_FEED, table)
     guides = side_by_side(given, GUIDES)
@@ -131,6 +148,15 @@ def eyelet(table: Table) -> pd.DataFrame:
     DataFrame
         X_E Y_E Z_E, L, dL_dphi, d2L_dphi2 [length]; wrap [rad]; length_error = P_h + P - L; dq [length^2] and weight
         [length], with dq = weight * length_error to first order; status: INVALID_INPUT where P_h + P <= 0
+
+    Examples
+    --------
+    >>> import sweep
+    >>> crank = {"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "phi_h": 0.0, "P_h": 8.0}
+    >>> sweep.thread.eyelet(crank | {"phi": [0.0, 1.0]})[["X_E", "Y_E", "Z_E", "L", "wrap"]].round(4)
+          X_E     Y_E     Z_E       L    wrap
+    0  2.0000  0.4794  0.8776  7.3466  0.6198
+    1  1.0806  1.9563  0.0707  8.9066  1.3377
     """
     given = columns_of(_EYELET, table)
     parameters = side_by_side(given, ("a", "e", "f", "alpha", "Z1", "Z2", "phi_h", "P_h"))
@@ -159,6 +185,13 @@ def follower(table: Table) -> pd.DataFrame:
     DataFrame
         S, dS, d2S [length]; theta_jam [rad], negative where the follower jams at every angle; tan_half_theta_jam;
         status: NOT_ASSEMBLED where the thread is too short, DEAD_POINT where S = 0
+
+    Examples
+    --------
+    >>> import sweep
+    >>> sweep.thread.follower({"L": 11.0, "dL": 1.0, "Z1": 3.0, "e": 4.0, "X1": 0.0})[["S", "dS", "status"]].round(4)
+            S      dS  status
+    0  2.2913  1.2002       0
     """
     given = columns_of(_FOLLOWER, table)
     data = side_by_side(given, ("L", "dL", "d2L", "Z1", "e", "X1"))
@@ -187,6 +220,14 @@ def free_cam(table: Table) -> pd.DataFrame:
         y_limit_plus, y_limit_minus, where the resultant leans by the angle of friction towards growing and falling y,
         nearest to the shortest thread; status: INVALID_INPUT where both guides are on one side, NOT_CONVERGED where a
         limit point lies far outside
+
+    Examples
+    --------
+    >>> import sweep
+    >>> cam = {"a": 0.4, "X1": 0.83, "Y1": -2.08, "Z1": -3.56, "X2": 3.3, "Y2": -0.85, "Z2": 3.7}
+    >>> sweep.thread.free_cam(cam | {"phi": 5.0})[["L", "wrap", "contact", "status"]].round(4)
+            L    wrap  contact  status
+    0  7.8488  0.2897      1.0       0
     """
     given = columns_of(_FREE_CAM, table)
     n = len(given["a"])

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sweep.errors import MeasuredRangeWarning
+from sweep.evaluation.angles import in_radians
 from sweep.evaluation.tables import Parametrised, design_matrix
 from sweep.families.base import Array, Parameter
 from sweep.families.thread_inputs import Range
@@ -34,8 +35,8 @@ class Sheet:
 
 
 def columns_of(sheet: Parametrised, table: Table) -> dict[str, Array]:
-    """The checked columns by name, each (n,) and contiguous."""
-    matrix, _ = design_matrix(sheet, table)
+    """The checked columns by name, each (n,) and contiguous; a header such as ``wrap [deg]`` says its unit."""
+    matrix, _ = design_matrix(sheet, in_radians(sheet, table))
     return {name: np.ascontiguousarray(matrix[:, k]) for k, name in enumerate(sheet.parameter_names)}
 
 

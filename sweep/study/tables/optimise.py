@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from sweep.families.chain import driven_guide
-from sweep.study.model import OptimiseSection
+from sweep.study.model import OptimiseSection, ProveTable
 from sweep.study.reading import Reading
-from sweep.study.study import OptimiseSettings
+from sweep.study.study import OptimiseSettings, ProveSettings
 
 
 def read(reading: Reading) -> None:
@@ -25,8 +25,17 @@ def read_values(reading: Reading) -> None:
         looks=search.looks,
         globally=search.globally,
         finalists=search.finalists,
+        prove=_prove(reading, search.prove),
     )
     reading.fields["optimise"] = settings if "optimise" in reading.data else None
+
+
+def _prove(reading: Reading, table: ProveTable | None) -> ProveSettings | None:
+    if table is None:
+        return None
+    gap = reading.share(table.gap or "1 %", ("optimise", "prove", "gap"))
+    smallest = reading.share(table.smallest, ("optimise", "prove", "smallest"))
+    return ProveSettings(gap, table.boxes, smallest, reading.quantity(table.time, "s", ("optimise", "prove", "time")))
 
 
 def check_objective(reading: Reading) -> None:

@@ -1,0 +1,128 @@
+"""Which crank-rockers on the locus cannot be better than a target: the search over boxes of them.
+
+A box is halved until its rows (:mod:`kernels.families.rssr.box_rows`) prove that it holds no feasible design, or none
+that reaches the target.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels._jit import inline, kernel
+from kernels.families.rssr.box_rows import OPEN, POSES, TOO_SMALL, Problem, Rows, judge
+from kernels.families.rssr.box_turn import Formulas
+from kernels.proof.branching import COMBINED, MOST_ROWS, Flags, Indices, pop, push
+from kernels.proof.slopes import SLOPES, Array
+
+
+class Leaves(NamedTuple):
+    """Boxes that were not halved: where they are and what was proven of them."""
+
+    low: Array  # (m, n)
+    high: Array
+    outcome: Flags  # (m,)
+    bound: Array
+    kinds: Indices  # (m, COMBINED) rows that prove it, -1 where there are fewer
+    theta: Array
+    factors: Array
+
+
+@kernel
+def _record(
+    leaves: Leaves, count: int, low: Array, high: Array, outcome: int, bound: float, rows: Rows, used: int
+) -> int:
+    """One more leaf, with the rows that prove it."""
+    leaves.low[count], leaves.high[count] = low, high
+    leaves.outcome[count], leaves.bound[count] = outcome, bound
+    leaves.kinds[count], leaves.theta[count], leaves.factors[count] = -1, 0.0, 0.0
+    place = 0
+    for j in range(used):
+        if rows.factors[j] != 0.0 and place < COMBINED:
+            leaves.kinds[count, place], leaves.theta[count, place] = rows.kinds[j], rows.theta[j]
+            leaves.factors[count, place] = rows.factors[j]
+            place += 1
+    return count + 1
+
+
+@inline
+def _to_halve(low: Array, high: Array, whole: Array, smallest: float, loose: Array) -> int:
+    """The variable whose width costs the bound most, of those that are not too narrow; -1 where all are.
+
+    Where nothing is known of the costs it is the one of the widest share.
+    """
+    best, most = -1, 0.0
+    known = loose.max() > 0.0
+    for k in range(low.shape[0]):
+        share = (high[k] - low[k]) / whole[k]
+        cost = loose[k] if known else share
+        if share >= smallest and low[k] < 0.5 * (low[k] + high[k]) < high[k] and (best < 0 or cost > most):
+            best, most = k, cost
+    return best
+
+
+@kernel
+def explore(
+    p: Problem, f: Formulas, starts: tuple[Array, Array, Array], whole: Array, varied: Array, given: Array,
+    smallest: float, most: int, leaves: Leaves,
+) -> tuple[int, int]:  # fmt: skip
+    """Halve boxes until every part is proven not to reach the target, or so many parts were judged; worst parts first.
+
+    Parameters
+    ----------
+    p, f : what is asked, and the formulas of the locus (``recorded()`` of ``box_by_axes`` or ``box_by_rocker``)
+    starts : low and high ends of the boxes, (m, n) with n <= 4, and the bounds (m,) known of them; 0 for nothing
+    whole : (n,) width of the whole space, by which widths are compared
+    varied, given : (n,) which of the seven coordinates vary, and all seven
+    smallest : share of ``whole`` below which a side is not halved again
+    most : parts to judge
+    leaves : out, of at least m + most rows
+
+    Returns
+    -------
+    Leaves that were filled, and parts that were judged.  Leaves of outcome OPEN or TOO_SMALL are not proven; their
+    bound is what is known of them.
+    """
+    boxes, n = starts[0].shape
+    at = np.zeros((f.forms, SLOPES + 2 * n))
+    rows = Rows(
+        np.zeros((MOST_ROWS, SLOPES + 2 * n)), np.zeros(MOST_ROWS, np.int64), np.zeros(MOST_ROWS),
+        np.zeros(MOST_ROWS, np.uint8), np.zeros(MOST_ROWS), np.zeros((n + 6, n + 1)), np.zeros(n + 1, np.int64),
+        np.zeros((MOST_ROWS, n + 1)), np.zeros(MOST_ROWS), np.zeros(n),
+    )  # fmt: skip
+    scratch, used = np.zeros((4, POSES)), np.zeros(POSES, np.uint8)
+    lows, highs, bounds = np.zeros((boxes + most, n)), np.zeros((boxes + most, n)), np.zeros(boxes + most)
+    heap, depths = np.zeros(boxes + most, np.int64), np.zeros(boxes + most, np.int64)
+    waiting, filled, judged = 0, 0, 0
+    for i in range(boxes):
+        lows[i], highs[i], bounds[i] = starts[0][i], starts[1][i], starts[2][i]
+        push(heap, waiting, bounds, depths, i)
+        waiting += 1
+    while waiting > 0 and judged < most:
+        box = pop(heap, waiting, bounds, depths)
+        waiting -= 1
+        judged += 1
+        lo, hi = lows[box], highs[box]
+        outcome, count, bound = judge(p, f, lo, hi, varied, given, at, rows, scratch, used)
+        bounds[box] = max(bounds[box], bound)
+        if outcome != OPEN:
+            filled = _record(leaves, filled, lo, hi, outcome, bound, rows, count)
+            continue
+        k = _to_halve(lo, hi, whole, smallest, rows.loose)
+        if k < 0:
+            filled = _record(leaves, filled, lo, hi, TOO_SMALL, bounds[box], rows, 0)
+            continue
+        middle = 0.5 * (lo[k] + hi[k])
+        lows[boxes], highs[boxes], bounds[boxes] = lo, hi, bounds[box]
+        lows[boxes, k], highs[box, k] = middle, middle
+        depths[box] += 1
+        depths[boxes] = depths[box]
+        push(heap, waiting, bounds, depths, box)
+        push(heap, waiting + 1, bounds, depths, boxes)
+        waiting += 2
+        boxes += 1
+    for i in range(waiting):
+        box = heap[i]
+        filled = _record(leaves, filled, lows[box], highs[box], OPEN, bounds[box], rows, 0)
+    return filled, judged

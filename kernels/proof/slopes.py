@@ -1,0 +1,193 @@
+"""Slope arithmetic: enclosures of a function over a box of designs that tighten with the square of the box's width.
+
+Of a function F over the box |x_k - c_k| <= h_k a *form* holds three kinds of intervals: its value at the centre c, its
+range over the box, and for every variable a slope s_k with
+
+    F(x) = F(c) + sum_k s_k (x_k - c_k)   for every x in the box and some s_k in their intervals                    (1)
+
+(R. Krawczyk and A. Neumaier, Interval slopes for rational functions and associated centered forms, SIAM J. Numer. Anal.
+22, 1985).  Slopes are narrower than derivatives over the box, and every rule below is exact algebra on (1).
+
+Forms lie in the rows of one array: centre, range, slopes, each as (low, high).  Every operation widens its result by
+more than rounding to nearest can have moved it, so an enclosure is one of the exact numbers.  Where nothing can be
+enclosed, an operation answers false.  Numbers whose magnitude leaves SMALL ... LARGE are refused before they could
+overflow: a product with an infinity could be nan, and a comparison with nan could lose an end.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels._jit import inline, kernel
+from kernels.sincos import sincos
+
+Array = NDArray[np.float64]
+
+ULP = 2.0**-52  # a number minus ULP of it is at most its lower neighbour, half of which rounding can have cost
+TINY = 1e-300  # more than rounding can cost where numbers are too small for ULP
+# The rows of a family multiply at most eight numbers of LARGE or 1/SMALL: below 1e280.
+SMALL, LARGE = 1e-30, 1e9
+CENTRE, RANGE, SLOPES = 0, 2, 4  # columns of a form
+
+
+@inline
+def down(x: float) -> float:
+    """A number that a sum or product rounded to x cannot lie below."""
+    return x - (abs(x) * ULP + TINY)
+
+
+@inline
+def up(x: float) -> float:
+    """A number that a sum or product rounded to x cannot lie above."""
+    return x + (abs(x) * ULP + TINY)
+
+
+@inline
+def times(a: float, b: float, c: float, d: float) -> tuple[float, float]:
+    """The interval [a, b] [c, d]."""
+    p, q, r, s = a * c, a * d, b * c, b * d
+    return down(min(min(p, q), min(r, s))), up(max(max(p, q), max(r, s)))
+
+
+@inline
+def width(variables: int) -> int:
+    """Columns of a form."""
+    return SLOPES + 2 * variables
+
+
+@kernel
+def settle(at: Array, out: int, half: Array) -> None:
+    """Intersect the range with what centre and slopes say of it; (1)."""
+    low, high = at[out, CENTRE], at[out, CENTRE + 1]
+    for k in range(half.shape[0]):
+        reach = up(max(abs(at[out, SLOPES + 2 * k]), abs(at[out, SLOPES + 2 * k + 1])) * half[k])
+        low, high = down(low - reach), up(high + reach)
+    if low > at[out, RANGE]:
+        at[out, RANGE] = low
+    if high < at[out, RANGE + 1]:
+        at[out, RANGE + 1] = high
+
+
+@kernel
+def constant(at: Array, out: int, low: float, high: float) -> None:
+    """A number that does not depend on the design and lies between the two ends."""
+    at[out, :] = 0.0
+    at[out, CENTRE], at[out, CENTRE + 1], at[out, RANGE], at[out, RANGE + 1] = low, high, low, high
+
+
+@kernel
+def variable(at: Array, out: int, centre: float, half: Array, k: int) -> None:
+    """The k-th variable itself."""
+    constant(at, out, centre, centre)
+    at[out, RANGE], at[out, RANGE + 1] = down(centre - half[k]), up(centre + half[k])
+    at[out, SLOPES + 2 * k], at[out, SLOPES + 2 * k + 1] = 1.0, 1.0
+
+
+@kernel
+def combine(at: Array, out: int, p: float, a: int, q: float, b: int, half: Array) -> None:
+    """P a + q b for two numbers p, q."""
+    for j in range(0, at.shape[1], 2):
+        first, second = times(p, p, at[a, j], at[a, j + 1])
+        third, fourth = times(q, q, at[b, j], at[b, j + 1])
+        at[out, j], at[out, j + 1] = down(first + third), up(second + fourth)
+    settle(at, out, half)
+
+
+@kernel
+def multiply(at: Array, out: int, a: int, b: int, half: Array) -> None:
+    """The product a b, with slopes  s_a b(box) + a(c) s_b;  ``out`` must be neither."""
+    at[out, 0], at[out, 1] = times(at[a, 0], at[a, 1], at[b, 0], at[b, 1])
+    at[out, 2], at[out, 3] = times(at[a, 2], at[a, 3], at[b, 2], at[b, 3])
+    for j in range(SLOPES, at.shape[1], 2):
+        first, second = times(at[a, j], at[a, j + 1], at[b, 2], at[b, 3])
+        third, fourth = times(at[a, 0], at[a, 1], at[b, j], at[b, j + 1])
+        at[out, j], at[out, j + 1] = down(first + third), up(second + fourth)
+    settle(at, out, half)
+
+
+@kernel
+def square(at: Array, out: int, a: int, half: Array) -> None:
+    """a^2, with slopes  s_a (a(box) + a(c));  never negative.  ``out`` must not be a."""
+    for j in (CENTRE, RANGE):
+        low, high = abs(at[a, j]), abs(at[a, j + 1])
+        least = 0.0 if at[a, j] <= 0.0 <= at[a, j + 1] else min(low, high)
+        most = max(low, high)
+        at[out, j], at[out, j + 1] = max(down(least * least), 0.0), up(most * most)
+    low, high = down(at[a, 2] + at[a, 0]), up(at[a, 3] + at[a, 1])
+    for j in range(SLOPES, at.shape[1], 2):
+        at[out, j], at[out, j + 1] = times(at[a, j], at[a, j + 1], low, high)
+    settle(at, out, half)
+
+
+@kernel
+def inverse(at: Array, out: int, a: int, half: Array) -> bool:
+    """1/a, with slopes  -s_a/(a(box) a(c));  false where a may be zero.  ``out`` must not be a."""
+    if not (at[a, RANGE] > SMALL or at[a, RANGE + 1] < -SMALL):
+        return False
+    for j in (CENTRE, RANGE):
+        at[out, j], at[out, j + 1] = down(1.0 / at[a, j + 1]), up(1.0 / at[a, j])
+    low, high = times(-at[out, 1], -at[out, 0], at[out, 2], at[out, 3])
+    for j in range(SLOPES, at.shape[1], 2):
+        at[out, j], at[out, j + 1] = times(at[a, j], at[a, j + 1], low, high)
+    settle(at, out, half)
+    return True
+
+
+@kernel
+def root(at: Array, out: int, a: int, half: Array) -> bool:
+    """The positive square root, with slopes  s_a/(root(box) + root(c));  false where a may be negative or zero."""
+    if not at[a, RANGE] > SMALL:
+        return False
+    for j in (CENTRE, RANGE):
+        at[out, j], at[out, j + 1] = down(math.sqrt(at[a, j])), up(math.sqrt(at[a, j + 1]))
+    low, high = down(1.0 / up(at[out, 1] + at[out, 3])), up(1.0 / down(at[out, 0] + at[out, 2]))
+    for j in range(SLOPES, at.shape[1], 2):
+        at[out, j], at[out, j + 1] = times(at[a, j], at[a, j + 1], low, high)
+    settle(at, out, half)
+    return True
+
+
+@inline
+def _clipped(at: Array, out: int) -> None:
+    """No sine or cosine is above 1."""
+    for j in (CENTRE, RANGE):
+        at[out, j], at[out, j + 1] = max(at[out, j], -1.0), min(at[out, j + 1], 1.0)
+
+
+@inline
+def _turned(at: Array, out: int, value: float, quarter: float, reach: float) -> None:
+    """Centre and range of  value cos(d) + quarter sin(d), |d| <= reach, from  1 - d^2/2 <= cos(d) <= 1."""
+    # sincos errs by less than 0.8 units in the last place
+    at[out, 0], at[out, 1] = value - 2.0 * ULP, value + 2.0 * ULP
+    sag = up(0.5 * up(reach * reach)) * max(abs(at[out, 0]), abs(at[out, 1]))
+    swing = up((abs(quarter) + 2.0 * ULP) * reach)
+    low, high = at[out, 0], at[out, 1]
+    if high > 0.0:
+        low = down(low - up(sag))
+    if low < 0.0:
+        high = up(high + up(sag))
+    at[out, 2], at[out, 3] = down(low - swing), up(high + swing)
+
+
+@kernel
+def sine_cosine(at: Array, sine: int, cosine: int, a: int, factor: float, half: Array) -> None:
+    """Sine and cosine of factor a, for a factor of 1 or 0.5 and a form whose centre is one number.
+
+    The slopes are those of the curves over the range.
+    """
+    centre = factor * at[a, CENTRE]
+    reach = factor * max(up(at[a, RANGE + 1] - at[a, CENTRE]), up(at[a, CENTRE] - at[a, RANGE]))
+    s, c = sincos(centre)
+    _turned(at, sine, s, c, reach)
+    _turned(at, cosine, c, -s, reach)
+    _clipped(at, sine)
+    _clipped(at, cosine)
+    for j in range(SLOPES, at.shape[1], 2):
+        low, high = factor * at[a, j], factor * at[a, j + 1]
+        at[sine, j], at[sine, j + 1] = times(low, high, at[cosine, 2], at[cosine, 3])
+        at[cosine, j], at[cosine, j + 1] = times(low, high, -at[sine, 3], -at[sine, 2])
+    settle(at, sine, half)
+    settle(at, cosine, half)

@@ -1,0 +1,170 @@
+"""The text of a first study of a mechanism: its own example, two parameters swept, every table explained."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sweep.families.base import Family, Parameter
+
+# Units of the examples by unit word.  Those with forces or masses are in SI, the others in any length unit.
+SI = {
+    "length": "m", "1/length": "1/m", "mass": "kg", "inertia": "kg*m^2", "force": "N", "torque": "N*m",
+    "pressure": "N/m^2", "stiffness": "N/m", "damping": "N*s/m", "acceleration": "m/s^2",
+}  # fmt: skip
+LENGTHS = {"length": "mm", "1/length": "1/mm"}
+OTHERS = {"speed": "rad/s", "angular_acceleration": "rad/s^2", "time": "s", "angle": "deg"}
+PURE = ("ratio", "sign", "count", "none", "choice")
+SPREAD, COUNT = 0.05, 5  # of the swept parameters: part of the example's value to either side, values
+SWEPT = 2
+FIRST = ("swing", "stroke", "margin", "max_pressure_angle", "dwell_angle", "dwell_deviation")
+FEWEST_WANTED, MOST_WANTED = 3, 5
+WIDTH = 56  # column of the explanations
+
+
+def study_text(name: str, family: Family, schema: str) -> str:
+    """A study.toml that passes `sweep check`; ``schema`` is where its JSON schema lies, seen from the file."""
+    from sweep.families.domain import March
+
+    wanted = _wanted(family)
+    goal = next((w for w in wanted if w.startswith("max_abs_d2")), wanted[-1])
+    lines = [
+        f"#:schema {schema}",
+        f"# A first study of {family.name}: {family.title}.",
+        f"# sweep check {name}          what it will compute, and what that costs",
+        f"# sweep run {name}            results/{name}/designs",
+        f"# sweep report results/{name}/designs",
+        "# What may stand here: docs/study-files.md.  What the mechanism can be asked: "
+        f"sweep families {'+'.join(_names(family))}",
+        "",
+        "[study]",
+        f'name = "{name}"',
+        f'title = "First look at {family.name}"',
+        'question = "What do small changes of two dimensions do?"',
+        "",
+        "[mechanism]",
+        _mechanism(family),
+        "",
+        "[scene]",
+        '# speed = "3000 rpm"                       # for accelerations in time, and for loads',
+        f"want = [{', '.join(f'{w!r}' for w in wanted)}]".replace("'", '"'),
+        "",
+        "# One value as a text with its unit; several as { values = [...], unit = ... } or { from, to, count, unit }.",
+        "[design]",
+        *_design(family),
+        "",
+        "# Designs beyond a limit are counted and dropped: { min = ..., max = ..., unit = ... }, or true.",
+        "[limits]",
+        *_limits(family),
+        "",
+        "[objective]",
+        f'minimise = "{goal}"',
+        "",
+        "[accuracy]",
+        *(
+            ["samples = 720                              # crank angles; this mechanism has a history, so no accuracy"]
+            if isinstance(family.domain, March)
+            else ["target = 1e-8                              # relative error of extrema over the turn"]
+        ),
+        "",
+        "# Search the best design between the swept ones, from this many of them:",
+        "# [optimise]",
+        "# starts = 12",
+        "",
+        "# What making it inaccurately does to the optimum:",
+        "# [tolerance]",
+        '# lengths = "0.02 mm"',
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def smoke_text(family: Family) -> str:
+    """The tiny version beside it."""
+    return "# The same question with few designs.\n[design]\n" + "".join(
+        f"{name} = {{ count = 2 }}\n" for name in _swept(family)
+    )
+
+
+def _names(family: Family) -> list[str]:
+    from sweep.families.chain import stages_of
+
+    return [stage.family.name for stage in stages_of(family)]
+
+
+def _mechanism(family: Family) -> str:
+    names = _names(family)
+    if len(names) == 1:
+        return f'family = "{names[0]}"'
+    return f"chain = [{', '.join(f'{name!r}' for name in names)}]".replace("'", '"')
+
+
+def _example(family: Family) -> dict[str, float]:
+    """The examples of the stages under the names of the chain."""
+    from sweep.families.chain import Chain, stages_of
+
+    stages = stages_of(family)
+    if not isinstance(family, Chain):
+        return dict(family.example)
+    return {f"{name}{stage.number}": value for stage in stages for name, value in stage.family.example.items()}
+
+
+def _wanted(family: Family) -> list[str]:
+    """What a designer asks first: size of the motion, pressure angle, greatest acceleration; else what there is."""
+    from sweep.cli.listing import main_outputs
+    from sweep.quantities.names import is_flag, parts
+
+    # Of a chain first what it does as a whole, then the stages.
+    offered = sorted((name for name in main_outputs(family) if not is_flag(name)), key=lambda name: parts(name).stage)
+    dwells = [name for name in offered if parts(name).stem.startswith("dwell_")]
+    if dwells:  # what turns on and on has no limit positions
+        offered = dwells + [name for name in offered if parts(name).stem not in (*FIRST, "stroke_ratio")]
+    bends = [name for name in offered if name.startswith("max_abs_d2")][:1]
+    first = [name for name in offered if parts(name).stem in FIRST][: MOST_WANTED - len(bends)]
+    chosen = [*first, *bends]
+    return chosen + [name for name in offered if name not in chosen][: max(0, FEWEST_WANTED - len(chosen))]
+
+
+def _swept(family: Family) -> list[str]:
+    """The first two dimensions: lengths that are not zero, or any numbers where there are none."""
+    example = _example(family)
+    usable = [p for p in family.parameters if p.choices is None and example.get(p.name)]
+    lengths = [p.name for p in usable if p.unit == "length"]
+    return (lengths or [p.name for p in usable if p.unit in ("ratio", "none")] or [p.name for p in usable])[:SWEPT]
+
+
+def _design(family: Family) -> Iterator[str]:
+    example, swept = _example(family), _swept(family)
+    given = {p.unit for p in family.parameters}
+    units = OTHERS | (SI if given & {"mass", "force", "stiffness", "torque"} else LENGTHS)
+    for p in family.parameters:
+        value = example.get(p.name, p.default)
+        assert value is not None  # an example has every parameter that must be given
+        unit = units.get(p.unit, "")
+        shown = math.degrees(value) if unit == "deg" else value
+        if p.name in swept:
+            ends = sorted((shown * (1.0 - SPREAD), shown * (1.0 + SPREAD)))
+            more = f', unit = "{unit}"' if unit else ""
+            entry = f"{p.name} = {{ from = {ends[0]:.6g}, to = {ends[1]:.6g}, count = {COUNT}{more} }}"
+        else:
+            entry = f"{p.name} = " + (f'"{shown:.6g} {unit}"' if unit else f"{shown:g}")
+        left_out = p.name not in example
+        yield f"{'# ' if left_out else ''}{entry}".ljust(WIDTH) + f" # {_words(p)}"
+
+
+def _words(p: Parameter) -> str:
+    notes = [p.sign] if p.sign else []
+    notes += [p.choice] if p.choices else []
+    notes += [f"{p.default:g} if left out"] if p.default is not None else []
+    return p.text + (f" ({', '.join(notes)})" if notes else "")
+
+
+def _limits(family: Family) -> list[str]:
+    from sweep.cli.listing import main_outputs
+    from sweep.quantities.names import is_flag, stem
+
+    offered = main_outputs(family)
+    flags = [f"{name} = true" for name in offered if is_flag(name)]
+    angles = [name for name in offered if stem(name) == "max_pressure_angle"]
+    return flags[:1] + [f'# {name} = {{ max = 45, unit = "deg" }}' for name in angles]

@@ -1,0 +1,61 @@
+"""Loci of limit positions over whose boxes bounds can be proven."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from kernels.families.rssr import box_by_axes, box_by_rocker, proof
+from kernels.families.rssr.box_rows import Problem
+from kernels.families.rssr.box_turn import Formulas
+from sweep.families.capabilities import Numbers, ProvableLocus, Searched
+
+_by_axes = cache(box_by_axes.recorded)
+_by_rocker = cache(box_by_rocker.recorded)
+
+
+def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
+    """Leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
+    s = searched
+    problem = Problem(s.branch, s.objective, s.cos2, s.links, s.target)
+    found = proof.explore(
+        problem, formulas, s.starts, s.whole, s.free, s.given, s.smallest, s.most, proof.Leaves(*leaves)
+    )
+    return int(found[0]), int(found[1])
+
+
+def _explored_by_axes(searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
+    return _explored(_by_axes(), searched, leaves)
+
+
+def _explored_by_rocker(searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
+    return _explored(_by_rocker(), searched, leaves)
+
+
+def _tests(lengths: tuple[str, ...]) -> tuple[str, ...]:
+    """What each kind of row says where it fails."""
+    room = 5 - len(lengths)
+    return (
+        "ball on the other side of the crank axis", "limits change places", "crank not positive",
+        "extended position on the other branch", "folded position on the other branch",
+        *(f"{name} too {word}" for name in lengths for word in ("small", "large")), *[""] * (2 * room),
+        "pressure angle", "objective", "objective",
+    )  # fmt: skip
+
+
+OBJECTIVES = {"max_abs_d2psi": 2, "max_abs_dpsi": 1, "max_pressure_angle": 0}
+
+CRANK_ROCKER_BY_AXES = ProvableLocus(
+    coordinates=("swing", "phi0", "phi_ext", "e", "f", "g", "alpha"),
+    links=("a", "c", "b"),
+    objectives=OBJECTIVES,
+    rows=_tests(("a", "c", "b")),
+    explore=_explored_by_axes,
+)
+
+CRANK_ROCKER_BY_ROCKER = ProvableLocus(
+    coordinates=("swing", "phi0", "phi_ext", "psi_ext", "c", "f", "alpha"),
+    links=("a", "e", "g", "b"),
+    objectives=OBJECTIVES,
+    rows=_tests(("a", "e", "g", "b")),
+    explore=_explored_by_rocker,
+)

@@ -1,0 +1,129 @@
+"""Tasks on a Dask cluster: processes of this machine, or whatever stands behind an address.
+
+A worker learns from the scheduler that it is to stop: a flag says so when it may hand back what it has, and the loss of
+its task says so when the program that asked for it is gone.  A task whose worker dies is given to another one.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from types import TracebackType
+from typing import Any, TypeVar
+
+from sweep.errors import InputError, WorkerDied
+from sweep.jobs.flow import Task, flow
+from sweep.jobs.signals import Stop, unheard
+
+T = TypeVar("T")
+
+GRACE = 2.0  # for workers to hand back what they have once they are to stop [s]
+ASK_SECONDS = 0.25  # between two questions of a task to the scheduler
+COUNT_SECONDS = 2.0  # between two counts of the cluster's threads
+CONNECT_SECONDS = 20
+CLOSE_SECONDS = 10
+FIRST_WORKER_SECONDS = 60.0
+
+
+class Dask:
+    """A Dask cluster; used as a context it keeps its workers from one call to the next.
+
+    Parameters
+    ----------
+    address : of a scheduler, such as ``tcp://10.0.0.1:8786``; None for one worker process per job on this machine
+    """
+
+    def __init__(self, address: str | None = None) -> None:
+        self.address = address
+        self._client: Any = None
+        self._cluster: Any = None
+        self._counted, self._threads = -math.inf, 0
+
+    def __enter__(self) -> Dask:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        client, cluster, self._client, self._cluster = self._client, self._cluster, None, None
+        for one in (client, cluster):
+            if one is not None:
+                with suppress(TimeoutError):  # workers of this machine end with this process at the latest
+                    one.close(timeout=CLOSE_SECONDS)
+
+    def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
+        """See `Executor`; with an address, as many tasks are on their way as the cluster has threads."""
+        client = self._connected(jobs)
+        from distributed import Event, KilledWorker
+
+        name = f"linksweep-{uuid.uuid4().hex}"
+        flag = Event(name, client)
+        stop.tell(lambda: client.loop.add_callback(flag.set))  # a signal handler cannot wait for the scheduler
+        pool = client.get_executor(pure=False)
+        try:
+            yield from flow(lambda n: pool.submit(_at_worker, task, n, name), numbers, self._jobs(jobs), stop, GRACE)
+        except KilledWorker as error:
+            raise WorkerDied(f"several workers died over one task ({error})") from error
+        except CancelledError as error:
+            raise WorkerDied(f"the Dask scheduler at {client.scheduler.address} is gone") from error
+        finally:
+            pool.shutdown(wait=False)  # takes back what is still on its way
+
+    def _connected(self, jobs: int) -> Any:
+        if self._client is not None:
+            return self._client
+        try:
+            from distributed import Client, LocalCluster
+        except ImportError as error:
+            allowed = f"a backend whose package is installed: pip install 'linksweep[dask]' ({error})"
+            raise InputError("backend", "dask", allowed, "run") from None
+        with unheard():
+            try:
+                if self.address is None:
+                    self._cluster = LocalCluster(n_workers=jobs, threads_per_worker=1, dashboard_address="127.0.0.1:0")
+                self._client = Client(self._cluster or self.address, timeout=CONNECT_SECONDS)
+                self._client.wait_for_workers(1, timeout=FIRST_WORKER_SECONDS)
+            except RuntimeError as error:
+                self.__exit__(None, None, None)
+                raise WorkerDied(f"the processes of a Dask cluster did not come up ({error})") from error
+            except (OSError, ValueError, TimeoutError) as error:
+                self.__exit__(None, None, None)
+                where = self.address or "this machine"
+                raise InputError("backend", f"dask={where}", f"a scheduler with workers ({error})", "run") from error
+        sys.stderr.write(f"linksweep: Dask dashboard at {self._client.dashboard_link}\n")
+        return self._client
+
+    def _jobs(self, jobs: int) -> Callable[[], int]:
+        """How many threads the cluster has at the moment; workers may come and go."""
+
+        def now() -> int:
+            if time.monotonic() - self._counted > COUNT_SECONDS:
+                self._counted, self._threads = time.monotonic(), sum(self._client.nthreads().values())
+            return max(self._threads, 1)
+
+        return (lambda: jobs) if self.address is None else now
+
+
+def _at_worker(task: Task[T], number: int, name: str) -> T:
+    from distributed import Event, get_worker
+
+    worker = get_worker()
+    key = worker.get_current_task()
+    flag = Event(name, worker.client)
+    asked, told = -math.inf, False
+
+    def should_stop() -> bool:
+        nonlocal asked, told
+        if not told and time.monotonic() - asked > ASK_SECONDS:
+            own = worker.state.tasks.get(key)
+            lost = own is None or own.state == "cancelled"  # nobody waits for it any more
+            told = lost or flag.is_set()
+            asked = time.monotonic()
+        return told
+
+    return task(number, should_stop)

@@ -1,0 +1,9 @@
+"""Proofs that no design of a space is better: branch and bound over boxes of designs (docs/proof.md).
+
+``question`` reads what is asked from a study, ``rounds`` spreads the boxes over the cores, ``certificate`` writes and
+reads what was proven.
+"""
+
+from sweep.proof.certificate import Proof as Proof
+from sweep.proof.certificate import read_proof as read_proof
+from sweep.proof.study import prove_study as prove_study

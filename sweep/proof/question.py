@@ -1,0 +1,176 @@
+"""What a study asks to be proven: the space of designs on the locus, the objective, and the limits a proof can use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sweep.errors import InputError
+from sweep.families.base import Array
+from sweep.families.capabilities import ProvableLocus
+from sweep.families.chain import Chain
+from sweep.optimise.discrete import listed
+
+if TYPE_CHECKING:
+    from sweep.study import Limit, Study
+
+MOST_FREE = 4
+WEAKER = 1.0 - 1e-14  # cos^2 of a limit, rounded to the side on which more designs are feasible
+
+
+@dataclass(frozen=True)
+class Question:
+    """A space of designs on the locus and what is asked of them; lengths in mm, angles in rad.
+
+    ``names`` are the free coordinates, between ``low`` and ``high``; ``given`` are all coordinates, with any number for
+    the free ones.  ``links`` are the least and most of every link, infinite without a limit.  ``left_out`` are
+    limits of the study that the proof does not use; without them the bound is lower, and still one.
+    """
+
+    provable: ProvableLocus
+    objective: str
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+    given: Array
+    branch: float
+    cos2: float
+    links: Array
+    left_out: tuple[str, ...]
+
+    @property
+    def free(self) -> Array:
+        """Numbers of the free coordinates, as the kernels count them."""
+        return np.array([self.provable.coordinates.index(name) for name in self.names], np.float64)
+
+    def in_kernel(self, value: float) -> float:
+        """A value of the objective in the unit of the proof's rows: sin^2 for a pressure angle."""
+        return float(np.sin(value) ** 2) if self.provable.objectives[self.objective] == 0 else value
+
+    def outside(self, bound: float) -> float:
+        """The value of the objective that a bound in the unit of the rows means."""
+        if self.provable.objectives[self.objective] == 0:
+            return float(np.arcsin(np.sqrt(min(max(bound, 0.0), 1.0))))
+        return bound
+
+
+def question_of(study: Study) -> Question:
+    """What the study asks to be proven.
+
+    Raises
+    ------
+    InputError
+        if the mechanism, the objective or the number of free parameters is not one that a proof serves.
+    """
+    place = f"{study.path}: optimise.prove"
+    provable = None if isinstance(study.family, Chain) or study.locus is None else _suited(study)
+    if provable is None:
+        allowed = "a study of one mechanism with a provable locus (see sweep families) and a table [locus]"
+        raise InputError("optimise.prove", study.family.name, allowed, place)
+    assert study.objective is not None
+    if study.objective.output not in provable.objectives:
+        allowed = f"an objective among {', '.join(provable.objectives)}"
+        raise InputError("objective.minimise", study.objective.output, allowed, place)
+    entries = _entries(study, provable.coordinates, place)
+    names = tuple(name for name, (low, high) in entries.items() if low < high)
+    if not 0 < len(names) <= MOST_FREE:
+        allowed = f"1 to {MOST_FREE} parameters that vary; give the others one value each"
+        raise InputError("free parameters", ", ".join(names) or "none", allowed, place)
+    swing = entries[provable.coordinates[0]]
+    if swing[0] * swing[1] <= 0.0:
+        raise InputError("locus.swing", swing, "angles of one sign", place)
+    cos2, links, left_out = _limits(study, provable)
+    return Question(
+        provable, study.objective.output, names,
+        np.array([entries[n][0] for n in names]), np.array([entries[n][1] for n in names]),
+        np.array([low for low, _ in entries.values()]), -1.0 if swing[0] > 0.0 else 1.0, cos2, links, left_out,
+    )  # fmt: skip
+
+
+def _suited(study: Study) -> ProvableLocus | None:
+    """The locus whose coordinates the study gives: with a rocker of one length that by the rocker.
+
+    There e and g follow, and their ranges become limits; elsewhere e and g are coordinates, and the rocker follows.
+    """
+    ways = study.family.every(ProvableLocus)
+    given = {limit.output for limit in study.parameter_limits if limit.minimum == limit.maximum is not None}
+    by_rocker = [way for way in ways if given & set(way.coordinates)]
+    others = [way for way in ways if way not in by_rocker and set(way.coordinates) <= _known(study)]
+    return next(iter(by_rocker or others), None)
+
+
+def _known(study: Study) -> set[str]:
+    return {*study.space.bounds, *study.space.fixed}
+
+
+def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str, tuple[float, float]]:
+    """Between which ends every coordinate lies; twice the same where it is given."""
+    found: dict[str, tuple[float, float]] = {}
+    chosen = listed(study)
+    for name in coordinates:
+        if name in chosen:
+            allowed = "one value, or a range with from and to: a proof covers a space without gaps"
+            raise InputError(name, "a list of values", allowed, place)
+        fixed = next((x.minimum for x in study.limits if x.output == name and x.minimum == x.maximum), None)
+        if name in study.space.bounds:
+            low, high = study.space.bounds[name]
+        elif name in study.space.fixed:
+            low = high = float(study.space.fixed[name])
+        elif fixed is not None:
+            low = high = fixed
+        else:  # an angle of the rocker, wherever it is
+            low, high = -np.pi, np.pi
+        found[name] = (float(low), float(high))
+    return found
+
+
+def _limits(study: Study, provable: ProvableLocus) -> tuple[float, Array, tuple[str, ...]]:
+    """Least cos^2 of the pressure angle, least and most of every link, and the limits that are not used."""
+    cos2, left_out = 0.0, []
+    links = np.array([-np.inf, np.inf] * len(provable.links))
+    for number, name in enumerate(provable.links):
+        if name in study.space.bounds:
+            links[2 * number : 2 * number + 2] = study.space.bounds[name]
+        elif name in study.space.fixed:
+            links[2 * number : 2 * number + 2] = study.space.fixed[name]
+    known = set(provable.coordinates) | {"rotatable"}
+    for limit in study.limits:
+        name = limit.output
+        if name == "max_pressure_angle" and limit.maximum is not None:
+            cos2 = max(cos2, float(np.cos(min(limit.maximum, 0.5 * np.pi)) ** 2) * WEAKER)
+        elif name == "margin" and limit.minimum is not None:
+            cos2 = max(cos2, limit.minimum * WEAKER)
+        elif name in provable.links:
+            _put(links, provable.links.index(name), limit)
+        elif name not in known:
+            left_out.append(name)
+    return cos2, links, tuple(left_out)
+
+
+def _put(links: Array, number: int, limit: Limit) -> None:
+    if limit.minimum is not None:
+        links[2 * number] = max(links[2 * number], limit.minimum)
+    if limit.maximum is not None:
+        links[2 * number + 1] = min(links[2 * number + 1], limit.maximum)
+
+
+def described(question: Question) -> Mapping[str, Any]:
+    """What the certificate has to hold so that another program can check it."""
+    return {
+        "objective": question.objective,
+        "coordinates": list(question.provable.coordinates),
+        "free": list(question.names),
+        "low": question.low.tolist(),
+        "high": question.high.tolist(),
+        "given": question.given.tolist(),
+        "branch": question.branch,
+        "cos2": question.cos2,
+        "links": {
+            name: [None if np.isinf(end) else end for end in question.links[2 * k : 2 * k + 2]]
+            for k, name in enumerate(question.provable.links)
+        },
+        "limits not used": list(question.left_out),
+    }

@@ -1,0 +1,190 @@
+"""Boxes of designs over the cores: rounds of work units whose results do not depend on how many cores there are.
+
+A round shares the open boxes out among UNITS units, worst bounds dealt like cards, and gives each unit the same number
+of boxes to judge.  What a unit leaves open goes into the next round.  Finished units lie in a folder, so a run that was
+stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.dataset import store
+from sweep.families.base import Array
+from sweep.families.capabilities import Numbers, Searched
+from sweep.jobs.flow import Executor
+from sweep.jobs.signals import Stop
+from sweep.proof.question import Question
+
+if TYPE_CHECKING:
+    from sweep.study import ProveSettings
+
+UNITS = 64
+SHARES = (0.1, 0.15, 0.25, 0.5)  # of all boxes, round by round: later ones know better where to look
+COMBINED = 5
+OPEN, TOO_SMALL, BOUND, EMPTY = range(4)
+OUTCOMES = ("open", "too small", "bound", "empty")
+
+
+@dataclass(frozen=True)
+class Leaves:
+    """Boxes that were not halved: where they are, what was proven of them, and by which rows."""
+
+    low: Array  # (m, n)
+    high: Array
+    outcome: Numbers  # (m,) of OUTCOMES
+    bound: Array  # (m,)
+    kinds: Numbers  # (m, COMBINED), -1 where fewer rows are combined
+    theta: Array
+    factors: Array
+
+    @property
+    def open(self) -> NDArray[np.bool_]:
+        """Which of them the next round goes on with."""
+        found: NDArray[np.bool_] = self.outcome == OPEN
+        return found
+
+    def taken(self, which: Numbers) -> Leaves:
+        """Some of them, by index or mask."""
+        return Leaves(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+
+def empty(rows: int, free: int) -> Leaves:
+    """Room for so many leaves."""
+    return Leaves(
+        np.zeros((rows, free)), np.zeros((rows, free)), np.zeros(rows, np.uint8), np.zeros(rows),
+        np.full((rows, COMBINED), -1, np.int64), np.zeros((rows, COMBINED)), np.zeros((rows, COMBINED)),
+    )  # fmt: skip
+
+
+def joined(parts: list[Leaves]) -> Leaves:
+    """All leaves in one."""
+    return Leaves(*(np.concatenate([getattr(p, n) for p in parts]) for n in Leaves.__dataclass_fields__))
+
+
+@dataclass(frozen=True)
+class Cores:
+    """Where work units run: the executor, its workers, and the flag that stops them."""
+
+    place: Executor
+    jobs: int
+    stop: Stop
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Judge the boxes of one unit of a round and write what is left of them."""
+
+    question: Question
+    target: float  # in the unit of the proof's rows
+    boxes: Leaves
+    most: int
+    smallest: float
+    folder: Path
+    round: int
+
+    def path(self, number: int) -> Path:
+        """Where the result of a unit stands."""
+        return self.folder / f"round-{self.round}-unit-{number:02d}.npz"
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[int, int]:
+        """Number of the unit and of the boxes it judged."""
+        mine = self.boxes.taken(np.arange(number, len(self.boxes.bound), UNITS))
+        if should_stop() or not len(mine.bound):
+            return number, 0
+        asked, provable = self.question, self.question.provable
+        leaves = empty(len(mine.bound) + self.most, mine.low.shape[1])
+        searched = Searched(
+            asked.branch, provable.objectives[asked.objective], asked.cos2, asked.links, self.target,
+            (mine.low, mine.high, mine.bound), asked.high - asked.low, asked.free, asked.given, self.smallest,
+            self.most,
+        )  # fmt: skip
+        filled, judged = provable.explore(searched, tuple(getattr(leaves, n) for n in Leaves.__dataclass_fields__))
+        _write(self.path(number), leaves.taken(np.arange(filled)), judged)
+        return number, judged
+
+
+def _write(path: Path, leaves: Leaves, judged: int) -> None:
+    import io
+
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, judged=judged, **{n: getattr(leaves, n) for n in Leaves.__dataclass_fields__})
+    store.write_atomically(path, buffer.getvalue())
+
+
+def _read(path: Path) -> tuple[Leaves, int]:
+    with np.load(path) as data:
+        return Leaves(*(data[name] for name in Leaves.__dataclass_fields__)), int(data["judged"])
+
+
+def explored(
+    question: Question, target: float, asked: ProveSettings, folder: Path, cores: Cores, tell: Callable[[int], None]
+) -> tuple[Leaves, int, bool]:
+    """Halve boxes until all is proven or as many as asked were judged.
+
+    Parameters
+    ----------
+    question : the space
+    target : in the unit of the proof's rows
+    asked : how many boxes to judge, and how small they may become
+    folder : where finished units are kept; the same question must find the same folder
+    cores : where units run, and what stops them
+    tell : called with the number of boxes judged so far
+
+    Returns
+    -------
+    All leaves, the number of boxes judged, and whether time or a signal cut it short.
+    """
+    done: list[Leaves] = []
+    start = empty(1, len(question.names))
+    start.low[0], start.high[0] = question.low, question.high
+    todo, judged, begin = start, 0, time.monotonic()
+    for number, share in enumerate(SHARES):
+        if not len(todo.bound):
+            break
+        if cores.stop or (asked.seconds is not None and time.monotonic() - begin > asked.seconds):
+            return joined([*done, todo]), judged, True
+        most = max(int(asked.boxes * share) // UNITS, 1)
+        unit = Unit(question, target, _split(todo, question), most, asked.smallest, folder, number)
+        for _ in _run(unit, cores):
+            tell(judged + sum(_read(p)[1] for p in _finished(unit)))
+        if cores.stop:
+            return joined([*done, todo]), judged, True
+        results = [_read(path) for path in _finished(unit)]
+        judged += sum(count for _, count in results)
+        found = joined([leaves for leaves, _ in results])
+        done.append(found.taken(~found.open))
+        todo = found.taken(found.open)
+        todo = todo.taken(np.lexsort((*todo.low.T, todo.bound)))
+    return joined([*done, todo]), judged, False
+
+
+def _split(boxes: Leaves, question: Question) -> Leaves:
+    """At least as many boxes as units: the widest side of each is halved until there are."""
+    whole = question.high - question.low
+    while len(boxes.bound) < UNITS:
+        low, high = boxes.low, boxes.high
+        widest = np.argmax((high - low) / whole, axis=1)
+        rows = np.arange(len(low))
+        middle = 0.5 * (low[rows, widest] + high[rows, widest])
+        first, second = boxes.taken(rows), boxes.taken(rows)
+        first.high[rows, widest] = middle
+        second.low[rows, widest] = middle
+        boxes = joined([first, second])
+    return boxes
+
+
+def _finished(unit: Unit) -> list[Path]:
+    return [path for path in map(unit.path, range(UNITS)) if path.is_file()]
+
+
+def _run(unit: Unit, cores: Cores) -> Iterator[tuple[int, int]]:
+    missing = (number for number in range(UNITS) if not unit.path(number).is_file())
+    yield from cores.place.outcomes(unit, missing, cores.jobs, cores.stop)

@@ -1,0 +1,135 @@
+"""The JSON schema of study files, made from the models that read them and from the register of families.
+
+Editors complete and check by it (docs/study-files.md, In an editor).  It knows the shape of every table and the
+parameters of every family; what one table asks of another, `sweep check` says.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from typing import Any, TypeAlias
+
+from sweep.effects import input_names
+from sweep.families import NAMES, family
+from sweep.families.base import Family, Parameter
+from sweep.study.model import FixedEntry, LimitEntry, ListEntry, RangeEntry, SampleTable, Section
+from sweep.study.tables import REQUIRED_TABLES, TABLES
+from sweep.study.units import example, internal_unit
+
+Schema: TypeAlias = dict[str, Any]
+
+DRAFT = "http://json-schema.org/draft-07/schema#"  # the newest that editors for TOML know
+# How the docstring of a model says which table it is: of the whole file, or of each name within one.
+_TABLE, _EACH = re.compile(r"\[(\w+)\](?!\w)"), re.compile(r"(\w+)\.<\w+>")
+ENTRY = {"$ref": "#/definitions/entry"}
+
+
+def study_schema() -> Schema:
+    """The schema as a plain dict, the same at every call."""
+    definitions: Schema = {"entry": _entry()}
+    tables: Schema = {name: _model(model, definitions) for name, model in models(_TABLE).items()}
+    tables |= {name: _each(_model(model, definitions)) for name, model in models(_EACH).items()}
+    tables["locus"] = _each(ENTRY)
+    tables["design"] = _each({"anyOf": [ENTRY, _each(ENTRY)]}) | {
+        "properties": {"sample": _model(SampleTable, definitions)}
+    }
+    limit = {"anyOf": [{"const": True}, {"type": "string"}, _model(LimitEntry, definitions)]}
+    tables["limits"] = _each({"anyOf": [*limit["anyOf"], _each(limit)]})
+    tables["pareto"]["properties"] |= dict.fromkeys(("at_most", "at_least"), ENTRY)
+    names = tables["mechanism"]["properties"]
+    names["family"]["enum"] = list(NAMES)
+    names["chain"]["items"]["enum"] = list(NAMES)
+    return {
+        "$schema": DRAFT,
+        "title": "linksweep study",
+        "type": "object",
+        "properties": {
+            name: {"description": described(name)} | tables.get(name, {"type": "object"}) for name in TABLES
+        },
+        "additionalProperties": False,
+        "required": list(REQUIRED_TABLES),
+        "anyOf": [{"required": ["mechanism"]}, {"required": ["machine"]}],
+        "allOf": [_of_family(family(name)) for name in NAMES],
+        "definitions": definitions,
+    }
+
+
+def models(kind: re.Pattern[str] = _TABLE) -> dict[str, type[Section]]:
+    """The models of the tables, by name: of whole tables, or of what stands under each name of one."""
+    found = ((kind.match(model.__doc__ or ""), model) for model in Section.__subclasses__())
+    return {match[1]: model for match, model in found if match is not None}
+
+
+def described(table: str) -> str:
+    """What a table is about, as the docstring of its reader says it; of several the one that is about least else."""
+    docstrings = [(module.__doc__ or "") for name, module in sys.modules.items() if name.startswith("sweep.study.")]
+    heads = [text.split("\n")[0].partition(": ") for text in docstrings if text.startswith("[")]
+    _, _, words = min((head for head in heads if f"[{table}]" in head[0]), key=lambda head: (len(head[0]), head))
+    return words[0].upper() + words[1:]
+
+
+def _each(schema: Schema) -> Schema:
+    return {"type": "object", "additionalProperties": schema}
+
+
+def _entry() -> Schema:
+    """A parameter: a number, a text with its unit, or one of the three tables."""
+    tables = [_model(model, {}) for model in (FixedEntry, ListEntry, RangeEntry)]
+    return {"anyOf": [{"type": "number"}, {"type": "string"}, *tables]}
+
+
+def _of_family(entry: Family) -> Schema:
+    """What [design] may hold where the mechanism is this family alone."""
+    own = {p.name: {"description": _described(p), "allOf": [ENTRY]} for p in entry.parameters}
+    known = [*own, *sorted(input_names(entry) - own.keys()), "sample"]
+    design = {"properties": own, "propertyNames": {"enum": known}}
+    this = {"properties": {"family": {"const": entry.name}}, "required": ["family"]}
+    return {
+        "if": {"properties": {"mechanism": this}, "required": ["mechanism"]},
+        "then": {"properties": {"design": design}},
+    }
+
+
+def _described(p: Parameter) -> str:
+    notes = [p.sign] if p.sign else []
+    notes += [p.choice] if p.choices else [example(internal_unit(p.unit))]
+    notes += [f"{p.default:g} if left out"] if p.default is not None else []
+    return f"{p.text} ({'; '.join(notes)})"
+
+
+def _model(model: type[Section], definitions: Schema) -> Schema:
+    """The schema of one table as a file writes it: without null, with the keys that it must have."""
+    raw = model.model_json_schema(by_alias=True)
+    for name, inner in raw.pop("$defs", {}).items():
+        definitions[name] = _cleaned(inner) | _required(_sections()[name])
+    found: Schema = _cleaned(raw) | _required(model)
+    return found
+
+
+def _required(model: type[Section]) -> Schema:
+    return {"required": list(model.required)} if model.required else {}
+
+
+def _sections() -> dict[str, type[Section]]:
+    return {model.__name__: model for model in Section.__subclasses__()}
+
+
+def _cleaned(raw: Any) -> Any:
+    """Without titles, empty defaults, null as a type, and docstrings that only say where a table stands."""
+    if isinstance(raw, list):
+        return [_cleaned(item) for item in raw]
+    if not isinstance(raw, dict):
+        return raw.replace("#/$defs/", "#/definitions/") if isinstance(raw, str) else raw
+    found = {
+        key: {name: _cleaned(inner) for name, inner in value.items()} if key == "properties" else _cleaned(value)
+        for key, value in raw.items()
+        if key != "title" and not (key == "default" and value in (None, [], ""))
+    }
+    if "properties" in found:
+        found.pop("description", None)
+    kinds = [kind for kind in found.get("anyOf", ()) if kind != {"type": "null"}]
+    if len(kinds) == 1:
+        del found["anyOf"]
+        return kinds[0] | found
+    return found | ({"anyOf": kinds} if kinds else {})
