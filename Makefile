@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-optimise help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -30,6 +30,9 @@ test-long: $(VENV)/ready  ## the tests that take minutes: thousands of hostile t
 
 test-faults: $(VENV)/ready  ## kills, signals, full disks, damage: 150 kills and 170 other faults, a table; about 15 minutes
 	$(BIN)/python -m tests.faults
+
+test-browser: $(VENV)/ready  ## the report and exported models in headless Chromium, which has to be installed
+	$(BIN)/python -m pytest -m browser
 
 lint: $(VENV)/ready  ## ruff
 	$(BIN)/ruff check .
@@ -73,6 +76,12 @@ bench-peers: $(VENV)/ready  ## the planar case next to pylinkage, which gets an 
 	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable . 'pylinkage[numba]'
 	.venv-peers/bin/python -m studies.accuracy.peers --out results/accuracy
 
+bench-scale: $(VENV)/ready  ## 10^5 to 10^9 samples, to 10^8 designs, and reading them: writes docs/scale.md, about 10 minutes
+	$(BIN)/python -m tests.bench.scale --out docs/scale.md
+
+smoke-scale: $(VENV)/ready  ## the same to 10^7, writes no page
+	$(BIN)/python -m tests.bench.scale --samples 7 --designs 6
+
 bench-object-store: $(VENV)/ready  ## a dataset by way of an object store; its server gets an environment of its own
 	$(PYTHON) -m venv .venv-store
 	.venv-store/bin/python -m pip install --quiet 'moto[server]'
@@ -112,6 +121,18 @@ bench-scene: $(VENV)/ready  ## all effects on 10^5 designs x 360 angles: rate, i
 
 bench-optimise: $(VENV)/ready  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 15 minutes
 	$(BIN)/python -m tests.bench.optimise --out docs/optimise-marks.md
+
+# The moving picture of the report: three.js with its licence, what is used of it, in one file that pages carry.
+THREE := three@0.187.0
+ESBUILD := esbuild@0.28.2
+LIVE := sweep/templates/live
+three:  ## bundle three.js for the report anew; needs node and npm, only where its version changes
+	rm -rf build/three && mkdir -p build/three && cp $(LIVE)/three.entry.js build/three/entry.js
+	cd build/three && npm init --yes >/dev/null && npm install --silent --no-save $(THREE) $(ESBUILD)
+	cp build/three/node_modules/three/LICENSE $(LIVE)/three.LICENSE
+	cd build/three && npx esbuild entry.js --bundle --minify --format=iife --global-name=THREE --outfile=three.min.js --log-level=error
+	{ echo '/*! $(THREE)'; cat $(LIVE)/three.LICENSE; echo '*/'; grep -v '^$$' build/three/three.min.js; } > $(LIVE)/three.min.js
+	rm -rf build/three
 
 clean:  ## remove results and the environment
 	rm -rf results $(VENV)

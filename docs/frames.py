@@ -5,25 +5,22 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
-
-from sweep.evaluation.joints import parts
+from sweep.exchange.scene import over
 from sweep.families import NAMES, family
-from sweep.families.capabilities import Skeleton
 from sweep.plot.space import draw_frame, is_spatial, projection
 from sweep.report.figures import house_style, new_figure, save
 
-DRAWN = [name for name in NAMES if family(name).find(Skeleton) is not None]
 FOLDER = Path(__file__).parent / "figures"
 FIRST = math.radians(50.0)  # a crank angle at which no two joints lie on each other
+# A heddle drive with all its links: the example has equal lever angles and a long rod, which need none of them.
+MORE = {"heddle": {"O3D": 80.0, "O4F": 70.0, "O3O4": 200.0, "DF": math.hypot(200.0, 10.0), "EG": 150.0, "x_s": 130.0}}
 
 
 def main() -> None:
     """Draw every family."""
-    phi = FIRST + np.linspace(0.0, 2.0 * math.pi, 180, endpoint=False)
     with house_style():
-        for name in DRAWN:
-            found = parts(name, dict(family(name).example), phi)
+        for name in NAMES:
+            found = over(name, dict(family(name).example) | MORE.get(name, {}), FIRST, 180)
             spatial = is_spatial(found)
             figure = new_figure(5.2, 4.2)
             axes = figure.subplots()

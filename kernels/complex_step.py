@@ -14,6 +14,14 @@ from typing import Any
 from numba import types
 from numba.extending import overload
 
+from kernels._jit import inline
+
+
+@inline
+def divisor(x: Any) -> Any:
+    """x, or nan for 0: a compiled division by a complex zero raises an exception where a real one gives inf."""
+    return x if x.real != 0.0 else math.nan + x
+
 
 def arctan2(y: Any, x: Any) -> Any:
     """Angle of the vector (x, y); for complex arguments continued to first order in their imaginary parts."""

@@ -171,3 +171,19 @@ def test_command_line_keeps_columns_and_says_the_status(tmp_path: Any) -> None:
     FRAME.assign(phi=0.1).to_csv(both, index=False)
     result = CliRunner().invoke(main, ["eval", "rssr", str(both), "--want", "psi", "--poses", "3"])
     assert result.exit_code == 2 and "either --poses or a column phi" in result.output
+
+
+def test_chain_may_be_written_in_one_word_as_on_the_command_line() -> None:
+    row = {"a1": 1.0, "b1": 4.0, "c1": 2.5, "e1": 3.1, "f1": 0.7, "g1": -0.6, "alpha1": 0.9, "a2": 1.0, "b2": 3.3}
+    row |= {"c2": 3.1, "e2": 3.0, "xi2": 4.2, "eta2": 0.8, "lam2": 1.1, "h2": -0.6}
+    table = pd.DataFrame([row])
+    for word in ("rssr+guide", "rssr, guide"):
+        pd.testing.assert_frame_equal(
+            sweep.summarise(word, table, ["stroke"]), sweep.summarise(["rssr", "guide"], table, ["stroke"])
+        )
+        pd.testing.assert_frame_equal(
+            sweep.evaluate(word, table, ["s"], phi=[0.0, 1.0]),
+            sweep.evaluate(["rssr", "guide"], table, ["s"], phi=[0.0, 1.0]),
+        )
+    with pytest.raises(InputError, match="did you mean 'guide'"):
+        sweep.summarise("rssr+giude", table, ["stroke"])

@@ -68,8 +68,8 @@ def test_crowded_angles_stand_no_wider_than_a_share_of_the_distance() -> None:
     assert not (gaps <= 0.26 * near.distance(wide + 0.5 * gaps)).all()
 
 
-@pytest.mark.parametrize("seed", [4, 6])
-@pytest.mark.parametrize("target", [1e-8, 1e-12])
+@pytest.mark.parametrize("seed", [4, 6, 20, 23])
+@pytest.mark.parametrize("target", [1e-6, 1e-8, 1e-12])
 def test_range_of_the_rocker_angle_of_tiny_cranks_holds_its_error(target: float, seed: int) -> None:
     designs = tiny_cranks(1000, seed)
     exact = brute_range(designs)
@@ -79,5 +79,4 @@ def test_range_of_the_rocker_angle_of_tiny_cranks_holds_its_error(target: float,
         off = np.abs(value - exact)
         # Brute force rounds two angles of up to pi.
         limit = err + 8.0 * 2.0**-53 * np.pi
-        assert (off <= 5.0 * limit).all()
-        assert (off > limit).mean() <= 0.003, "rounding that is alike at neighbouring poses is told by one pose in all"
+        assert (off <= limit).all()

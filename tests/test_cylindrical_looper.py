@@ -15,7 +15,8 @@ from sweep.families import family
 from tests.family_checks import assert_compiled_equals_plain, assert_gradients_are_those_of_the_reference, factors
 from tests.reference import cylindrical_looper as naive
 
-NAMES = cylindrical_looper.Design._fields
+NAMES = (*cylindrical_looper.Design._fields, *cylindrical_looper.Offset._fields)
+ON_AXIS = {"d2": 0.0, "beta2": 0.0, "gamma2": 0.0, "mode": 1.0}
 SHAPES = [(4,), (2,), (4,), (2,), (3,), (3,), (3,), (3,), (3,), (6,)]
 ALL = [o.name for o in family("cylindrical_looper").pose_outputs]
 POINT = ["x_p", "y_p", "z_p"]
@@ -23,7 +24,7 @@ TABLE = {
     "a1": 1.0, "b1": 4.2, "c1": 2.5, "e1": 3.5, "f1": 0.5, "g1": -0.3, "alpha1": 1.0, "branch1": 1.0,
     "a2": 0.5, "b2": 3.0, "e2": 0.3, "f2": 0.1, "alpha2": 0.2, "offset2": 0.5, "branch2": 1.0, "slides": 1.0,
     "p0x": 2.0, "p0y": 0.3, "p0z": 3.0,
-}  # fmt: skip
+} | ON_AXIS  # fmt: skip
 DESIGN = tuple(TABLE.values())
 
 
@@ -31,7 +32,7 @@ def evaluated(design, phi, want):
     return sweep.evaluate("cylindrical_looper", dict(zip(NAMES, design, strict=True)), want, phi=np.atleast_1d(phi))
 
 
-def loopers(count, seed):
+def loopers(count, seed, on_axis=True):
     """Loopers that assemble at the crank angle given with them, not near a dead point."""
     generator = np.random.default_rng(seed)
     while count:
@@ -39,7 +40,9 @@ def loopers(count, seed):
         table |= {"a1": 1.0, "b1": generator.uniform(1.0, 8.0), "c1": generator.uniform(1.0, 3.0)}
         table |= {"a2": generator.uniform(0.2, 1.5), "b2": generator.uniform(2.0, 6.0)}
         table |= {name: generator.choice([-1.0, 1.0]) for name in ("branch1", "branch2")}
-        table |= {"slides": generator.choice([0.0, 1.0])}
+        table |= {"slides": generator.choice([0.0, 1.0])} | (
+            ON_AXIS if on_axis else {"mode": generator.choice([1.0, 2.0])}
+        )
         design, phi = tuple(table.values()), generator.uniform(-3.0, 3.0)
         row = evaluated(design, phi, ALL).iloc[0]
         if row.status == st.OK and max(row.pressure_angle1, row.pressure_angle2) < 1.5:
@@ -113,7 +116,7 @@ def test_cylindrical_looper_with_a_rocker_that_stays_is_crank_rocker_and_slider_
 
 def test_cylindrical_looper_jitted_equals_plain():
     designs = np.array([DESIGN, *(d for d, _ in loopers(3, 6))])
-    designs = np.vstack([designs, designs[0] * np.where(np.arange(19) == 9, 1e-3, 1.0)])
+    designs = np.vstack([designs, designs[0] * np.where(np.arange(len(NAMES)) == 9, 1e-3, 1.0)])
     phi = np.random.default_rng(3).uniform(-4.0, 4.0, (5, 3))
     assert_compiled_equals_plain(cylindrical_looper.poses, designs, phi, SHAPES)
 
@@ -126,7 +129,7 @@ def test_cylindrical_looper_complex_step_gives_exact_gradients(slides):
 
     def reference(numbers, angle):
         h = mp.mpf(10) ** -25
-        pose, ahead = (naive.position(numbers, x, near) for x in (angle, angle + h))
+        pose, ahead = (naive.coupled(numbers, x, near) for x in (angle, angle + h))
         return pose | {"dx_p": (ahead["x_p"] - pose["x_p"]) / h}
 
     outputs = ["psi", "s", *POINT, "dx_p"]

@@ -261,7 +261,8 @@ def test_code_is_what_was_imported_whatever_its_files_have_become(monkeypatch: p
 
 
 def test_progress_that_nobody_reads_any_more_does_not_stop_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.jobs.progress.LINE_SECONDS", -1.0)
+    for name in ("FIRST_SECONDS", "LINE_SECONDS"):
+        monkeypatch.setattr(f"sweep.jobs.progress.{name}", -1.0)
     reading, writing = os.pipe()
     stream = os.fdopen(writing, "w", buffering=1)
     with Progress("x", 3, 0, True, stream) as shown:

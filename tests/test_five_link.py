@@ -324,3 +324,30 @@ def test_five_links_with_limits_do_not_exist_for_a_joint_longer_than_the_reach()
     found = five_links_with_limits(table, 1e4)
     assert (found.status != st.OK).all() and (found.status == st.NOT_ADMISSIBLE).any()
     assert found.loc[found.status == st.NOT_ADMISSIBLE, ["a", "b"]].isna().all().all()
+
+
+def test_five_link_with_complex_numbers_has_a_status_where_the_coupler_reaches_just_not_at_all():
+    """At the end of the arc rho is exactly 0, and a compiled division by a complex zero would raise an exception."""
+    generator = np.random.default_rng(12)
+    names = family("five_link").parameter_names
+    for _ in range(60):
+        table = {
+            "a": 1.0,
+            "b": 2.0 ** generator.integers(-1, 2),
+            "c": 2.0,
+            "e": 1.0,
+            "f": float(generator.integers(-2, 3)),
+        }
+        table |= {
+            "g": float(generator.integers(-2, 3)),
+            "alpha": math.pi / 2,
+            "h": 0.5,
+            "s2": 0.0,
+            "mode": 1.0,
+            "branch": 1.0,
+        }
+        design = np.array([[table[name] for name in names]], complex)
+        phi = np.linspace(0.0, 2.0 * np.pi, 9)[None, :] + 0j
+        columns = family("five_link").poses(design, Angles.of(phi), frozenset(family("five_link").pose_names))
+        plain = family("five_link").poses(design.real.copy(), Angles.of(phi.real), frozenset(("psi",)))
+        np.testing.assert_array_equal(columns["status"], plain["status"])

@@ -211,3 +211,19 @@ def test_negative_control_launch_without_restitution_fails_the_oracle():
     got = sweep.summarise("foot", p, ["jump_height_free"]).jump_height_free[0]
     with mp.workdps(20):
         assert abs(float(mpf(row["expected"]["jump_height_free"]) / mpf(float(got)) - 1)) > 0.1
+
+
+def test_foot_on_a_feed_rack_keeps_contact_from_the_softest_spring_and_the_least_preload():
+    p = RACK | {"y_plate": 1.55, "m": 0.05, "k": 0.0, "F0": 4.0, "omega": 20.0}
+    need = sweep.summarise("feed_foot", p, ["F0_min_contact"]).F0_min_contact[0]
+    assert need > 0.0
+    preload = 1.02 * need
+    found = sweep.summarise("feed_foot", p | {"F0": preload}, ["k_min_contact"]).iloc[0]
+    assert found.status == st.OK and found.k_min_contact > 0.0
+    springs = np.array([0.999, 1.001]) * found.k_min_contact
+    got = sweep.summarise("feed_foot", p | {"F0": preload, "k": springs}, ["flights"])
+    assert got.flights[0] > 0.0 and got.flights[1] == 0.0
+    short = sweep.summarise("feed_foot", p | {"F0": 0.98 * need}, ["k_min_contact"]).iloc[0]
+    assert math.isnan(short.k_min_contact) and short.status == st.NO_EVENT
+    plenty = sweep.summarise("feed_foot", p | {"F0": 50.0 * need}, ["k_min_contact"]).iloc[0]
+    assert plenty.k_min_contact == 0.0 and plenty.status == st.OK

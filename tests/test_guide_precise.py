@@ -86,5 +86,5 @@ def test_computing_less_changes_no_bit_and_plain_python_agrees():
     values = [np.empty((15, 11)) for _ in PLAIN.pose_names[:9]]
     guide.precise_poses.py_func(designs, angles.cos, angles.sin, status, *values, joints)
     np.testing.assert_array_equal(status, everything["status"])
-    for name, column in zip(PLAIN.pose_names, [*values, *joints], strict=True):
+    for name, column in zip(PLAIN.pose_names[:15], [*values, *joints], strict=True):
         np.testing.assert_allclose(column, everything[name], rtol=2.0**-50, err_msg=name)

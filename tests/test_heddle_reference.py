@@ -219,3 +219,13 @@ def test_negative_control_other_side_fails_the_oracle():
     one, theta = of_row(row)
     got = moved([(*one[:-1], -one[-1])], [[theta]])
     assert abs(float(got["chi"][0, 0]) - float(row["out"]["chi"])) > 1e-3
+
+
+@pytest.mark.parametrize("lacking", ["O3C", "BC", "O4F", "O3D", "DF", "O2B"])
+def test_heddle_with_a_link_of_no_length_is_invalid_with_complex_numbers_too(lacking):
+    values = {"O2B": 90.0, "BC": 225.0, "O3C": 138.5, "O2O3": 160.0, "O4E": 138.5, "chi_mid": 1.13,
+              "O3D": 120.0, "O4F": 138.5, "O3O4": 900.0, "DF": 900.2}  # fmt: skip
+    for dtype in (np.float64, np.complex128):
+        got = moved([design(**values | {lacking: 0.0})], [[1.5]], dtype)
+        assert got["status"][0, 0] == st.INVALID_INPUT
+        assert np.isnan(got["y"][0, 0].real)

@@ -67,3 +67,44 @@ def test_backrest_drift_over_the_beam_and_its_place():
     assert got.max_K_couple == pytest.approx(1558.0, abs=0.05)
     dense = sweep.evaluate("backrest", example, "K_couple", phi=np.linspace(0.09375, 0.375, 2001)).K_couple
     assert got.min_K_couple == pytest.approx(dense.min(), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["backrest", "backrest_tension", "backrest_closure"])
+def test_backrest_slopes_over_the_beam_come_by_the_complex_step(name):
+    from sweep.families.base import Angles
+
+    family = sweep.families.family(name)
+    design = np.array([[family.example.get(p.name, p.default) for p in family.parameters]])
+    rho, wanted = np.array([[0.12, 0.2, 0.3]]), frozenset(("K", "R1", "theta"))
+
+    def at(radius):
+        still = np.zeros_like(radius)
+        return family.poses(design.astype(radius.dtype), Angles(radius, still, still), wanted)
+
+    exact, ahead, behind = at(rho + 1e-30j), at(rho + 1e-6), at(rho - 1e-6)
+    for output in wanted:
+        slope = (ahead[output] - behind[output]) / 2e-6
+        # differences of that step are good to some 1e-9 of the tension
+        np.testing.assert_allclose(exact[output].imag / 1e-30, slope, rtol=1e-7, atol=1e-7)
+
+
+def test_backrest_extrema_over_the_beam_are_followed_to_rest():
+    from sweep.families.base import Accuracy
+    from sweep.optimise.form import Program
+    from sweep.optimise.model import Model
+    from sweep.optimise.problem import Problem
+
+    family = sweep.families.family("backrest")
+    table = family.example | {"s1": 0.0, "s2": 0.0, "K0": 1482.0}
+    design = np.array([table.get(p.name, p.default) for p in family.parameters], np.float64)
+    free = ("H", "psi")
+    place = np.array([table[name] for name in free])
+    fixed = {n: float(x) for n, x in zip(family.parameter_names, design, strict=True) if n not in free}
+    problem = Problem(family, free, 0.9 * place, 1.1 * place, fixed, "max_abs_drift", (), None, Accuracy(target=1e-9))
+    model = Model(problem, Program(problem), design, lambda: False)
+    calls = model.curves.calls
+    state = model.state(np.array([0.52, 0.48]))
+    assert model.curves.calls - calls < 10  # Newton settles; what wanders takes a dozen rounds
+    moved = dict(zip(family.parameter_names, state.design, strict=True))
+    expected = sweep.summarise("backrest", moved, ["max_abs_drift"], accuracy=1e-10).max_abs_drift[0]
+    assert state.objective * model.scale == pytest.approx(expected, rel=1e-9)

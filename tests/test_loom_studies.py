@@ -61,3 +61,19 @@ def test_heddle_shafts_strokes_and_accelerations_are_recomputed():
     # in proportion to the arm within 1 %
     per_arm = got.stroke / np.array([s["O3D2"] for s in expected["shafts"]])
     assert np.ptp(per_arm) < 0.01 * per_arm.mean()
+
+
+def test_heddle_shafts_of_one_loom_have_their_strokes_and_a_symmetric_shed():
+    import importlib.util
+
+    spec = importlib.util.spec_from_file_location("heddle_shafts", STUDIES / "heddle-shafts" / "figure.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    rows, expected = module.table(), accepted("heddle-shafts")["loom"]
+    assert (rows.status == 0).all()
+    # the chain from the cam gives the strokes that the synthesis was asked for
+    np.testing.assert_allclose(rows.made, rows.stroke, rtol=1e-8)
+    for name in ("stroke", "O3D", "DF", "y_high", "y_low", "acceleration"):
+        np.testing.assert_allclose(rows[name], [row[name] for row in expected], rtol=1e-6)
+    assert rows.asymmetry.abs().max() < 0.2 and abs(rows.asymmetry[3]) < 1e-9
+    assert rows.acceleration.iloc[-1] / rows.acceleration.iloc[0] == pytest.approx(1.64, abs=0.005)

@@ -84,6 +84,43 @@ def test_speed_of_a_point_is_the_difference_of_its_places() -> None:
         np.testing.assert_allclose(found["pace"], np.linalg.norm(slope, axis=1), atol=1e-7)
 
 
+def test_value_at_an_event_is_that_of_the_pose_there() -> None:
+    relations = RELATIONS | {
+        "nearing": {"speed": ["needle.point", "looper.tip"]},
+        "hit": {"value": ["nearing", "phi_arrive"]},
+        "nearest": {"value": ["pace", "phi_min_clearance"]},
+    }
+    machine = sweep.machine(MEMBERS, relations)
+    names = ["hit", "nearest", "phi_arrive", "phi_min_clearance"]
+    found = sweep.summarise(machine, TABLE, names, accuracy=1e-10)
+    for name, of, place in (("hit", "nearing", "phi_arrive"), ("nearest", "pace", "phi_min_clearance")):
+        at = sweep.evaluate(machine, TABLE, [of], phi=[found[place][0]])[of][0]
+        assert found[name][0] == pytest.approx(at, rel=1e-13)
+        assert 0.0 <= found[f"err_{name}"][0] < 1e-6
+    # the tip comes nearer by what it moves towards the needle, so no faster than it moves against it
+    phi, clearance = grid(machine, "clearance")
+    k = np.searchsorted(phi, found["phi_arrive"][0])
+    assert abs(np.diff(clearance)[k] / phi[1]) <= found["hit"][0]
+    never = sweep.machine(
+        MEMBERS, RELATIONS | {"far": {"event": "clearance", "level": 1e4}, "x": {"value": ["pace", "phi_far"]}}
+    )
+    assert np.isnan(sweep.summarise(never, TABLE, ["x"])["x"][0])
+
+
+def test_guided_point_moves_at_the_rate_of_its_places() -> None:
+    machine = sweep.machine(MEMBERS, {"pace": {"speed": ["needle.point"]}})
+    phi, h = np.linspace(0.1, 6.0, 7), 1e-5
+    names = [f"needle.point_{axis}" for axis in "xyz"]
+    ends = [sweep.evaluate(machine, TABLE, names, phi=phi + sign * h)[names].to_numpy() for sign in (1.0, -1.0)]
+    slope = (ends[0] - ends[1]) / (2.0 * h)
+    found = sweep.evaluate(machine, TABLE, ["pace", *(f"needle.dpoint_{axis}" for axis in "xyz")], phi=phi)
+    np.testing.assert_allclose(found[[f"needle.dpoint_{axis}" for axis in "xyz"]], slope, atol=1e-6)
+    np.testing.assert_allclose(found["pace"], np.linalg.norm(slope, axis=1), atol=1e-6)
+    alone = sweep.evaluate("guide", sweep.families.family("guide").example, ["dx_m", "d2x_m", "ds", "ddev"], phi=phi)
+    lam = sweep.families.family("guide").example["lam"]
+    np.testing.assert_allclose(alone.dx_m, alone.ds * np.cos(lam) - alone.ddev * np.sin(lam), rtol=1e-14, atol=1e-14)
+
+
 def test_speed_of_a_tip_is_radius_times_rate() -> None:
     found = sweep.evaluate(two(), TABLE, ["looper.dpsi", "looper.dtip_x", "looper.dtip_y", "looper.dtip_z"], phi=[1.0])
     size = np.linalg.norm(found[["looper.dtip_x", "looper.dtip_y", "looper.dtip_z"]].to_numpy()[0])
@@ -127,7 +164,9 @@ def test_slopes_of_a_residence_are_those_of_differences() -> None:
         ({"x": {"event": "looper.psi", "levle": 1.0}}, "did you mean 'level'"),
         ({"x": {"event": "looper.psi", "level": "1 rad"}}, "a number"),
         ({"x": {"event": "looper.psi", "rising": 1}}, "true or false"),
-        ({"x": {"speed": ["needle.point"]}}, "looper.tip"),
+        ({"x": {"speed": ["needle.b"]}}, "needle.point"),
+        ({"x": {"value": ["pacr", "phi_arrive"]}}, "a pose output of the machine"),
+        ({"x": {"value": ["looper.tip_x"]}}, "a crank angle"),
         ({"x": {"speed": ["looper.tip", "looper.tip", "looper.tip"]}}, "two"),
     ],
 )

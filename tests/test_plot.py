@@ -149,3 +149,11 @@ def test_export_verb_takes_the_optimum_or_a_row_of_a_folder(kind, tmp_path):
     assert points.loc[(1, "B"), "x"] == pytest.approx(row["a1"], abs=1e-12)  # the crank at phi = 0
     wrong = CliRunner().invoke(main, ["export", str(place), "--format", "csv", "--design", "worst"])
     assert wrong.exit_code == 2 and "optimum, reference, best" in wrong.output
+
+
+def test_motion_of_what_does_not_turn_is_refused_and_its_mechanism_is_drawn():
+    design = dict(family("backrest").example)
+    with pytest.raises(sweep.InputError, match="over an interval"):
+        sweep.plot.motion("backrest", design)
+    (axes,) = sweep.plot.mechanism("backrest", design)
+    assert {"bracket", "warp 1"} <= {line.get_label() for line in axes.lines}

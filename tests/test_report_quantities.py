@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
+from sweep.report.dataset import Dataset
 from sweep.report.quantities import change, number, percent_change, quantity
 
 RPM = 2.0 * math.pi / 60.0
@@ -98,3 +100,17 @@ def test_changes_of_sizes_angles_and_signed_values() -> None:
     assert change(quantity("max_x_m2", "length"), 66.0, 55.0) == "20\u00a0% more"
     assert change(quantity("dwell_angle", "rad"), 1.0, 1.0 + 1e-15) == "the same"
     assert change(quantity("max_abs_d2s", "length"), math.nan, 1.0) == ""
+
+
+@pytest.mark.parametrize(
+    ("want", "second"),
+    [
+        (("needle.max_abs_d2s", "looper.max_abs_dpsi"), "looper.max_abs_dpsi"),
+        (("max_abs_d2s", "phi_max_abs_dev", "max_pressure_angle", "max_abs_dev"), "max_abs_dev"),
+        (("max_abs_d2s", "swing", "looper.max_pressure_angle"), "looper.max_pressure_angle"),
+        (("max_abs_d2s", "swing"), None),
+    ],
+)
+def test_what_stands_against_the_objective_is_found_for_members_too(want: tuple[str, ...], second: str | None) -> None:
+    study = SimpleNamespace(pareto=None, objective=SimpleNamespace(output=want[0]), want=want)
+    assert Dataset.second.func(SimpleNamespace(study=study)) == second

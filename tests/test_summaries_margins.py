@@ -150,3 +150,4 @@ def test_first_stage_that_does_not_turn_spoils_only_what_needs_the_turn():
     assert frame["margin"][0] < 0.0
     assert frame[["margin2", "stroke"]].isna().all(axis=None)
     assert family(["rssr", "guide"]).name == "rssr+guide"
+    assert family("rssr+guide") is family("rssr, guide") is family(["rssr", "guide"])

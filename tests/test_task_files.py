@@ -108,3 +108,102 @@ def test_faults_are_named_with_their_place(text: str, words: list[str], tmp_path
         load_task(written(tmp_path, text))
     for word in words:
         assert word in str(caught.value)
+
+
+STUDY = """
+[study]
+name = "from-a-task"
+[mechanism]
+family = "rssr"
+[task]
+kind = "task1"
+swing = "46 deg"
+phi0 = "183 deg"
+e = "10 mm"
+g = "10 mm"
+alpha = "75 deg"
+positions = [{ dphi = "1 rad", dpsi = "0.25 rad" }]
+bounds = { a = { from = 1, to = 30, unit = "mm" }, f = { from = -60, to = 60, unit = "mm" } }
+[design]
+sample = { kind = "sobol", n = 256 }
+a = { from = 1, to = 30, unit = "mm" }
+b = { from = 5, to = 90, unit = "mm" }
+c = { from = 5, to = 60, unit = "mm" }
+e = "10 mm"
+f = { from = -60, to = 60, unit = "mm" }
+g = "10 mm"
+alpha = "75 deg"
+branch = { values = [-1, 1] }
+[limits]
+rotatable = true
+swing = { min = 45, max = 47, unit = "deg" }
+[objective]
+minimise = "max_abs_d2psi"
+[optimise]
+starts = 2
+"""
+
+
+def study(tmp_path: Path, text: str = STUDY) -> Path:
+    (tmp_path / "study.toml").write_text(text)
+    return tmp_path
+
+
+def test_search_of_a_study_begins_at_the_mechanisms_that_do_its_task(tmp_path: Path) -> None:
+    import sweep
+    from sweep.optimise.starts import of_task
+    from sweep.study import load_study
+
+    place = study(tmp_path)
+    loaded = load_study(place)
+    names = loaded.family.parameter_names
+    starts = of_task(loaded, 2, 0)
+    best = solve(load_task(place), starts=2, seed=0)[0]
+    assert best.feasible and 1 <= len(starts) <= 2
+    for name, value in zip(names, starts[0], strict=True):
+        assert value == loaded.space.fixed.get(name, best.mechanism[name])
+    folder = sweep.run(place, out=tmp_path / "out" / "designs")
+    import pandas as pd
+
+    found = pd.read_parquet(Path(folder).parent / "_optimum.parquet")
+    at = dict(zip(names, starts[0], strict=True))
+    begun = sweep.summarise("rssr", at, ["max_abs_d2psi"], accuracy=1e-8).max_abs_d2psi[0]
+    # the search never ends above the best of its feasible starts
+    assert found.max_abs_d2psi[0] <= begun * (1.0 + 1e-9)
+
+
+def test_task_whose_second_stage_is_no_family_starts_no_study(tmp_path: Path) -> None:
+    from sweep.study import load_study
+
+    five = f'[task]\nkind = "task5"\n{FILES["task5"]}\n'
+    text = STUDY[: STUDY.index("[task]")] + five + STUDY[STUDY.index("[design]") :]
+    with pytest.raises(StudyError, match="answered by `sweep task` alone"):
+        load_study(study(tmp_path, text))
+
+
+def test_study_without_its_task_has_another_fingerprint_and_no_task(tmp_path: Path) -> None:
+    from sweep.study import load_study
+
+    with_task = load_study(study(tmp_path))
+    plain = STUDY[: STUDY.index("[task]")] + STUDY[STUDY.index("[design]") :]
+    without = load_study(study(tmp_path, plain))
+    other = load_study(study(tmp_path, STUDY.replace("46 deg", "40 deg")))
+    assert without.task is None and with_task.task is not None
+    assert len({x.fingerprint for x in (with_task, without, other)}) == 3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        ("[optimise]\nstarts = 2\n", "", "optimise is missing"),
+        ('family = "rssr"', 'family = "rssp"', "task1 is about family = \"rssr\""),
+        ('kind = "task1"', 'kind = "task5"\nrho0 = "1 mm"', "task.positions[0].drho"),
+        ('swing = "46 deg"\n', 'swing = "46 mm"\n', "task.swing"),
+    ],
+)  # fmt: skip
+def test_study_whose_task_does_not_fit_is_refused(old: str, new: str, word: str, tmp_path: Path) -> None:
+    from sweep.study import load_study
+
+    with pytest.raises(StudyError) as caught:
+        load_study(study(tmp_path, STUDY.replace(old, new, 1)))
+    assert word in str(caught.value)

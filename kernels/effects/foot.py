@@ -62,7 +62,7 @@ def _between(p0: float, p1: float, m0: float, m1: float, c0: float, c1: float, s
 
 
 @inline
-def _height(path: Array, j: int, s: float) -> tuple[float, float, float]:
+def rack_height(path: Array, j: int, s: float) -> tuple[float, float, float]:
     """Height of the rack above the plate in cell j at the share s, with derivatives by phi."""
     n = path.shape[1]
     h, j, k = TWO_PI / n, j % n, (j + 1) % n
@@ -105,7 +105,7 @@ def _force(foot: Foot, y: float, bend: float) -> float:
 @inline
 def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int) -> float:
     """What changes sign at an event: height of the rack (0), contact force (1), gap below the flying foot (2)."""
-    y, _, bend = _height(path, j, s)
+    y, _, bend = rack_height(path, j, s)
     if which == 0:
         return y
     if which == 1:
@@ -140,7 +140,7 @@ def _root(path: Array, foot: Foot, state: State, j: int, low: float, high: float
 @kernel
 def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[State, float]:
     """State after the foot meets rack or plate with a speed, and the relative speed; (7)-(9)."""
-    y, y1, bend = _height(path, j, s)
+    y, y1, bend = rack_height(path, j, s)
     phi = (j + s) * (TWO_PI / path.shape[1])
     on_rack = y > 0.0 or (y >= -1e-14 * abs(y1) and y1 > 0.0)
     ground, surface = (max(y, 0.0), y1) if on_rack else (0.0, 0.0)
@@ -198,7 +198,7 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
 @inline
 def _above(path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> tuple[float, float]:
     """Crank angle and way along the feed between two shares of a cell while the rack is above the plate."""
-    one, two = _height(path, j, low)[0], _height(path, j, high)[0]
+    one, two = rack_height(path, j, low)[0], rack_height(path, j, high)[0]
     if one <= 0.0 and two <= 0.0:
         return 0.0, 0.0
     if one < 0.0 < two:
@@ -229,7 +229,7 @@ def _cell(path: Array, foot: Foot, state: State, j: int, tally: Array) -> tuple[
             return state, True
         _record(tally, path, foot, state, j, s, at)
         phi = (j + at) * step
-        y, y1, _ = _height(path, j, at)
+        y, y1, _ = rack_height(path, j, at)
         if which == 1:
             following = State(FLIGHT, phi, y, y1, phi)
         else:

@@ -78,8 +78,11 @@ def parameter_ns(study: Study) -> float:
     return own + sum(log if axis.scale == "log" else plain for axis in study.space.axes)
 
 
-def warm(study: Study) -> None:
-    """Compile or load every kernel the study needs, on a few designs spread over its space."""
+def warm(study: Study, tell: Callable[[int, int], None] = lambda done, total: None) -> None:
+    """Compile or load every kernel the study needs, on a few designs spread over its space.
+
+    ``tell`` is called with how many of the steps through which a design goes are ready, and how many there are.
+    """
     count = study.space.count
     starts = sorted({k * (count - 1) // 7 for k in range(8)})
     blocks = [parameter_matrix(study, start, start + 1) for start in starts]
@@ -87,9 +90,11 @@ def warm(study: Study) -> None:
     designs = np.nan_to_num(np.concatenate([matrix for matrix, _ in blocks]), nan=1.0)
     if study.fit is not None:
         designs, _ = fit_line(study.family, designs, study.fit, study.window)
-    for level in levels(study):
-        if level.route is not None:
-            design_outputs(study.family, designs, level.route.outputs, study.accuracy, study.window)
+    asked = [level.route for level in levels(study) if level.route is not None]
+    for k, route in enumerate(asked):
+        tell(k, len(asked))
+        design_outputs(study.family, designs, route.outputs, study.accuracy, study.window)
+    tell(len(asked), len(asked))
 
 
 def compute_chunk(

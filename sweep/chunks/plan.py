@@ -145,6 +145,10 @@ def choose_chunk_size(study: Study) -> int:
     return CHUNK_STEP * max(1, math.floor(min(by_time, by_memory, by_count) / CHUNK_STEP))
 
 
+TRIED = (512, 4096)  # designs that are sent through the limits where some that keep them are asked for
+RUN = 8  # of them that stand side by side: what one call costs is shared
+
+
 def pilot(study: Study) -> Pilot:
     """Send about a thousand designs, spread over the space, through the cascade.
 
@@ -175,6 +179,29 @@ def spread_designs(study: Study, number: int) -> Array:
     starts = sorted({int((k * golden) % 1.0 * count) for k in range(number)})
     blocks = [parameter_matrix(study, start, start + 1) for start in starts]
     return np.concatenate([matrix[status == OK] for matrix, status in blocks])
+
+
+def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
+    """About that many designs that keep all limits, spread over those found, and how many were tried.
+
+    512 designs spread over the space go through the limits, then 4096 if none of them keeps all: fitted and on their
+    locus, as those of the sweep.
+    """
+    count, tried = study.space.count, 0
+    golden = (math.sqrt(5.0) - 1.0) / 2.0
+    kept = np.empty((0, len(study.family.parameters)))
+    for many in TRIED:
+        runs = -(-count // RUN)
+        chosen = range(runs) if count <= many else sorted({int((k * golden) % 1.0 * runs) for k in range(many // RUN)})
+        blocks = [parameter_matrix(study, k * RUN, min((k + 1) * RUN, count)) for k in chosen]
+        designs, status = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+        cascade = Cascade(study, keep=False)
+        cascade.feed(np.arange(len(designs)), designs, status)
+        kept, tried = cascade.end(()).designs, len(designs)
+        if len(kept) or tried == count:
+            break
+    some = np.unique(np.linspace(0, len(kept) - 1, min(number, len(kept))).astype(int))
+    return kept[some], tried
 
 
 def row_bytes(study: Study) -> int:

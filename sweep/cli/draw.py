@@ -77,7 +77,7 @@ def _of_one(source: str, table: Path | None, design: str | None, row: int) -> tu
     from sweep.cli.listing import family_names
     from sweep.cli.tables import read_table
     from sweep.errors import InputError
-    from sweep.exchange.folder import chosen
+    from sweep.report.chosen import chosen
 
     if table is None:
         if not Path(source).is_dir():

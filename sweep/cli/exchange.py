@@ -14,10 +14,13 @@ FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_
 @click.command()
 @click.argument("family", shell_complete=completion.families)
 @FILE
+@click.option("--part", default="", help="Of a file with several: `stage 1`, the member's name, or both.")
 @click.option("--tolerance", type=float, help="Largest residual as a part of the drawing's size; default 1e-4.")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A table for `sweep eval`: one design.")
-def points(family: str, file: Path, tolerance: float | None, out: Path | None) -> None:
-    """The dimensions of FAMILY from the points of a drawing, FILE.csv with the columns name, x, y, z.
+def points(family: str, file: Path, part: str, tolerance: float | None, out: Path | None) -> None:
+    """The dimensions of FAMILY from the points of a drawing: FILE.csv with the columns name, x, y, z.
+
+    FILE may also be a .csv, .dxf or .glb that `sweep export` wrote; of several stages or members --part names one.
 
     Names are A (centre of the crank circle), axis_A (crank axis), B (crank pin), C, D, axis_D and so on: see
     docs/frames.md.  Printed are the parameters, the crank angle of the drawn position, where the family's frame stands
@@ -25,10 +28,12 @@ def points(family: str, file: Path, tolerance: float | None, out: Path | None) -
     as a table.
     """
     from sweep.cli.tables import checked_format, write_table
-    from sweep.exchange.points import TOLERANCE, from_points, read_points
+    from sweep.exchange.points import TOLERANCE, from_points, reader_of
+    from sweep.exchange.reading import read_points
 
     out = checked_format(out)
-    found = from_points(family, tolerance=TOLERANCE if tolerance is None else tolerance, **read_points(file))
+    given = read_points(file, reader_of(family), part=part)
+    found = from_points(family, tolerance=TOLERANCE if tolerance is None else tolerance, **given)
     if out is not None:
         import pandas as pd
 
@@ -59,7 +64,7 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     from sweep.evaluation.angles import grid_in_radians
     from sweep.exchange.export import FORMATS
     from sweep.exchange.export import export as write
-    from sweep.exchange.folder import chosen
+    from sweep.report.chosen import chosen
 
     grid_in_radians("phi", "rad", phi, None)  # --phi is in rad, whatever the design is
     found = chosen(folder, design)

@@ -23,8 +23,10 @@ ANGLES = click.option(
 
 def family_names(text: str) -> str | list[str]:
     """``rssr`` is a family, ``rssr+guide`` or ``rssr,guide`` a chain of two."""
-    names = [name.strip() for name in text.replace("+", ",").split(",")]
-    return names if len(names) > 1 else names[0]
+    from sweep.families import chain_names
+
+    names = chain_names(text)
+    return list(names) if len(names) > 1 else names[0]
 
 
 @click.command()

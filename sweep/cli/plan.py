@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sweep.cli.listing import aligned, main_outputs
+from sweep.quantities.names import without_minus
 
 if TYPE_CHECKING:
     from sweep.engine.estimate import Estimate
@@ -42,7 +43,8 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     left = [name for name in main_outputs(study.family) if name not in study.want]
     lines += ["", "will not be computed, because nothing asks for it", f"  {', '.join(left)}"]
     if study.objective is not None:
-        lines += ["", f"to be made small: {study.objective.output}"]
+        large = without_minus(study.objective.output)
+        lines += ["", f"to be made large: {large}" if large else f"to be made small: {study.objective.output}"]
     if study.optimise is not None:
         settings = study.optimise
         brake = "" if settings.time_budget is None else f"; emergency brake after {duration(settings.time_budget)}"
@@ -143,7 +145,7 @@ def _front(study: Study) -> list[str]:
 
 def _effects(study: Study) -> list[str]:
     """The effects of the scene: what is computed, what is not, and which rules of negligibility hold."""
-    from sweep.chunks.plan import spread_designs
+    from sweep.chunks.plan import feasible_designs, spread_designs
     from sweep.effects.advice import findings, left_out, tree
 
     bare = study.bare
@@ -155,12 +157,16 @@ def _effects(study: Study) -> list[str]:
         lines += ["", "effects, with their share of the cost at equal numbers of poses"]
         lines += aligned(tree(bare, study.want, POSES))
     lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(out)}"]
-    looked_at = spread_designs(study, ADVISED)
+    looked_at, tried = feasible_designs(study, ADVISED)
+    which = f"by {len(looked_at)} designs within all limits, of {tried} tried"
+    if not len(looked_at):
+        looked_at = spread_designs(study, ADVISED)
+        which = f"by {len(looked_at)} designs spread over the space: none of {tried} tried keeps all limits"
     found = findings(bare, study.family, looked_at, study.want)
     if found:
         lines += [
             "",
-            f"what matters here, by {len(looked_at)} of the designs, spread over the space; the choice is yours",
+            f"what matters here, {which}; the choice is yours",
         ]
         lines += [f"  {finding.words}" for finding in found]
     return lines

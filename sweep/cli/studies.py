@@ -101,9 +101,12 @@ def report(folder: Path, out: Path | None) -> None:
     curves.parquet (if the study optimises), pareto.parquet (if it asks for a front) and survivors.parquet, the designs
     within all limits.
     """
+    from sweep.jobs.progress import Phases
     from sweep.report import write_report
 
-    click.echo(f"report: {write_report(folder, out)}")
+    with Phases(show=True) as phases:
+        written = write_report(folder, out, phases.say)
+    click.echo(f"report: {written}")
 
 
 @click.command()

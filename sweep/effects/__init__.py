@@ -20,6 +20,7 @@ from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work
 from sweep.families.chain import Chain
 from sweep.families.members import Machine
+from sweep.families.relations import Reading
 from sweep.numerics.curves import Curve
 from sweep.quantities.names import stem
 from sweep.quantities.reduction import reduced
@@ -29,6 +30,7 @@ _ENTRIES = {
     "pressure": ("pressure", "EFFECT"),
     "pressure_extrema": ("pressure_extrema", "EFFECT"),
     "coupler": ("coupler", "EFFECT"),
+    "shaking": ("shaking", "EFFECT"),
     "kinetostatics": ("kinetostatics", "EFFECT"),
     "slider_kinetostatics": ("kinetostatics", "SLIDER"),
     "friction": ("friction", "EFFECT"),
@@ -183,8 +185,10 @@ def _check_even(machine: Machine, found: Mapping[str, Family]) -> None:
 def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     """Dotted names that wanted names are about, those behind relations included."""
     names = {about for name in wanted for about in reduced(name, machine.domain)}
-    places = [place for timing in machine.timings if timing.name in names for place in timing.places]
+    asked = [timing for timing in machine.timings if timing.name in names]
+    places = [place for timing in asked for place in timing.places]
     names |= {about for name in places for about in reduced(name, machine.domain)}
+    names |= {timing.of.name for timing in asked if isinstance(timing, Reading)}
     for relation in machine.relations:
         if not names.isdisjoint(o.name for o in relation.outputs):
             names |= relation.needs(frozenset(names))

@@ -19,6 +19,7 @@ from sweep.engine.opening import is_part, known_folder, open_plan, part_range, p
 from sweep.engine.proving import prove
 from sweep.errors import Interrupted, SearchCutShort, StoreError, TimeUsedUp, WorkerDied
 from sweep.jobs.executors import at_work, executor, for_tasks
+from sweep.jobs.progress import Phases, Progress
 from sweep.jobs.signals import Stop, stop_on_signal
 
 if TYPE_CHECKING:
@@ -87,9 +88,14 @@ def run(
     >>> len(sweep.load(folder))
     4
     """
+    from sweep.chunks.chunk import warm
+
     place = executor(backend, jobs)  # refuses what there is not
     model = _model(study, smoke, accuracy, certify)
-    _check_budget(model, jobs, force)
+    with Phases(progress) as phases:
+        warm(model, lambda done, total: phases.say("compiling", done, total))
+        phases.say("planning")
+        _check_budget(model, jobs, force)
     default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
     folder = default if out is None else store.located(out)
     refuse_or_clear_older(folder, force)
@@ -107,7 +113,7 @@ def _search(study: Study, folder: Path, jobs: int, backend: str, progress: bool)
     if study.optimise is not None:
         _optimise(replace(study, pareto=None), folder, jobs, progress)
     prove(study, folder, jobs, backend, progress)
-    _front(study, folder, jobs)
+    _front(study, folder, jobs, progress)
     _raise_if_cut_short(folder)
 
 
@@ -144,7 +150,8 @@ def _check_budget(study: Study, jobs: int, force: bool) -> None:
 def _sweep(study: Study, folder: Path, jobs: int, place: Executor, force: bool, progress: bool) -> int:
     """Compute the missing chunks and note the totals; returns the number of chunks computed."""
     computed = 0
-    with stop_on_signal() as stop:
+    with stop_on_signal() as stop, Phases(progress) as phases:
+        phases.say("reading what is there")
         store.remove_temporary(folder)
         plan: Plan | None = None
         with stop.raising():  # a pilot may have to compile
@@ -154,6 +161,7 @@ def _sweep(study: Study, folder: Path, jobs: int, place: Executor, force: bool, 
         for _ in range(ROUNDS + 1):
             finished = store.finished_chunks(folder, plan)
             missing = [index for index in part_range(folder, plan.chunks) if index not in finished]
+            phases.end()
             if not missing:
                 break
             computed += _compute(study, plan, folder, missing, jobs, place, stop, force, progress)
@@ -178,8 +186,6 @@ def _compute(
     progress: bool,
 ) -> int:
     """Compute these chunks; returns their number."""
-    from sweep.jobs.progress import Progress
-
     failure: Exception | None = None
     allowed = math.inf if force else study.budget.seconds
     done = plan.designs - sum(len(range(*plan.bounds(index))) for index in missing)
@@ -242,7 +248,6 @@ def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
 
 def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     """Run the optimiser unless its result for these very sources is there already, whole."""
-    from sweep.jobs.progress import Progress
     from sweep.optimise import optimise_study, read_survey
 
     note = store.read_plan(folder) or {}
@@ -255,9 +260,10 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
         return
     assert study.optimise is not None
     store.write_plan(folder, note | {"optimised": None})
-    with stop_on_signal() as stop, Progress("optimum", study.optimise.starts, 0, progress, unit="starts") as shown:
+    with stop_on_signal() as stop, Phases(progress) as phases:
+        phases.say("optimum", 0, study.optimise.starts, "starts")
         try:
-            optimise_study(study, folder, lambda: bool(stop), jobs, lambda done, _: shown.advance(done - shown.done))
+            optimise_study(study, folder, lambda: bool(stop), jobs, phases.say)
         except KeyboardInterrupt:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
@@ -275,7 +281,7 @@ def _raise_if_cut_short(folder: Path) -> None:
         raise SearchCutShort(folder, text)
 
 
-def _front(study: Study, folder: Path, jobs: int) -> None:
+def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     """Search the study's front, from where an earlier run of these very sources left it."""
     if study.pareto is None:
         (store.beside(folder) / store.PARETO).unlink(missing_ok=True)
@@ -291,9 +297,9 @@ def _front(study: Study, folder: Path, jobs: int) -> None:
     if store.PARETO in known and (damaged or metadata(place / store.PARETO).get(b"key") != key.encode()):
         del known[store.PARETO]  # of a front that is over: the new one grows step by step
         store.write_plan(folder, note | {TABLES: known})
-    with stop_on_signal() as stop:
+    with stop_on_signal() as stop, Phases(progress) as phases:
         try:
-            front_study(study, folder, key, lambda: bool(stop), jobs)
+            front_study(study, folder, key, lambda: bool(stop), jobs, phases.say)
         except KeyboardInterrupt:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while searching the front; run again to continue"

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from kernels.status import OK
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
+from sweep.evaluation.poses import check_march
 from sweep.evaluation.tables import design_matrix, numbers
 from sweep.families import Mechanism
 from sweep.families import family as find_family
@@ -92,7 +93,8 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
     ----------
     mechanism : a family's name, a list of them for a chain, a table of members for a machine
     design : the parameters of one design, in one length unit and rad
-    phi : angles of the driving shaft [rad], one or a plain list
+    phi : angles of the driving shaft [rad], one or a plain list; over an interval values of its variable, of a march
+        equal steps of one turn from 0
     angles : the unit of the angles given, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
@@ -157,6 +159,7 @@ def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
     angles = np.atleast_1d(numbers(phi, "phi", "phi, position"))
     if angles.ndim != 1 or not np.isfinite(angles).all():
         raise InputError("phi", phi, "finite angles [rad], one or a plain list", "phi")
+    check_march(family, angles)
     given = Angles.of(np.ascontiguousarray(angles[None, :]))
     if isinstance(family, Machine):
         return [part for member in family.members for part in _of_member(family, member, matrix, given)]

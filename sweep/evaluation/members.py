@@ -13,17 +13,22 @@ import numpy as np
 
 from kernels import status as st
 from sweep.errors import InputError
+from sweep.evaluation.boxes import box_route
 from sweep.evaluation.route import Part, Route
 from sweep.families.base import Accuracy, Array, Columns, Work
 from sweep.families.capabilities import Assembly
 from sweep.families.members import Machine, Member
-from sweep.families.relations import Timing
+from sweep.families.relations import Reading, Timing
 from sweep.quantities.names import error_of, is_place
+from sweep.reductions.box import box
 from sweep.reductions.catalogue import output, quantity
+from sweep.reductions.dimensions import size
 from sweep.reductions.margins import NAMES as MARGINS
-from sweep.reductions.margins import combined, margins
-from sweep.reductions.sampling import TWO_PI
+from sweep.reductions.margins import TRANSMISSION, combined, margins, with_transmission
+from sweep.reductions.sampling import TWO_PI, pose_columns
 from sweep.reductions.work import group_ns
+
+SLOPE = 1e-5  # rad, for the slope that says what the error of an angle does to a value there
 
 
 def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) -> tuple[list[Route], list[str]]:
@@ -39,8 +44,12 @@ def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) 
         timing = next((t for t in machine.timings if t.name == name), None)
         if member is not None and is_alone(member[0]) and not is_of_point(machine, name):
             own.setdefault(member[0].name, []).append(member[1])
-        elif name in MARGINS:
+        elif name in (*MARGINS, TRANSMISSION):
             margin.append(name)
+        elif size(machine, name) is not None:
+            left.append(name)
+        elif (extent := box(machine, name)) is not None:
+            found.append(box_route(machine, extent, accuracy))
         elif timing is not None:
             found.append(_timing(machine, timing, accuracy))
         elif quantity(machine, name) is not None:
@@ -118,15 +127,36 @@ def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part)
             columns |= found
             suffixes += loops
         status = np.where(status == st.OK, now, status).astype(np.uint8)
-    return combined(columns, tuple(suffixes)) | {"status": status}
+    return with_transmission(combined(columns, tuple(suffixes)), ("",)) | {"status": status}
 
 
-def _timing(machine: Machine, timing: Timing, accuracy: Accuracy) -> Route:
+def _timing(machine: Machine, timing: Timing | Reading, accuracy: Accuracy) -> Route:
     from sweep.evaluation.routes import routes
 
     both = routes(machine, timing.places, accuracy)
     cost, order = sum(route.ns_per_design for route in both), max(route.order for route in both)
+    if isinstance(timing, Reading):
+        return Route(f"value {timing.name}", (timing.name,), cost, partial(_value, machine, timing), order=order)
     return Route(f"timing {timing.name}", (timing.name,), cost, partial(_difference, machine, timing), order=order)
+
+
+def _value(machine: Machine, reading: Reading, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+    """A pose output at a crank angle that the design gives; its error is that of the angle, by the slope there."""
+    from sweep.evaluation.summaries import design_outputs
+
+    place = reading.places[0]
+    found = design_outputs(machine, designs, reading.places, accuracy, window)
+    phi = np.asarray(found[place], np.float64)
+    known = np.isfinite(phi)
+    near = np.where(known, phi, 0.0)[:, None] + SLOPE * np.array([0.0, -1.0, 1.0])
+    poses, at = pose_columns(machine, designs, near, [reading.of.name])
+    values = np.where(known[:, None], poses[reading.of.name], np.nan)
+    status = np.where(found["status"] == st.OK, at[:, 0], found["status"]).astype(np.uint8)
+    columns: Columns = {reading.name: np.where(status == st.OK, values[:, 0], np.nan), "status": status}
+    if accuracy.target is not None:
+        slope = np.abs(values[:, 2] - values[:, 1]) / (2.0 * SLOPE)
+        columns[error_of(reading.name)] = slope * np.asarray(found[error_of(place)], np.float64)
+    return columns
 
 
 def _difference(machine: Machine, timing: Timing, designs: Array, accuracy: Accuracy, window: Part) -> Columns:

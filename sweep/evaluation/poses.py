@@ -35,8 +35,8 @@ def evaluate(
     *,
     keep: bool | str | Sequence[str] = False,
     status_text: bool = False,
-    loads: Loads | None = None,
     angles: AngleUnit | None = None,
+    loads: Loads | None = None,
 ) -> pd.DataFrame:
     """Pose outputs of mechanisms at given crank angles, one row per pose, in the order of the input.
 
@@ -51,10 +51,10 @@ def evaluate(
         that name; one whose poses depend on those before takes equal steps of one turn from 0, in order
     keep : columns of the table that the result repeats in front: names, or True for all of them
     status_text : add a column ``status_text``, the meaning of ``status`` in words
-    loads : loads over the turn, as for `summarise`
     angles : the unit of angles in ``table`` and ``phi``, "rad" or "deg"; a header such as ``alpha [deg]`` says it of
         one column.  Left out, it is rad, and what reads as degrees is refused: a parameter above 2 pi, crank angles
         whose largest is a whole or half number between 4 pi and 720.  Results are in rad
+    loads : loads over the turn, as for `summarise`
 
     Returns
     -------
@@ -154,11 +154,11 @@ def _grid(mechanism: Family, table: Table, phi: ArrayLike) -> NDArray[np.float64
         allowed = f"either phi= for every design, or a column {variable}, not both"
         raise InputError(variable, "a column", allowed, f"table of {mechanism.name}")
     grid = _values_of_the_variable(phi)
-    _check_march(mechanism, grid)
+    check_march(mechanism, grid)
     return grid
 
 
-def _check_march(mechanism: Family, grid: NDArray[np.float64]) -> None:
+def check_march(mechanism: Family, grid: NDArray[np.float64]) -> None:
     """Refuse crank angles that are no march over one turn."""
     if not isinstance(mechanism.domain, March):
         return

@@ -8,14 +8,17 @@ from functools import partial
 import numpy as np
 
 from sweep.errors import InputError
+from sweep.evaluation.boxes import box_route
 from sweep.evaluation.members import machine_routes
+from sweep.evaluation.negatives import negative_route
 from sweep.evaluation.route import Part, Route
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.chain import Stage
 from sweep.families.domain import March
 from sweep.families.members import Machine
-from sweep.quantities.names import at_stage, error_of
+from sweep.quantities.names import at_stage, error_of, without_minus
 from sweep.quantities.reduction import reduction_of
+from sweep.reductions.box import box
 from sweep.reductions.catalogue import output, quantity
 from sweep.reductions.events import event_outputs
 from sweep.reductions.means import mean_squares
@@ -34,10 +37,11 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
         for an unknown name, or an accuracy that the family's domain or the output does not serve.
     """
     _check_domain(family, accuracy)
-    found: list[Route] = []
+    found = [negative_route(family, name, accuracy) for name in dict.fromkeys(wanted) if without_minus(name)]
+    wanted = [name for name in wanted if not without_minus(name)]
     if isinstance(family, Machine):
-        found, left = machine_routes(family, wanted, accuracy)
-        wanted = left
+        of_members, wanted = machine_routes(family, wanted, accuracy)
+        found += of_members
     steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
     groups: dict[tuple[Group, str], list[str]] = {}
     asked = {name: (applying_step(family, name, accuracy), quantity(family, name)) for name in dict.fromkeys(wanted)}
@@ -46,6 +50,10 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
         own is None and one is not None and one.route == "margin" and not one.stage for own, one in asked.values()
     )
     for name, (own, one) in asked.items():
+        extent = box(family, name)
+        if extent is not None:
+            found.append(box_route(family, extent, accuracy))
+            continue
         if own is not None and not (together and one is not None and one.route == "margin"):
             step, stage = own
             steps.setdefault((step.name, stage.number if stage else 0), (step, stage, []))[2].append(name)

@@ -62,8 +62,8 @@ def summarise(
     window: tuple[float, float] | None = None,
     keep: bool | str | Sequence[str] = False,
     status_text: bool = False,
-    loads: Loads | None = None,
     angles: AngleUnit | None = None,
+    loads: Loads | None = None,
 ) -> pd.DataFrame:
     """Design outputs of mechanisms, one row per design, in the order of the input.
 
@@ -73,8 +73,8 @@ def summarise(
     table : DataFrame or mapping with a column per parameter [one length unit, rad], and per input of the effects that
         ``want`` calls for; missing ``branch`` means +1
     want : names of design outputs: ``rotatable``, ``margin``, ``stroke``, ``max_abs_d2s`` ... (see ``sweep families``),
-        ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``); the name of an effect, as
-        ``friction``, stands for its outputs; a list, or one text between commas
+        ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``); a list, or one text between
+        commas; the name of an effect, as ``friction``, stands for its outputs
     samples : extrema on a dense grid of so many crank angles
     accuracy : true extrema, refined to this relative error; 1e-8 if neither is given.  A family whose poses depend on
         those before (a march) has no true extrema: 720 samples if neither is given
@@ -84,10 +84,10 @@ def summarise(
         fractions of the stroke, measured from its smallest position; default the whole turn
     keep : columns of the table that the result repeats in front: names, or True for all of them
     status_text : add a column ``status_text``, the meaning of ``status`` in words
-    loads : loads over the turn, by the input that each adds to (``load_torque``, ``tool_force2``): a pair (crank angles
-        [rad], values), joined by periodic monotone cubics, or ``{"mean": m, "cos": [...], "sin": [...]}``
     angles : the unit of angles in ``table``, "rad" or "deg"; a header such as ``alpha [deg]`` says it of one column.
         Left out, it is rad, and a parameter above 2 pi is refused.  Results are in rad
+    loads : loads over the turn, by the input that each adds to (``load_torque``, ``tool_force2``): a pair (crank angles
+        [rad], values), joined by periodic monotone cubics, or ``{"mean": m, "cos": [...], "sin": [...]}``
 
     Returns
     -------

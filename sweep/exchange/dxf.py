@@ -19,22 +19,38 @@ VIEWS = {"front": (0, 1), "side": (2, 1), "top": (0, 2)}
 UNITS = {"mm": 4, "m": 6}
 
 
+NAMED = "LINKSWEEP"  # application under which entities carry their names
+
+
+def ezdxf_or_refuse() -> Any:
+    """The package ezdxf.
+
+    Raises
+    ------
+    InputError
+        if it is not installed.
+    """
+    try:
+        import ezdxf
+    except ImportError as error:
+        raise InputError("format", "dxf", "the package ezdxf: pip install 'linksweep[cad]'", "export") from error
+    return ezdxf
+
+
 def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
     """The first pose with the joints' paths; planar parts from the front, spatial ones from the side and top as well.
 
     Layers are LINKS, JOINTS, PIVOTS, AXES, PATHS and TEXT.  Every frame has its views side by side, the front view of
-    the first one standing at its own coordinates.
+    the first one standing at its own coordinates.  In front views points and axes keep their third coordinate and carry
+    part and name as extended data of the application LINKSWEEP, by which ``sweep points`` reads them.
 
     Raises
     ------
     InputError
         if ezdxf is not installed.
     """
-    try:
-        import ezdxf
-    except ImportError as error:
-        raise InputError("format", "dxf", "the package ezdxf: pip install 'linksweep[cad]'", "export") from error
-    document: Any = ezdxf.new("R2010", setup=True)  # type: ignore[attr-defined]
+    document: Any = ezdxf_or_refuse().new("R2010", setup=True)
+    document.appids.add(NAMED)
     document.header["$INSUNITS"] = UNITS[unit]
     for layer, colour in LAYERS.items():
         document.layers.add(layer, color=colour)
@@ -61,6 +77,7 @@ def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
 
 
 def _draw(space: Any, part: Part, seen: list[int], shift: Array, size: float) -> None:
+    front = tuple(seen) == VIEWS["front"]
     at = {name: path[:, seen] + shift for name, path in part.joints.items()}
     for link in part.links:
         corners = [at[name][0] for name in link.joints]
@@ -69,16 +86,28 @@ def _draw(space: Any, part: Part, seen: list[int], shift: Array, size: float) ->
     for name, path in at.items():
         layer = "PIVOTS" if name in part.kinds else "JOINTS"
         here = tuple(path[0])
-        space.add_point(here, dxfattribs={"layer": layer})
+        point = space.add_point(here, dxfattribs={"layer": layer})
+        if front:
+            point.dxf.location = (*here, float(part.joints[name][0, 2]))
+            _name(point, part, shown_name(name))
         space.add_circle(here, 0.012 * size, dxfattribs={"layer": layer})
         _text(space, shown_name(name), path[0] + 0.018 * size, 0.03 * size)
         if name not in part.kinds and float(np.ptp(path, axis=0).max()) > 0.0:
             space.add_lwpolyline([tuple(p) for p in path[:-1]], close=True, dxfattribs={"layer": "PATHS"})
     for name, axis in part.axes.items():
-        along = 0.12 * size * axis[seen]
+        middle, along = at[name][0], 0.12 * size * axis[seen]
+        if front:
+            middle, along = np.append(middle, part.joints[name][0, 2]), 0.12 * size * axis
         if float(np.linalg.norm(along)) > 1e-6 * size:
-            ends = tuple(at[name][0] - along), tuple(at[name][0] + along)
-            space.add_line(*ends, dxfattribs={"layer": "AXES", "linetype": "CENTER"})
+            ends = tuple(middle - along), tuple(middle + along)
+            line = space.add_line(*ends, dxfattribs={"layer": "AXES", "linetype": "CENTER"})
+            if front:
+                _name(line, part, f"axis_{shown_name(name)}")
+
+
+def _name(entity: Any, part: Part, name: str) -> None:
+    label = part.label if part.member or part.stage else ""
+    entity.set_xdata(NAMED, [(1000, label), (1000, name)])
 
 
 def _text(space: Any, words: str, at: Array, height: float) -> None:

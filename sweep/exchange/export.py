@@ -110,19 +110,19 @@ def _writer(
 
         return lambda path: write_law(mechanism, design, path, phi, poses, unit, speed)
     placed = turn(mechanism, design, phi, poses)
-    name = find_family(mechanism).name
+    family = find_family(mechanism)
     if kind == "glb":
         from sweep.exchange.glb import write_glb
 
         seconds = SECONDS if speed is None else 2.0 * math.pi / speed
-        return lambda path: write_glb(name, placed, path, UNITS[unit], seconds)
+        return lambda path: write_glb(family.name, placed, path, UNITS[unit], seconds)
     if kind == "dxf":
         from sweep.exchange.dxf import write_dxf
 
         return lambda path: write_dxf(placed, path, unit)
     from sweep.exchange.mjcf import write_mjcf
 
-    return lambda path: write_mjcf(name, placed, _numbers(design), path, unit)
+    return lambda path: write_mjcf(family, placed, _numbers(design), path, unit)
 
 
 def _numbers(design: Table) -> dict[str, float]:

@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sweep.evaluation.joints import Part
 from sweep.exchange.scene import Placed, extent, shown_name
 from sweep.families.base import Array
+from sweep.families.capabilities import Link
 
 COLOURS = {
     "frame": (0.08, 0.09, 0.12), "joint": (0.92, 0.93, 0.95),
@@ -99,12 +101,12 @@ def write_glb(name: str, placed: list[Placed], path: Path, metres: float, second
     size = extent([one.part for one in placed])
     groups = [_group(model, one, times, size) for one in placed]
     half = math.sqrt(0.5)
-    root = model.node(name=name, rotation=[-half, 0.0, 0.0, half], scale=[metres] * 3, children=groups)
+    root = model.node(name=f"mechanism {name}", rotation=[-half, 0.0, 0.0, half], scale=[metres] * 3, children=groups)
     data = bytes(model.data) + b"\0" * (-len(model.data) % 4)
     document = {
         "asset": {"version": "2.0", "generator": "linksweep"},
         "scene": 0,
-        "scenes": [{"name": name, "nodes": [root]}],
+        "scenes": [{"nodes": [root]}],
         "nodes": model.nodes,
         "meshes": model.meshes,
         "materials": [_material(colour, rgb) for colour, rgb in COLOURS.items()],
@@ -146,6 +148,7 @@ def _group(model: Model, one: Placed, times: int, size: float) -> int:
             for a, b in pairs
             if np.abs(part.joints[b] - part.joints[a]).max() > 1e-9 * size  # the fork slot has an arm of no length
         ]
+        bars += [_block(model, part, link, colour, times, thick)] if _slides(part, link) else []
         if bars:
             children.append(model.node(name=link.name, children=bars))
     for joint, path in part.joints.items():
@@ -166,7 +169,26 @@ def _group(model: Model, one: Placed, times: int, size: float) -> int:
                 rotation=_unit(_from_z(axis)).tolist(), scale=[0.4 * thick, 0.4 * thick, 2.0 * reach],
             )
         )  # fmt: skip
-    return model.node(name=part.label, translation=one.shift.tolist(), children=children)
+    name = part.label if part.member or part.stage else "stage"
+    return model.node(name=name, translation=one.shift.tolist(), children=children)
+
+
+def _slides(part: Part, link: Link) -> bool:
+    """Whether a link is known by one joint only, and that one moves."""
+    return len(link.joints) == 1 and link.joints[0] not in part.kinds
+
+
+def _block(model: Model, part: Part, link: Link, colour: str, times: int, thick: float) -> int:
+    """A block on the joint of a slider, along the line it moves on."""
+    slides = [part.axes[name] for name, kind in part.kinds.items() if kind == "slide"]
+    axis, reach = slides[0] if slides else np.array([0.0, 0.0, 1.0]), 4.0 * thick
+    path = part.joints[link.joints[0]] - reach * axis
+    node = model.node(
+        name=f"{link.name} block", mesh=model.mesh("bar", colour), translation=path[0].tolist(),
+        rotation=_unit(_from_z(axis)).tolist(), scale=[2.2 * thick, 2.2 * thick, 2.0 * reach],
+    )  # fmt: skip
+    model.animate(node, times, "translation", path)
+    return node
 
 
 def _bar(model: Model, name: str, colour: str, start: Array, end: Array, times: int, thick: float) -> int:

@@ -6,8 +6,7 @@ import csv
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sweep.evaluation.joints import parts
-from sweep.exchange.scene import shown_name
+from sweep.exchange.scene import pose, shown_name
 from sweep.families import Mechanism
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ def write_hardpoints(mechanism: Mechanism, design: Table, path: Path, phi: float
     with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(["member", "stage", "frame", "name", "x", "y", "z", "unit"])
-        for part in parts(mechanism, design, phi):
+        for part in pose(mechanism, design, phi):
             head = [part.member, part.stage, part.frame]
             for joint, at in part.joints.items():
                 rows.writerow([*head, shown_name(joint), *map(repr, at[0].tolist()), unit])

@@ -10,8 +10,10 @@ import numpy as np
 
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.poses import evaluate
+from sweep.evaluation.tables import design_matrix
 from sweep.families import Mechanism
 from sweep.families import family as find_family
+from sweep.families.domain import Interval, Turn, equal_steps
 
 if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
@@ -22,19 +24,26 @@ def write_law(
 ) -> None:
     """Position with its derivatives by the shaft's angle, deviations and pressure angles, at equal steps of one turn.
 
-    With ``speed`` [rad/s] there is a column of time, from 0.  Units stand in the headings of a CSV, ``s [mm]``, and in
+    Over an interval the steps go from one end to the other; a march begins at 0.  With ``speed`` [rad/s] there is a
+    column of time, from 0, but for an interval.  Units stand in the headings of a CSV, ``s [mm]``, and in
     the field metadata of a Parquet file, where the names stay bare.
     """
     import pyarrow as pa
 
     family = find_family(mechanism)
     names = list(dict.fromkeys(motion_curves(family)))
-    angles = phi + np.arange(poses) * (2.0 * math.pi / poses)
+    domain = family.domain
+    if isinstance(domain, Turn):
+        angles, text = phi + np.arange(poses) * (2.0 * math.pi / poses), "angle of the driving shaft"
+    else:
+        matrix, _ = design_matrix(family, design)
+        angles, text = equal_steps(domain, matrix, poses), domain.text
     found = evaluate(mechanism, design, names, phi=angles, angles="rad")
-    units = {"phi": "rad"} | {o.name: o.unit.replace("length", unit) for o in family.pose_outputs}
-    texts = {"phi": "angle of the driving shaft"} | {o.name: o.text for o in family.pose_outputs}
-    columns = {"phi": angles}
-    if speed is not None:
+    units = {o.name: o.unit for o in family.pose_outputs} | {domain.name: domain.unit}
+    units = {name: of.replace("length", unit) for name, of in units.items()}
+    texts = {o.name: o.text for o in family.pose_outputs} | {domain.name: text}
+    columns = {domain.name: angles}
+    if speed is not None and not isinstance(domain, Interval):
         columns["t"] = (angles - phi) / speed
         units["t"], texts["t"] = "s", "time"
     columns |= {name: found[name].to_numpy(np.float64) for name in names}

@@ -1,151 +1,215 @@
-"""A simulation model for MuJoCo: the crank carries the coupler, a ``connect`` constraint closes the loop.
+"""A simulation model for MuJoCo: crank, coupler and follower, a ``connect`` constraint closes the loop.
 
-Joints are named as the links, so that a position of the hinge ``crank`` is phi, one of ``rocker`` psi, one of
-``slider`` s.  Lengths are metres, masses kilograms.
+The coupler hangs on the link that carries its finger, by the two axes of that universal joint, so that its spin is that
+of the kernels; at the other end it is held by a ball, the constraint.  Hinges are named as the links, so that a
+position of ``crank`` is phi, one of ``rocker`` psi, one of ``slider`` s.  Lengths are metres, masses kilograms.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from sweep.effects.base import Scene
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part
+from sweep.evaluation.poses import evaluate
+from sweep.exchange.inertia import inertial
 from sweep.exchange.scene import Placed, extent
-from sweep.families.base import Array
+from sweep.families.base import Angles, Array, Family
+from sweep.families.capabilities import JointRecords
+from sweep.families.members import Machine
+from sweep.quantities import names
 
-FOLLOWERS = ("rocker", "slider")
-KILOGRAMS = {"mm": 1e3, "m": 1.0}  # masses of designs in mm are tonnes, as N and s want
 METRES = {"mm": 1e-3, "m": 1.0}
-MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+THICK = 0.008  # of a bar, of the extent of all joints
+DRIVING = 1.0  # the finger stands on the crank's end of the coupler
 
 
-def write_mjcf(name: str, placed: list[Placed], design: Mapping[str, float], path: Path, unit: str) -> None:
+@dataclass(frozen=True)
+class Loop:
+    """One stage in its first pose: joints, and the bodies' axes as columns x, y, z, all in metres.
+
+    Parameters
+    ----------
+    tag : what stands behind names: member and number of the stage
+    follower : "rocker" or "slider"
+    A, B, C, D : joints; D is C on a slider
+    crank, coupler, driven : axes of the bodies, (3, 3); x along the link, z along its axis
+    finger : DRIVING or not
+    turn : from the frame in which the family's forces and gravity are, into that of its joints
+    """
+
+    tag: str
+    follower: str
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    crank: Array
+    coupler: Array
+    driven: Array
+    finger: float
+    turn: Array
+
+
+def write_mjcf(family: Family, placed: list[Placed], design: Mapping[str, float], path: Path, unit: str) -> None:
     """The model in its first pose.
 
     Bodies get the masses, centres and inertias (``m_crank``, ``com_crank_x``, ``j_crank_xx`` ...) of the design, else
-    those of steel bars.  Stages of a chain are coupled at their common shaft.
+    those of steel bars.  Stages of a chain are coupled at their common shaft, members of a machine to the first one.
 
     Raises
     ------
     InputError
-        for a stage that has no crank, coupler and rocker or slider; for a mass without inertia.
+        for a stage that has no crank, coupler and rocker or slider, a mass without inertia.
     """
-    root = Xml.Element("mujoco", model=name)
+    root = Xml.Element("mujoco", model=family.name)
     Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="auto")
-    Xml.SubElement(root, "option", gravity=_words(_vector(design, "gravity", "", METRES[unit])))
-    world = Xml.SubElement(root, "worldbody")
-    equality = Xml.SubElement(root, "equality")
-    before: Part | None = None
-    for one in placed:
-        part = one.part
-        names = [link.name for link in part.links]
-        follower = next((link for link in part.links if link.name in FOLLOWERS), None)
-        if follower is None or not {"crank", "coupler"} <= set(names) or part.member:
-            allowed = "a family or chain of linkages with crank, coupler and rocker or slider"
-            raise InputError("format", f"mjcf of {part.label}", allowed, "export")
-        tag = f" {part.stage}" if part.stage else ""
-        _stage(world, one, design, tag, follower.name, unit, 0.008 * extent([o.part for o in placed]))
-        arm = np.linalg.norm(part.joints["c"][0] - part.joints["b"][0])
-        Xml.SubElement(
-            equality, "connect", name=f"C{tag}", body1=f"coupler{tag}", body2=f"{follower.name}{tag}",
-            anchor=_words(np.array([arm * METRES[unit], 0.0, 0.0])),
-        )  # fmt: skip
-        if before is not None:
-            sense = design.get(f"kappa{part.stage}", 1.0)
-            Xml.SubElement(
-                equality, "joint", name=f"shaft{tag}", joint1=f"crank{tag}", joint2=f"rocker {before.stage}",
-                polycoef=_words(np.array([0.0, sense, 0.0, 0.0, 0.0])),
-            )  # fmt: skip
-        before = part
+    option = Xml.SubElement(root, "option")
+    world, equality = Xml.SubElement(root, "worldbody"), Xml.SubElement(root, "equality")
+    thick = THICK * extent([one.part for one in placed]) * METRES[unit]
+    for k, one in enumerate(placed):
+        part, before = one.part, placed[k - 1].part if k else None
+        own = _of_member(design, part.member)
+        loop = _loop(one, own.get(f"finger{part.stage}", 0.0), METRES[unit])
+        _stage(world, equality, loop, part, own, unit, thick)
+        if before is None:
+            gravity = np.array([own.get(f"gravity_{axis}{part.stage}", 0.0) for axis in "xyz"])
+            option.set("gravity", words(loop.turn @ gravity * METRES[unit]))
+        elif before.member == part.member:
+            _geared(equality, f"crank{loop.tag}", f"rocker{_tag(before)}", own.get(f"kappa{part.stage}", 1.0))
+        elif isinstance(family, Machine):
+            _geared(equality, f"crank{loop.tag}", *_driver(family, part.member, f"crank{_tag(placed[0].part)}"))
     actuators = Xml.SubElement(root, "actuator")
-    first = f"crank {placed[0].part.stage}".strip()
-    Xml.SubElement(actuators, "motor", name="drive", joint=first)
+    Xml.SubElement(actuators, "motor", name="drive", joint=f"crank{_tag(placed[0].part)}")
     Xml.indent(root)
     path.write_text(Xml.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
 
 
+def _tag(part: Part) -> str:
+    """What stands behind the names of a stage: member and number, each behind a space."""
+    return "".join(f" {word}" for word in (part.member, part.stage) if word)
+
+
+def _of_member(design: Mapping[str, float], member: str) -> dict[str, float]:
+    """The columns of one member without its name, of a family all."""
+    head = f"{member}." if member else ""
+    return {name.removeprefix(head): float(value) for name, value in design.items() if name.startswith(head)}
+
+
+def _driver(machine: Machine, name: str, first: str) -> tuple[str, float]:
+    """The joint that drives a member's crank, and the ratio of both; ``first`` is the crank of the first member."""
+    members = {member.name: member for member in machine.members}
+    member = members[name]
+    if member.driver is None:
+        return first, member.ratio / machine.members[0].ratio
+    # Of the families that are served, the angle that drives another member is that of a rocker.
+    other, output = member.driver
+    return " ".join(word for word in ("rocker", other, names.parts(output).stage) if word), float(member.ratio)
+
+
+def _geared(equality: Xml.Element, joint: str, other: str, ratio: float) -> None:
+    """Couple two joints, from where they stand in the first pose."""
+    Xml.SubElement(
+        equality, "joint", name=f"shaft of {joint}", joint1=joint, joint2=other,
+        polycoef=words(np.array([0.0, ratio, 0.0, 0.0, 0.0])),
+    )  # fmt: skip
+
+
+def _loop(one: Placed, finger: float, metres: float) -> Loop:
+    """The stage's joints and directions, from its joint records."""
+    part = one.part
+    records = part.family.find(JointRecords)
+    if records is None:
+        allowed = "a family or chain of linkages with crank, coupler and rocker or slider"
+        raise InputError("format", f"mjcf of {part.label}", allowed, "export")
+    matrix, angles = part.design[None, :], Angles.of(part.crank[None, :1])
+    poses, designs = Scene(part.family, matrix, angles, {}).records
+    pose, own = poses[0, 0], designs[0]
+    # as kernels/joints.py writes them: B C s rho_b tau_b rho tau per pose, u k A D per design
+    s, rho_b, tau_b, rho, tau = (pose[k : k + 3] for k in (6, 9, 12, 15, 18))
+    u, k, center, d = (own[n : n + 3] for n in (0, 3, 6, 9))
+    found = evaluate(
+        part.family, part.parameters | {"finger": finger}, ["n_x", "n_y", "n_z"], phi=part.crank[:1], angles="rad"
+    )
+    n = found[["n_x", "n_y", "n_z"]].to_numpy(np.float64)[0]
+    # The records of a family may stand in the frame of another one whose effects it shares.
+    crank = np.column_stack([rho_b, tau_b, u])
+    turn = _triad(part.joints["b"][0] - part.joints["a"][0], part.axes["a"]) @ crank.T
+    slider = records.follower == "slider"
+    a, b, c, d = (
+        (turn @ (point - center) + part.joints["a"][0] + one.shift) * metres
+        for point in (center, pose[0:3], pose[3:6], pose[3:6] if slider else d)
+    )
+    coupler, driven = np.column_stack([s, np.cross(n, s), n]), np.column_stack([rho, tau, k])
+    return Loop(
+        _tag(part), records.follower, a, b, c, d,
+        turn @ crank, turn @ coupler, turn @ driven, finger, turn,
+    )  # fmt: skip
+
+
+def _triad(along: Array, axis: Array) -> Array:
+    """Columns x along a link, y across, z its axis."""
+    x = along / np.linalg.norm(along)
+    return np.column_stack([x, np.cross(axis, x), axis])
+
+
 def _stage(
-    world: Xml.Element, one: Placed, design: Mapping[str, float], tag: str, follower: str, unit: str, thick: float
-) -> None:
-    """Crank with coupler, and the follower, in the first pose; x of a body along its link, z along its axis."""
-    part, m = one.part, METRES[unit]
-    a, b, c, d = (part.joints[name][0] + one.shift for name in "abcd")
-    u, k = part.axes["a"], part.axes["d"]
-    ends = {"crank": b - a, "coupler": c - b, follower: c - d}
-    crank_frame = _frame(b - a, u)
-    crank = _body(world, f"crank{tag}", a * m, crank_frame)
+    world: Xml.Element, equality: Xml.Element, loop: Loop, part: Part, design: Mapping[str, float], unit: str,
+    thick: float,
+) -> None:  # fmt: skip
+    """Crank, follower, and the coupler on one of them; x of a body along its link, z along its axis."""
+    tag, follower = loop.tag, loop.follower
+    a, b, c = (float(np.linalg.norm(end)) for end in (loop.B - loop.A, loop.C - loop.B, loop.C - loop.D))
+    crank = _body(world, f"crank{tag}", loop.A, loop.crank)
     Xml.SubElement(crank, "joint", name=f"crank{tag}", type="hinge", axis="0 0 1", ref=repr(float(part.crank[0])))
-    side = u if np.linalg.norm(np.cross(u, c - b)) > 1e-6 * np.linalg.norm(c - b) else crank_frame[:, 1]
-    coupler_frame = _frame(c - b, side)
-    at = np.array([np.linalg.norm(b - a), 0.0, 0.0])
-    coupler = _body(crank, f"coupler{tag}", at * m, crank_frame.T @ coupler_frame)
-    Xml.SubElement(coupler, "joint", name=f"coupler{tag}", type="ball")
+    driven = _body(world, f"{follower}{tag}", loop.D, loop.driven)
     position = float(part.position[0])
-    if follower == "rocker" and not part.family.pose_output[part.family.position].wraps:
-        position = float(np.arctan2(c[1] - d[1], c[0] - d[0]))  # the guide's position is that of its point
     if follower == "slider":
-        x = _square(k)
-        driven = _body(world, f"slider{tag}", c * m, np.column_stack([x, k, np.cross(x, k)]))
-        Xml.SubElement(driven, "joint", name=f"slider{tag}", type="slide", axis="0 1 0", ref=repr(position * m))
+        ref = repr(position * METRES[unit])
+        Xml.SubElement(driven, "joint", name=f"slider{tag}", type="slide", axis="0 1 0", ref=ref)
     else:
-        driven = _body(world, f"rocker{tag}", d * m, _frame(c - d, k))
+        if not part.family.pose_output[part.family.position].wraps:
+            position = float(np.arctan2(*(loop.C - loop.D)[[1, 0]]))  # the guide's position is that of its point
         Xml.SubElement(driven, "joint", name=f"rocker{tag}", type="hinge", axis="0 0 1", ref=repr(position))
+    carries = crank if loop.finger == DRIVING else driven
+    origin, axes = (loop.A, loop.crank) if loop.finger == DRIVING else (loop.D, loop.driven)
+    cross = loop.coupler.T @ (loop.crank[:, 2] if loop.finger == DRIVING else loop.driven[:, 0])
+    coupler = _body(carries, f"coupler{tag}", axes.T @ (loop.B - origin), axes.T @ loop.coupler)
+    hinge = words(np.array([0.0 if loop.finger == DRIVING else b, 0.0, 0.0]))
+    Xml.SubElement(coupler, "joint", name=f"finger{tag}", type="hinge", pos=hinge, axis=words(cross))
+    Xml.SubElement(coupler, "joint", name=f"coupler{tag}", type="hinge", pos=hinge, axis="0 0 1")
+    first, second, anchor, joint = (
+        (f"coupler{tag}", f"{follower}{tag}", b, "C")
+        if loop.finger == DRIVING
+        else (f"crank{tag}", f"coupler{tag}", a, "B")
+    )
+    Xml.SubElement(
+        equality, "connect", name=f"{joint}{tag}", body1=first, body2=second,
+        anchor=words(np.array([anchor, 0.0, 0.0])),
+    )  # fmt: skip
+    lengths = {"crank": a, "coupler": b, follower: c if follower == "rocker" else 4.0 * thick}
     for body, name in ((crank, "crank"), (coupler, "coupler"), (driven, follower)):
-        given = f"m_{name}{part.stage}" in design
-        if given:
-            _inertial(body, design, name, part.stage, unit)
-        length = float(np.linalg.norm(ends[name])) if name != "slider" else 4.0 * thick
-        bar = np.array([0.0, 0.0, 0.0, length, 0.0, 0.0]) * m
+        if f"m_{name}{part.stage}" in design:
+            body.append(inertial(design, name, part.stage, unit))
         Xml.SubElement(
-            body, "geom", name=f"{name}{tag}", type="capsule", fromto=_words(bar), size=repr(thick * m),
-            density="7850", contype="0", conaffinity="0",
+            body, "geom", name=f"{name}{tag}", type="capsule", size=repr(thick), density="7850", contype="0",
+            conaffinity="0", fromto=words(np.array([0.0, 0.0, 0.0, lengths[name], 0.0, 0.0])),
         )  # fmt: skip
-    for body, site, end in ((crank, "B", float(at[0])), (coupler, "C", float(np.linalg.norm(c - b)))):
-        Xml.SubElement(body, "site", name=f"{site}{tag}", pos=_words(np.array([end * m, 0.0, 0.0])))
+    for body, site, x in ((crank, "A", 0.0), (crank, "B", a), (coupler, "C", b), (driven, "D", 0.0)):
+        Xml.SubElement(body, "site", name=f"{site}{tag}", pos=words(np.array([x, 0.0, 0.0])))
 
 
 def _body(parent: Xml.Element, name: str, at: Array, frame: Array) -> Xml.Element:
     axes = np.concatenate([frame[:, 0], frame[:, 1]])
-    return Xml.SubElement(parent, "body", name=name, pos=_words(at), xyaxes=_words(axes))
+    return Xml.SubElement(parent, "body", name=name, pos=words(at), xyaxes=words(axes))
 
 
-def _frame(along: Array, axis: Array) -> Array:
-    """Columns x, y, z: x along a link, less what it has along the axis, z the axis made square to it."""
-    x = along / np.linalg.norm(along)
-    z = axis - (axis @ x) * x
-    z = z / np.linalg.norm(z)
-    return np.column_stack([x, np.cross(z, x), z])
-
-
-def _square(k: Array) -> Array:
-    """A unit vector square to k."""
-    trial = np.array([1.0, 0.0, 0.0]) if abs(k[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    rest = trial - (trial @ k) * k
-    found: Array = rest / np.linalg.norm(rest)
-    return found
-
-
-def _inertial(body: Xml.Element, design: Mapping[str, float], name: str, stage: str, unit: str) -> None:
-    mass, m = KILOGRAMS[unit], METRES[unit]
-    moments = np.array([design.get(f"j_{name}_{entry}{stage}", 0.0) for entry in MOMENTS])
-    xx, yy, zz, xy, xz, yz = moments
-    least = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))[0]
-    if not least > 0.0:
-        allowed = "the inertias of a body: MuJoCo takes no mass without"
-        raise InputError(f"j_{name}_xx{stage}", f"least moment {least:.3g}", allowed, "export")
-    Xml.SubElement(
-        body, "inertial", pos=_words(_vector(design, f"com_{name}", stage, m)),
-        mass=repr(float(design[f"m_{name}{stage}"]) * mass), fullinertia=_words(moments * mass * m**2),
-    )  # fmt: skip
-
-
-def _vector(design: Mapping[str, float], stem: str, stage: str, factor: float) -> Array:
-    return np.array([float(design.get(f"{stem}_{axis}{stage}", 0.0)) for axis in "xyz"]) * factor
-
-
-def _words(values: Array) -> str:
+def words(values: Array) -> str:
+    """Numbers as MuJoCo reads them, to the last bit."""
     return " ".join(repr(float(x)) for x in values)

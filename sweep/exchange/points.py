@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,9 +15,6 @@ from sweep.families.base import Array, Family
 from sweep.families.capabilities import Hardpoints, Reading
 from sweep.families.hardpoints import size
 from sweep.families.placing import Place, vector
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 TOLERANCE = 1e-4  # part of the drawing's size: coordinates given to 0.01 mm in a drawing of 100 mm
 
@@ -83,11 +78,7 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
     >>> round(found.parameters["b"], 6), found.branch
     (1219.631092, -1.0)
     """
-    found = find_family(family)
-    reader = found.find(Hardpoints)
-    if reader is None:
-        known = [name for name in NAMES if find_family(name).find(Hardpoints) is not None]
-        raise InputError("family", found.name, f"one of {', '.join(known)}", "points")
+    found, reader = find_family(family), reader_of(family)
     given = _checked(reader, points)
     extent = size(given)
     if not extent > 0.0:
@@ -104,29 +95,20 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
     return PlacedDesign(found.name, reading.parameters, reading.phi, place, max(off.values()))
 
 
-def read_points(file: Path) -> dict[str, list[float]]:
-    """Points by name from a CSV file with the columns name, x, y, z (others are not looked at).
+def reader_of(family: str) -> Hardpoints:
+    """What reads the points of a family.
 
     Raises
     ------
     InputError
-        for a missing column, a name that stands twice, a file that is no CSV.
+        for a family whose dimensions are not read off points.
     """
-    import pandas as pd
-
-    try:
-        table: pd.DataFrame = pd.read_csv(file, comment="#", skipinitialspace=True)
-    except (ValueError, OSError) as error:
-        raise InputError("file", file.name, f"a CSV table ({error})", str(file)) from error
-    table.columns = [str(name).strip() for name in table.columns]
-    for column in ("name", "x", "y", "z"):
-        if column not in table:
-            raise InputError("column", column, "the columns name, x, y, z", str(file))
-    names = [str(name).strip() for name in table["name"]]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise InputError("name", twice[0], "each name once: keep the points of one stage", str(file))
-    return dict(zip(names, table[["x", "y", "z"]].to_numpy().tolist(), strict=True))
+    found = find_family(family)
+    reader = found.find(Hardpoints)
+    if reader is None:
+        known = [name for name in NAMES if find_family(name).find(Hardpoints) is not None]
+        raise InputError("family", found.name, f"one of {', '.join(known)}", "points")
+    return reader
 
 
 def _checked(reader: Hardpoints, points: Mapping[str, Sequence[float] | Array]) -> dict[str, Array]:

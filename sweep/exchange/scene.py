@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,12 +12,16 @@ import numpy as np
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part, parts
 from sweep.evaluation.statuses import meaning
+from sweep.evaluation.tables import design_matrix
 from sweep.families import Mechanism
+from sweep.families import family as find_family
 from sweep.families.base import Array
+from sweep.families.domain import Interval, March, equal_steps
 
 if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
+STEPS = 720  # of a march, where one pose of it is asked for
 GAP = 0.25  # between two frames side by side, as a part of the larger one
 
 
@@ -30,15 +34,15 @@ class Placed:
 
 
 def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Placed]:
-    """All parts over one turn from ``phi`` on, the last pose being the first one again.
+    """All parts over one turn as of :func:`over`, each with its place in the scene.
 
     Raises
     ------
     InputError
         where a pose does not exist.
     """
-    angles = phi + np.linspace(0.0, 2.0 * math.pi, poses + 1)
-    found = parts(mechanism, design, angles)
+    found = over(mechanism, design, phi, poses)
+    domain = find_family(mechanism).domain
     for part in found:
         if not part.links:
             raise InputError(
@@ -47,9 +51,63 @@ def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pl
         bad = np.flatnonzero([not np.isfinite(path).all(axis=1).all() for path in part.joints.values()])
         if bad.size:
             pose = int(np.argmax(part.status != 0))
-            value = f"{meaning(int(part.status[pose]))} at phi = {angles[pose]:.6g}"
-            raise InputError(part.label, value, "a design whose crank turns fully", "export")
+            value = f"{meaning(int(part.status[pose]))} at {domain.name} = {part.phi[pose]:.6g}"
+            whole = "that exists over the whole interval" if isinstance(domain, Interval) else "whose crank turns fully"
+            raise InputError(part.label, value, f"a design {whole}", "export")
     return side_by_side(found)
+
+
+def over(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Part]:
+    """All parts over one turn from ``phi`` on, the last pose being the first one again.
+
+    An interval is run through to its end, back to its beginning and to ``phi`` again, which is its beginning if it lies
+    outside.  A march begins at 0.
+    """
+    family = find_family(mechanism)
+    if isinstance(family.domain, March):
+        steps = equal_steps(family.domain, np.empty((0, 0)), poses)
+        return [_closed(part) for part in parts(mechanism, design, steps)]
+    if isinstance(family.domain, Interval):
+        matrix, _ = design_matrix(family, design)
+        return parts(mechanism, design, _there_and_back(equal_steps(family.domain, matrix, 2), phi, poses))
+    return parts(mechanism, design, phi + np.linspace(0.0, 2.0 * math.pi, poses + 1))
+
+
+def _there_and_back(ends: Array, start: float, poses: int) -> Array:
+    low, high = ends
+    wide = high - low
+    run = (start - low if low < start < high else 0.0) + np.linspace(0.0, 2.0 * wide, poses + 1)
+    angles: Array = high - np.abs(np.mod(run, 2.0 * wide) - wide)
+    return angles
+
+
+def _closed(part: Part) -> Part:
+    """The first pose once more behind the last."""
+    return _taken(part, [*range(part.phi.size), 0], np.append(part.phi, 2.0 * math.pi))
+
+
+def _taken(part: Part, rows: list[int], phi: Array) -> Part:
+    joints = {name: path[rows] for name, path in part.joints.items()}
+    crank, position, status = part.crank[rows], part.position[rows], part.status[rows]
+    return replace(part, phi=phi, joints=joints, crank=crank, position=position, status=status)
+
+
+def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
+    """All parts in one position.
+
+    Raises
+    ------
+    InputError
+        for a march, whose poses depend on those before, if ``phi`` is none of its steps of half a degree.
+    """
+    domain = find_family(mechanism).domain
+    if not isinstance(domain, March):
+        return parts(mechanism, design, phi)
+    steps = equal_steps(domain, np.empty((0, 0)), STEPS)
+    k = round(phi / (2.0 * math.pi) * STEPS)
+    if not (0 <= k < STEPS and abs(steps[k] - phi) < 1e-9):
+        raise InputError("phi", phi, "a multiple of half a degree below a turn: a march has poses in steps", "export")
+    return [_taken(part, [k], steps[[k]]) for part in parts(mechanism, design, steps)]
 
 
 def side_by_side(found: Sequence[Part]) -> list[Placed]:

@@ -60,8 +60,17 @@ Mechanism: TypeAlias = "str | Sequence[str] | Mapping[str, Any] | Specification 
 """A family's name, a list of them for a chain, a table of members for a machine, or what `sweep.machine` made."""
 
 
+def chain_names(text: str) -> tuple[str, ...]:
+    """Names of the families of a chain in one text.
+
+    >>> chain_names("rssr+guide"), chain_names("rssr, guide"), chain_names("rssr")
+    (('rssr', 'guide'), ('rssr', 'guide'), ('rssr',))
+    """
+    return tuple(name.strip() for name in text.replace("+", ",").split(","))
+
+
 def family(name: Mechanism) -> Family:
-    """The family of that name, the chain of the families named in a list, or the machine of a table of members.
+    """The family of that name, the chain of the families named in a list or as "rssr+guide", or a machine of members.
 
     Raises
     ------
@@ -75,7 +84,8 @@ def family(name: Mechanism) -> Family:
     if isinstance(name, Specification):
         return _machine(name)
     if isinstance(name, str):
-        return _single(name)
+        parts = chain_names(name)
+        return _single(name) if len(parts) == 1 else _chain(parts)
     names = tuple(name) if isinstance(name, Sequence) else (name,)
     if not names or not all(isinstance(part, str) for part in names):
         raise InputError("family", name, f"one of {', '.join(NAMES)}, or a list of them", "family")

@@ -8,6 +8,7 @@ from kernels.families import backrest
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, guarded
 from sweep.families.capabilities import Points
 from sweep.families.domain import Interval
+from sweep.families.warp import skeleton
 
 FRAME = (
     Parameter("a1", "length", "warp stop motion, where the warp ends, to the right of the beam axis"),
@@ -106,12 +107,14 @@ def kernel_matrix(designs: Array, names: tuple[str, ...]) -> Array:
 
 def solved(matrix: Array, modes: np.ndarray, angles: Angles, wanted: frozenset[str], position: str) -> Columns:
     """Wanted outputs and status from the kernel; ``position`` is the entry's name of the bracket angle."""
-    shape, dtype = (len(matrix), angles.phi.shape[1]), matrix.dtype
+    shape, dtype = (len(matrix), angles.phi.shape[1]), np.result_type(matrix, angles.phi)
+    # the complex step goes through the radius too, or no extremum over the beam could be followed
+    matrix, radius = matrix.astype(dtype, copy=False), np.ascontiguousarray(angles.phi, dtype)
     status = np.empty(shape, np.uint8)
     needed = wanted | ({"K_couple"} if DRIFT.name in wanted else set())
     names = [[position, *(o.name for o in GEOMETRY[1:])], [o.name for o in LOADS], [o.name for o in BAND]]
     blocks = [None if needed.isdisjoint(group) else np.empty((len(group), *shape), dtype) for group in names]
-    backrest.poses(matrix, np.ascontiguousarray(angles.phi.real), modes, status, *blocks)
+    backrest.poses(matrix, radius, modes, status, *blocks)
     found: dict[str, Array] = {}
     for group, block in zip(names, blocks, strict=True):
         if block is not None:
@@ -152,5 +155,5 @@ FAMILY = Family(
     poses=guarded(poses),
     example=EXAMPLE | {"phi": 0.4, "turn": -0.15, "K0": 1482.0},
     domain=beam_of(_NAMES),
-    capabilities=(POINTS,),
+    capabilities=(POINTS, skeleton(PARAMETERS, "phi_rho")),
 )

@@ -8,6 +8,7 @@ from kernels.families import backrest
 from sweep.families import backrest as regulated
 from sweep.families.backrest_tension import PHI, SOUGHT
 from sweep.families.base import Angles, Array, Columns, Family, guarded
+from sweep.families.warp import skeleton
 
 PARAMETERS = (*regulated.FRAME, *SOUGHT, *regulated.BEAM)
 _NAMES = tuple(p.name for p in PARAMETERS)
@@ -28,5 +29,5 @@ FAMILY = Family(
     poses=guarded(poses),
     example=regulated.EXAMPLE | {"phi_lo": -0.5, "phi_hi": 0.6},
     domain=regulated.beam_of(_NAMES),
-    capabilities=(regulated.POINTS,),
+    capabilities=(regulated.POINTS, skeleton(PARAMETERS, "phi")),
 )

@@ -7,6 +7,7 @@ import numpy as np
 from kernels.families import backrest
 from sweep.families import backrest as regulated
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, guarded
+from sweep.families.warp import skeleton
 
 SOUGHT = (
     Parameter("phi_lo", "angle", "bracket angles are sought from here"),
@@ -43,5 +44,5 @@ FAMILY = Family(
     poses=guarded(poses),
     example=regulated.EXAMPLE | {"K0": 1482.0, "phi_lo": -0.1, "phi_hi": 1.2},
     domain=regulated.beam_of(_NAMES),
-    capabilities=(regulated.POINTS,),
+    capabilities=(regulated.POINTS, skeleton(PARAMETERS, "phi")),
 )

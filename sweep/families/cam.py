@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from kernels.families.cam import law, translating
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled
-from sweep.families.capabilities import Link, Made, Points, Skeleton
+from sweep.families.capabilities import Link, Points, Skeleton
 from sweep.families.skeletons import ORIGIN, X, line, parameter
 
 PHASES = (
@@ -36,7 +37,7 @@ PARAMETERS = (
     *TABLE,
 )
 
-POSE_OUTPUTS = (
+PROFILE_OUTPUTS = (
     Output("s", "length", "displacement of the follower from its rest", "(1)"),
     Output("ds", "length", "velocity analogue ds/dphi", "(1)"),
     Output("d2s", "length", "acceleration analogue", "(1)"),
@@ -45,6 +46,11 @@ POSE_OUTPUTS = (
     Output("x_p", "length", "pitch curve in the frame of the cam, along the direction of lift at phi = 0", "(8)"),
     Output("y_p", "length", "pitch curve in the frame of the cam, to the left of it", "(8)"),
 )
+ROLLER_OUTPUTS = (
+    Output("x_r", "length", "roller's centre in the fixed frame, along the direction of lift", "(6)"),
+    Output("y_r", "length", "roller's centre in the fixed frame, to the left of it", "(6)"),
+)
+_PROFILE = tuple(o.name for o in PROFILE_OUTPUTS)
 
 
 def cam_poses(
@@ -58,7 +64,15 @@ def cam_poses(
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its cam angles, each (n, m)."""
-    return cam_poses(translating.poses, tuple(o.name for o in POSE_OUTPUTS), designs, angles, wanted)
+    of_roller = wanted & {o.name for o in ROLLER_OUTPUTS}
+    found = cam_poses(translating.poses, _PROFILE, designs, angles, wanted | ({"s"} if of_roller else set()))
+    if of_roller:
+        s: Any = found["s"] if "s" in wanted else found.pop("s")
+        r0, e = (parameter(PARAMETERS, name, designs)[:, None] for name in ("r0", "e"))
+        with np.errstate(invalid="ignore"):  # an offset beyond the prime circle has its status
+            places = {"x_r": np.sqrt((r0 - e) * (r0 + e)) + s, "y_r": -e + 0.0 * s}
+        found |= {name: places[name] for name in of_roller}
+    return found
 
 
 def follower_line(designs: Array) -> tuple[Array, Array]:
@@ -68,28 +82,17 @@ def follower_line(designs: Array) -> tuple[Array, Array]:
     return at, np.tile(X, (len(designs), 1))
 
 
-def roller(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """The roller's centre in the fixed frame, (n, m, 3)."""
-    s = np.asarray(motion["s"], np.float64)
-    r0, e = (parameter(PARAMETERS, name, designs)[:, None] for name in ("r0", "e"))
-    return np.stack([np.sqrt((r0 - e) * (r0 + e)) + s, -e + 0.0 * s, np.zeros_like(s)], axis=-1)
-
-
 FAMILY = Family(
     name="cam",
     title="cam with a sliding roller follower",
     parameters=PARAMETERS,
     position="s",
-    pose_outputs=POSE_OUTPUTS,
+    pose_outputs=PROFILE_OUTPUTS + ROLLER_OUTPUTS,
     poses=poses,
     example={"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0},
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
     capabilities=(
-        Points({"p": ("x_p", "y_p", None)}),
-        Skeleton(
-            {"a": ORIGIN, "d": line(follower_line)},
-            (Link("cam", ("a",)), Link("follower", ("r",))),
-            {"r": Made(("s",), roller)},
-        ),
+        Points({"r": ("x_r", "y_r", None)}),
+        Skeleton({"a": ORIGIN, "d": line(follower_line)}, (Link("cam", ("a",)), Link("follower", ("r",)))),
     ),
 )

@@ -7,8 +7,8 @@ import numpy as np
 from kernels.families.cam import swinging
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
 from sweep.families.cam import PHASES, TABLE, cam_poses
-from sweep.families.capabilities import Link, Made, OutputLink, Skeleton
-from sweep.families.skeletons import ORIGIN, parameter, standing
+from sweep.families.capabilities import Dimensions, Link, Made, OutputLink, Skeleton
+from sweep.families.skeletons import ORIGIN, links, parameter, standing
 
 PARAMETERS = (
     Parameter("lift", "angle", "swing of the lever", positive=True),
@@ -44,8 +44,8 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 def lever_origin(designs: Array) -> Array:
     """The axis of the lever, (n, 3)."""
-    origin = np.zeros((len(designs), 3))
-    origin[:, 0] = designs[:, 8]
+    origin = np.zeros((len(designs), 3), designs.dtype)
+    origin[:, 0] = parameter(PARAMETERS, "e", designs)
     return origin
 
 
@@ -66,6 +66,7 @@ FAMILY = Family(
     example={"lift": 0.4, "r0": 3.0, "c": 5.0, "e": 6.0, "branch": -1.0},
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     capabilities=(
+        Dimensions(links("c")),
         OutputLink(lever_origin),
         Skeleton(
             {"a": ORIGIN, "d": standing(PARAMETERS, "e")},

@@ -226,6 +226,41 @@ class Skeleton:
 
 
 @dataclass(frozen=True)
+class Arm:
+    """A point that a link carries: its coordinates and those of the link's other joint, both from its first joint.
+
+    Each is the names of one to three parameters, along perpendicular directions fixed to the link; the first of both
+    is the same direction.
+    """
+
+    point: tuple[str, ...]
+    link: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Dimensions:
+    """Which parameters are the sizes of the moving links; limits on what can be made are about them.
+
+    Parameters
+    ----------
+    links : of every link the parameters of the vector between its two joints: its length, or the coordinates of one
+        joint from the other
+    optional : lengths of links that a design may lack; 0 stands for a link that is not there
+    arms : points that links carry beyond their joints
+    """
+
+    links: tuple[tuple[str, ...], ...]
+    optional: tuple[str, ...] = ()
+    arms: tuple[Arm, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All parameters that it is about."""
+        vectors = (*self.links, self.optional, *(side for arm in self.arms for side in (arm.point, arm.link)))
+        return tuple(dict.fromkeys(name for vector in vectors for name in vector))
+
+
+@dataclass(frozen=True)
 class Hardpoints:
     """The family's dimensions can be read off points of a drawing.
 

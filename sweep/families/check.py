@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from sweep.families.base import Family
-from sweep.families.capabilities import Assembly, JointRecords, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, JointRecords, OutputLink, Points, Skeleton
 from sweep.families.domain import Turn
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -115,6 +115,9 @@ def _capabilities(family: Family) -> list[str]:
             for one in made.needs
             if one not in names
         ]
+    lengths = {p.name for p in family.parameters if p.unit == "length"}
+    for dimensions in family.every(Dimensions):
+        faults += [f"Dimensions names {x!r}, which is no length" for x in dimensions.names if x not in lengths]
     turned = family.find(OutputLink) is not None
     if turned and family.position in names and not family.pose_output[family.position].wraps:
         faults.append("OutputLink turns by the position, which is no angle: mark it (wraps=True) or leave it out")

@@ -8,9 +8,9 @@ import numpy as np
 
 from kernels.families import cylindrical_looper
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Link, Made, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Points, Skeleton
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
-from sweep.families.skeletons import crank_axis, parameter, standing
+from sweep.families.skeletons import crank_axis, links, parameter, standing
 
 PARAMETERS = (
     Parameter("a1", "length", "crank that swings the shaft", positive=True),
@@ -22,7 +22,7 @@ PARAMETERS = (
     Parameter("alpha1", "angle", "angle from the axis of crank 1 to the looper's shaft", default=0.0),
     Parameter("branch1", "sign", "assembly mode of the swinging drive", default=1.0, choices=(-1.0, 1.0)),
     Parameter("a2", "length", "crank that moves the shaft along", positive=True),
-    Parameter("b2", "length", "coupler of the sliding drive; its ball lies on the shaft's axis", positive=True),
+    Parameter("b2", "length", "coupler of the sliding drive", positive=True),
     Parameter("e2", "length", "common perpendicular, from the axis of crank 2 to the shaft", default=0.0),
     Parameter("f2", "length", "offset of the plane of crank 2 along its axis", default=0.0),
     Parameter("alpha2", "angle", "90 deg minus the angle between the axis of crank 2 and the shaft", default=0.0),
@@ -33,7 +33,14 @@ PARAMETERS = (
     Parameter("p0x", "length", "working point at psi = s = 0, from the rocker's foot along x"),
     Parameter("p0y", "length", "working point at psi = s = 0, from the rocker's foot along y"),
     Parameter("p0z", "length", "working point at psi = s = 0, from the rocker's foot along the shaft"),
+    Parameter("d2", "length", "distance of the sliding drive's ball from the shaft's axis", default=0.0),
+    Parameter("beta2", "angle", "place of that ball about the shaft at psi = 0, from x", default=0.0),
+    Parameter("gamma2", "angle", "place of the frame of crank 2 about the shaft, of its x from x", default=0.0),
+    Parameter("mode", "choice", "which of several solutions of the same branches, where d2 is not 0", default=1.0,
+              choices=(1.0, 2.0)),
 )  # fmt: skip
+
+_D2 = [p.name for p in PARAMETERS].index("d2")
 
 SHAFT_OUTPUTS = (
     Output("psi", "rad", "angle of the shaft", "(3)", wraps=True),
@@ -68,7 +75,25 @@ _BLOCKS = (
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_blocks(cylindrical_looper.poses, designs, angles, _BLOCKS, wanted)
+    # what is no number counts even where the place of the ball does not
+    beside = (designs[:, _D2] != 0.0) | ~np.isfinite(designs[:, _D2:]).all(axis=1)
+    if not beside.any():
+        return filled_blocks(cylindrical_looper.poses, designs, angles, _BLOCKS, wanted)
+    if beside.all():
+        return filled_blocks(cylindrical_looper.coupled_poses, designs, angles, _BLOCKS, wanted)
+    return _of_both(designs, angles, wanted, beside)
+
+
+def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.ndarray) -> Columns:
+    """Poses of designs some of which have the second ball beside the axis."""
+    found: Columns = {}
+    for rows in (beside, ~beside):
+        own = angles if len(angles.cos) == 1 else Angles(*(np.ascontiguousarray(x[rows]) for x in angles))
+        for name, values in poses(np.ascontiguousarray(designs[rows]), own, wanted).items():
+            if name not in found:
+                found[name] = np.empty((len(designs), values.shape[1]), values.dtype)
+            found[name][rows] = values
+    return found
 
 
 def first_coupler_square(designs: Array) -> Array:
@@ -114,6 +139,7 @@ FAMILY = Family(
     },
     uses_phi=False,
     capabilities=(
+        Dimensions(links("a1 b1 c1 a2 b2")),
         Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
         Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")}),

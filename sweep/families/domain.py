@@ -69,3 +69,11 @@ class March:
 
 
 Domain: TypeAlias = Turn | Interval | March
+
+
+def equal_steps(domain: Domain, designs: Array, poses: int) -> Array:
+    """So many values of the variable for the first design: one turn from 0 in equal steps, or a whole interval."""
+    if isinstance(domain, Interval):
+        first, last = domain.ends(designs)
+        return np.linspace(float(first[0]), float(last[0]), poses, dtype=np.float64)
+    return np.arange(poses, dtype=np.float64) * (TWO_PI / poses)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from kernels.families import eyelet
-from sweep.families.base import Family, Output, Parameter, poses_of
-from sweep.families.capabilities import Points, ThreadPath
+from sweep.families.base import Array, Family, Output, Parameter, poses_of
+from sweep.families.capabilities import Fixed, Link, Points, Skeleton, ThreadPath
+from sweep.families.skeletons import crank_axis, parameter
 
 PARAMETERS = (
     Parameter("a", "length", "radius of the circle of the eyelet", positive=True),
@@ -37,6 +40,16 @@ _NAMES = tuple(o.name for o in POSE_OUTPUTS)
 poses = poses_of(eyelet.poses, _NAMES)
 
 
+def guide(number: int) -> Fixed:
+    """Guide 1 or 2, where the thread comes from and goes to."""
+
+    def at(designs: Array) -> Array:
+        e, x, y, z = (parameter(PARAMETERS, name.format(number), designs) for name in ("e", "dX{}", "dY{}", "Z{}"))
+        return np.stack([e + x, y, z], axis=1)
+
+    return Fixed(at, kind="point")
+
+
 FAMILY = Family(
     name="eyelet",
     title="thread take-up by an eyelet on a crank",
@@ -47,5 +60,12 @@ FAMILY = Family(
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP"},
     uses_phi=False,
     example={"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "P_h": 8.0},
-    capabilities=(Points({"eyelet": ("X_E", "Y_E", "Z_E")}), ThreadPath("wrap", "dP", "d2P")),
+    capabilities=(
+        Points({"eyelet": ("X_E", "Y_E", "Z_E")}),
+        ThreadPath("wrap", "dP", "d2P"),
+        Skeleton(
+            {"a": crank_axis(PARAMETERS, "f", "alpha"), "n1": guide(1), "n2": guide(2)},
+            (Link("crank", ("a", "eyelet")), Link("thread 1", ("n1", "eyelet")), Link("thread 2", ("eyelet", "n2"))),
+        ),
+    ),
 )

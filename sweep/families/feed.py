@@ -8,8 +8,8 @@ from kernels.families import feed
 from kernels.families.feed.events import OUTPUTS as _EVENTS
 from kernels.families.feed.motion import OUTPUTS as _POSES
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import Link, Points, Skeleton
-from sweep.families.skeletons import standing
+from sweep.families.capabilities import Arm, Dimensions, Link, Points, Skeleton
+from sweep.families.skeletons import links, standing
 
 ROCKER = (
     Parameter("h_a", "length", "horizontal chain: crank", positive=True),
@@ -117,6 +117,16 @@ EXAMPLE = {
 }  # fmt: skip
 
 
+SKELETON = Skeleton(
+    {"d": standing(PARAMETERS, "h_e"), "l": standing(PARAMETERS, "xE", "yE")},
+    (
+        Link("rocker", ("d", "h")), Link("eccentric", ("l", "e")),
+        Link("lift coupler", ("e", "f")), Link("rack", ("h", "f", "t")),
+    ),
+)  # fmt: skip
+_RACK = ("fx", "fy")
+SIZES = Dimensions((*links("h_a h_b h_c rh q"), _RACK), optional=("rE",), arms=(Arm(("tx", "ty"), _RACK),))
+
 FAMILY = Family(
     name="feed",
     title="feed rack on a horizontal and a lift chain",
@@ -132,13 +142,8 @@ FAMILY = Family(
     },
     uses_phi=False,
     capabilities=(
+        SIZES,
         Points({k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")}),
-        Skeleton(
-            {"d": standing(PARAMETERS, "h_e"), "l": standing(PARAMETERS, "xE", "yE")},
-            (
-                Link("rocker", ("d", "h")), Link("eccentric", ("l", "e")),
-                Link("lift coupler", ("e", "f")), Link("rack", ("h", "f", "t")),
-            ),
-        ),
+        SKELETON,
     ),
 )  # fmt: skip

@@ -7,8 +7,10 @@ import numpy as np
 from kernels.families import feed
 from kernels.families.feed import triad
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Points
+from sweep.families.capabilities import Dimensions, Link, Made, Points, Skeleton
 from sweep.families.feed import ROCKER, SIGMA
+from sweep.families.rssr import FAMILY as CRANK_ROCKER
+from sweep.families.skeletons import links, parameter, standing
 
 
 def _eccentric(number: int) -> tuple[Parameter, ...]:
@@ -59,6 +61,41 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return {name: x for name, x in zip(triad.OUTPUTS, outputs, strict=True) if name in wanted} | {"status": status}
 
 
+def _columns(designs: Array, *names: str) -> list[Array]:
+    return [parameter(PARAMETERS, name, designs)[:, None] for name in names]
+
+
+def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
+    """H, on the arm of the horizontal chain's rocker."""
+    chain = np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(PARAMETERS, SIGMA.name, designs)])
+    psi = np.asarray(CRANK_ROCKER.poses(chain, angles, frozenset({"psi"}))["psi"], np.float64)
+    e, arm, ahead = _columns(designs, "h_e", "rh", "dh")
+    return np.stack([e + arm * np.cos(psi + ahead), arm * np.sin(psi + ahead), 0.0 * psi], axis=-1)
+
+
+def eccentric(number: int) -> Made:
+    """Centre of an eccentric."""
+
+    def at(designs: Array, angles: Angles, found: Columns) -> Array:
+        x, y, radius, ahead = _columns(designs, *(f"{name}{number}" for name in ("xE", "yE", "rE", "dE")))
+        turn = angles.phi + ahead
+        return np.stack([x + radius * np.cos(turn), y + radius * np.sin(turn), 0.0 * turn], axis=-1)
+
+    return Made((), at)
+
+
+def rack_joint(number: int) -> Made:
+    """Joint of a link on the rack."""
+
+    def at(designs: Array, angles: Angles, found: Columns) -> Array:
+        x, y, chi = (np.asarray(found[name], np.float64) for name in ("x_t", "y_t", "chi"))
+        along, across = _columns(designs, f"f{number}x", f"f{number}y")
+        cos, sin = np.cos(chi), np.sin(chi)
+        return np.stack([x + along * cos - across * sin, y + along * sin + across * cos, 0.0 * chi], axis=-1)
+
+    return Made(("x_t", "y_t", "chi"), at)
+
+
 EXAMPLE = {
     "h_a": 0.5, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "rh": 1.2, "xE2": 2.0, "yE2": -2.5, "rE2": 0.15, "dE2": 0.3,
     "xE3": 5.5, "yE3": -2.5, "rE3": 0.15, "dE3": 0.5, "f1x": -1.0, "f1y": -0.5, "f2x": -0.8, "f2y": -0.6, "f3x": 1.2,
@@ -77,5 +114,23 @@ FAMILY = Family(
     derivative_of={
         "x_t": "dx_t", "dx_t": "d2x_t", "y_t": "dy_t", "dy_t": "d2y_t", "chi": "dchi", "dchi": "d2chi",
     },
-    capabilities=(Points({"t": ("x_t", "y_t", None)}),),
+    capabilities=(
+        Dimensions(links("h_a h_b h_c rh q1 q2 q3"), optional=("rE2", "rE3")),
+        Points({"t": ("x_t", "y_t", None)}),
+        Skeleton(
+            {
+                "d": standing(PARAMETERS, "h_e"), "l2": standing(PARAMETERS, "xE2", "yE2"),
+                "l3": standing(PARAMETERS, "xE3", "yE3"),
+            },
+            (
+                Link("rocker", ("d", "h")), Link("eccentric 2", ("l2", "e2")), Link("eccentric 3", ("l3", "e3")),
+                Link("link 1", ("h", "f1")), Link("link 2", ("e2", "f2")), Link("link 3", ("e3", "f3")),
+                Link("rack", ("f1", "f2", "f3", "t")),
+            ),
+            {
+                "h": Made((), rocker_pin), "e2": eccentric(2), "e3": eccentric(3),
+                "f1": rack_joint(1), "f2": rack_joint(2), "f3": rack_joint(3),
+            },
+        ),
+    ),
 )  # fmt: skip

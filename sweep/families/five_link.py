@@ -6,7 +6,7 @@ from kernels.families import five_link
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
 from sweep.families.capabilities import Assembly, Link, OutputLink, Points, Skeleton
-from sweep.families.skeletons import CRANK, ROCKER, crank_axis, standing
+from sweep.families.skeletons import CRANK, CRANK_ROCKER_SIZES, ROCKER, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -74,6 +74,7 @@ FAMILY = Family(
     outward="branch",
     uses_phi=False,
     capabilities=(
+        CRANK_ROCKER_SIZES,
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")}),
         OutputLink(crank_rocker.rocker_origin),

@@ -6,11 +6,15 @@ import numpy as np
 
 from kernels.effects.foot import OUTPUTS as _EVENTS
 from kernels.effects.foot import march
+from kernels.effects.foot_fabric import march_on_fabric
 from kernels.families import foot
 from kernels.families.foot.harmonic import OUTPUTS as _CLOSED
 from kernels.status import NO_EVENT, OK
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, Work, guarded
+from sweep.families.capabilities import Link, Made, Skeleton
 from sweep.families.domain import March
+from sweep.families.skeletons import Y as UPWARDS
+from sweep.families.skeletons import parameter, standing
 
 FOOT = (
     Parameter("m", "mass", "foot with its bar", positive=True),
@@ -21,12 +25,18 @@ FOOT = (
 RESTITUTION = Parameter("restitution", "ratio", "of the foot against rack and plate, below 1; 0 does not bounce",
                         default=0.0, not_negative=True)  # fmt: skip
 
+FABRIC = (
+    Parameter("kf", "stiffness", "of the fabric between foot and ground; 0: rigid", default=0.0, not_negative=True),
+    Parameter("cf", "damping", "of the fabric, which takes the place of restitution", default=0.0, not_negative=True),
+)
+
 PARAMETERS = (
     *FOOT,
     Parameter("Y", "length", "amplitude of the rack's height", positive=True),
     Parameter("p", "length", "depth of the rack's middle below the plate"),
     RESTITUTION,
     Parameter("X", "length", "half of the rack's travel along the feed", default=0.0),
+    *FABRIC,
 )
 
 CLOSED_OUTPUTS = (
@@ -57,8 +67,8 @@ EVENT_OUTPUTS = (
     Output("stitch_error", "1", "lost_travel over the way of the rack above the plate", "(11)"),
     Output("impact_speed", "length/time", "greatest relative speed of an impact in a turn", "(7)"),
     Output("impulse", "N s", "greatest impulse of an impact in a turn", "(9)"),
-    Output("least_force", "N", "least contact force above the plate, if the foot follows the rack; (5) at the nodes",
-           "(5)"),
+    Output("least_force", "N", "least contact force above the plate, if the foot follows the rack; (5) at the nodes; "
+           "on fabric the least of the march", "(5), (14)"),
     Output("most_force", "N", "greatest force between the foot and rack or plate, impacts apart", "(5)"),
     Output("settled", "1", "1 if the foot lies on the plate when the rack is lowest: every turn is alike", "(12)",
            jumps=True),
@@ -66,14 +76,23 @@ EVENT_OUTPUTS = (
 
 TURNS = 4
 NODES = 720
+FEET = [0, 1, 2, 3, 6, 8, 9]  # columns of what the march takes
 
 
 def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
-    """Events, status and the heights and forces at the nodes of the last turn."""
+    """Events, status and the heights and forces at the nodes of the last turn.
+
+    ``feet`` (n, 7) are mass, spring, preload, speed, restitution, stiffness and damping of the fabric.
+    """
     n = len(path)
     status, values = np.empty(n, np.uint8), np.empty((len(_EVENTS), n))
     heights, forces = np.empty((n, path.shape[2])), np.empty((n, path.shape[2]))
-    march(path, np.ascontiguousarray(feet), TURNS, status, values, heights, forces)
+    soft = (feet[:, 5] != 0.0) | (feet[:, 6] != 0.0)
+    for rows, kernel, count in ((~soft, march, 5), (soft, march_on_fabric, 7)):
+        if rows.any():
+            room = status[rows], values[:, rows], heights[rows], forces[rows]
+            kernel(path[rows], np.ascontiguousarray(feet[rows, :count]), TURNS, *room)
+            status[rows], values[:, rows], heights[rows], forces[rows] = room
     columns: dict[str, Array] = dict(zip(_EVENTS, values, strict=True))
     travel = columns.pop("travel")
     with np.errstate(all="ignore"):
@@ -107,7 +126,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design over one turn in equal steps from 0, each (n, m)."""
     nodes, apart = nodes_for(angles.phi.shape[1])
     path = path_of(designs, nodes)
-    columns, heights, forces = marched(path, designs[:, [0, 1, 2, 3, 6]])
+    columns, heights, forces = marched(path, designs[:, FEET])
     found: Columns = {"y_rack": path[:, 0, ::apart], "y_foot": heights[:, ::apart], "force": forces[:, ::apart]}
     status = np.repeat(np.asarray(columns["status"], np.uint8)[:, None], angles.phi.shape[1], axis=1)
     return {name: x for name, x in found.items() if name in wanted} | {"status": status}
@@ -123,8 +142,20 @@ def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
 
 def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Loss of contact, landing, impacts and what they cost, of the last turn marched."""
-    columns, _, _ = marched(path_of(designs, NODES), designs[:, [0, 1, 2, 3, 6]])
+    columns, _, _ = marched(path_of(designs, NODES), designs[:, FEET])
     return chosen(columns, wanted)
+
+
+def foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
+    """The foot, above the middle of the rack's travel."""
+    y = np.asarray(found["y_foot"], np.float64)
+    return np.stack([0.0 * y, y, 0.0 * y], axis=-1)
+
+
+def rack_place(designs: Array, angles: Angles, found: Columns) -> Array:
+    """The rack's tooth."""
+    y = np.asarray(found["y_rack"], np.float64)
+    return np.stack([-parameter(PARAMETERS, "X", designs)[:, None] * np.cos(angles.phi) + 0.0 * y, y, 0.0 * y], axis=-1)
 
 
 EXAMPLE = {"m": 0.05, "k": 3000.0, "F0": 6.0, "omega": 400.0, "Y": 1.5e-3, "p": 0.5e-3, "X": 1e-3}
@@ -144,4 +175,11 @@ FAMILY = Family(
     ),
     example=EXAMPLE,
     analytic=False,
+    capabilities=(
+        Skeleton(
+            {"d": standing(PARAMETERS, axis=UPWARDS, kind="slide")},
+            (Link("foot", ("p",)), Link("rack", ("t",))),
+            {"p": Made(("y_foot",), foot_place), "t": Made(("y_rack",), rack_place)},
+        ),
+    ),
 )

@@ -14,8 +14,10 @@ from sweep.families import guide
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
 from sweep.families.capabilities import (
+    Arm,
     Assembly,
     CrankRockerLoop,
+    Dimensions,
     JointRecords,
     Link,
     OutputLink,
@@ -24,7 +26,7 @@ from sweep.families.capabilities import (
     Skeleton,
 )
 from sweep.families.hardpoints import FOUR_BAR_POINTS
-from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, standing
+from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, links, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -142,6 +144,7 @@ FAMILY = Family(
     outward="branch",
     uses_phi=False,
     capabilities=(
+        Dimensions(links("a b c"), arms=(Arm(("xi", "eta"), ("b",)),)),
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         JointRecords(joint_records, crank_rocker.JOINT_NEEDS, "rocker"),
         PressureEllipse(ellipse),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from kernels.families import free_cam
-from sweep.families.base import Family, Output, Parameter, poses_of
-from sweep.families.capabilities import Points, ThreadPath
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, poses_of
+from sweep.families.capabilities import Link, Made, Points, Skeleton, ThreadPath
+from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
     Parameter("a", "1/length", "bend of the edge x = a y^2 in the axes of the cam", not_negative=True),
@@ -37,6 +40,39 @@ _NAMES = tuple(o.name for o in POSE_OUTPUTS)
 poses = poses_of(free_cam.poses, _NAMES)
 
 
+EDGE = {"k1": -1.0, "k2": -0.5, "k3": 0.5, "k4": 1.0}
+
+
+def edge_point(share: float) -> Made:
+    """A point of the edge, at a share of the larger distance of a guide from the cam axis."""
+
+    def at(designs: Array, angles: Angles, found: Columns) -> Array:
+        x1, y1, x2, y2, a = (parameter(PARAMETERS, name, designs) for name in ("X1", "Y1", "X2", "Y2", "a"))
+        y = share * np.maximum(np.hypot(x1, y1), np.hypot(x2, y2))
+        return turned(a * y * y, y, angles)
+
+    return Made((), at)
+
+
+def turned(x: Array, y: Array, angles: Angles) -> Array:
+    """Points of the cam, (n,) or (n, m) each in its own axes, turned with it: (n, m, 3)."""
+    x, y = (values if values.ndim == 2 else values[:, None] for values in (x, y))
+    x, y = x * angles.cos - y * angles.sin, x * angles.sin + y * angles.cos
+    return np.stack([x, y, 0.0 * x], axis=-1)
+
+
+SKELETON_FIXED = {
+    "a": ORIGIN,
+    "n1": standing(PARAMETERS, "X1", "Y1", "Z1", axis=None, kind="point"),
+    "n2": standing(PARAMETERS, "X2", "Y2", "Z2", axis=None, kind="point"),
+}
+LINKS = (
+    Link("cam", ("k1", "k2", "a", "k3", "k4")),
+    Link("thread 1", ("n1", "contact")),
+    Link("thread 2", ("contact", "n2")),
+)
+EDGE_POINTS = {name: edge_point(share) for name, share in EDGE.items()}
+
 FAMILY = Family(
     name="free_cam",
     title="thread take-up by the bare edge of a turning cam, without friction",
@@ -47,5 +83,9 @@ FAMILY = Family(
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP"},
     uses_phi=False,
     example={"a": 0.4, "X1": 0.83, "Y1": -2.08, "Z1": -3.56, "X2": 3.3, "Y2": -0.85, "Z2": 3.7},
-    capabilities=(Points({"contact": ("X", "Y", None)}), ThreadPath("wrap", "dP", "d2P")),
+    capabilities=(
+        Points({"contact": ("X", "Y", None)}),
+        ThreadPath("wrap", "dP", "d2P"),
+        Skeleton(SKELETON_FIXED, LINKS, EDGE_POINTS),
+    ),
 )

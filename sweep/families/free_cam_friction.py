@@ -7,7 +7,9 @@ import numpy as np
 from kernels.families import free_cam
 from sweep.families import free_cam as frictionless
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, optional_outputs
+from sweep.families.capabilities import Made, Skeleton
 from sweep.families.domain import March
+from sweep.families.skeletons import parameter
 
 PARAMETERS = (
     *frictionless.PARAMETERS,
@@ -48,6 +50,16 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return {name: found[name] for name in found if name in wanted} | {"status": status}
 
 
+def contact(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Where the thread passes the plane of the cam: on the edge, or on the straight line between the guides."""
+    y, on = (np.asarray(found[name], np.float64) for name in ("y_contact", "contact"))
+    at = frictionless.turned(parameter(PARAMETERS, "a", designs)[:, None] * y * y, y, angles)
+    guides = (np.stack([parameter(PARAMETERS, f"{axis}{k}", designs) for axis in "XYZ"], axis=1) for k in (1, 2))
+    first, second = (guide[:, None, :] for guide in guides)
+    straight = first + (second - first) * (first[..., 2:] / (first[..., 2:] - second[..., 2:]))
+    return np.where(on[..., None] == 1.0, at, straight)
+
+
 FAMILY = Family(
     name="free_cam_friction",
     title="thread take-up by the bare edge of a turning cam, with friction",
@@ -57,5 +69,12 @@ FAMILY = Family(
     poses=poses,
     domain=DOMAIN,
     analytic=False,
+    capabilities=(
+        Skeleton(
+            frictionless.SKELETON_FIXED,
+            frictionless.LINKS,
+            frictionless.EDGE_POINTS | {"contact": Made(("y_contact", "contact"), contact)},
+        ),
+    ),
     example={**frictionless.FAMILY.example, "mu": 0.3, "tension_ratio": 1.5},
 )

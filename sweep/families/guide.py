@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from kernels.families import guide
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
 from sweep.families.capabilities import (
+    Arm,
     Assembly,
     CrankRockerLoop,
+    Dimensions,
     GuidedPoint,
     JointRecords,
     Link,
@@ -19,7 +24,7 @@ from sweep.families.capabilities import (
     ToolPoint,
 )
 from sweep.families.hardpoints import GUIDE_POINTS
-from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, parameter, standing
+from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -54,18 +59,41 @@ JOINT_OUTPUTS = (
     Output("y_m", "length", "coupler point, across the frame", "(6)"),
 )
 
+POINT_OUTPUTS = (
+    Output("dx_m", "length", "velocity analogue of the coupler point along the frame", "(6)"),
+    Output("dy_m", "length", "velocity analogue of the coupler point across the frame", "(6)"),
+    Output("d2x_m", "length", "acceleration analogue of the coupler point along the frame", "(6)"),
+    Output("d2y_m", "length", "acceleration analogue of the coupler point across the frame", "(6)"),
+)
+
 _VALUES = tuple(o.name for o in VALUE_OUTPUTS)
 _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
+_POINT = {"dx_m": ("ds", "ddev"), "dy_m": ("ds", "ddev"), "d2x_m": ("d2s", "d2dev"), "d2y_m": ("d2s", "d2dev")}
+_LAM = [p.name for p in PARAMETERS].index("lam")
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_with_places(guide.poses, designs, angles, _VALUES, _JOINTS, wanted)
+    return _with_point(guide.poses, designs, angles, wanted)
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """As :func:`poses`, in twice the working precision; for float64 only."""
-    return filled_with_places(guide.precise_poses, designs, angles, _VALUES, _JOINTS, wanted)
+    return _with_point(guide.precise_poses, designs, angles, wanted)
+
+
+def _with_point(kernel: Callable[..., object], designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """The kernel's outputs, and the coupler point's rates along and across the line turned into the frame."""
+    own = [name for name in _POINT if name in wanted]
+    if not own:
+        return filled_with_places(kernel, designs, angles, _VALUES, _JOINTS, wanted)
+    needed = (wanted - set(own)).union(*(_POINT[name] for name in own))
+    found: dict[str, Any] = dict(filled_with_places(kernel, designs, angles, _VALUES, _JOINTS, frozenset(needed)))
+    cos, sin = np.cos(designs[:, [_LAM]]), np.sin(designs[:, [_LAM]])
+    for name in own:
+        along, across = (found[part] for part in _POINT[name])
+        found[name] = along * cos - across * sin if "x" in name else along * sin + across * cos
+    return {name: found[name] for name in (*wanted, "status")}
 
 
 def as_crank_rocker(designs: Array) -> Array:
@@ -116,12 +144,16 @@ FAMILY = Family(
     title="planar four-bar with a guided coupler point",
     parameters=PARAMETERS,
     position="s",
-    pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
+    pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS + POINT_OUTPUTS,
     poses=poses,
-    derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s", "dev": "ddev", "ddev": "d2dev"},
+    derivative_of={
+        "s": "ds", "ds": "d2s", "d2s": "d3s", "dev": "ddev", "ddev": "d2dev",
+        "x_m": "dx_m", "dx_m": "d2x_m", "y_m": "dy_m", "dy_m": "d2y_m",
+    },
     outward="branch",
     uses_phi=False,
     capabilities=(
+        Dimensions(links("a b c"), arms=(Arm(("xi", "eta"), ("b",)),)),
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         JointRecords(joint_records, (), "rocker"),
         PressureEllipse(ellipse),
@@ -142,4 +174,4 @@ FAMILY = Family(
     ),
     precise_poses=precise_poses,
     example={"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "lam": 1.1, "h": -0.6, "branch": 1.0},
-)
+)  # fmt: skip

@@ -17,7 +17,8 @@ from sweep.families.base import (
     Work,
     filled_with_places,
 )
-from sweep.families.capabilities import Points, ThreadPath
+from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton, ThreadPath
+from sweep.families.skeletons import Y, line, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
 PARAMETERS = (
@@ -89,6 +90,35 @@ def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     return found | {"status": status}
 
 
+def cam_axis(designs: Array) -> Array:
+    """Centre of the cam on the follower's way: R0 behind the least displacement, which is one of the whole turn."""
+    least = np.asarray(size(designs, frozenset({"least_displacement"}), Accuracy())["least_displacement"], np.float64)
+    e, radius = (parameter(PARAMETERS, name, designs) for name in ("e", "R0"))
+    return np.stack([e, least - radius, np.zeros(len(designs))], axis=1)
+
+
+def follower_line(designs: Array) -> tuple[Array, Array]:
+    """The follower's way: across the line of the guides."""
+    e = parameter(PARAMETERS, "e", designs)
+    return np.stack([e, 0.0 * e, 0.0 * e], axis=1), np.tile(np.array(Y), (len(designs), 1))
+
+
+def follower(designs: Array, angles: Angles, found: Columns) -> Array:
+    """The end of the follower, which lies on the cam and carries the thread."""
+    s = np.asarray(found["S"], np.float64)
+    return np.stack([np.broadcast_to(parameter(PARAMETERS, "e", designs)[:, None], s.shape), s, 0.0 * s], axis=-1)
+
+
+def guide(side: float) -> Fixed:
+    """One of the two guides, on either side of the plane of the cam."""
+
+    def at(designs: Array) -> Array:
+        x, z = (parameter(PARAMETERS, name, designs) for name in ("X1", "Z1"))
+        return np.stack([x, 0.0 * x, side * z], axis=1)
+
+    return Fixed(at, kind="point")
+
+
 FAMILY = Family(
     name="guided_cam",
     title="thread take-up by a cam with a guided follower",
@@ -100,5 +130,23 @@ FAMILY = Family(
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},
     uses_phi=False,
     example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
-    capabilities=(Points({"profile": ("X_P", "Y_P", None)}), ThreadPath(WRAP.name, "dP", "d2P")),
+    capabilities=(
+        Points({"profile": ("X_P", "Y_P", None)}),
+        ThreadPath(WRAP.name, "dP", "d2P"),
+        Skeleton(
+            {
+                "a": Fixed(cam_axis, standing(PARAMETERS).axis),
+                "d": line(follower_line),
+                "n1": guide(1.0),
+                "n2": guide(-1.0),
+            },
+            (
+                Link("cam", ("a", "r")),
+                Link("follower", ("r",)),
+                Link("thread 1", ("n1", "r")),
+                Link("thread 2", ("r", "n2")),
+            ),
+            {"r": Made(("S",), follower)},
+        ),
+    ),
 )

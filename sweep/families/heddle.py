@@ -6,7 +6,8 @@ import numpy as np
 
 from kernels.families import heddle
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, Points
+from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, Made, Points, Skeleton
+from sweep.families.skeletons import ORIGIN, Y, Z, line, links, parameter, standing
 
 PARAMETERS = (
     Parameter("O2B", "length", "arm of the cam lever", positive=True),
@@ -65,6 +66,54 @@ def rod_square(designs: Array) -> Array:
     return square
 
 
+def _column(name: str, designs: Array) -> Array:
+    return parameter(PARAMETERS, name, designs)
+
+
+def shaft_pivot(designs: Array) -> Array:
+    """O4, along O2O3 behind O3: the picture lays both frames along one line."""
+    x = _column("O2O3", designs) + _column("O3O4", designs)
+    return np.stack([x, 0.0 * x, 0.0 * x], axis=1)
+
+
+def shaft_line(designs: Array) -> tuple[Array, Array]:
+    """The vertical on which the shaft moves: through the slide of its rod, of a long rod through E at mid-stroke."""
+    at = shaft_pivot(designs)
+    at[:, 0] += np.where(_column("EG", designs) > 0.0, _column("x_s", designs), _column("O4E", designs))
+    return at, np.tile(np.array(Y), (len(designs), 1))
+
+
+def _arm(pivot: Array, length: Array, angle: Array) -> Array:
+    """The end of an arm at an angle from x, (n, m, 3)."""
+    end: Array = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1) * length[:, None, None]
+    return pivot[:, None, :] + end
+
+
+def lower_arm(designs: Array, angles: Angles, found: Columns) -> Array:
+    """D: the lower arm of the bell crank, square to O3O4 at mid-stroke."""
+    x = _column("O2O3", designs)
+    turn = np.asarray(found["chi"], np.float64) - _column("chi_mid", designs)[:, None]
+    pivot = np.stack([x, 0.0 * x, 0.0 * x], axis=1)
+    return _arm(pivot, _column("O3D", designs) * _column("side_F", designs), turn + 0.5 * np.pi)
+
+
+def shaft_lever(designs: Array, angles: Angles, found: Columns) -> Array:
+    """E: the arm of the shaft lever to the heddle rod, horizontal at mid-stroke."""
+    return _arm(shaft_pivot(designs), _column("O4E", designs), np.asarray(found["lam"], np.float64))
+
+
+def shaft_lever_back(designs: Array, angles: Angles, found: Columns) -> Array:
+    """F: the arm of the shaft lever to the link, square to the other one."""
+    length = _column("O4F", designs) * _column("side_F", designs)
+    return _arm(shaft_pivot(designs), length, np.asarray(found["lam"], np.float64) + 0.5 * np.pi)
+
+
+def shaft(designs: Array, angles: Angles, found: Columns) -> Array:
+    """G: the heddle shaft on its vertical."""
+    y = np.asarray(found["y"], np.float64)
+    return shaft_line(designs)[0][:, None, :] + np.stack([0.0 * y, y, 0.0 * y], axis=-1)
+
+
 EXAMPLE = {"O2B": 30.0, "BC": 150.0, "O3C": 70.0, "O2O3": 155.0, "O4E": 138.5, "chi_mid": 1.85}
 
 
@@ -79,7 +128,23 @@ FAMILY = Family(
     derivative_of={"chi": "dchi", "dchi": "d2chi", "d2chi": "d3chi", "y": "dy", "dy": "d2y", "d2y": "d3y"},
     uses_phi=False,
     capabilities=(
+        Dimensions(links("O2B BC O3C O4E"), optional=("O3D", "O4F", "DF", "EG")),
         Assembly("discriminant", "pressure_angle", rod_square),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
+        Skeleton(
+            {
+                "o2": ORIGIN, "o3": standing(PARAMETERS, "O2O3"),
+                "o4": Fixed(shaft_pivot, standing(PARAMETERS, axis=Z).axis), "line": line(shaft_line),
+            },
+            (
+                Link("cam lever", ("o2", "b")), Link("rod", ("b", "c")), Link("bell crank", ("o3", "c", "d")),
+                Link("link", ("d", "f")), Link("shaft lever", ("o4", "f", "e")), Link("heddle rod", ("e", "g")),
+                Link("shaft", ("g",)),
+            ),
+            {
+                "d": Made(("chi",), lower_arm), "e": Made(("lam",), shaft_lever), "f": Made(("lam",), shaft_lever_back),
+                "g": Made(("y",), shaft),
+            },
+        ),
     ),
-)
+)  # fmt: skip

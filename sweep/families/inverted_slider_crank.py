@@ -6,8 +6,8 @@ import numpy as np
 
 from kernels.families import inverted_slider_crank
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, Link, Made, OutputLink, Points, Skeleton
-from sweep.families.skeletons import CRANK, ORIGIN, parameter, standing
+from sweep.families.capabilities import Assembly, Dimensions, Link, Made, OutputLink, Points, Skeleton
+from sweep.families.skeletons import CRANK, ORIGIN, links, parameter, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -76,6 +76,7 @@ FAMILY = Family(
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi", "s": "ds", "ds": "d2s"},
     uses_phi=False,
     capabilities=(
+        Dimensions(links("a")),
         Assembly("discriminant", "pressure_angle", _one),
         Points({"b": ("x_b", "y_b", None)}),
         OutputLink(rocker_origin),

@@ -14,9 +14,17 @@ from kernels import status as st
 from kernels.families import rssr
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
-from sweep.families.capabilities import Assembly, CrankRockerLoop, JointRecords, Points, PressureEllipse, Skeleton
+from sweep.families.capabilities import (
+    Assembly,
+    CrankRockerLoop,
+    Dimensions,
+    JointRecords,
+    Points,
+    PressureEllipse,
+    Skeleton,
+)
 from sweep.families.placing import move_records
-from sweep.families.skeletons import CRANK_ROCKER, standing
+from sweep.families.skeletons import CRANK_ROCKER, links, standing
 
 PARAMETERS = (
     Parameter("r", "length", "crank", positive=True),
@@ -203,6 +211,7 @@ FAMILY = Family(
     derivative_of={"alpha": "dalpha", "dalpha": "d2alpha", "d2alpha": "d3alpha"},
     uses_phi=False,
     capabilities=(
+        Dimensions(links("r l h")),
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         JointRecords(joint_records, (), "rocker"),
         PressureEllipse(ellipse),

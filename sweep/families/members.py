@@ -15,7 +15,7 @@ from sweep.families.base import Angles, Array, Columns, Event, Family, Output, P
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.located import EYE, TIP, coordinates, coupler_joints, velocity
 from sweep.families.placing import AXES, Place
-from sweep.families.relations import Frame, Relation, Timing
+from sweep.families.relations import Frame, Reading, Relation, Timing
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Machine(Family):
 
     members: tuple[Member, ...] = ()
     relations: tuple[Relation, ...] = ()
-    timings: tuple[Timing, ...] = ()
+    timings: tuple[Timing | Reading, ...] = ()
 
     def member(self, name: str) -> Member:
         """The member of that name."""
@@ -146,11 +146,13 @@ class Machine(Family):
         return _built(self, tuple(replace(m, family=families.get(m.name, m.family)) for m in self.members))
 
 
-def assemble(name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | Event, ...]) -> Machine:
+def assemble(
+    name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | Reading | Event, ...]
+) -> Machine:
     """The machine of these members; each may be driven by one that stands before it."""
-    timings = tuple(r for r in relations if isinstance(r, Timing))
+    timings = tuple(r for r in relations if isinstance(r, Timing | Reading))
     events = tuple(r for r in relations if isinstance(r, Event))
-    others = tuple(r for r in relations if not isinstance(r, Timing | Event))
+    others = tuple(r for r in relations if not isinstance(r, Timing | Reading | Event))
     bare = Machine(name, "", (), "", (), _no_poses, relations=others, timings=timings, events=events)
     return _built(bare, members)
 
@@ -241,10 +243,10 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             columns = _member(m, designs, angles, own, found)
             np.copyto(status, columns.pop("status"), where=status == OK)
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
+    frames = {m.name: Frame(m.place.rotation, m.origin(designs)) for m in machine.members} if relations else {}
     found["phi"] = angles.phi
     columns_of = machine.parameter_names
     found |= {p.name: designs[:, [columns_of.index(p.name)]] for r in relations for p in r.parameters}
-    frames = {m.name: Frame(m.place.rotation, m.origin(designs)) for m in machine.members} if relations else {}
     for relation in relations:
         found |= relation.compute(found, frames, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}

@@ -30,6 +30,7 @@ class Relation(Protocol):
     def name(self) -> str: ...  # noqa: D102
     @property
     def outputs(self) -> tuple[Output, ...]: ...  # noqa: D102
+
     @property
     def parameters(self) -> tuple[Parameter, ...]: ...  # noqa: D102
 
@@ -56,6 +57,24 @@ class Timing:
         """The difference."""
         first, second = self.places
         return Output(self.name, "rad", f"crank angle from {first} to {second}, in (-pi, pi]", "ours")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Value of a pose output where something happens, such as the speed of a tip where it arrives.
+
+    ``of`` is the pose output as the machine has it; ``places`` holds one design output that is a crank angle of the
+    main shaft, such as "phi_arrive".
+    """
+
+    name: str
+    of: Output
+    places: tuple[str]
+
+    @property
+    def output(self) -> Output:
+        """The value."""
+        return Output(self.name, self.of.unit, f"{self.of.name} at {self.places[0]}", "ours", wraps=self.of.wraps)
 
 
 @dataclass(frozen=True)

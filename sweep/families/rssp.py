@@ -9,7 +9,7 @@ from kernels.families import rssp
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
 from sweep.families.capabilities import Assembly, JointRecords, LimitLocus, Points, PressureEllipse, Skeleton
 from sweep.families.hardpoints import SLIDER_CRANK_POINTS
-from sweep.families.skeletons import SLIDER_CRANK, Y, crank_axis, standing
+from sweep.families.skeletons import SLIDER_CRANK, SLIDER_CRANK_SIZES, Y, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -164,6 +164,7 @@ FAMILY = Family(
     outward="branch",
     uses_phi=False,
     capabilities=(
+        SLIDER_CRANK_SIZES,
         Assembly("discriminant", "pressure_angle", coupler_square),
         JointRecords(joint_records, _JOINT_NEEDS, "slider"),
         PressureEllipse(ellipse),

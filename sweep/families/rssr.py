@@ -35,7 +35,7 @@ from sweep.families.capabilities import (
 )
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
-from sweep.families.skeletons import CRANK_ROCKER, crank_axis, standing
+from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -323,6 +323,7 @@ FAMILY = Family(
     outward="branch",
     uses_phi=False,
     capabilities=(
+        CRANK_ROCKER_SIZES,
         Assembly("discriminant", "pressure_angle", discriminant_scale),
         JointRecords(joint_records, JOINT_NEEDS, "rocker"),
         PressureEllipse(ellipse),

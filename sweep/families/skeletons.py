@@ -9,12 +9,21 @@ from typing import Literal
 import numpy as np
 
 from sweep.families.base import Array, Parameter
-from sweep.families.capabilities import Fixed, Link
+from sweep.families.capabilities import Dimensions, Fixed, Link
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 CRANK, COUPLER, ROCKER = Link("crank", ("a", "b")), Link("coupler", ("b", "c")), Link("rocker", ("d", "c"))
 CRANK_ROCKER = (CRANK, COUPLER, ROCKER)
 SLIDER_CRANK = (CRANK, COUPLER, Link("slider", ("c",)))
+
+
+def links(names: str) -> tuple[tuple[str, ...], ...]:
+    """Links that are each given by one length, the names with blanks between."""
+    return tuple((name,) for name in names.split())
+
+
+CRANK_ROCKER_SIZES = Dimensions(links("a b c"))
+SLIDER_CRANK_SIZES = Dimensions(links("a b"))
 
 
 def parameter(parameters: tuple[Parameter, ...], name: str | None, designs: Array) -> Array:

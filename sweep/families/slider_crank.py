@@ -14,7 +14,7 @@ from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output
 from sweep.families.capabilities import Assembly, JointRecords, Points, Skeleton
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS
 from sweep.families.placing import move_records
-from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, X, standing
+from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -106,6 +106,7 @@ FAMILY = Family(
     outward="branch",
     uses_phi=False,
     capabilities=(
+        SLIDER_CRANK_SIZES,
         Assembly("discriminant", "pressure_angle", rssp.coupler_square),
         JointRecords(joint_records, ("s", "ds", "d2s", "discriminant"), "slider"),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),

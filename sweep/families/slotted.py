@@ -9,8 +9,8 @@ import numpy as np
 
 from kernels.families import slotted
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, Link, OutputLink, Points, Skeleton
-from sweep.families.skeletons import CRANK, crank_axis, standing
+from sweep.families.capabilities import Assembly, Dimensions, Link, OutputLink, Points, Skeleton
+from sweep.families.skeletons import CRANK, crank_axis, links, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -89,6 +89,7 @@ FAMILY = Family(
     example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "s": 0.5},
     uses_phi=False,
     capabilities=(
+        Dimensions(links("a"), optional=("k",)),
         Assembly("discriminant", "pressure_angle", unit),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(pivot),

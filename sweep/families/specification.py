@@ -10,17 +10,17 @@ from typing import Any
 
 from sweep.errors import InputError, nearest
 from sweep.families import Specification
-from sweep.families.base import Event, Family
+from sweep.families.base import Event, Family, Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.domain import Turn, reads_as_degrees
 from sweep.families.located import coupler_joints, is_planar
 from sweep.families.members import Machine, Member, assemble
 from sweep.families.placing import place, vector
-from sweep.families.relations import Distance, Relation, ShaftTorque, Shaking, Speed, Timing
+from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Shaking, Speed, Timing
 from sweep.families.thread_balance import thread_balance
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye")
-RELATION_KINDS = ("distance", "speed", "timing", "event", "torque", "shaking", "thread")
+RELATION_KINDS = ("distance", "speed", "timing", "event", "value", "torque", "shaking", "thread")
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
@@ -80,10 +80,11 @@ def built(given: Specification, find: FindFamily) -> Machine:
         if not _WORD.fullmatch(name) or name in members:
             raise InputError("member", name, "a plain word, each once", "machine")
         members[name] = _member(name, dict(table), members, find)
-    plain = {name: dict(table) for name, table in given.relations if "event" not in dict(table)}
+    plain = {name: dict(table) for name, table in given.relations if not {"event", "value"} & set(dict(table))}
     known = {name: _relation(name, table, members) for name, table in plain.items()}
+    outputs = _outputs(members, tuple(known.values()))
     events = {
-        name: _event(name, dict(table), members, tuple(known.values()))
+        name: _event(name, dict(table), outputs) if "event" in dict(table) else _reading(name, dict(table), outputs)
         for name, table in given.relations
         if name not in plain
     }
@@ -152,14 +153,31 @@ def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[s
     return member, output
 
 
-def _event(name: str, table: dict[str, Any], members: Mapping[str, Member], others: tuple[Any, ...]) -> Event:
+def _outputs(members: Mapping[str, Member], others: tuple[Any, ...]) -> Mapping[str, Output]:
+    """Pose outputs of the machine: of its members, their points, and relations of several."""
+    relations = tuple(r for r in others if not isinstance(r, Timing))
+    return assemble("", tuple(members.values()), relations).pose_output
+
+
+def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Reading:
+    """The value of a pose output at a crank angle."""
+    where, given = f"machine.relations.{name}", table["value"]
+    if len(table) != 1:
+        raise InputError(name, dict(table), "value alone", where)
+    if not isinstance(given, tuple) or len(given) != 2 or not all(isinstance(part, str) for part in given):
+        raise InputError("value", given, "a pose output and a crank angle", where)
+    of, place = given
+    if of not in outputs:
+        raise InputError("value", of, f"a pose output of the machine{nearest(of, outputs)}", where)
+    return Reading(name, outputs[of], (place,))
+
+
+def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Event:
     """The event where a pose output of the machine, a relation's or a member's, passes a level."""
     where = f"machine.relations.{name}"
     for key in table:
         if key not in EVENT_KEYS:
             raise InputError(key, table[key], f"{', '.join(EVENT_KEYS)}{nearest(key, EVENT_KEYS)}", where)
-    relations = tuple(r for r in others if not isinstance(r, Timing))
-    outputs = assemble("", tuple(members.values()), relations).pose_output
     of, level, rising = table["event"], table.get("level", 0.0), table.get("rising", True)
     if of not in outputs:
         raise InputError("event", of, f"a pose output of the machine{nearest(str(of), outputs)}", where)

@@ -8,9 +8,9 @@ import numpy as np
 
 from kernels.families import spherical_looper
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Fixed, Link, Points, Skeleton
+from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Points, Skeleton
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
-from sweep.families.skeletons import crank_axis, parameter, standing
+from sweep.families.skeletons import crank_axis, links, parameter, standing
 
 PARAMETERS = (
     Parameter("a1", "length", "crank that swings the carrier", positive=True),
@@ -97,6 +97,8 @@ def second_shaft(designs: Array) -> Array:
     return np.stack([np.sin(theta) * np.cos(beta), np.sin(theta) * np.sin(beta), np.cos(theta)], axis=1)
 
 
+LOOPER = ("c0x", "c0y", "c0z")  # its ball from Os, where it is held
+
 FAMILY = Family(
     name="spherical_looper",
     title="looper on a sphere",
@@ -113,6 +115,7 @@ FAMILY = Family(
     },
     uses_phi=False,
     capabilities=(
+        Dimensions((*links("a1 b1 c1 a2 b2"), LOOPER), arms=(Arm(("p0x", "p0y", "p0z"), LOOPER),)),
         Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
         Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "b2", "c2", "p")}),

@@ -6,9 +6,9 @@ from itertools import chain
 
 from kernels.families import swivel
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Link, Points, Skeleton
+from sweep.families.capabilities import Dimensions, Link, Points, Skeleton
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, point_outputs
-from sweep.families.skeletons import CRANK, crank_axis, standing
+from sweep.families.skeletons import CRANK, crank_axis, links, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -50,6 +50,7 @@ FAMILY = Family(
     example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "Lw": 5.0},
     uses_phi=False,
     capabilities=(
+        Dimensions(links("a")),
         Points({"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")}),
         Skeleton(
             {

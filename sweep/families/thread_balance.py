@@ -26,6 +26,7 @@ from sweep.errors import InputError, nearest
 from sweep.families.base import Output, Parameter
 from sweep.families.capabilities import ThreadPath
 from sweep.families.placing import AXES, vector
+from sweep.families.relations import Frame
 from sweep.families.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY
 from sweep.numerics.curves import TableCurve, table_curve
 

@@ -1,79 +1,157 @@
-"""How far a sweep is: a bar with the remaining time on a terminal, a plain line now and then in a log."""
+"""How far long work is: a bar with the remaining time on a terminal, a plain line now and then in a log."""
 
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Never, TextIO
+from typing import Never, TextIO, TypeAlias
 
 from tqdm import tqdm
 
+FIRST_SECONDS = 2.0  # of silence at the beginning
 LINE_SECONDS = 10.0
+TICK_SECONDS = 0.5
+
+Say: TypeAlias = Callable[[str, int, int, str], None]
+"""``say(label, done, total, unit)``: what is worked on, and how much of it is done."""
+
+
+def unsaid(label: str, done: int, total: int, unit: str) -> None:
+    """Tell nobody."""
 
 
 class Progress:
     """Counts designs, or starts; used as a context.
 
-    Nobody to tell (a closed pipe, a lost terminal) silences it, not the sweep.
+    A thread looks twice a second whether something has to be said, so that long steps are not silent.  Nobody to tell
+    (a closed pipe, a lost terminal) silences it, not the sweep.
 
     Parameters
     ----------
     label : what is swept
-    total : designs in all
+    total : designs in all; 0 where nothing can be counted
     done : designs finished by earlier runs
     show : False for a silent one (the library's way unless asked)
     unit : what is counted
+    quiet : nothing is said of work that takes less than two seconds; otherwise its end always is
     """
 
     def __init__(
-        self, label: str, total: int, done: int, show: bool, stream: TextIO | None = None, unit: str = "designs"
+        self,
+        label: str,
+        total: int,
+        done: int,
+        show: bool,
+        stream: TextIO | None = None,
+        unit: str = "designs",
+        quiet: bool = False,
     ) -> None:
-        self.label, self.total, self.done, self.unit = label, total, done, unit
+        self.label, self.total, self.done, self.unit, self.quiet = label, total, done, unit, quiet
         self.stream = sys.stderr if stream is None else stream
         self.show = show and self.stream is not None
-        self.begin = self.said = time.monotonic()
+        self.begin = time.monotonic()
+        self.said: float | None = None
         self.first = done
         self.bar: tqdm[Never] | None = None
+        self.lock, self.over = threading.RLock(), threading.Event()
+        self.ticker: threading.Thread | None = None
         if self.show and self.stream.isatty():
-            self.bar = tqdm(desc=label, total=total, initial=done, unit=f" {unit}", unit_scale=True, file=self.stream)
+            self.bar = tqdm(
+                desc=label, total=total or None, initial=done, unit=f" {unit}", unit_scale=True, file=self.stream,
+                delay=FIRST_SECONDS if quiet else 0.0, leave=not quiet,
+            )  # fmt: skip
 
     def __enter__(self) -> Progress:
+        if self.show:
+            self.ticker = threading.Thread(target=self._tick, name="progress", daemon=True)
+            self.ticker.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.over.set()
+        if self.ticker is not None:
+            self.ticker.join()
         with self._listener():
             if self.bar is not None:
                 self.bar.close()
-            elif self.show:
+            elif self.show and (self.said is not None or not self.quiet):
                 self._line()
 
     def advance(self, designs: int) -> None:
         """So many more designs are finished."""
-        self.done += designs
         with self._listener():
+            self.done += designs
             if self.bar is not None:
                 self.bar.update(designs)
-            elif self.show and time.monotonic() - self.said > LINE_SECONDS:
-                self._line()
+            else:
+                self._line_if_due()
+
+    def _tick(self) -> None:
+        while not self.over.wait(TICK_SECONDS):
+            with self._listener():
+                if self.bar is not None:
+                    self.bar.refresh()
+                else:
+                    self._line_if_due()
+
+    def _line_if_due(self) -> None:
+        now = time.monotonic()
+        waited = now - self.begin > FIRST_SECONDS if self.said is None else now - self.said > LINE_SECONDS
+        if self.show and waited:
+            self._line()
 
     @contextmanager
     def _listener(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError:
-            self.show, self.bar = False, None
+        with self.lock:
+            try:
+                yield
+            except OSError:
+                self.show, self.bar = False, None
 
     def _line(self) -> None:
         self.said = time.monotonic()
         seconds = self.said - self.begin
-        text = f"{self.label}: {self.done} of {self.total} {self.unit} ({self.done / max(self.total, 1):.0%})"
-        text += f", {seconds:.0f} s"
+        text = f"{self.label}: "
+        if self.total:
+            text += f"{self.done} of {self.total} {self.unit} ({self.done / self.total:.0%}), "
+        text += f"{seconds:.0f} s"
         if self.first < self.done < self.total:
             text += f", {seconds * (self.total - self.done) / (self.done - self.first):.0f} s left"
         self.stream.write(text + "\n")
         self.stream.flush()
+
+
+class Phases:
+    """One piece of work after the other, each told by itself if it takes more than two seconds; used as a context."""
+
+    def __init__(self, show: bool, stream: TextIO | None = None) -> None:
+        self.show, self.stream = show, stream
+        self.now: Progress | None = None
+
+    def __enter__(self) -> Phases:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.end()
+
+    def say(self, label: str, done: int = 0, total: int = 0, unit: str = "steps") -> None:
+        """So much is done of this piece of work; another one than before begins its own count."""
+        if self.now is None or self.now.label != label:
+            self.end()
+            self.now = Progress(label, total, done, self.show, self.stream, unit, quiet=True).__enter__()
+        elif done > self.now.done:
+            self.now.advance(done - self.now.done)
+
+    def end(self) -> None:
+        """The present piece is finished."""
+        if self.now is not None:
+            self.now.__exit__(None, None, None)
+            self.now = None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from sweep.families.base import Array
-from sweep.optimise.form import Form, Label
+from sweep.optimise.rows import Form, Label
 
 ACTIVE = 1e-6  # a row within this of its bound (scaled) may carry a multiplier
 AGREE = 1e-4  # starts whose objective is within this of the best agree

@@ -11,10 +11,11 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.optimise import newton, slsqp
-from sweep.optimise.form import Form, Program
+from sweep.optimise.form import Program
 from sweep.optimise.model import FEASIBLE, Model, State
 from sweep.optimise.points import STATIC, Points
 from sweep.optimise.problem import Problem
+from sweep.optimise.rows import Form
 
 ROUNDS, CYCLES = 60, 3
 NEWTON = 240  # rounds of Newton steps: along a narrow curved valley hundreds are needed, and each gains
@@ -113,8 +114,9 @@ class Descent:
         apart = np.abs(np.remainder(found.phi[:, None] - known.phi + np.pi, 2.0 * np.pi) - np.pi)
         same = (found.series[:, None] == known.series) & (found.sense[:, None] == known.sense)
         new = ~((apart < NEAR_ANGLE) & same).any(axis=1)
-        # A window moves with the design: a fixed angle may lie outside of it, where nothing is asked.
-        new &= np.array([self.model.curves.series[n].window is None for n in found.series], dtype=np.bool_)
+        # A window moves with the design: a fixed angle may lie outside of it, where nothing is asked; so do passages.
+        held = [s.window is None and s.passes is None for s in self.model.curves.series]
+        new &= np.array(held, dtype=np.bool_)[found.series]
         return replace(found, how=np.full(len(found), STATIC)).take(new)
 
     def _verified(self) -> bool:

@@ -1,30 +1,24 @@
-"""The program that is solved at one design, in epigraph form: make t small, so that all rows are >= 0 or = 0.
-
-A row is ``c = constant + matrix @ atoms + slack * t``.  Rows of the objective bound it by t; those of limits have no t.
-The atoms are the quantities whose gradients are computed: the values of curves at K points, which are extrema or
-ends of windows, the crank angles of these points, and plain numbers such as lengths.
-"""
+"""The epigraph program of a problem, laid out as rows for any design (:mod:`sweep.optimise.rows`)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sweep.errors import InputError
 from sweep.families.base import Array
+from sweep.optimise.passages import first_passage
 from sweep.optimise.points import Curves, Points
 from sweep.optimise.problem import PLACE, Problem
+from sweep.optimise.rows import Form, Label
+from sweep.optimise.terms import Term, box, numbers
 from sweep.reductions.catalogue import output
 from sweep.reductions.measures import Measure, Series, margins, measure
 
-Term = dict[int, float]
 SMALLEST = 1e-100  # a limit nearer to zero is a limit at zero
-AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first
-FAR = 1e3  # stands for a row that cannot be computed at a trial design: far outside, but a number
 
 
 @dataclass(frozen=True)
@@ -39,91 +33,6 @@ class Requirement:
     def equal(self) -> bool:
         """Whether this is an equation."""
         return self.minimum is not None and self.minimum == self.maximum
-
-
-@dataclass(frozen=True)
-class Label:
-    """The output that a row is about, and which bound of it: "objective", "minimum", "maximum" or "equal".
-
-    ``per`` turns the row's multiplier into one per relative change of the bound: the bound over the row's scale.
-    """
-
-    name: str
-    side: str
-    per: float = 1.0
-
-
-@dataclass(frozen=True)
-class Form:
-    """Rows of the program and the points whose curves they use.
-
-    ``complete`` says that the design turns and every limit exists for it, ``reaches`` that every stage assembles
-    somewhere, so that its margin says how far it is from turning.
-    """
-
-    points: Points
-    scalars: tuple[str, ...]
-    matrix: Array
-    constant: Array
-    slack: Array
-    equal: NDArray[np.bool_]
-    labels: tuple[Label, ...]
-    complete: bool
-    reaches: bool
-
-    def rows(self, atoms: Array, t: float) -> Array:
-        """Evaluate the rows; a row that is nan counts as far outside."""
-        if np.isfinite(atoms).all():
-            return np.asarray(self.constant + self.matrix @ atoms + self.slack * t)
-        return np.nan_to_num(self.constant + self.matrix @ np.nan_to_num(atoms, nan=1e30) + self.slack * t, nan=-FAR)
-
-    def objective(self, atoms: Array) -> float:
-        """Give the objective: the smallest t that its rows allow; infinite where there is no such row."""
-        own = np.array([label.side == "objective" for label in self.labels], dtype=np.bool_)
-        if not own.any():
-            return math.inf
-        return float(-(self.constant + self.matrix @ atoms)[own].min())
-
-    def violation(self, atoms: Array) -> float:
-        """Give the largest scaled violation of a limit; infinite where this design lacks a limited output."""
-        if not self.complete:
-            return math.inf
-        return self.known_violation(atoms)
-
-    def known_violation(self, atoms: Array) -> float:
-        """Give the largest scaled violation of the limits on outputs that exist; infinite if no stage closes."""
-        if not self.reaches:
-            return math.inf
-        c = self.constant + self.matrix @ atoms
-        own = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
-        if np.isnan(c[own]).any():
-            return math.inf
-        return float(np.maximum(np.where(self.equal, np.abs(c), -c)[own], 0.0).max(initial=0.0))
-
-    def near(self, atoms: Array, t: float) -> Form:
-        """Leave out the rows that are far from their bound, which no short step reaches."""
-        keep = (self.rows(atoms, t) < AT_HAND) | self.equal
-        labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
-        return replace(
-            self, matrix=self.matrix[keep], constant=self.constant[keep], slack=self.slack[keep],
-            equal=self.equal[keep], labels=labels,
-        )  # fmt: skip
-
-    def relaxed(self, hard: set[str]) -> Form:
-        """Make the elastic program: its t is the amount by which all limits but the ``hard`` ones have to give way."""
-        keep = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
-        soft = np.array([label.name not in hard for label in self.labels], dtype=np.float64)[keep]
-        both = self.equal[keep]
-        matrix, constant = self.matrix[keep], self.constant[keep]
-        labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
-        return replace(
-            self,
-            matrix=np.concatenate([matrix, -matrix[both]]),
-            constant=np.concatenate([constant, -constant[both]]),
-            slack=np.concatenate([soft, soft[both]]),
-            equal=np.zeros(len(labels) + int(both.sum()), dtype=np.bool_),
-            labels=labels + tuple(label for label, twice in zip(labels, both, strict=True) if twice),
-        )
 
 
 def measured_in(size: float) -> float:
@@ -159,10 +68,15 @@ class Program:
                 and not 0.0 < float(limit.maximum or 0) < math.pi / 2
             ):
                 raise InputError(limit.output, limit.maximum, "an angle between 0 and pi/2", PLACE)
+            if found.inner == "transmission" and not all(
+                side is None or 0.0 < float(side) < math.pi / 2 for side in (limit.minimum, limit.maximum)
+            ):
+                raise InputError(limit.output, (limit.minimum, limit.maximum), "angles between 0 and pi/2", PLACE)
             self.requirements.append(Requirement(found, sides[0], sides[1]))
         measures = [self.objective, *(r.measure for r in self.requirements)]
         self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
         self.scalars = tuple(dict.fromkeys(name for m in measures for name in m.numbers))
+        self.pieces = {name: piece for m in measures for name, piece in zip(m.numbers, m.pieces, strict=False)}
         self.places = any(m.is_angle for m in measures)
 
     def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
@@ -209,6 +123,7 @@ class _Layout:
     def require(self, r: Requirement) -> bool:
         """Add the rows of one limit; the result is false where the design has none of the extrema that it is about."""
         found = True
+        self._keep_first(r, "minimum" if r.maximum is None else "maximum")
         if r.equal and r.minimum is not None:
             for term, shift in self.lower(r.measure)[:1]:
                 size = self._size(r, r.minimum)
@@ -238,10 +153,16 @@ class _Layout:
         return self._bounded(m, above=m.sign < 0.0)
 
     def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        if m.kind == "minus":
+            of = m.parts[0]
+            return [({k: -w for k, w in t.items()}, -shift) for t, shift in (self.lower if above else self.upper)(of)]
         if m.numbers:
             return self._numbers(m, above)
         if m.kind == "difference":
             return self._difference(m, above)
+        if m.kind == "phi_event":
+            first, _ = self._passage(m.series[0])
+            return [] if first is None else [({len(self.points) + first: 1.0}, self._turns(first))]
         maxima, minima = self._ends(m.series)
         if m.kind in ("max", "min"):
             many = above == (m.kind == "max")
@@ -272,6 +193,14 @@ class _Layout:
         apart = self.points.phi[fold] - self.points.phi[ext]
         return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
 
+    def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        """Sums of plain numbers, and of the ends of curves with them."""
+        first = 2 * len(self.points)
+        if m.kind == "box":
+            tops, bottoms = ([(float(self.points.value[k]), k) for k in side] for side in self._ends(m.series))
+            return box(m, tops, bottoms, self.design, self.scalars, first, above)
+        return numbers(m, self.design, self.curves.family.parameter_names, self.scalars, first, above)
+
     def _difference(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
         """Give the second angle minus the first, with whole turns so that it is in (-pi, pi] at the present points."""
         ends = [self._bounded(part, above)[:1] for part in m.parts]
@@ -284,20 +213,19 @@ class _Layout:
         turns = 2.0 * math.pi * math.ceil((apart - math.pi) / (2.0 * math.pi))
         return [(second | {k: -w for k, w in first.items()}, other - shift - turns)]
 
-    def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
-        """Give the sums for a plain number, or for the largest of some lengths.
+    def _passage(self, series: Series) -> tuple[int | None, list[int]]:
+        own = np.flatnonzero(self.points.series == self.curves.series.index(series)).tolist()
+        return first_passage(self.points.phi, self.points.how, own)
 
-        The largest length is below a bound if every length is, with both signs; above one if the largest of them is.
-        """
-        first = 2 * len(self.points)
-        if m.kind == "scalar":
-            return [({first + self.scalars.index(m.name): m.sign}, 0.0)]
-        names = self.curves.family.parameter_names
-        sizes = {name: float(self.design[names.index(name)]) for name in m.numbers}
-        if above:
-            return [({first + self.scalars.index(name): sign}, 0.0) for name in sizes for sign in (1.0, -1.0)]
-        name = max(sizes, key=lambda name: abs(sizes[name]))
-        return [({first + self.scalars.index(name): math.copysign(1.0, sizes[name])}, 0.0)]
+    def _keep_first(self, r: Requirement, side: str) -> None:
+        """Rows that let no earlier passage arise where an event is limited."""
+        for series in r.measure.series:
+            if series.passes is None:
+                continue
+            level, sense = series.passes
+            for k in self._passage(series)[1]:
+                size = measured_in(max(abs(level), 1e-3 * abs(self.points.value[k])))
+                self.add({k: -sense}, 0.0, 1.0 / size, sense * level / size, 0.0, False, Label(r.measure.name, side))
 
     def _outward(self, position: str) -> float:
         """+1 where the extended position of that follower is the largest, -1 where it is the smallest."""

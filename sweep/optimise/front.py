@@ -16,6 +16,7 @@ from sweep.dataset import store
 from sweep.dataset.tables import metadata
 from sweep.errors import InputError, SearchCutShort
 from sweep.families.base import Array
+from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.certificate import Result
 from sweep.optimise.pareto import Front, advance, steps
 from sweep.optimise.starts import diverse
@@ -32,7 +33,12 @@ KEY, STATE = b"key", b"state"
 
 
 def front_study(
-    study: Study, folder: str | Path, key: str, stop: Callable[[], bool] | None = None, jobs: int = 1
+    study: Study,
+    folder: str | Path,
+    key: str,
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+    say: Say = unsaid,
 ) -> Path:
     """Search the least objective for each bound of [pareto] and write the front beside the optimum, step by step.
 
@@ -46,6 +52,7 @@ def front_study(
     key : what the result depends on, in a word
     stop : asked often; true ends the search as Ctrl-C does
     jobs : processes the starts are spread over; the result does not depend on it
+    say : called with how many steps of the front are done, and how many there are
 
     Returns
     -------
@@ -69,11 +76,14 @@ def front_study(
     front = saved(path, key) or Front.of(settings)
     if front.complete and path.exists():
         return path
+    many = len(steps(len(front.bounds)))
+    say("front", front.taken, many, "steps")
     _, problem, _ = problem_and_starts(study, place)
     starts = _starts(study, settings, problem, place)
     kept, begin = front, time.monotonic()
     for best in advance(problem, settings, front, starts, stop, jobs):
         kept = best if best.taken > kept.taken else kept
+        say("front", kept.taken, many, "steps")
         _write(path, study, settings, best, key, kept)
     late = settings.time_budget is not None and time.monotonic() - begin >= settings.time_budget
     if not kept.complete and (not late or (stop is not None and stop())):

@@ -11,10 +11,11 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.optimise.certificate import ACTIVE, Multipliers, multipliers
-from sweep.optimise.form import Form, Program
+from sweep.optimise.form import Program
 from sweep.optimise.gradients import gradients, scalar_gradient, stepped
 from sweep.optimise.points import STEP, Curves, Points
 from sweep.optimise.problem import Problem
+from sweep.optimise.rows import Form
 
 FEASIBLE = 1e-9  # largest scaled violation of a feasible design
 PRICE = 10.0  # of a unit of scaled violation when two designs are compared, until multipliers are known
@@ -162,7 +163,7 @@ class Model:
         return found.residual
 
     def _scalar_gradient(self, name: str, fractions: Array, designs: Any) -> Array:
-        if name in self.problem.family.parameter_names:
+        if name in self.problem.family.parameter_names or name in self.program.pieces:
             return np.asarray(self._scalar(name, designs).imag / STEP, np.float64)
         return scalar_gradient(lambda f: self._scalar(name, self.problem.placed(self.base, f)), fractions)
 
@@ -170,6 +171,8 @@ class Model:
         names = self.problem.family.parameter_names
         if name in names:
             return designs[:, names.index(name)]
+        if name in self.program.pieces:
+            return self.program.pieces[name](designs)
         from sweep.evaluation.summaries import design_outputs
 
         columns = design_outputs(self.problem.family, designs, [name], self.problem.accuracy, self.problem.window)

@@ -10,9 +10,9 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.optimise.certificate import ACTIVE, Multipliers, multipliers
-from sweep.optimise.form import Form
 from sweep.optimise.model import FEASIBLE, Model, State
 from sweep.optimise.points import Index
+from sweep.optimise.rows import Form
 
 CORRECTIONS = 8  # of a step along curved limits, each two or three milliseconds
 LOST = 1.0  # scaled violation that no correction mends, above all of links that do not reach: the step must be shorter

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.families.base import Angles, Array
+from sweep.optimise.passages import PASSING, passages
 from sweep.optimise.problem import Problem
 from sweep.reductions.closing import on_closed_turn
 from sweep.reductions.differentiable import differentiable
@@ -34,8 +35,9 @@ class Points:
     """K points of a design's curves; every array is (K,).
 
     ``series`` numbers the curve, ``phi`` is the crank angle, ``sense`` +1 for a maximum and -1 for a minimum; ``how``
-    says what holds the point: stationary, the crossing of the window's edge at the fraction ``level`` of the stroke, or
-    a fixed angle.  ``value`` is the curve there, ``slope`` and ``curvature`` are its derivatives with respect to phi;
+    says what holds the point: stationary, the crossing of the window's edge at the fraction ``level`` of the stroke, a
+    fixed angle, or the place where the curve passes ``level``, upwards for ``sense`` +1.  ``value`` is the curve there,
+    ``slope`` and ``curvature`` are its derivatives with respect to phi;
     ``pace`` is the slope of the position.
     """
 
@@ -116,7 +118,9 @@ class Curves:
         rows: list[tuple[int, float, float, int, float, float]] = []
         windowed = [n for n, s in enumerate(self.series) if s.window is not None]
         for n, s in enumerate(self.series):
-            if n not in windowed:
+            if s.passes is not None:
+                rows += passages(n, phi, self.curve(s, columns)[0], *s.passes)
+            elif n not in windowed:
                 rows += _extrema(n, phi, self.curve(s, columns)[0], s.wrapped)
         points = self.follow(design, Points.of(rows), stride=2.0 * math.pi / samples)
         if windowed and turns:
@@ -151,12 +155,13 @@ class Curves:
         """
         if not len(points):
             return points
-        held = points.how == STATIONARY
+        held, passing = points.how == STATIONARY, points.how == PASSING
         phi = points.phi.copy()
         reach, uphill = np.full(len(phi), stride), np.zeros(len(phi))
         for _ in range(12):
-            slope, curvature, pace, place = self._local(design, phi, points)
+            slope, curvature, pace, place, value = self._local(design, phi, points)
             move = np.zeros(len(phi))
+            move[passing] = (points.level[passing] - value[passing]) / slope[passing]
             peak = held & (points.sense * curvature < 0.0)
             move[peak] = -slope[peak] / curvature[peak]
             climb = held & ~peak
@@ -171,7 +176,9 @@ class Curves:
             if np.abs(move).max() < SETTLED:
                 break
         if self.places or (points.how == CROSSING).any():
-            slope, curvature, pace, _ = self._local(design, phi, points)
+            slope, curvature, pace, _, value = self._local(design, phi, points)
+            # A passage is its angle itself: the error of the last step above is worth one step more.
+            phi[passing] += np.clip((points.level - value) / slope, -SETTLED, SETTLED)[passing]
         moved = replace(points, phi=phi, slope=slope, curvature=curvature, pace=pace)
         return replace(moved, value=self.values(design[None, :], moved)[0])
 
@@ -203,21 +210,22 @@ class Curves:
             return np.concatenate([points.phi, np.arange(16) * (math.pi / 8.0)])
         return points.phi
 
-    def _local(self, design: Array, phi: Array, points: Points) -> tuple[Array, Array, Array, Array]:
-        """Slope and curvature of each point's own output, slope and value of the position, all (K,)."""
+    def _local(self, design: Array, phi: Array, points: Points) -> tuple[Array, Array, Array, Array, Array]:
+        """Slope and curvature of each point's own output, slope and value of the position, value there, all (K,)."""
         three = np.concatenate([phi - NEIGHBOUR, phi, phi + NEIGHBOUR])
         columns = self.poses(design[None, :], three + 1j * STEP)
         k = len(phi)
-        slopes = np.empty((3, k))
+        slopes, value = np.empty((3, k)), np.empty(k)
         for n, s in enumerate(self.series):
             own = points.series == n
             if own.any():
-                slopes[:, own] = columns[s.output][0].imag.reshape(3, k)[:, own] / STEP
+                curve = columns[s.output][0].reshape(3, k)[:, own]
+                slopes[:, own], value[own] = curve.imag / STEP, curve[1].real
         curvature = (slopes[2] - slopes[0]) / (2.0 * NEIGHBOUR)
         if self.position < 0:
-            return slopes[1], curvature, np.zeros(k), np.zeros(k)
+            return slopes[1], curvature, np.zeros(k), np.zeros(k), value
         place = columns[self.series[self.position].output][0, k : 2 * k]
-        return slopes[1], curvature, place.imag / STEP, place.real
+        return slopes[1], curvature, place.imag / STEP, place.real, value
 
     def _approach_edges(self, points: Points, phi: Array, place: Array, pace: Array, move: Array) -> None:
         edges = points.how == CROSSING

@@ -10,9 +10,10 @@ from kernels import status as st
 from sweep.families.base import Array
 from sweep.optimise.certificate import Multipliers, Result, in_words, multipliers
 from sweep.optimise.descent import KKT, Descent
-from sweep.optimise.form import Form, Program
+from sweep.optimise.form import Program
 from sweep.optimise.model import LooksUsedUp, State, Stopped
 from sweep.optimise.problem import Problem
+from sweep.optimise.rows import Form
 
 FIRST = 2  # looks that give a start its scale and its first design
 

@@ -13,6 +13,7 @@ from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
 from sweep.quantities.names import is_flag
+from sweep.reductions.catalogue import output as described
 from sweep.reductions.measures import Measure
 
 TIE = 1e-6  # extrema this near to the largest one (relative) share it
@@ -39,6 +40,7 @@ def sensitivities(
     -------
     Rows ``parameter``, ``output``, ``value``, ``growing`` and ``shrinking`` (per internal unit of the parameter: mm,
     rad or 1), nan where the output does not exist.  Derivatives are exact to rounding (docs/optimiser.md, Gradients).
+    An output that is constant in pieces, such as a count, has none: it has no rows.
     """
     varied = [k for k, p in enumerate(family.parameters) if p.unit in DIMENSIONS and p.choices is None]
     sizes = {
@@ -50,7 +52,7 @@ def sensitivities(
     fixed = {n: float(x) for n, x in zip(family.parameter_names, design, strict=True) if n not in names}
     rows: dict[str, list[Any]] = {name: [] for name in ("parameter", "output", "value", "growing", "shrinking")}
     for output in outputs:
-        if is_flag(output):
+        if is_flag(output) or described(family, output).jumps:
             continue
         place = design[varied]
         problem = Problem(
@@ -83,8 +85,14 @@ def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
 
 def _outward(measure: Measure, inner: float) -> float:
     """Derivative of the output by its inner value."""
+    if measure.kind == "minus":
+        return _outward(measure.parts[0], -inner)
     if measure.inner == "pressure":  # inner = -cos^2 of the angle
         return 1.0 / (2.0 * math.sqrt(max(-inner * (1.0 + inner), 1e-300)))
+    if measure.inner == "transmission":  # inner = sin^2 of the angle
+        return 1.0 / (2.0 * math.sqrt(max(inner * (1.0 - inner), 1e-300)))
     if measure.inner == "ratio":
         return 2.0 * math.pi / (2.0 * math.pi - inner) ** 2
+    if measure.inner == "square":
+        return 0.5 / math.sqrt(abs(inner)) if inner else math.nan
     return 1.0

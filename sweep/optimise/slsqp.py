@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from sweep.families.base import Array
-from sweep.optimise.form import Form
 from sweep.optimise.model import Model, State
+from sweep.optimise.rows import Form
 
 ITERATIONS, PER_VARIABLE = (
     30,

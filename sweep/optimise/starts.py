@@ -87,6 +87,23 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
     return designs, merit
 
 
+def of_task(study: Study, count: int, seed: int) -> Array:
+    """Designs of the study that do its [task], the best first, (k, P), at most ``count``; none without a task.
+
+    A parameter that the study gives as a number keeps it.
+    """
+    names = study.family.parameter_names
+    if study.task is None:
+        return np.empty((0, len(names)))
+    from sweep.synthesis.tasks import solve
+
+    found = solve(study.task, starts=count, seed=seed)
+    default = {p.name: p.default for p in study.family.parameters}
+    rows = [default | {n: x for n, x in s.mechanism.items() if n in names} | dict(study.space.fixed) for s in found]
+    rows = [row for row in rows if None not in (row[name] for name in names)]
+    return np.array([[row[name] for name in names] for row in rows], np.float64).reshape(-1, len(names))[:count]
+
+
 def drawn(study: Study, count: int, seed: int) -> Array:
     """Designs of a study's space at random, finished by its [locus] and [fit]: for datasets without feasible rows."""
     from sweep.chunks.chunk import parameter_matrix

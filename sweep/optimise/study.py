@@ -18,6 +18,7 @@ from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Angles, Array, Parameter
 from sweep.families.domain import Interval
+from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.candidates import ranking
 from sweep.optimise.certificate import Result
 from sweep.optimise.coordinates import LocusCoordinates
@@ -30,8 +31,8 @@ from sweep.optimise.problem import Problem
 from sweep.optimise.proportions import from_proportions, widened
 from sweep.optimise.robust import robust, yields
 from sweep.optimise.sensitivity import sensitivities
-from sweep.optimise.solve import Tell, explore
-from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn
+from sweep.optimise.solve import explore
+from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn, of_task
 from sweep.optimise.survey import CUT, Survey
 from sweep.optimise.tolerance import tolerance_rows
 from sweep.optimise.written import certificates, outputs, write
@@ -134,10 +135,19 @@ def problem_and_starts(
 ) -> tuple[OptimiseSettings, Problem, Array]:
     """Settings, problem and starts: the diverse best of the dataset, filled up from samples where they are too few.
 
-    Where no row of the dataset is feasible, the first starts are the best of random designs.  With
+    Where no row of the dataset is feasible, the first starts are the best of random designs.  The mechanisms that do
+    the study's [task] come before all others.  With
     ``optimise.global = "proportions"`` five of six starts come from the search over proportions instead; ``stop`` ends
     it early.
     """
+    settings, problem, starts = _problem_and_starts(study, folder, stop)
+    first = of_task(study, settings.starts, settings.seed)
+    return settings, problem, np.concatenate([first, starts])[: max(len(starts), len(first))]
+
+
+def _problem_and_starts(
+    study: Study, folder: Path, stop: Callable[[], bool]
+) -> tuple[OptimiseSettings, Problem, Array]:
     if study.optimise is None or study.objective is None:
         raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
     settings = study.optimise
@@ -184,7 +194,7 @@ def optimise_study(
     folder: str | Path,
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
-    tell: Tell | None = None,
+    say: Say = unsaid,
 ) -> Path:
     """Search from diverse best designs of the dataset and write the result beside it.
 
@@ -194,7 +204,7 @@ def optimise_study(
     folder : its dataset; where it has no feasible row, the starts come from a sample of the same bounds
     stop : asked often; true ends the search as Ctrl-C does
     jobs : processes the starts are spread over; the result does not depend on it
-    tell : called with the number of starts that are done and the most there will be
+    say : called with the number of starts that are done and the most there will be, then with what else is worked on
 
     Returns
     -------
@@ -213,20 +223,30 @@ def optimise_study(
     """
     place = Path(folder)
     settings, problem, starts = problem_and_starts(study, place, stop or (lambda: False))
-    results, found = explore(problem, starts, settings, stop, jobs, tell)
+    results, found = explore(
+        problem, starts, settings, stop, jobs, lambda done, most: say("optimum", done, most, "starts")
+    )
     catalogue = listed(study)
     if catalogue and found.ended not in CUT:
+        say("neighbours in the catalogue", 0, 0, "steps")
         results = with_neighbours(problem, results, catalogue, settings, stop, jobs)
     nominal = results[0]
     if study.tolerance is not None and study.tolerance.robust is not None and found.ended not in CUT:
+        say("robust design", 0, 0, "steps")
         made = robust(problem, results, study.tolerance, settings, stop, jobs)
         results = results if made is None else [made.result, *results]
     side = store.beside(place)
+    parts = 3 if study.tolerance is None else 4
+    after = "curves, sensitivities" if study.tolerance is None else "yield, curves, sensitivities, tolerances"
+    say(after, 0, parts, "tables")
     frame = _table(study, problem, results, nominal)
     about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}
     write(side / store.OPTIMUM, frame, study, about=about)
+    say(after, 1, parts, "tables")
     write(side / store.CURVES, _curves(study, frame), study)
+    say(after, 2, parts, "tables")
     write(side / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
+    say(after, 3, parts, "tables")
     if study.tolerance is None:
         (side / store.TOLERANCE).unlink(missing_ok=True)
     else:

@@ -14,9 +14,10 @@ from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.joints import parts
 from sweep.evaluation.poses import evaluate, pose_wants
-from sweep.exchange.scene import shown_name
+from sweep.exchange.scene import over, shown_name
 from sweep.families import Mechanism
 from sweep.families import family as find_family
+from sweep.families.domain import Interval
 from sweep.plot.space import VIEWS, draw_frame, is_spatial, projection
 from sweep.report.curves import motion_figure
 from sweep.report.figures import OPTIMUM, house_style, new_figure
@@ -64,6 +65,8 @@ def motion(
     import pandas as pd
 
     family = find_family(mechanism)
+    if isinstance(family.domain, Interval):
+        raise InputError("mechanism", family.name, "a mechanism that turns: this one runs over an interval", "plot")
     asked = want.split(",") if isinstance(want, str) else want
     names = (
         list(dict.fromkeys(motion_curves(family))) if asked is None else pose_wants(family, [n.strip() for n in asked])
@@ -114,8 +117,8 @@ def mechanism(
     if view is not None and view != "space" and view not in VIEWS:
         raise InputError("view", view, f"space, {', '.join(VIEWS)}", "plot")
     design = in_radians(find_family(mechanism), design, angles)
-    start = np.asarray(grid_in_radians("phi", "rad", phi, angles), np.float64)
-    found = parts(mechanism, design, start + np.linspace(0.0, 2.0 * math.pi, 181))
+    start = float(np.asarray(grid_in_radians("phi", "rad", phi, angles), np.float64))
+    found = over(mechanism, design, start, 180)
     frames = list(dict.fromkeys(part.frame for part in found))
     with house_style():
         figure = new_figure(5.4 * len(frames), 4.6)

@@ -65,9 +65,27 @@ def error_of(name: str) -> str:
 ERROR = "err_"
 
 
+def negative(name: str) -> str:
+    """The name of the negative of a design output, which is small where the output is to be large."""
+    return f"{MINUS}{name}"
+
+
+def without_minus(name: str) -> str:
+    """The output that a name is the negative of; "" for any other name."""
+    return name.removeprefix(MINUS) if name.startswith(MINUS) else ""
+
+
+MINUS = "minus_"
+
+
 def is_place(name: str) -> bool:
     """Whether a design output is a crank angle at which something happens, not a size that could be compared."""
     return parts(name).stem.startswith("phi_")
+
+
+def is_largest(name: str, *, magnitude: bool = False) -> bool:
+    """Whether a design output is the largest value of a pose output, or its largest magnitude."""
+    return stem(name).startswith("max_abs_" if magnitude else "max_")
 
 
 def is_flag(name: str) -> bool:

@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 
 from sweep.families.base import Family, Output
 from sweep.families.domain import Domain, Turn
+from sweep.quantities.names import without_minus
 
 Mode: TypeAlias = Literal[-1, 0, 1]
 """Which extremum: 0 the largest magnitude, +1 the largest value, -1 the least."""
@@ -87,6 +88,7 @@ def split(name: str, domain: Domain) -> Iterator[tuple[Reduction, str]]:
 
 def reduced(name: str, domain: Domain) -> set[str]:
     """What a name may be about: itself, or what follows the prefix of a reduction."""
+    name = without_minus(name) or name
     return {name, *(rest for _, rest in split(name, domain))}
 
 

@@ -13,8 +13,11 @@ from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
 from sweep.families.domain import Turn
 from sweep.families.members import Machine, Member
-from sweep.quantities.names import parts
+from sweep.quantities.names import parts, without_minus
 from sweep.quantities.reduction import Mode, prefixes, reduction_of, split
+from sweep.reductions.box import NAMES as BOXES
+from sweep.reductions.box import box, boxes
+from sweep.reductions.dimensions import sizes
 from sweep.reductions.events import event_names
 from sweep.reductions.extrema import Request
 from sweep.reductions.size import SIZE, lengths
@@ -24,6 +27,7 @@ MARGIN_TEXTS = {
     "rotatable": ("1", "whether the links reach over the whole turn"),
     "margin": ("1", "smallest cos^2(pressure angle) over one turn; negative if the crank does not turn fully"),
     "max_pressure_angle": ("rad", "largest pressure angle over one turn"),
+    "least_transmission_angle": ("rad", "least transmission angle over one turn: 90 degrees less the pressure angle"),
 }
 BOTH_EXTREMA: tuple[Mode, ...] = (1, -1)
 PLACES = ("phi_ext", "phi_fold", "phi0", "stroke_ratio")
@@ -149,6 +153,10 @@ def output(family: Family, name: str) -> Output:
     InputError
         if the family has no such output; the message gives the nearest name.
     """
+    of = without_minus(name)
+    if of:
+        found = output(family, of)
+        return replace(found, name=name, text=f"negative of {of}: {found.text}")
     if isinstance(family, Machine):
         member = family.split(name)
         if member is not None:
@@ -159,6 +167,9 @@ def output(family: Family, name: str) -> Output:
             return timing.output
     for _, found, stage in own_steps(family, name):
         return found.of_stage(stage.number) if stage else found
+    extent = box(family, name)
+    if extent is not None:
+        return extent.output
     asked = quantity(family, name)
     if asked is None:
         raise InputError("output", name, _known(family, name), f"design outputs of {family.name}")
@@ -175,6 +186,11 @@ def _known(family: Family, name: str) -> str:
     near = nearest(name, [*names, *of_effects, *(f"{prefix}{x}" for x in of_effects for prefix in grammar)])
     if name in family.pose_names:
         near = f"; {name} is one of a single pose, ask `evaluate`"
+    if name in BOXES and isinstance(family, Chain):
+        near = (
+            f"; {name} is one of a stage, as {name}1: the frames of several stages stand to each other in no known way"
+        )
+        near += ", of a machine's members they do"
     if of_effects:
         words += ", and those of effects (sweep effects)"
     return words + (elsewhere(family, name) or near)
@@ -187,7 +203,8 @@ def output_names(family: Family) -> tuple[str, ...]:
         own = [o.name for relation in family.relations for o in relation.outputs]
         reductions = [f"{prefix}{name}" for name in own for prefix in prefixes(family.domain)]
         events = [name for event in family.events for name in event_names(family, event)]
-        return (*dotted, *MARGIN_TEXTS, *(t.name for t in family.timings), *events, *reductions)
+        whole = [name for name in (*sizes(family), *boxes(family)) if "." not in name]
+        return (*dotted, *MARGIN_TEXTS, *whole, *(t.name for t in family.timings), *events, *reductions)
     names = [o.name for step in family.steps for o in step.provides]
     assemblies = family.every(Assembly)
     if assemblies:
@@ -199,6 +216,7 @@ def output_names(family: Family) -> tuple[str, ...]:
     names += [name for event in family.events for name in event_names(family, event)]
     names += [STAY.name] if isinstance(family.domain, Turn) else []
     names += [SIZE.name] if lengths(family) else []
+    names += [*sizes(family), *boxes(family)]
     names += [f"{prefix}{pose}" for pose in family.pose_names for prefix in prefixes(family.domain)]
     return tuple(dict.fromkeys(names))
 

@@ -13,6 +13,7 @@ from sweep.reductions.extrema import DESIGN_STATUS, Request, true_extrema
 from sweep.reductions.sampling import pose_columns
 
 NAMES = ("rotatable", "margin", "max_pressure_angle")
+TRANSMISSION = "least_transmission_angle"
 # Smallest values are refined to this part of themselves: their sign is what matters.
 TARGET = 1e-10
 
@@ -74,6 +75,20 @@ def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
     result["max_pressure_angle"][~rotatable] = np.nan
     result["err_max_pressure_angle"][~rotatable] = np.nan
     return result
+
+
+def with_transmission(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
+    """The columns with the least transmission angle of each suffix: 90 degrees less the largest pressure angle.
+
+    It is made of the cosine and the sine of that angle, so that it stays exact where the linkage nearly locks.
+    """
+    for suffix in suffixes:
+        margin = np.asarray(columns[f"margin{suffix}"], np.float64)
+        pressure = np.asarray(columns[f"max_pressure_angle{suffix}"], np.float64)
+        cosine = np.sqrt(np.where(margin > 0.0, margin, np.nan))
+        columns[f"{TRANSMISSION}{suffix}"] = np.arctan2(cosine, np.sin(pressure))
+        columns[f"err_{TRANSMISSION}{suffix}"] = columns[f"err_max_pressure_angle{suffix}"]
+    return columns
 
 
 def own_step(family: Family, suffix: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:

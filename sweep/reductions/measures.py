@@ -14,9 +14,15 @@ from typing import Literal, TypeAlias, cast
 from sweep.errors import InputError
 from sweep.families.base import Family
 from sweep.families.capabilities import Assembly
+from sweep.families.domain import Turn
 from sweep.families.members import Machine
-from sweep.quantities.names import parts, stem
+from sweep.families.relations import Reading
+from sweep.quantities.names import parts, stem, without_minus
+from sweep.reductions.box import box
 from sweep.reductions.catalogue import output, quantity
+from sweep.reductions.dimensions import Piece, size
+from sweep.reductions.events import event_names
+from sweep.reductions.margins import TRANSMISSION
 from sweep.reductions.size import SIZE, lengths
 
 # A crank that turns must keep this much of Delta/b^2 at its worst pose: cos^2 of 89.94 degrees.
@@ -24,9 +30,9 @@ ROTATABLE_MARGIN = 1e-6
 
 Kind: TypeAlias = Literal[
     "max_abs", "max", "min", "range", "phi_max_abs", "phi_max", "phi_min", "ext", "fold", "phi_ext", "phi_fold", "phi0",
-    "difference", "scalar", "lengths",
+    "phi_event", "difference", "scalar", "lengths", "least", "most", "box", "minus",
 ]  # fmt: skip
-Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable"]
+Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable", "square", "transmission"]
 
 # What the optimiser follows of the two limit positions: which end, or the difference of both.
 LIMIT_KINDS: dict[str, Kind] = {
@@ -41,21 +47,24 @@ class Series:
 
     ``output`` is the pose output; with ``pressure`` it is a discriminant and the curve is Delta/b^2 = cos^2 of that
     pressure angle (the ratio of both does not depend on the crank angle, and the discriminant goes on below zero).
-    ``window`` limits it to a part of the stroke.  ``wrapped`` curves are angles that jump by a full turn.
+    ``window`` limits it to a part of the stroke.  ``wrapped`` curves are angles that jump by a full turn.  With
+    ``passes``, a level and +1 upwards or -1 downwards, not its extrema are followed but where it passes that level.
     """
 
     output: str
     pressure: str = ""
     window: tuple[float, float] | None = None
     wrapped: bool = False
+    passes: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
 class Measure:
     """A design output as ``sign`` * (reduction ``kind`` of its series), read back through ``inner``.
 
-    ``parts`` are the two angles of a "difference", the second minus the first.  ``numbers`` are plain numbers instead
-    of series: the output itself ("scalar"), or parameters of which it is the largest magnitude ("lengths").
+    ``parts`` are the two angles of a "difference", the second minus the first; of "minus" what it is the negative of.
+    ``numbers`` are plain numbers instead of series: the output itself ("scalar"), parameters of which it is the largest
+    magnitude ("lengths"), or the pieces of which it is the "least" or the "most".  ``pieces`` computes the latter.
     """
 
     name: str
@@ -65,31 +74,46 @@ class Measure:
     sign: float = 1.0
     numbers: tuple[str, ...] = ()
     parts: tuple[Measure, ...] = ()
+    pieces: tuple[Piece, ...] = ()
 
     @property
     def is_angle(self) -> bool:
         """Whether it is made of crank angles at which something happens."""
+        if self.kind == "minus":
+            return self.parts[0].is_angle
         return self.kind.startswith("phi") or self.kind == "difference"
 
     def to_inner(self, value: float) -> float:
         """Inner value that stands for a value of the output."""
+        if self.kind == "minus":
+            return -self.parts[0].to_inner(-value)
         if self.inner == "pressure":
             return -(math.cos(value) ** 2)
+        if self.inner == "transmission":
+            return math.sin(value) ** 2
         if self.inner == "ratio":
             return 2.0 * math.pi * value / (1.0 + value)
         if self.inner == "rotatable":
             return ROTATABLE_MARGIN * value
+        if self.inner == "square":
+            return math.copysign(value * value, value)  # a negative limit stays one that always holds, or never
         return value
 
     def from_inner(self, value: float) -> float:
         """Value of the output for an inner value; nan where there is none (a mechanism that does not turn)."""
+        if self.kind == "minus":
+            return -self.parts[0].from_inner(-value)
         if self.inner == "pressure":
             # 1 - cos^2 may come out as -1e-16 where coupler force and velocity are in line.
             return math.atan2(math.sqrt(max(1.0 + value, 0.0)), math.sqrt(-value)) if value <= 0.0 else math.nan
+        if self.inner == "transmission":
+            return math.atan2(math.sqrt(value), math.sqrt(max(1.0 - value, 0.0))) if value >= 0.0 else math.nan
         if self.inner == "ratio":
             return value / (2.0 * math.pi - value)
         if self.inner == "rotatable":
             return 1.0 if value > 0.0 else 0.0
+        if self.inner == "square":
+            return math.copysign(math.sqrt(abs(value)), value)
         return value
 
 
@@ -124,23 +148,43 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     InputError
         for a name that is no design output and no parameter.
     """
+    of = without_minus(name)
+    if of:
+        inner = measure(family, of, window)
+        return Measure(name, "minus", inner.series, inner.inner, 1.0, inner.numbers, (inner,), inner.pieces)
     if stem(name) == "rotatable" and not margins(family, parts(name).stage):
         return _margin_measure(name, "rotatable", ())
     timing = next((t for t in family.timings if t.name == name), None) if isinstance(family, Machine) else None
+    if isinstance(timing, Reading):
+        return Measure(name, "scalar", (), numbers=(name,))
     if timing is not None:
         ends = tuple(measure(family, place, window) for place in timing.places)
-        if not all(end.is_angle for end in ends):  # an event is found as a root, not followed as an extremum
+        if not all(end.is_angle for end in ends):
             return Measure(name, "scalar", (), numbers=(name,))
         return Measure(name, "difference", tuple(s for end in ends for s in end.series), parts=ends)
     asked = quantity(family, name)
+    event = next((e for e in family.events if event_names(family, e)[0] == name), None)
+    # The passage of an angle that jumps, and one on the way out of an interval, are found anew for every design.
+    if event is not None and isinstance(family.domain, Turn) and not family.pose_output[event.of].wraps:
+        return Measure(name, "phi_event", (Series(event.of, passes=(event.level, 1.0 if event.rising else -1.0)),))
     if asked is not None and asked.route == "margin":
         return _margin_measure(name, asked.kind, margins(family, asked.stage))
     if asked is not None and asked.route == "limits" and asked.kind in LIMIT_KINDS:
-        inner: Inner = "ratio" if asked.kind == "stroke_ratio" else "same"
-        return Measure(name, LIMIT_KINDS[asked.kind], (curve(family, asked.of),), inner)
+        ratio: Inner = "ratio" if asked.kind == "stroke_ratio" else "same"
+        return Measure(name, LIMIT_KINDS[asked.kind], (curve(family, asked.of),), ratio)
     if asked is not None and asked.route == "reduction":
         inside = window if family.pose_output[asked.of].windowed and asked.modes == (0,) else None
         return Measure(name, cast(Kind, asked.kind), (curve(family, asked.of, inside),))
+    extent = box(family, name)
+    if extent is not None:
+        numbers = tuple(f"{name}, still {k}" for k in range(len(extent.still)))
+        curves = tuple(curve(family, of) for of in extent.curves)
+        return Measure(name, "box", curves, numbers=numbers, pieces=extent.still)
+    found = size(family, name)
+    if found is not None:
+        numbers = tuple(f"{name}, piece {k}" for k in range(len(found.pieces)))
+        kind: Kind = "least" if found.least else "most"
+        return Measure(name, kind, (), "square" if found.squared else "same", numbers=numbers, pieces=found.pieces)
     steps = {output.name for step in family.steps for output in step.provides}
     if asked is not None or name in steps or name in family.parameter_names:
         return Measure(name, "scalar", (), numbers=(name,))
@@ -153,4 +197,6 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
 def _margin_measure(name: str, kind: str, series: tuple[Series, ...]) -> Measure:
     if kind == "max_pressure_angle":
         return Measure(name, "min", series, "pressure", sign=-1.0)
+    if kind == TRANSMISSION:
+        return Measure(name, "min", series, "transmission")
     return Measure(name, "min", series, "rotatable" if kind == "rotatable" else "same")

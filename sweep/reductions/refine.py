@@ -109,7 +109,7 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
     return Peaks(phi, height, err_phi, err_height, guess, spacing, step)
 
 
-def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> Peaks:
+def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, rounding: Array | float = 0.0) -> Peaks:
     """Peaks as poses of higher precision have them: their heights are values at their places.
 
     One pose at the place of a peak measures how far rounding, and what was left of interpolation, have moved its
@@ -120,6 +120,8 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) ->
     ----------
     sample : evaluates the measured quantity with less rounding than what the peaks come from
     peaks, tolerance, locate : as in `sharpen`
+    rounding : (k,) what rounding may have moved the heights by that the peaks come from.  One pose may see none of it
+        by chance, and the place may be spoilt all the same
     """
     before = peaks.height
     peaks = _attained(sample, peaks, np.arange(peaks.phi.size))
@@ -131,7 +133,8 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) ->
         # Rounding may have spoilt the place too, and rounding that is alike at neighbouring poses hides that: where it
         # has changed the height begin anew, else as wide as the place is uncertain.
         fresh = SHRINK * peaks.spacing
-        err_phi = np.where(rounded > tolerance, np.maximum(peaks.err_phi, fresh), peaks.err_phi)
+        spoilt = np.maximum(rounded, rounding) > tolerance
+        err_phi = np.where(spoilt, np.maximum(peaks.err_phi, fresh), peaks.err_phi)
         step = np.maximum(peaks.step, np.minimum(err_phi, fresh))
         rough = peaks._replace(step=step, err_phi=err_phi).only(again)
         sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, tolerance[again], locate[again])

@@ -10,6 +10,7 @@ import numpy as np
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
+from sweep.families.capabilities import Assembly
 from sweep.reductions.breaks import jumps, near_jumps, search
 from sweep.reductions.refine import EPS, SHRINK, Peaks, Sampler, confirmed, first_peaks, polish_places, sharpen
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
@@ -186,16 +187,19 @@ class Search:
         sample = self._sampler(self.family, rows, candidates, sign * around[:, 3])
         place = np.where(self.places(number), self.target, np.inf)
         peaks = sharpen(sample, first, tolerance, place)
-        rounding = self._rounding(columns, candidates, self.guards) * np.abs(peaks.height)
-        peaks = peaks._replace(err_height=peaks.err_height + rounding)
+        share = self._rounding(rows, columns, candidates, self.guards)
+        peaks = peaks._replace(err_height=peaks.err_height + share * np.abs(peaks.height))
         if self.family.precise_poses is not None:
-            self._confirm(rows, columns, candidates, peaks, size)
+            self._confirm(rows, columns, candidates, peaks, size, share)
         return peaks
 
     def _confirm(
-        self, rows: Index, columns: dict[str, Array], candidates: Candidates, peaks: Peaks, size: Array
+        self, rows: Index, columns: dict[str, Array], candidates: Candidates, peaks: Peaks, size: Array, share: Array
     ) -> None:
-        """Replace the peaks that may be the highest by what the family's precise poses say of them."""
+        """Replace the peaks that may be the highest by what the family's precise poses say of them.
+
+        ``share`` of a height is what rounding may have changed.
+        """
         number, row, _, sign = candidates
         windowed = np.array([request.windowed for request in self.requests])[number]  # which of them count, shows later
         group, doubt = number * rows.size + row, peaks.err_height + RIVALS * size
@@ -215,9 +219,9 @@ class Search:
         bare &= located
         locate[bare] = self.target
         peak.err_phi[bare] = np.maximum(peak.step, SHRINK**3 * peak.spacing)[bare]
-        peak = confirmed(sample, peak, tolerance, locate)
+        peak = confirmed(sample, peak, tolerance, locate, share[rivals] * np.abs(peak.height))
         # The first stage of a chain is given its exact input, those behind it a rounded one.
-        rounding = self._rounding(columns, mine, self.guards[1:]) * np.abs(peak.height)
+        rounding = self._rounding(rows, columns, mine, self.guards[1:]) * np.abs(peak.height)
         for column, found in zip(peaks, peak._replace(err_height=peak.err_height + rounding), strict=True):
             column[rivals] = found
 
@@ -243,15 +247,20 @@ class Search:
 
         return sample
 
-    def _rounding(self, columns: dict[str, Array], candidates: Candidates, guards: list[str]) -> Array:
+    def _rounding(self, rows: Index, columns: dict[str, Array], candidates: Candidates, guards: list[str]) -> Array:
         """Share of a value that rounding may have changed alike at neighbouring poses, where it leaves no ripple.
 
-        A pose near a dead point amplifies the rounding of its discriminant (docs/extrema.md).
+        A pose near a dead point amplifies the rounding of its discriminant (docs/extrema.md).  What is rounded are
+        terms of the size that the discriminant has where the links meet at a right angle: a tiny crank may keep it far
+        below that over the whole turn.
         """
         number, row, column, _ = candidates
         amplified = np.ones(row.size)
+        sizes = {loop.discriminant: loop.scale for loop in self.family.every(Assembly)}
         for name in guards:
             here, largest = columns[name][row, column], columns[name].max(axis=1)[row]
+            if name in sizes:
+                largest = np.maximum(largest, sizes[name](self.designs[rows])[row])
             amplified += np.divide(largest, here, out=np.ones(row.size), where=_tells(largest) & (here > 0.0))
         derivatives = set(self.family.derivative_of.values())
         derived = np.array([request.pose in derivatives for request in self.requests])[number]

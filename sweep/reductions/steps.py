@@ -9,13 +9,14 @@ from sweep.families.base import Accuracy, Family, Output, Step
 from sweep.families.chain import Chain, Stage
 from sweep.quantities.names import at_stage
 from sweep.quantities.reduction import reduction_of
+from sweep.reductions.dimensions import dimension_step
 from sweep.reductions.size import size_step
 from sweep.reductions.travel import certified_travel
 
 
 def steps_of(family: Family) -> tuple[Step, ...]:
     """The family's own routes, and those that are made for it here."""
-    made = (size_step(family), certified_travel(family))
+    made = (size_step(family), dimension_step(family), certified_travel(family))
     return (*family.steps, *(step for step in made if step is not None))
 
 

@@ -15,7 +15,7 @@ from sweep.reductions.catalogue import STAY, Quantity, quantity
 from sweep.reductions.closing import variable
 from sweep.reductions.dwell import window_angle
 from sweep.reductions.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
-from sweep.reductions.margins import combined, margin_suffixes, margins
+from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
 from sweep.reductions.sampling import TWO_PI, Mask, Status, blocks, sample_turn
 from sweep.reductions.window import Window
 
@@ -27,11 +27,29 @@ def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy:
     """Rotatability, margins and largest pressure angles; only the stages that the names need, all if there are none."""
     asked = quantities(family, names)
     known = margin_suffixes(family)
+    if any("." in one.stage for one in asked):
+        return _of_members(family, designs, asked, known, accuracy)
     last = max((known.index(one.stage) if one.stage else len(known) - 1 for one in asked), default=len(known) - 1)
     suffixes = known[: last + 1]
     columns = margins(family, designs, suffixes, accuracy)
     if suffixes != ("",) and suffixes == known:
         columns |= combined(columns, suffixes)
+        suffixes = ("", *suffixes)
+    return with_transmission(columns, suffixes)
+
+
+def _of_members(
+    family: Family, designs: Array, asked: Sequence[Quantity], known: Sequence[str], accuracy: Accuracy
+) -> Columns:
+    """Margins of members of a machine under their dotted names; a chain's weakest stage speaks for the member."""
+    members = {f"{one.stage.rpartition('.')[0]}." for one in asked}
+    suffixes = tuple(s for s in known if any(s.startswith(member) for member in members))
+    columns = with_transmission(margins(family, designs, suffixes, accuracy), suffixes)
+    for one in asked:
+        loops = tuple(s for s in suffixes if s == one.stage or (one.stage.endswith(".") and s.startswith(one.stage)))
+        found = columns if loops == (one.stage,) else with_transmission(combined(columns, loops), ("",))
+        key = f"{one.kind}{one.stage if found is columns else ''}"
+        columns |= {one.output.name: found[key], f"err_{one.output.name}": found[f"err_{key}"]}
     return columns
 
 

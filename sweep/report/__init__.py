@@ -5,15 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from sweep.dataset.layout import beside, is_older, located
+from sweep.jobs.progress import Say, unsaid
 
 
-def write_report(folder: str | Path, out: str | Path | None = None) -> Path:
+def write_report(folder: str | Path, out: str | Path | None = None, say: Say = unsaid) -> Path:
     """Write the report of a dataset.
 
     Parameters
     ----------
     folder : dataset that ``sweep.run`` left behind, complete
     out : where to write; default beside the chunks, ``results/<name>`` for ``results/<name>/designs``
+    say : called with how many of the report's steps are done
 
     Returns
     -------
@@ -31,7 +33,7 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Path:
     from sweep.report.page import write
 
     place = located(folder)
-    return write(place, _default(place) if out is None else Path(out))
+    return write(place, _default(place) if out is None else Path(out), say)
 
 
 def _default(folder: Path) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from kernels import status as codes
@@ -23,8 +24,8 @@ NEAREST = 4  # limits with room to spare that are named in the answer; the table
 NO_PROOF = "This is no proof of a global optimum"
 
 
-def answer(data: Dataset, found: Scan) -> list[str]:
-    """Sentences that answer the study's question, the most important first."""
+def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]:
+    """Sentences that answer the study's question, the most important first; ``further`` ones come before the limits."""
     total = data.designs
     if data.result is None:
         stops = max(fates(data, found)[:-1], key=lambda fate: fate.count, default=None)
@@ -42,6 +43,7 @@ def answer(data: Dataset, found: Scan) -> list[str]:
     second = data.second
     if second is not None and _is_number(data.result, second):
         sentences.append(_comparison(data, second))
+    sentences += further
     sentences += [] if cut else search_warnings(data)
     # What [locus] prescribes as an axis is a space that was searched; as a value it holds by construction.
     sentences += _limit_sentences([s for s in limit_states(data) if s.shown.name not in data.study.prescribed])
@@ -120,7 +122,7 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
             best, value = found.best_row[objective.output], value_of(data.optimum, objective.output)
             if not compared(objective.output, value) <= compared(objective.output, best) + 1e-6 * abs(best):
                 shown = quantity(objective.output, data.units.get(objective.output, ""))
-                faults.append(f"the optimiser ended above the best design of the sweep, {shown.show(best)}")
+                faults.append(f"the optimiser ended behind the best design of the sweep, {shown.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
 
 

@@ -115,7 +115,11 @@ def rotates(turn: pd.DataFrame, position: str) -> bool:
     """Whether the follower itself turns fully, so that it has no lowest position."""
     if not is_angle(position):
         return False
-    path = np.unwrap(turn[position].to_numpy(float))
+    return turns_fully(np.unwrap(turn[position].to_numpy(float)))
+
+
+def turns_fully(path: Array) -> bool:
+    """Whether an unwrapped angle over one turn of the crank makes a turn itself."""
     return bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
 
 
@@ -154,7 +158,16 @@ def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, A
 
 
 def _limit_lines(axes: Axes, name: str, shown: Quantity, limits: tuple[Limit, ...]) -> None:
-    """The limits that bound this curve itself, as thin lines."""
+    """The limits that bound this curve itself, as thin lines; far ones would make the curves flat."""
+    reach = FAR_LIMIT * np.abs(axes.dataLim.intervaly).max()
+    for value in limit_values(name, limits):
+        if abs(value) * shown.factor <= reach:
+            axes.axhline(value * shown.factor, color=LIMIT, linewidth=0.9, linestyle=":", zorder=2)
+
+
+def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
+    """Ordinates, in stored units, that the limits set to a curve itself; both signs where its size is limited."""
+    found = []
     for limit in limits:
         for value, outputs in (
             (limit.maximum, (f"max_abs_{name}", f"max_{name}")),
@@ -162,8 +175,6 @@ def _limit_lines(axes: Axes, name: str, shown: Quantity, limits: tuple[Limit, ..
         ):
             if value is None or limit.output not in outputs:
                 continue
-            if abs(value) * shown.factor > FAR_LIMIT * np.abs(axes.dataLim.intervaly).max():
-                continue
             both = limit.output.startswith("max_abs_") and stem(name) != "pressure_angle"
-            for sign in (1.0, -1.0) if both else (1.0,):
-                axes.axhline(sign * value * shown.factor, color=LIMIT, linewidth=0.9, linestyle=":", zorder=2)
+            found += [value, -value] if both else [value]
+    return found

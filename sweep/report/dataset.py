@@ -12,6 +12,7 @@ from sweep.dataset import store
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
 from sweep.optimise import Survey, read_survey
+from sweep.quantities.names import is_largest, is_place, stem
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,10 +114,15 @@ class Dataset:
             return None if self.study.pareto.at_least else self.study.pareto.output
         objective = self.study.objective
         others = [name for name in self.study.want if objective is None or name != objective.output]
-        ranked = [name for name in others if "dev" in name and not name.startswith("phi_")]
-        ranked += [name for name in others if name.startswith("max_abs_")]
-        ranked += [name for name in others if name.startswith("max_")]
+        ranked = [name for name in others if "dev" in stem(name) and not is_place(name)]
+        ranked += [name for name in others if is_largest(name, magnitude=True)]
+        ranked += [name for name in others if is_largest(name)]
         return ranked[0] if ranked else None
+
+    @property
+    def against(self) -> str | None:
+        """The criterion of the trade-off: that of [pareto], also where more of it is better."""
+        return self.study.pareto.output if self.study.pareto is not None else self.second
 
     def _role(self, role: str) -> Row | None:
         if self.optima is None:

@@ -145,6 +145,27 @@ def mechanism_figure(curves: pd.DataFrame, unit: str) -> Figure | None:
     return figure
 
 
+def small_figures(curves: pd.DataFrame, unit: str = "mm") -> dict[str, Figure]:
+    """One small picture of every mechanism, its stages side by side as seen along z, all to the same scale."""
+    drawn = [(str(role), stages(turn)) for role, turn in curves.groupby("role", sort=False)]
+    drawn = [(role, found) for role, found in drawn if found]
+    if not drawn:
+        return {}
+    count = len(drawn[0][1])
+    frames = [_frame([found[k] for _, found in drawn], "xy") for k in range(count)]
+    shapes = [min(max((right - left) / (top - bottom), 0.35), 3.0) for (left, right), (bottom, top) in frames]
+    pictures = {}
+    for role, found in drawn:
+        figure = new_figure(0.5 * WIDTH, min((0.5 * WIDTH - 0.6 * count) / sum(shapes), 2.8) + 0.7)
+        panels = figure.subplots(1, count, squeeze=False, width_ratios=shapes)[0]
+        for k, (axes, frame) in enumerate(zip(panels, frames, strict=True)):
+            _draw(axes, found[k], "xy", OPTIMUM, unit, k + 1 if count > 1 else None)
+            axes.set_xlim(frame[0])
+            axes.set_ylim(frame[1])
+        pictures[role] = figure
+    return pictures
+
+
 def _frame(same: list[Stage], plane: str) -> tuple[tuple[float, float], tuple[float, float]]:
     """Limits of both axes that hold a stage of every mechanism drawn, so that their sizes can be compared."""
     columns = ["xyz".index(letter) for letter in plane]

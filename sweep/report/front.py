@@ -53,7 +53,7 @@ def front_rows(data: Dataset) -> list[FrontRow]:
                 change="" if missed else change(objective, value, best),
                 second="–" if missed else second.show(compared(second.name, float(point[second.name]))),
                 state="no design found" if missed else _state(point),
-                held=str(point["relaxation"]) if missed else _held(str(point["active"]), second.name),
+                held=_given_way(data, str(point["relaxation"])) if missed else _held(str(point["active"]), second.name),
             )
         )
     return rows
@@ -125,6 +125,16 @@ def _state(point: dict[str, Any]) -> str:
     if residual <= SETTLED:
         return "settled"
     return f"{'time was up' if point['ended'] == 'time' else 'not settled'}, residual {number(residual, 2)}"
+
+
+def _given_way(data: Dataset, relaxation: str) -> str:
+    """By how much limits would have to give way, in the units of the table."""
+    words = []
+    for part in filter(None, relaxation.split("; ")):
+        name, _, size = part.rpartition(" by ")
+        shown = quantity(name, data.units.get(name, ""))
+        words.append(f"{shown.words} by {shown.show(abs(float(size)), 3)}")
+    return "; ".join(words)
 
 
 def _held(active: str, second: str) -> str:

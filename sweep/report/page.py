@@ -6,39 +6,48 @@ import math
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.errors import StoreError
+from sweep.jobs.progress import Say, unsaid
 from sweep.report import answer, front, limits, pictures, robust, tables
 from sweep.report.curves import motion_caption
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.drawing import mechanism_caption
 from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
 from sweep.report.files import copy_tables, write_survivors
+from sweep.report.live import live
 from sweep.report.scan import Cells, Scan, most_telling, scan
+from sweep.report.sections import buildable
 from sweep.report.turns import curves, reference_row
 
 if TYPE_CHECKING:
     from sweep.study import Study
 
 CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
+STEPS = 4  # of a report: rows, figures, optima and yield, page
 DESIGNS_PER_CELL = 3.0
 
 
-def write(folder: Path, out: Path) -> Path:
+def write(folder: Path, out: Path, say: Say = unsaid) -> Path:
     """Write everything the report consists of into ``out`` and return the path of ``report.html``."""
+    say("report", 0, STEPS, "steps")
     data, found, cells = gather(folder)
     try:
         out.mkdir(parents=True, exist_ok=True)
         with house_style():
+            say("report", 1, STEPS, "steps")
             figures = draw(data, found, cells, out / "figures")
+            say("report", 2, STEPS, "steps")
+            more = buildable(data, out / "figures")
+        say("report", 3, STEPS, "steps")
         copy_tables(folder, out)
         write_survivors(data.parts, out / "survivors.parquet")
         target = out / "report.html"
         partial = out / "_tmp-report.html"
         own = own_figures(data.study, out / "figures")
-        partial.write_text(render(data, found, cells, figures, own), encoding="utf-8")
+        partial.write_text(render(data, found, cells, figures, own, more), encoding="utf-8")
         partial.replace(target)
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
@@ -50,7 +59,8 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
     data = read_dataset(folder)
     cells = divided_axes(data.study, data.counts.get(codes.OK, 0))
     objective = pictures.objective_of(data.study)
-    found = scan(data.parts, cells, objective, data.second if objective is not None else None)
+    larger = data.study.pareto is not None and data.study.pareto.at_least
+    found = scan(data.parts, cells, objective, data.against if objective is not None else None, larger)
     data = replace(data, best=found.best_row or None)
     if data.optima is None:
         data = replace(data, computed_reference=reference_row(data.study))
@@ -117,8 +127,15 @@ def own_figures(study: Study, folder: Path) -> list[OwnFigure]:
     return found
 
 
-def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Saved], own: list[OwnFigure]) -> str:
-    """The HTML text."""
+def render(
+    data: Dataset,
+    found: Scan,
+    cells: list[Cells],
+    figures: dict[str, Saved],
+    own: list[OwnFigure],
+    more: dict[str, Any],
+) -> str:
+    """The HTML text; ``more`` are the sections about what can be built."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -130,13 +147,13 @@ def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Sa
     )
     pair = most_telling(found)
     return environment.get_template("report.html").render(
-        style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
+        style="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("report.css", "optima.css")),
         study=data.study,
         data=data,
         title=data.study.title or data.study.name,
         figures=figures,
         own_figures=own,
-        sentences=answer.answer(data, found),
+        sentences=answer.answer(data, found, more["further"]),
         limits=limits.limit_states(data),
         outputs=tables.output_rows(data),
         parameters=tables.parameter_rows(data),
@@ -157,4 +174,6 @@ def render(data: Dataset, found: Scan, cells: list[Cells], figures: dict[str, Sa
         axes=len(cells),
         speed=answer.rpm(data.study.speed),
         today=date.today().isoformat(),
+        **live(data, cells),
+        **more,
     )

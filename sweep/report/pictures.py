@@ -56,7 +56,7 @@ def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, 
 def trade_off(data: Dataset, found: Scan) -> Figure | None:
     """The objective against a second criterion, with the front where one was searched."""
     study, shown = data.study, shown_objective(data)
-    against = study.pareto.output if study.pareto is not None else data.second
+    against = data.against
     if shown is None or against is None or not (len(found.scatter) or data.front is not None):
         return None
     second = quantity(against, data.units.get(against, ""))

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, replace
 
 from sweep.families.domain import Turn
-from sweep.quantities.names import is_error, is_place, parts, without_error
+from sweep.quantities.names import is_error, is_place, parts, without_error, without_minus
 from sweep.quantities.reduction import split
 from sweep.study.units import internal_unit
 
@@ -23,6 +23,8 @@ DERIVATIVES = ("", "velocity", "acceleration", "jerk")
 SYMBOLS = {"psi": "ψ", "phi": "φ", "phi0": "φ₀", "phi_ext": "φ extended", "phi_fold": "φ folded"}
 PRIMES = ("", "′", "″", "‴")
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
+# Units that a designer reads instead of those that are stored, with the factor to them.
+READ_IN = {"t": ("g", 1e6), "t*mm^2": ("kg·mm²", 1e3), "life": ("h", 1.0 / 3600.0)}
 _POINT = re.compile("([xyz])_([a-z])")
 
 
@@ -77,6 +79,9 @@ def with_unit(text: str, unit: str) -> str:
 def quantity(name: str, unit: str) -> Quantity:
     """How the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
     unit = internal_unit(unit)
+    if of := without_minus(name):  # what is to be made large is shown as itself
+        shown = quantity(of, unit)
+        return replace(shown, name=name, factor=-shown.factor, speed_scale=-shown.speed_scale)
     if is_error(name):
         shown = quantity(without_error(name), unit)
         return Quantity(name, f"error of {shown.symbol}", f"error of the {shown.words}", shown.unit, shown.factor)
@@ -96,7 +101,8 @@ def quantity(name: str, unit: str) -> Quantity:
     if is_place(name) or (order == 0 and unit in ("rad", "angle")):
         return Quantity(name, symbol, words, "°", math.degrees(1.0), symbolic)
     if order == 0:
-        return Quantity(name, symbol, words, _pretty_unit(unit), 1.0, symbolic)
+        read, factor = READ_IN.get("life" if unit == "s" and "life" in name else unit, (_pretty_unit(unit), 1.0))
+        return Quantity(name, symbol, words, read, factor, symbolic)
     length = unit.startswith("mm")
     return Quantity(
         name,

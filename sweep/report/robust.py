@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from sweep.dataset import store
-from sweep.quantities.names import is_flag
+from sweep.quantities.names import is_flag, without_minus
 from sweep.report.quantities import number, quantity
 
 if TYPE_CHECKING:
@@ -31,13 +31,18 @@ class ToleranceRow:
 
 @dataclass(frozen=True)
 class SlopeRow:
-    """One dimension: change of the objective in percent where it grows, and where it shrinks, by ``step``."""
+    """One dimension: change of the objective in percent where it grows, and where it shrinks, by ``step``.
+
+    ``up`` and ``down`` are the same as lengths of bars, 50 for the largest change of all.
+    """
 
     name: str
     text: str
     step: str
     growing: str
     shrinking: str
+    up: float
+    down: float
 
 
 def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
@@ -47,6 +52,8 @@ def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
         name = str(row["output"])
         within = "" if math.isnan(row["within"]) else f"{number(100.0 * row['within'], 3)}\u00a0%"
         if name == "all limits":
+            known = float((data.optimum or {}).get("yield", math.nan))  # of more mechanisms, where it is known
+            within = f"{number(100.0 * known, 3)}\u00a0%" if math.isfinite(known) else within
             rows.append(ToleranceRow("", "all limits", "", "", "", within))
         elif not is_flag(name):
             shown = quantity(name, data.units.get(name, ""))
@@ -80,8 +87,16 @@ class Slope:
 def slope_rows(data: Dataset) -> list[SlopeRow]:
     """Dimensions by how much they change the objective, the most telling first."""
     texts = {p.name: p.text for p in data.study.family.parameters}
-    percent = ((s, _percent(s.growing), _percent(s.shrinking)) for s in slopes(data))
-    return [SlopeRow(s.name, texts.get(s.name, ""), s.step, up, down) for s, up, down in percent]
+    ranked = slopes(data)
+    most = max((abs(x) for s in ranked for x in (s.growing, s.shrinking)), default=0.0)
+    scale = 50.0 / most if most > 0.0 else 0.0
+    return [
+        SlopeRow(
+            s.name, texts.get(s.name, ""), s.step, _percent(s.growing), _percent(s.shrinking),
+            scale * s.growing, scale * s.shrinking,
+        )
+        for s in ranked
+    ]  # fmt: skip
 
 
 def slopes(data: Dataset) -> list[Slope]:
@@ -96,7 +111,9 @@ def slopes(data: Dataset) -> list[Slope]:
         step, step_words = STEPS.get(units.get(name, ""), (0.1, "0.1"))
         if not value > 0.0 or math.isnan(row["growing"]):
             continue
-        up, down = (100.0 * step * x / value for x in (row["growing"], -row["shrinking"]))
+        share = 100.0 * step / value
+        share = -share if without_minus(data.study.objective.output) else share  # shown as what is made large
+        up, down = (share * x for x in (row["growing"], -row["shrinking"]))
         ranked.append(Slope(name, step_words, up, down))
     return sorted(ranked, key=lambda slope: -max(abs(slope.growing), abs(slope.shrinking)))
 

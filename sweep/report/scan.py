@@ -94,7 +94,9 @@ class Scan:
     counts: dict[int, int] = field(default_factory=dict)
 
 
-def scan(parts: Sequence[Path], cells: Sequence[Cells], objective: str | None, second: str | None) -> Scan:
+def scan(
+    parts: Sequence[Path], cells: Sequence[Cells], objective: str | None, second: str | None, larger: bool = False
+) -> Scan:
     """Read every part of the dataset once.
 
     Parameters
@@ -102,7 +104,9 @@ def scan(parts: Sequence[Path], cells: Sequence[Cells], objective: str | None, s
     parts : Parquet files of the dataset
     cells : divided axes; every pair of them gets a grid
     objective, second : output columns, smaller is better; None where the study has none
+    larger : more of the second is better
     """
+    sense = -1.0 if larger else 1.0
     found = Scan()
     for c in cells:
         found.lines[c.name] = Grid(np.full(c.weights.size, np.inf), np.zeros(c.weights.size))
@@ -131,14 +135,15 @@ def scan(parts: Sequence[Path], cells: Sequence[Cells], objective: str | None, s
         if score[row] < best:
             best, found.best_row = float(score[row]), {name: float(batch[name][row]) for name in names}
         if objective is not None and second is not None:
-            other = compared(second, batch[second])
+            other = sense * compared(second, batch[second])
             both = ok & np.isfinite(other)
             points = np.column_stack([score, other])
             found.front = non_dominated(np.vstack([found.front, points[both]]))
             taken = points[offset::stride]
             samples.append(taken[both[offset::stride]])
     if samples:
-        found.scatter = np.vstack(samples)
+        found.scatter = np.vstack(samples) * (1.0, sense)
+        found.front = found.front * (1.0, sense)
     return found
 
 

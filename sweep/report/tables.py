@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.evaluation.statuses import meaning
-from sweep.quantities.names import is_flag, is_place
+from sweep.quantities.names import is_flag, is_place, without_minus
 from sweep.report.limits import bound_words, limited
 from sweep.report.quantities import change, number, quantity
 
@@ -72,7 +72,7 @@ def output_rows(data: Dataset) -> list[OutputRow]:
             OutputRow(
                 name,
                 shown.symbol,
-                data.definitions.get(name, shown.words),
+                data.definitions.get(name, shown.words).removeprefix(f"negative of {without_minus(name)}: "),
                 _yes(value) if flag else shown.show(value),
                 shown.at_speed(value, study.speed),
                 _yes(other) if flag else shown.show(other),

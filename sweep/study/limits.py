@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,8 @@ def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple
             found.append(Limit(name, minimum=1.0))
         elif isinstance(entry, str) and "+-" in entry:
             found += _read_band(output, entry, key, faults)
+        elif isinstance(entry, str) and entry.lstrip()[:1] in _SIDES:
+            found += _read_side(output, entry, key, faults)
         elif isinstance(entry, dict):
             found += _read_bounds(output, entry, key, faults)
         else:
@@ -108,6 +111,37 @@ def _read_band(output: Output, text: str, key: Key, faults: Faults) -> list[Limi
     return [Limit(output.name, (centre - half) * factor, (centre + half) * factor)]
 
 
+def _read_side(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
+    """A bound on one side, as "<= 45 deg"."""
+    internal = units.internal_unit(output.unit)
+    sign, rest = _SIDE.fullmatch(text.strip()).groups()  # type: ignore[union-attr]
+    if sign not in ("<=", ">=", "\u2264", "\u2265"):
+        faults.value(key, text, f'"<=" or ">=", or "+-" for a band, as {_side(internal)} or {_band(internal)}')
+        return []
+    try:
+        number, unit = units.split(rest, internal) if internal != "1" else (float(rest), "1")
+        bound = number * units.factor(unit, internal)
+    except units.UnitFault as fault:
+        faults.value(key, text, f"{fault}: {_side(internal)}")
+        return []
+    except ValueError:
+        faults.value(key, text, f"a sign and a number, as {_side(internal)}")
+        return []
+    if not math.isfinite(bound):
+        faults.value(key, text, f"a finite number, as {_side(internal)}")
+        return []
+    upper = sign in ("<=", "\u2264")
+    return [Limit(output.name, None if upper else bound, bound if upper else None)]
+
+
+_SIDES = ("<", ">", "=", "\u2264", "\u2265")
+_SIDE = re.compile("([<>=\u2264\u2265]+)\\s*(.*)", re.DOTALL)
+
+
+def _side(internal: str) -> str:
+    return {"1": '"<= 2.5"', "rad": '"<= 45 deg"'}.get(internal, f'"<= 24.5 {internal}"')
+
+
 def _band(internal: str) -> str:
     return {"1": '"2 +- 0.1"', "rad": '"40 +- 0.2 deg"'}.get(internal, f'"24.5 +- 0.1 {internal}"')
 
@@ -115,4 +149,4 @@ def _band(internal: str) -> str:
 def _form(output: Output) -> str:
     internal = units.internal_unit(output.unit)
     unit = {"1": "", "rad": ', unit = "deg"'}.get(internal, f', unit = "{internal}"')
-    return f"{{ min = ..., max = ...{unit} }}"
+    return f"{{ min = ..., max = ...{unit} }}, or {_side(internal)}, or {_band(internal)}"

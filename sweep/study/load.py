@@ -73,13 +73,13 @@ def with_accuracy(study: Study, target: float | None = None, certify: bool | Seq
 def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...] = ()) -> dict[str, Any]:
     """Lay one file's tables over another's, key by key.
 
-    [accuracy] and whatever stands as value or values of a parameter replace what they cover: half of one and half of
-    the other would be neither.
+    [accuracy], [objective] and whatever stands as value or values of a parameter replace what they cover: half of one
+    and half of the other would be neither.
     """
     result = copy.deepcopy(dict(base))
     for name, new in over.items():
         old = result.get(name)
-        if not isinstance(old, dict) or not isinstance(new, dict) or (*key, name) == ("accuracy",):
+        if not isinstance(old, dict) or not isinstance(new, dict) or (*key, name) in (("accuracy",), ("objective",)):
             result[name] = copy.deepcopy(new)
         elif {"value", "values"}.isdisjoint({*old, *new}):
             result[name] = merged(old, new, (*key, name))

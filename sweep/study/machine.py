@@ -59,6 +59,7 @@ class RelationSection(Section):
     event: str | None = Field(None, description='a pose output, as "clearance" or "looper.tip_x"')
     level: str | Number | None = Field(None, description='what it passes, in its unit, as "1 mm"; 0 if left out')
     rising: bool | None = Field(None, description="true or false: whether it passes upwards; true if left out")
+    value: Names | None = Field(None, description='a pose output and a crank angle, as ["pace", "phi_arrive"]')
     torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
     shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
 
@@ -108,7 +109,7 @@ def read_machine(
     if len(faults.lines) > before:
         return None
     try:
-        plain = {name: table for name, table in relations.items() if "event" not in table}
+        plain = {name: table for name, table in relations.items() if not {"event", "value"} & set(table)}
         outputs = find_family(specification(members, plain)).pose_output if len(plain) < len(relations) else {}
         for name, table in relations.items():
             if "level" in table and (of := outputs.get(table.get("event", ""))) is not None:

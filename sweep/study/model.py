@@ -6,6 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator
 
+from sweep.quantities.names import negative
+
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e100, le=1e100)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
@@ -117,8 +119,13 @@ class FitSection(Section):
 class ObjectiveSection(Section):
     """[objective]"""
 
-    required = ("minimise",)
     minimise: str | None = Field(None, description="the name of a design output")
+    maximise: str | None = Field(None, description="the name of a design output")
+
+    @property
+    def goal(self) -> str | None:
+        """The output that is made small: of one to be made large its negative."""
+        return self.minimise or (self.maximise and negative(self.maximise))
 
 
 class AccuracySection(Section):

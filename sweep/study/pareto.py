@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Output, Parameter, Unit
+from sweep.quantities.names import without_minus
 from sweep.study.design import read_entry
 from sweep.study.faults import Faults, Key
 from sweep.study.limits import read_output_name
@@ -47,7 +48,7 @@ def read_pareto(
     output = read_output_name(family, section.output, place, faults)
     if output is None or len(given) != 1:
         return None
-    if output.name == objective:
+    if output.name in (objective, without_minus(objective or "")):
         faults.value(place, output.name, "another output than the objective")
         return None
     key: Key = ("pareto", given[0])
@@ -82,7 +83,7 @@ def _searchable(family: Family, output: Output, bounds: tuple[float, ...], side:
     if found.inner == "rotatable" or output.jumps:
         faults.value(("pareto", "output"), output.name, "a quantity that changes steadily")
         return False
-    if found.inner == "pressure" and not all(0.0 < bound < 0.5 * math.pi for bound in bounds):
+    if found.inner in ("pressure", "transmission") and not all(0.0 < bound < 0.5 * math.pi for bound in bounds):
         faults.value(("pareto", side), list(bounds), "angles between 0 and 90 deg")
         return False
     return True

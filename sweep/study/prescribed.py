@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.families.base import Family
+from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import LimitLocus
 from sweep.families.chain import Chain, stages_of
 from sweep.study.design import Entry, missing_parameter, read_entry
@@ -33,13 +33,22 @@ def read_locus(family: Family, faults: Faults) -> OnLocus | None:
 def read_prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled: bool) -> dict[str, Entry]:
     """The prescribed outputs as fixed values or axes; faulty ones are reported and left out."""
     known = [p.name for p in locus.prescribed]
+    ratio, phi0 = f"time_ratio{locus.number}", f"phi0{locus.number}"
+    known.insert(known.index(phi0) + 1, ratio)
     for name in raw:
         if name not in known:
-            faults.unknown(("locus", name), [k for k in known if k not in raw] or known)
+            told = {phi0, ratio} if {phi0, ratio} & set(raw) else set()  # one of both says it
+            faults.unknown(("locus", name), [k for k in known if k not in raw and k not in told] or known)
     found: dict[str, Entry] = {}
     for p in locus.prescribed:
+        if p.name == phi0 and ratio in raw:
+            angle = _angle_of_ratio(phi0, raw, ratio, faults, sampled)
+            found |= {} if angle is None else {phi0: angle}
+            continue
         if p.name not in raw:
-            faults.missing(("locus", p.name), missing_parameter(p))
+            instead = ratio if p.name == phi0 else ""
+            other = f"; or {ratio}, the time there over the time back, as 1.1" if instead else ""
+            faults.missing(("locus", p.name), missing_parameter(p) + other, instead=instead)
             continue
         entry = read_entry(p, raw[p.name], ("locus", p.name), faults, sampled)
         if entry is None:
@@ -49,6 +58,25 @@ def read_prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, samp
             faults.value(("locus", p.name), raw[p.name], wrong)
         found[p.name] = entry
     return found
+
+
+def _angle_of_ratio(phi0: str, raw: Mapping[str, Any], ratio: str, faults: Faults, sampled: bool) -> Entry | None:
+    """phi0 from the ratio of the times of both strokes, phi0/(2 pi - phi0), the crank turning evenly."""
+    key = ("locus", ratio)
+    if phi0 in raw:
+        faults.value(key, raw[ratio], f"{phi0} or {ratio}, not both: they say the same")
+        return None
+    text = "time from the extended to the folded position over the time back"
+    entry = read_entry(Parameter(ratio, "ratio", text, positive=True), raw[ratio], key, faults, sampled)
+    if entry is None or not isinstance(entry, Axis):
+        return None if entry is None else float(_angle(entry))
+    if entry.values is None:
+        return Axis.sampled(phi0, (float(_angle(entry.low)), float(_angle(entry.high))), "rad")
+    return Axis.listed(phi0, _angle(entry.values), "rad")
+
+
+def _angle(ratio: Any) -> Any:
+    return 2.0 * np.pi * ratio / (1.0 + ratio)
 
 
 def prescribed_limits(entries: Mapping[str, Entry]) -> tuple[Limit, ...]:

@@ -15,11 +15,13 @@ from sweep.families import Specification
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
 from sweep.numerics.curves import Curve
+from sweep.quantities.names import without_minus
 from sweep.study.space import DesignSpace
 
 if TYPE_CHECKING:
     from sweep.synthesis.fit import LineFit
     from sweep.synthesis.prescription import OnLocus
+    from sweep.synthesis.tasks.problem import Problem
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,14 @@ class Limit:
 
 @dataclass(frozen=True)
 class Objective:
-    """The design output to be made small."""
+    """The design output to be made small: the negative of one that is to be made large."""
 
     output: str
+
+    @property
+    def aim(self) -> str:
+        """What is done with the output that the study names."""
+        return "maximised" if without_minus(self.output) else "minimised"
 
 
 @dataclass(frozen=True)
@@ -153,6 +160,7 @@ class Study:
     pareto: ParetoSettings | None
     tolerance: Tolerance | None
     reference: dict[str, float] | None
+    task: Problem | None
     output: OutputSettings
     budget: Budget
     data: dict[str, Any]
@@ -230,6 +238,8 @@ class Study:
             content["curves"] = {name: asdict(curve) for name, curve in self.curves.items()}
         if self.accuracy.certify:
             content["certify"] = self.accuracy.proven or True
+        if self.task is not None:
+            content["task"] = repr(self.task)
         if self.tolerance is not None:
             content["tolerance"] = _without_none(asdict(self.tolerance), "robust")
         return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()

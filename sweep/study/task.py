@@ -22,6 +22,11 @@ from sweep.synthesis.tasks.task5 import SlotPosition
 KINDS: Mapping[str, Any] = {"engineering": tasks.EngineeringMethod} | {
     f"task{number}": getattr(tasks, f"Task{number}") for number in range(1, 9)
 }
+# What the mechanisms that do a task are; the second stage of task 5 is no family.
+CHAINS: Mapping[str, tuple[str, ...]] = {
+    "engineering": ("rssr",), "task1": ("rssr",), "task2": ("rssr",), "task3": ("rssr",), "task4": ("rssr",),
+    "task6": ("rssr", "guide"), "task7": ("rssr", "rssp"), "task8": ("rssr", "rssp"),
+}  # fmt: skip
 RECORDS: Mapping[str, Any] = {"task1": Position, "task2": Position, "task3": Setting, "task5": SlotPosition}
 
 # What the numbers of the tasks are, by name; all others are lengths. A range is called as what it is a range of.
@@ -36,8 +41,9 @@ def load_task(path: str | Path) -> Problem:
 
     Parameters
     ----------
-    path : a TOML file; ``kind`` is "engineering" or "task1" to "task8", the other keys are those of the task's class in
-        docs/tasks.md: numbers as texts with their units, ranges as ``{ from = ..., to = ..., unit = "..." }``
+    path : a TOML file, a study file perhaps, or the folder of a study; ``kind`` is "engineering" or "task1" to "task8",
+        the other keys are those of the task's class in docs/tasks.md: numbers as texts with their units, ranges as
+        ``{ from = ..., to = ..., unit = "..." }``
 
     Raises
     ------
@@ -45,18 +51,22 @@ def load_task(path: str | Path) -> Problem:
         lists every fault with file, line, key, value and what is allowed.
     """
     file = Path(path)
+    file = file / "study.toml" if file.is_dir() else file
     data = read_toml(file)
     faults = Faults({file.name: data}, {file.name: key_lines(toml_text(file))})
-    for name in data:
-        if name not in ("task", "study"):
-            faults.unknown((name,), ("task", "study"))
-    problem = _problem(data.get("task"), faults)
+    if not {"mechanism", "machine"} & set(data):  # a study checks its other tables itself
+        for name in data:
+            if name not in ("task", "study"):
+                faults.unknown((name,), ("task", "study"))
+    problem = read_task(data.get("task"), faults)
     if problem is None or faults.lines:
         raise StudyError(str(file), faults.lines)
     return problem
 
 
-def _problem(raw: object, faults: Faults) -> Problem | None:
+def read_task(raw: object, faults: Faults) -> Problem | None:
+    """The problem of a table [task], or None with its faults."""
+    before = len(faults.lines)
     if not isinstance(raw, dict):
         faults.missing(("task",), "a table [task] with kind and what is given")
         return None
@@ -72,7 +82,7 @@ def _problem(raw: object, faults: Faults) -> Problem | None:
     for name, field in known.items():
         if name not in raw and field.default is MISSING and field.default_factory is MISSING:
             faults.missing(("task", name), _needed(name))
-    if faults.lines:
+    if len(faults.lines) > before:
         return None
     try:
         problem: Problem = KINDS[kind](**given)

@@ -46,10 +46,12 @@ _DEFINITIONS = (
     "percent = 1e-2 = %",
 )
 SYMBOLS = tuple(line.rsplit(" = ", 1)[1] for line in _DEFINITIONS)
+# Other ways to write a symbol: "90°", "2 inch", both code points of the micro sign.
+_ALIASES = {"°": "deg", "inch": "in", "\u00b5m": "um", "\u03bcm": "um"}
 
 # What may stand for an internal unit, as messages say it.
 _EXAMPLES = {
-    "mm": "a length, in mm, um, cm, m or in",
+    "mm": "a length, in mm, um, cm, m or inch",
     "rad": "an angle, in deg, rad, mrad or rev",
     "t": "a mass, in kg, g or t",
     "N": "a force, in N or kN",
@@ -85,7 +87,7 @@ WORDS = {
 }
 
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
-_TERM = re.compile(r"([A-Za-z%]+|1)(?:\^(-?[1-9]))?")
+_TERM = re.compile(r"([A-Za-z%°\u00b5\u03bc]+|1)(?:\^(-?[1-9]))?")
 
 
 class UnitFault(ValueError):
@@ -162,13 +164,14 @@ def _parse(text: str) -> pint.Unit:
     parts = re.split(r"\s*([*/])\s*", text.strip())
     for part in parts[::2]:
         match = _TERM.fullmatch(part)
-        if match is None or (match[1] not in SYMBOLS and match[1] != "1"):
+        if match is None or (match[1] not in SYMBOLS and match[1] not in _ALIASES and match[1] != "1"):
             symbol = part if match is None else match[1]
-            raise UnitFault(nearest(symbol, SYMBOLS))
+            raise UnitFault(nearest(symbol, (*SYMBOLS, *_ALIASES)))
     unit = _registry().Unit("")
     for operator, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
         symbol, _, exponent = part.partition("^")
-        term = _registry().Unit("" if symbol == "1" else symbol) ** int(exponent or 1)
+        known = _ALIASES.get(symbol, symbol)
+        term = _registry().Unit("" if known == "1" else known) ** int(exponent or 1)
         unit = unit * term if operator == "*" else unit / term
     return unit
 

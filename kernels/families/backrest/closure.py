@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels._jit import inline
-from kernels.complex_step import arctan2, hypotenuse
+from kernels.complex_step import arctan2, divisor, hypotenuse
 
 Array: TypeAlias = NDArray[np.float64]
 Status: TypeAlias = NDArray[np.uint8]
@@ -121,13 +121,13 @@ def scaled(designs: Array, i: int, row: Array) -> tuple[float, bool]:
 
 
 @inline
-def place(d: Array, phi: Any, rho: float) -> Place:
+def place(d: Array, phi: Any, rho: Any) -> Place:
     """Axis of the back-rest, yarn branches, wrap angle; (1)-(5).  ``defined`` is false where a length is not real."""
     sin_p, cos_p = np.sin(phi), np.cos(phi)
     sin_g, cos_g = np.sin(d[7]), np.cos(d[7])
     sin_d, cos_d = np.sin(d[7] - phi), np.cos(d[7] - phi)
     numerator = d[6] + (d[2] - d[8]) * sin_g + (d[3] - d[9]) * cos_g + d[4] * cos_d
-    arm = numerator / sin_d
+    arm = numerator / divisor(sin_d)
     x = d[2] - arm * cos_p + d[4] * sin_p
     y = d[3] + arm * sin_p + d[4] * cos_p
     one, two = hypotenuse(x, y), hypotenuse(d[0] - x, d[1] - y)
@@ -151,7 +151,7 @@ def spring(d: Array, phi: Any) -> tuple[Any, Any, Any]:
     qx, qy = d[15] - d[2], d[16] - d[3]
     length = hypotenuse(qx - px, qy - py)
     force = d[19] + d[17] * (length - d[18])
-    moment = force * ((py * qx - px * qy) / length) - d[12] * d[20] * np.cos(phi + d[21])
+    moment = force * ((py * qx - px * qy) / divisor(length)) - d[12] * d[20] * np.cos(phi + d[21])
     return length, force, moment
 
 
@@ -177,20 +177,20 @@ def forces(d: Array, phi: Any, at: Place, moment: Any, s1: Any, s2: Any) -> Forc
     """Yarn tension and reactions of guide and bracket; (9), and (10), (11) with the slider's couple."""
     a, s, q2, k1, k2, sin_v, cos_v, both = directions(d, phi, at, s1, s2)
     weight = d[11]
-    n2 = moment * (at.sin_d / at.numerator)
-    n1 = (n2 * q2 - weight * sin_v) / s
-    tension = (n2 * a - weight * (np.sin(d[7]) + s1 * d[10] * np.cos(d[7]))) / (both * s)
+    n2 = moment * (at.sin_d / divisor(at.numerator))
+    n1 = (n2 * q2 - weight * sin_v) / divisor(s)
+    tension = (n2 * a - weight * (np.sin(d[7]) + s1 * d[10] * np.cos(d[7]))) / divisor(both * s)
     arm = at.R1 - s2 * d[10] * d[4]
     lever = s1 * d[10] * d[6]
-    det = s * arm + lever * q2
+    det = divisor(s * arm + lever * q2)
     n2_couple = (s * moment + lever * weight * sin_v) / det
     n1_couple = (q2 * moment - weight * sin_v * arm) / det
-    couple = (n2_couple * k2 - n1_couple * k1 - weight * cos_v) / both
+    couple = (n2_couple * k2 - n1_couple * k1 - weight * cos_v) / divisor(both)
     return Forces(tension, n1, n2, couple, n1_couple, n2_couple)
 
 
 @inline
-def residual(d: Array, phi: Any, rho: float, mode: int) -> tuple[Any, bool]:
+def residual(d: Array, phi: Any, rho: Any, mode: int) -> tuple[Any, bool]:
     """Left side of the equation for the bracket angle with its poles multiplied out; (12).
 
     False where the geometry is not defined or the slider would stand on the other side of the bracket's pivot.

@@ -14,29 +14,31 @@ from kernels.families.backrest.roots import MOST, all_roots
 
 
 @inline
-def _by_law(d: Array, rho: float) -> tuple[Any, bool]:
+def _by_law(d: Array, rho: Any) -> tuple[Any, bool]:
     """Bracket angle of the let-off regulator, linear in 1/rho; (13)."""
     # constant angle: then the radii of the full and the empty beam need not be given
     if d[25].real == 0.0:
         return d[24] + 0.0 * d[25], True
     full, empty = d[26], d[27]
     ordered = full.real > empty.real > 0.0
-    return d[24] + d[25] * (empty * (full - rho)) / (rho * (full - empty)), ordered
+    if not ordered:  # compiled complex numbers raise where real ones give inf
+        return math.nan * d[24], False
+    return d[24] + d[25] * (empty * (full - rho)) / (rho * (full - empty)), True
 
 
 @inline
-def _by_root(d: Array, plain: Array, rho: float, mode: int, roots: Array) -> tuple[Any, int, int]:
+def _by_root(d: Array, plain: Array, rho: Any, mode: int, roots: Array) -> tuple[Any, int, int]:
     """Bracket angle from the equation of the mode, how many there are, and the status.
 
-    The last Newton step carries the imaginary parts of a complex design: it differentiates the root exactly.
+    The last Newton step carries the imaginary parts of a complex design or radius: it differentiates the root exactly.
     """
-    count = all_roots(plain, rho, mode, roots)
+    count = all_roots(plain, rho.real, mode, roots)
     which = int(plain[31]) - 1
     if not 0 <= which < count:
         return math.nan * d[24], count, st.NO_ROOT
     phi = roots[which]
     # the slope by a complex step, which has no difference to cancel
-    slope = residual(plain, complex(phi, 1e-100), rho, mode)[0].imag * 1e100
+    slope = residual(plain, complex(phi, 1e-100), rho.real, mode)[0].imag * 1e100
     value, _ = residual(d, phi + 0.0 * d[24], rho, mode)
     step = value / slope
     # At a double root the step is noise: the bracket is better.
@@ -64,7 +66,7 @@ def poses(
     Parameters
     ----------
     designs : (n, 32) columns of :class:`Design`
-    rho : (n, m), or (1, m) shared by all designs; radius of the yarn on the beam [length]
+    rho : (n, m), or (1, m) shared by all designs; radius of the yarn on the beam [length], complex where designs are
     modes : (n,) numbers of :class:`Mode`: what fixes the bracket angle
     status : (n, m) out; OK, NO_ROOT (fewer roots than ``root``), NOT_ASSEMBLED (a yarn branch has no length), SINGULAR
         (bracket parallel to the guide) or INVALID_INPUT; where it is not OK all values are nan, but the count of roots
@@ -80,8 +82,8 @@ def poses(
         scaled(plain, i, flat)
         row, mode = i if rho.shape[0] > 1 else 0, modes[i]
         for j in range(rho.shape[1]):
-            radius = rho[row, j].real / unit
-            good, code, count = valid and 0.0 < radius < 1e140, st.OK, 1
+            radius = rho[row, j] / unit
+            good, code, count = valid and 0.0 < radius.real < 1e140, st.OK, 1
             if mode == Mode.LAW:
                 phi, ordered = _by_law(d, radius)
                 good = good and ordered and (0.0 * phi).real == 0.0  # false for inf and nan

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kernels._jit import inline
+from kernels.complex_step import divisor
 from kernels.crank_closure import EPS, Numbers, Reduced, axial_terms, reduce_scaled, unit_scale
 from kernels.sincos import sincos
 
@@ -99,7 +100,7 @@ def slope(joint: Joint, x: Any, y: Any, w: Any, c: Any, s: Any) -> Slope:
     """G5, its first two derivatives and rho at the rocker angle of cosine c and sine s; needs rho^2 > 0.  (1), (2)."""
     z, square = axial_reach(joint, s)
     rho = np.sqrt(square)
-    per_rho = 1.0 / rho
+    per_rho = 1.0 / divisor(rho)  # 0 at the very end of an arc
     z1, z2 = joint.sweep * c, -joint.sweep * s
     rho1 = -z * z1 * per_rho
     rho2 = -(z1 * z1 + z * z2 + rho1 * rho1) * per_rho

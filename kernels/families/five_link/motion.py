@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.complex_step import arctan2, hypotenuse
+from kernels.complex_step import arctan2, divisor, hypotenuse
 from kernels.crank_closure import Numbers, Reduced, Status
 from kernels.families.five_link.closure import Joint, axial_reach, reduce_design, slope
 from kernels.families.five_link.roots import MOST, extremes
@@ -30,7 +30,7 @@ def _bends(joint: Joint, c: Any, s: Any) -> Bends:
     rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
     second, third = 0.0 * rho, 0.0 * rho
     if not joint.plain:
-        per_rho = 1.0 / rho
+        per_rho = 1.0 / divisor(rho)
         z1, z2 = joint.sweep * c, -joint.sweep * s
         rho1 = -z * z1 * per_rho
         rho2 = -(z1 * z1 + z * z2 + rho1 * rho1) * per_rho
@@ -101,7 +101,7 @@ def across(r: Reduced, joint: Joint, v: Any, w: Any, c: Any, s: Any) -> tuple[An
     if joint.share != 0.0:
         close = close - joint.share * rho
         z, _ = axial_reach(joint, -s)
-        lean = joint.h * z / rho
+        lean = joint.h * z / divisor(rho)
     along = (r.rocker - close) - lean * joint.sweep * s / r.rocker
     return along, (r.z0 - r.sa * v) - lean * (r.branch * r.ca)
 
@@ -114,7 +114,7 @@ def discriminant_of(r: Reduced, joint: Joint, code: int, u: Any, v: Any, w: Any,
         return x * x + y * y - w * w
     if code == st.OK or code == st.DEAD_POINT:
         along, rise = across(r, joint, v, w, c, s)
-        return joint.coupler * joint.coupler * (t * t / (along * along + rise * rise + t * t))
+        return joint.coupler * joint.coupler * (t * t / divisor(along * along + rise * rise + t * t))
     return _shortfall(r, joint, u, v)
 
 
@@ -207,7 +207,7 @@ def _put_places(
 
     a, ca = designs[i, 0], r.branch * r.ca
     length = hypotenuse(towards, aside)
-    cos_theta, sin_theta = towards / length, aside / length
+    cos_theta, sin_theta = towards / divisor(length), aside / divisor(length)
     m1, m2 = joint.h * cos_theta - joint.s2 * sin_theta, joint.h * sin_theta + joint.s2 * cos_theta
     x, y, z = a * u, designs[i, 4] * r.sa + a * (ca * v), designs[i, 4] * ca - a * (r.sa * v)
     places[2, i, j], places[3, i, j], places[4, i, j] = x, y, z

@@ -9,6 +9,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels._jit import inline, kernel
+from kernels.complex_step import divisor
 from kernels.crank_closure import EPS, Array, Reduced, discriminant_tolerance
 from kernels.families.five_link.closure import Joint, axial_reach, residual_size, slope
 from kernels.families.five_link.proof import NONE, ONE, solutions
@@ -101,7 +102,8 @@ def solve_plain(r: Reduced, joint: Joint, x: Any, y: Any, w: Any) -> tuple[int, 
         # B on the rocker axis has every angle as a solution; a dead point has one.
         code = st.DEAD_POINT if square.real > tolerance else st.SINGULAR
     t = np.sqrt(delta) if code == st.OK else 0.0 * delta
-    return code, (x * w + y * t) / square, (x * t - y * w) / square, t
+    per = divisor(square)
+    return code, (x * w + y * t) / per, (x * t - y * w) / per, t
 
 
 @inline
@@ -123,7 +125,7 @@ def solve_general(r: Reduced, joint: Joint, x: Any, y: Any, w: Any, at: Array) -
         # Two rounds with everything the numbers carry: rounding is all that is left, and complex parts are exact.
         for _ in range(2):
             here = slope(joint, x, y, w, c, s)
-            c, s = rotate(c, s, -here.value / here.first)
+            c, s = rotate(c, s, -here.value / divisor(here.first))
     if code == st.OK or code == st.DEAD_POINT:
         here = slope(joint, x, y, w, c, s)
         if not reaches(real, s.real):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline
+from kernels.complex_step import divisor
 from kernels.verdict import pose_status
 
 Array: TypeAlias = NDArray[np.float64]
@@ -75,9 +76,10 @@ class Reduced(NamedTuple):
 def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
     """Constants of the closure X C + Y S + W = 0 of a four-bar with coupler b; (3)."""
     difference = (c - b) * (c + b)
-    k0 = 0.5 * (difference + (a * a + e * e)) / c
-    k2 = a * e / c
-    size = 0.5 * (abs(difference.real) + (a * a + e * e).real) / c.real + abs(k2.real)
+    by = divisor(c)
+    k0 = 0.5 * (difference + (a * a + e * e)) / by
+    k2 = a * e / by
+    size = 0.5 * (abs(difference.real) + (a * a + e * e).real) / by.real + abs(k2.real)
     return FourBar(a, c, e, k0, k2, abs(e.real) + a.real, size, side)
 
 
@@ -108,7 +110,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     # 0 * x is nan exactly for what is not finite
     valid = valid and (0.0 * (arm + heddle + slide)).real == 0.0 and heddle.real >= 0.0
     return Reduced(
-        first, second, parallel, b, np.sin(chi_mid), np.cos(chi_mid),
+        first, second, parallel, divisor(b), np.sin(chi_mid), np.cos(chi_mid),
         arm, heddle, slide, heddle.real > 0.0, side_f, unit, valid,
     )  # fmt: skip
 

@@ -26,6 +26,7 @@ from sweep.study.tables import (
     pareto,
     report,
     scene,
+    task,
     thread,
     tolerance,
 )
@@ -49,6 +50,7 @@ TABLES = (
     "objective",
     "accuracy",
     "optimise",
+    "task",
     "pareto",
     "tolerance",
     "reference",
@@ -84,6 +86,7 @@ READERS: tuple[tuple[str, Reader], ...] = (
     ("pareto", pareto.read),
     ("pareto", pareto.check_optimised),
     ("optimise", optimise.check_objective),
+    ("task", task.read),
     ("scene", scene.check_wanted),
     # What the mechanism has to do with it.
     ("mechanism", mechanism.demand),
@@ -92,7 +95,9 @@ READERS: tuple[tuple[str, Reader], ...] = (
     ("locus", locus.check),
     ("limits", limits.check),
     ("optimise", optimise.check),
+    ("task", task.check),
     ("objective", objective.check),
+    ("optimise", optimise.check_steady),
     ("pareto", pareto.check),
     ("fit", fit.check),
     ("design", design.check),

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from sweep.errors import InputError
+from sweep.families.base import Family
 from sweep.families.chain import driven_guide
-from sweep.study.model import OptimiseSection, ProveTable
+from sweep.reductions.catalogue import output
+from sweep.study.model import ObjectiveSection, OptimiseSection, ProveTable
 from sweep.study.reading import Reading
 from sweep.study.study import OptimiseSettings, ProveSettings
 
@@ -43,6 +46,32 @@ def check_objective(reading: Reading) -> None:
     if "optimise" in reading.data and "objective" not in reading.data:
         needed = "a table [objective] with minimise = a design output, as [optimise] is given"
         reading.faults.missing(("objective",), needed)
+
+
+def check_steady(reading: Reading) -> None:
+    """Report an objective and limits that are constant in pieces: no slope leads a search to them.
+
+    What is only wanted may jump; it has no sensitivities.
+    """
+    if "optimise" not in reading.data:
+        return
+    family, section = reading.family, reading.get(ObjectiveSection)
+    names = [(("objective", key), name) for key in ("minimise", "maximise") if (name := getattr(section, key))]
+    names += [(("limits", limit.output), limit.output) for limit in reading.fields["limits"]]
+    for key, name in names:
+        if name not in family.parameter_names and _jumps(family, name):
+            allowed = (
+                f"a quantity that changes steadily; {name} is constant in pieces, so no slope leads to it: ask for it "
+                "in scene.want, or leave out [optimise] and let the sweep alone decide"
+            )
+            reading.faults.value(key, reading.raw["limits"].get(name, name) if key[0] == "limits" else name, allowed)
+
+
+def _jumps(family: Family, name: str) -> bool:
+    try:
+        return output(family, name).jumps
+    except InputError:  # an unknown name is reported where it stands
+        return False
 
 
 def check(reading: Reading) -> None:

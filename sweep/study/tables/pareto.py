@@ -30,7 +30,7 @@ def check_optimised(reading: Reading) -> None:
 
 def check(reading: Reading) -> None:
     """Find the bounds of the front."""
-    raw, goal = reading.data.get("pareto"), reading.get(ObjectiveSection).minimise
+    raw, goal = reading.data.get("pareto"), reading.get(ObjectiveSection).goal
     reading.fields["pareto"] = None
     if isinstance(raw, dict):
         section, seconds = reading.get(ParetoSection), reading.get(FrontBudget).seconds

@@ -78,7 +78,7 @@ def speeds(family: Family, speed: float) -> dict[str, float]:
 
 
 def _goal(reading: Reading) -> str | None:
-    return reading.get(ObjectiveSection).minimise
+    return reading.get(ObjectiveSection).goal
 
 
 def _window(scene: SceneSection, faults: Faults) -> tuple[float, float] | None:

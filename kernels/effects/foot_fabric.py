@@ -1,0 +1,279 @@
+"""Presser foot on fabric: the march of :mod:`kernels.effects.foot` with a spring and a damper between foot and ground.
+
+Equations (13)-(16) of docs/foot.md.  Ground is the rack where it stands above the plate, else the plate.  A cell of the
+path is cut into parts over which the foot on its fabric turns by at most a radian; over a part the forcing is a
+polynomial, so the foot's motion is a power series that ends within rounding, however stiff the fabric is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels import status as st
+from kernels._jit import inline, kernel
+from kernels.effects.foot import TWO_PI, Array, Foot, State, Status, flown, rack_height
+
+LYING, FLIGHT = 1, 2
+TERMS = 22  # of the power series: over a radian the next one is below 2^-53
+PARTS = 4  # of a cell at least
+MOST_PARTS = 4096  # of a cell: a fabric so stiff that it swings 650 times within a five-hundredth of a turn
+_HALVINGS = 60
+_MOST_EVENTS = 64
+
+
+class Fabric(NamedTuple):
+    """Stiffness and damping of the fabric, divided by m omega^2 and by m omega."""
+
+    stiffness: float
+    damping: float
+
+
+class Piece(NamedTuple):
+    """A part of a cell: its place, its length in crank angle, and whether the rack is the ground there."""
+
+    j: int
+    low: float
+    high: float
+    begin: float  # crank angle
+    angle: float
+    on_rack: bool
+
+
+@inline
+def _quintic(path: Array, row: int, j: int, at: float, size: float, out: Array) -> None:
+    """Coefficients (6,) of the path in cell j by x, with the cell's share = at + size x; (4)."""
+    n = path.shape[1]
+    h, j, k = TWO_PI / n, j % n, (j + 1) % n
+    p0, m0, c0 = path[row, j], path[row + 1, j] * h, path[row + 2, j] * h * h
+    p1, m1, c1 = path[row, k], path[row + 1, k] * h, path[row + 2, k] * h * h
+    d, e, f = p1 - p0 - m0 - 0.5 * c0, m1 - m0 - c0, c1 - c0
+    out[0], out[1], out[2] = p0, m0, 0.5 * c0
+    out[3], out[4], out[5] = 10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f
+    # about the share ``at``: Horner's scheme, again and again
+    for k in range(5):
+        for i in range(4, k - 1, -1):
+            out[i] += at * out[i + 1]
+    factor = 1.0
+    for i in range(6):
+        out[i] *= factor
+        factor *= size
+
+
+@inline
+def _value(series: Array, count: int, x: float) -> tuple[float, float]:
+    """A power series and its derivative at x."""
+    y, slope = series[count - 1], 0.0
+    for i in range(count - 2, -1, -1):
+        slope = slope * x + y
+        y = y * x + series[i]
+    return y, slope
+
+
+@inline
+def _motion(foot: Foot, fabric: Fabric, y: float, v: float, angle: float, ground: Array, series: Array) -> None:
+    """Power series (TERMS,) of a foot that presses on the fabric, by the share of the piece; (13)."""
+    drag, pull = fabric.damping * angle, (foot.kappa * foot.kappa + fabric.stiffness) * angle * angle
+    series[0], series[1] = y, v * angle
+    for i in range(TERMS - 2):
+        force = -foot.g0 * angle * angle if i == 0 else 0.0
+        if i < 6:
+            force += fabric.stiffness * angle * angle * ground[i]
+        if i < 5:
+            force += fabric.damping * angle * (i + 1) * ground[i + 1]
+        series[i + 2] = (force - drag * (i + 1) * series[i + 1] - pull * series[i]) / ((i + 1) * (i + 2))
+
+
+@inline
+def _press(fabric: Fabric, ground: Array, y: float, v: float, x: float, angle: float) -> tuple[float, float]:
+    """Force of the fabric, and how deep the foot stands in it, for a foot at height y with speed v; (14)."""
+    g, slope = _value(ground, 6, x)
+    return fabric.stiffness * (g - y) + fabric.damping * (slope / angle - v), g - y
+
+
+@inline
+def _look(
+    foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array, x: float
+) -> tuple[float, float, float]:
+    """What is negative after an event, at the share x of the piece; height and speed of the foot there."""
+    if state.mode == FLIGHT:
+        y, v = flown(foot, state, piece.begin + x * piece.angle)
+        force, depth = _press(fabric, ground, y, v, x, piece.angle)
+        return -min(force, depth * fabric.stiffness), y, v
+    y, slope = _value(series, TERMS, x)
+    force, _ = _press(fabric, ground, y, slope / piece.angle, x, piece.angle)
+    return force, y, slope / piece.angle
+
+
+@kernel
+def _event(foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array) -> float:
+    """Share of the piece at which the state ends; 2 if it lasts beyond."""
+    low = 0.0
+    for k in range(1, 5):
+        high = 0.25 * k
+        off, _, _ = _look(foot, fabric, state, piece, ground, series, high)
+        if off < 0.0:
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                off, _, _ = _look(foot, fabric, state, piece, ground, series, middle)
+                if off < 0.0:
+                    high = middle
+                else:
+                    low = middle
+            return high
+        low = high
+    return 2.0
+
+
+@kernel
+def _stretch(
+    path: Array, foot: Foot, fabric: Fabric, state: State, piece: Piece, work: Array, tally: Array
+) -> tuple[State, float]:
+    """March over a piece until its end or the first event; the state there, and the share of the piece.
+
+    ``work`` has a row each for the ground, the way along the feed and the foot's series.
+    """
+    ground, along, series = work[0], work[1], work[2]
+    size = piece.high - piece.low
+    if piece.on_rack:
+        _quintic(path, 0, piece.j, piece.low, size, ground)
+    else:
+        ground[:6] = 0.0
+    if state.mode == LYING:
+        _motion(foot, fabric, state.y, state.v, piece.angle, ground, series)
+    end = _event(foot, fabric, state, piece, ground, series)
+    ended, end = end <= 1.0, min(end, 1.0)
+    off, y, v = _look(foot, fabric, state, piece, ground, series, end)
+    phi = piece.begin + end * piece.angle
+    if piece.on_rack:
+        _quintic(path, 3, piece.j, piece.low, size, along)
+        way = _value(along, 6, end)[0] - along[0]
+        tally[5] += way
+        if state.mode == FLIGHT:
+            tally[3] += end * piece.angle
+            tally[4] += way
+        tally[8] = min(tally[8], max(off, 0.0) if state.mode == LYING else 0.0)
+    if state.mode == LYING:
+        tally[7] = max(tally[7], off)
+    if not ended:
+        return (State(LYING, phi, y, v, phi) if state.mode == LYING else state), 1.0
+    if state.mode == LYING:
+        tally[0] += 1.0
+        if math.isnan(tally[1]):
+            tally[1] = phi
+        return State(FLIGHT, phi, y, v, phi), end
+    _, slope = _value(ground, 6, end)
+    tally[6] = max(tally[6], slope / piece.angle - v)
+    if not math.isnan(tally[1]) and math.isnan(tally[2]):
+        tally[2] = phi
+    return State(LYING, phi, y, v, phi), end
+
+
+@kernel
+def _cell(
+    path: Array, foot: Foot, fabric: Fabric, state: State, j: int, parts: int, work: Array, tally: Array
+) -> tuple[State, bool]:
+    """March over one cell; the state at its end, false if the events did not come to an end."""
+    step = TWO_PI / path.shape[1]
+    for k in range(parts):
+        low, last = k / parts, (k + 1) / parts
+        one, two = rack_height(path, j, low)[0], rack_height(path, j, last)[0]
+        level = 2.0
+        if (one > 0.0) != (two > 0.0):
+            below, above = low, last
+            for _ in range(_HALVINGS):
+                level = 0.5 * (below + above)
+                if (rack_height(path, j, level)[0] > 0.0) == (two > 0.0):
+                    above = level
+                else:
+                    below = level
+            level = above
+        for _ in range(_MOST_EVENTS):
+            high = level if low < level < last else last
+            on_rack = two > 0.0 if low >= level or level > last else one > 0.0
+            piece = Piece(j, low, high, (j + low) * step, (high - low) * step, on_rack)
+            state, share = _stretch(path, foot, fabric, state, piece, work, tally)
+            low = high if share == 1.0 else low + share * (high - low)
+            if low >= last:
+                break
+        if low < last:
+            return state, False
+    return state, True
+
+
+@kernel
+def march_on_fabric(
+    path: Array, feet: Array, turns: int, status: Status, outputs: Array, heights: Array, forces: Array
+) -> None:
+    """March feet on fabric over their racks for some turns and keep the last one; (13)-(16) of docs/foot.md.
+
+    Parameters
+    ----------
+    path, turns, heights, forces : as of :func:`kernels.effects.foot.march`; the foot's height is counted from the
+        unpressed fabric on the plate, so a foot that lies is below 0
+    feet : (n, 7) mass, spring stiffness, preload (weight included), speed [rad per time], restitution (0: the fabric's
+        damper takes the energy of an impact), stiffness and damping of the fabric
+    status : (n,) out; as of ``march``; NOT_CONVERGED too for a fabric that swings more than 650 times a cell
+    outputs : (11, n) out of the last turn in the order of :data:`kernels.effects.foot.OUTPUTS`.  ``impulse`` is 0, as
+        forces are finite; ``least_force`` is the least force of the fabric while the rack stands above the plate
+    """
+    tally, work = np.empty(9), np.empty((3, TERMS))
+    for i in range(path.shape[0]):
+        rack, count = path[i], path.shape[2]
+        mass, stiffness, preload, speed = feet[i, 0], feet[i, 1], feet[i, 2], feet[i, 3]
+        soft, damping = feet[i, 5], feet[i, 6]
+        for k in range(11):
+            outputs[k, i] = math.nan
+        heights[i, :] = math.nan
+        forces[i, :] = math.nan
+        valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and soft > 0.0 and damping >= 0.0
+        valid = valid and feet[i, 4] == 0.0
+        unit, lowest = mass * speed * speed, 0
+        for j in range(count):
+            valid = valid and abs(rack[0, j]) < math.inf
+            if rack[0, j] < rack[0, lowest]:
+                lowest = j
+        status[i] = st.OK if valid and unit > 0.0 and unit < math.inf else st.INVALID_INPUT
+        if status[i] == st.OK and rack[0, lowest] > 0.0:
+            status[i] = st.NO_EVENT
+        if status[i] != st.OK:
+            continue
+        foot = Foot(math.sqrt(stiffness / mass) / speed, preload / unit, 0.0, 0.0)
+        fabric = Fabric(soft / unit, damping / (mass * speed))
+        step = TWO_PI / count
+        quick = max(math.sqrt(foot.kappa * foot.kappa + fabric.stiffness), fabric.damping) * step
+        parts = max(PARTS, math.ceil(min(quick, 2.0 * MOST_PARTS)))
+        if parts > MOST_PARTS:
+            status[i] = st.NOT_CONVERGED
+            continue
+        rest = -foot.g0 / (foot.kappa * foot.kappa + fabric.stiffness)
+        begin = lowest * step
+        state = State(LYING, begin, rest, 0.0, begin)
+        lying = True
+        for turn in range(turns):
+            tally[:] = 0.0
+            tally[1], tally[2], tally[8] = math.nan, math.nan, math.inf
+            lying = state.mode == LYING
+            for k in range(count):
+                j, node = turn * count + lowest + k, (lowest + k) % count
+                y, v = (state.y, state.v) if state.mode == LYING else flown(foot, state, j * step)
+                heights[i, node], forces[i, node] = y, 0.0
+                if state.mode == LYING:
+                    above = rack[0, node] > 0.0
+                    ground, slope = (rack[0, node], rack[1, node]) if above else (0.0, 0.0)
+                    push = fabric.stiffness * (ground - y) + fabric.damping * (slope - v)
+                    forces[i, node] = unit * max(push, 0.0)
+                state, ended = _cell(rack, foot, fabric, state, j, parts, work, tally)
+                if not ended:
+                    status[i] = st.NOT_CONVERGED
+        if status[i] != st.OK:
+            heights[i, :] = math.nan
+            forces[i, :] = math.nan
+            continue
+        outputs[0, i], outputs[1, i], outputs[2, i] = tally[0], tally[1] % TWO_PI, tally[2] % TWO_PI
+        outputs[3, i], outputs[4, i], outputs[5, i] = tally[3], tally[4], tally[5]
+        outputs[6, i], outputs[7, i] = tally[6] * speed, 0.0
+        outputs[8, i], outputs[9, i] = unit * tally[8] if tally[8] < math.inf else math.nan, unit * tally[7]
+        outputs[10, i] = 1.0 if lying and state.mode == LYING else 0.0

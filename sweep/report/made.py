@@ -1,0 +1,177 @@
+"""What manufacture makes of the optimum: the yield, how the limit that costs most is missed, and by which dimension."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sweep.chunks.cascade import compared, meets
+from sweep.evaluation.summaries import design_outputs
+from sweep.optimise.tolerance import deviating, touched
+from sweep.report.dataset import Dataset
+from sweep.report.quantities import Quantity, number, quantity
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sweep.families.base import Array
+    from sweep.study import Limit, Study
+
+SAMPLES = 8192  # as the optimiser's yield: the same mechanisms, the same share
+SINGLE = 1024  # for what each dimension costs
+BINS = 41
+TELLING = 0.002  # a share of mechanisms below which a dimension costs nothing that 1024 of them could tell
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What one dimension's tolerance costs, found by making the same mechanisms with it exact.
+
+    ``spread`` is its share in the variance of the output whose limit is missed most, ``gain`` the share of mechanisms
+    that keep the limits more without it.  A design that stands at its limit gains nothing from any single dimension.
+    """
+
+    name: str
+    text: str
+    spread: float
+    gain: float
+
+    @property
+    def spread_words(self) -> str:
+        """The share of the scatter in percent."""
+        return f"{number(100.0 * self.spread, 2)}\u00a0%"
+
+    @property
+    def gain_words(self) -> str:
+        """The gain in points."""
+        return f"{number(100.0 * self.gain, 2)} points" if self.gain >= TELLING else "–"
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """An output over what is made: edges and shares of its bins in the unit shown, and the bounds of its limit."""
+
+    shown: Quantity
+    edges: Array
+    shares: Array
+    low: float | None
+    high: float | None
+    within: float
+
+
+@dataclass(frozen=True)
+class Made:
+    """Yield of the result, the limit that most of what is made misses, and what its dimensions cost."""
+
+    share: float
+    histogram: Histogram
+    costs: tuple[Cost, ...]
+
+
+def made(data: Dataset) -> Made | None:
+    """Make the optimum many times; None without tolerances, an optimum, or a limit that leaves room."""
+    study, row = data.study, data.optimum
+    limits = [x for x in study.output_limits if x.minimum is None or x.minimum != x.maximum]
+    if study.tolerance is None or study.optimise is None or row is None or not limits:
+        return None
+    design = np.array([float(row[name]) for name in study.family.parameter_names])
+    if not np.isfinite(design).all():
+        return None
+    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, SAMPLES)
+    columns, kept = _kept(study, limits, designs)
+    worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
+    histogram = _histogram(data, worst, compared(worst.output, np.asarray(columns[worst.output], np.float64)))
+    return Made(float(kept.mean()), histogram, tuple(_costs(study, limits, worst, design)))
+
+
+def made_sentence(found: Made | None, tolerance: str) -> str:
+    """The yield and what costs most, for the answer."""
+    if found is None:
+        return ""
+    text = f"Of what is made within {tolerance}, {number(100.0 * found.share, 3)}\u00a0% keeps all limits"
+    most = next(iter(found.costs), None)
+    if most is None or found.share == 1.0:
+        return f"{text}."
+    text += f"; the dimension that costs most is {most.name}, with {most.spread_words} of the scatter"
+    missed = f"{text} of the {found.histogram.shown.words}"
+    return f"{missed}: were it exact, {most.gain_words} more would." if most.gain >= TELLING else f"{missed}."
+
+
+def histogram_svg(found: Histogram, width: float = 620.0, height: float = 150.0) -> str:
+    """The histogram as SVG: what misses the limit is drawn in another colour."""
+    low, high = float(found.edges[0]), float(found.edges[-1])
+    span, top = high - low or 1.0, float(found.shares.max()) or 1.0
+
+    def x(value: float) -> float:
+        return width * (value - low) / span
+
+    bars = []
+    for left, right, share in zip(found.edges[:-1], found.edges[1:], found.shares, strict=True):
+        middle = 0.5 * (left + right)
+        good = (found.low is None or middle >= found.low) and (found.high is None or middle <= found.high)
+        tall = height * float(share) / top
+        bars.append(
+            f'<rect class="{"good" if good else "bad"}" x="{x(left):.1f}" y="{height - tall:.1f}" '
+            f'width="{max(x(right) - x(left) - 1.0, 0.5):.1f}" height="{tall:.1f}"/>'
+        )
+    lines = [
+        f'<line x1="{x(bound):.1f}" x2="{x(bound):.1f}" y1="0" y2="{height:g}"/>'
+        for bound in (found.low, found.high)
+        if bound is not None and low <= bound <= high
+    ]
+    first, last = (found.shown.show(end / found.shown.factor, 4) for end in (low, high))
+    ends = f'<text x="0" y="{height + 16:g}">{first}</text>'
+    ends += f'<text x="{width:g}" y="{height + 16:g}" text-anchor="end">{last}</text>'
+    box = f'viewBox="0 0 {width:g} {height + 22:g}" role="img"'
+    return f'<svg class="histogram" {box}>{"".join([*bars, *lines])}{ends}</svg>'
+
+
+def _kept(
+    study: Study, limits: list[Limit], designs: Array
+) -> tuple[dict[str, NDArray[np.generic]], NDArray[np.bool_]]:
+    names = list(dict.fromkeys(limit.output for limit in limits))
+    columns = design_outputs(study.family, designs, names, study.accuracy, study.window)
+    return columns, np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits])
+
+
+def _costs(study: Study, limits: list[Limit], worst: Limit, design: Array) -> list[Cost]:
+    """Dimensions by what their tolerances cost, the dearest first: the same mechanisms with one dimension exact."""
+    assert study.tolerance is not None and study.optimise is not None
+    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, SINGLE)
+    columns, kept = _kept(study, limits, designs)
+    scatter, before = _variance(columns, worst), float(kept.mean())
+    found = []
+    for k in np.flatnonzero(touched(study.family, study.tolerance)):
+        exact = designs.copy()
+        exact[:, k] = design[k]
+        parameter = study.family.parameters[k]
+        columns, kept = _kept(study, limits, exact)
+        spread = 1.0 - _variance(columns, worst) / scatter if scatter > 0.0 else 0.0
+        found.append(Cost(parameter.name, parameter.text, max(spread, 0.0), float(kept.mean()) - before))
+    return sorted(found, key=lambda cost: -cost.spread)
+
+
+def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
+    values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
+    known = values[np.isfinite(values)]
+    return float(known.var()) if known.size else 0.0
+
+
+def _histogram(data: Dataset, limit: Limit, values: Array) -> Histogram:
+    shown = quantity(limit.output, data.units.get(limit.output, ""))
+    known = values[np.isfinite(values)] * shown.factor
+    bounds = [None if x is None else x * shown.factor for x in (limit.minimum, limit.maximum)]
+    ends = [*(np.percentile(known, (0.1, 99.9)) if known.size else (0.0, 1.0)), *(x for x in bounds if x is not None)]
+    low, high = min(ends), max(ends)
+    room = 0.03 * (high - low) or 1e-9 * max(abs(high), 1.0)
+    low, high = low - room, high + room
+    width = (high - low) / BINS
+    at = next((x for x in bounds if x is not None), low)  # no bin stands astride of the bound
+    first = at - width * np.ceil((at - low) / width)
+    edges = first + width * np.arange(BINS + 2)
+    edges[np.argmin(np.abs(edges - at))] = at
+    counts, _ = np.histogram(np.clip(known, edges[0], edges[-1]), edges)
+    shares = counts / max(values.size, 1)
+    return Histogram(shown, edges, shares, bounds[0], bounds[1], float(meets(limit, values).mean()))

@@ -1,0 +1,32 @@
+"""The sections about what can be built: different optima, yield; as the page's template takes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from sweep.report.dataset import Dataset
+from sweep.report.made import TELLING, histogram_svg, made, made_sentence
+from sweep.report.optima import MOST, groups, optima, optima_sentence
+from sweep.report.robust import tolerance_words
+
+COSTS = 8  # dimensions that are shown
+
+
+def buildable(data: Dataset, folder: Path) -> dict[str, Any]:
+    """Names of the template with what they stand for; pictures are saved in ``folder``, in the style in force."""
+    several, make, within = groups(data), made(data), tolerance_words(data)
+    costs = (
+        ()
+        if make is None
+        else tuple(cost for cost in make.costs if cost.spread >= TELLING or cost.gain >= TELLING)[:COSTS]
+    )
+    return {
+        "optima": optima(data, several, folder),
+        "optima_left": max(len(several) - MOST, 0),
+        "made": make,
+        "made_words": made_sentence(make, within),
+        "made_histogram": "" if make is None else histogram_svg(make.histogram),
+        "made_costs": costs,
+        "further": [text for text in (optima_sentence(data, several), made_sentence(make, within)) if text],
+    }

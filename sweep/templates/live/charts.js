@@ -1,0 +1,139 @@
+"use strict";
+// Curves over the turn as small panels with one cursor. Pointing into a panel moves the cursor.
+
+const WIDE = 340, HIGH = 160, LEFT = 46, RIGHT = 14, TOP = 8, BOTTOM = 22;
+
+// Numbers that Python has packed as base64 of float32.
+function numbersOf(text) {
+  return new Float32Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+}
+
+function svg(name, attributes, parent) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (parent) parent.append(made);
+  return made;
+}
+
+function short(value, digits = 4) {
+  if (!Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(digits - 2).replace("-", "−");
+  return String(Number(value.toPrecision(digits))).replace("-", "−");
+}
+
+function withUnit(text, unit) {
+  return unit === "°" ? text + unit : `${text} ${unit}`;
+}
+
+// Round numbers between two ends, three to six of them.
+function ticksBetween(low, high) {
+  const rough = (high - low) / 4, power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((x) => x * power).find((x) => x >= rough);
+  const found = [];
+  for (let value = Math.ceil(low / step) * step; value <= high + 1e-9 * step; value += step) found.push(value);
+  return found;
+}
+
+class Panel {
+  constructor(host, curve, data, chosen) {
+    this.curve = curve;
+    this.data = data;
+    const box = host.appendChild(document.createElement("figure"));
+    box.className = "panel";
+    const head = box.appendChild(document.createElement("figcaption"));
+    head.innerHTML = "<b></b> <output></output>";
+    head.firstChild.textContent = curve.title;
+    this.value = head.querySelector("output");
+    this.frame = svg("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img", "aria-label": curve.title }, box);
+    let [low, high] = curve.range;
+    const room = high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high)) ? 0.06 * (high - low) : Math.abs(high) || 1;
+    [this.low, this.high] = [low - room, high + room];
+    this.drawAxes();
+    this.shade = svg("g", { class: "shade" }, this.frame);
+    const clip = `clip-${curve.name.replace(/[^a-z0-9]/gi, "-")}`;
+    const field = svg("clipPath", { id: clip }, this.frame);
+    svg("rect", { x: LEFT, y: TOP, width: WIDE - LEFT - RIGHT, height: HIGH - TOP - BOTTOM }, field);
+    const inside = svg("g", { "clip-path": `url(#${clip})` }, this.frame);
+    for (const limit of curve.limits) {
+      svg("line", { class: "limit", x1: LEFT, x2: WIDE - RIGHT, y1: this.y(limit), y2: this.y(limit) }, inside);
+    }
+    this.lines = data.designs.map((design) => svg("path", { d: this.path(design), class: design.role }, inside));
+    this.cursor = svg("line", { class: "cursor", y1: TOP, y2: HIGH - BOTTOM }, this.frame);
+    this.dot = svg("circle", { class: "dot", r: 3.5 }, inside);
+    this.frame.addEventListener("pointerdown", (event) => { this.follow(event, chosen); });
+    this.frame.addEventListener("pointermove", (event) => { if (event.buttons) this.follow(event, chosen); });
+  }
+
+  follow(event, chosen) {
+    const box = this.frame.getBoundingClientRect();
+    const x = ((event.clientX - box.left) / box.width) * WIDE;
+    chosen(Math.min(Math.max((x - LEFT) / (WIDE - LEFT - RIGHT), 0), 1));
+  }
+
+  x(share) { return LEFT + share * (WIDE - LEFT - RIGHT); }
+
+  y(value) { return TOP + ((this.high - value) / (this.high - this.low)) * (HIGH - TOP - BOTTOM); }
+
+  drawAxes() {
+    for (const value of ticksBetween(this.low, this.high)) {
+      svg("line", { class: "grid", x1: LEFT, x2: WIDE - RIGHT, y1: this.y(value), y2: this.y(value) }, this.frame);
+      svg("text", { x: LEFT - 5, y: this.y(value) + 3.5, "text-anchor": "end" }, this.frame).textContent = short(value);
+    }
+    const { ends, closed } = this.data;
+    const marks = closed ? [0, 90, 180, 270, 360] : ticksBetween(...ends);
+    for (const mark of marks) {
+      const x = this.x((mark - ends[0]) / (ends[1] - ends[0]));
+      svg("line", { class: "grid", x1: x, x2: x, y1: TOP, y2: HIGH - BOTTOM }, this.frame);
+      svg("text", { x, y: HIGH - 7, "text-anchor": "middle" }, this.frame).textContent = short(mark);
+    }
+  }
+
+  path(design) {
+    const values = design.values[this.curve.name], last = this.data.closed ? values.length : values.length - 1;
+    let text = "", pen = "M";
+    for (let k = 0; k <= last; k += 1) {
+      const value = values[k % values.length];
+      // A position that turns fully does not close: its last step is left out.
+      if (k === values.length && Math.abs(value - values[k - 1]) > 0.5 * (this.high - this.low)) break;
+      if (Number.isFinite(value)) text += `${pen}${this.x(k / last).toFixed(1)} ${this.y(value).toFixed(1)}`;
+      pen = Number.isFinite(value) ? "L" : "M";
+    }
+    return text;
+  }
+
+  show(index) {
+    this.index = index;
+    this.lines.forEach((line, k) => line.classList.toggle("chosen", k === index));
+    this.lines[index].parentNode.insertBefore(this.lines[index], this.dot);
+    this.shade.replaceChildren();
+    const design = this.data.designs[index], poses = design.phi.length;
+    if (this.curve.name !== "dev") return;
+    for (const [first, last] of design.shaded) {
+      const box = { x: this.x(first / poses), width: this.x((last + 1) / poses) - this.x(first / poses) };
+      svg("rect", { ...box, y: TOP, height: HIGH - TOP - BOTTOM }, this.shade);
+    }
+  }
+
+  pose(share) {
+    const values = this.data.designs[this.index].values[this.curve.name];
+    const value = between(values, share, this.data.closed);
+    const x = this.x(share), { unit, fast, range } = this.curve;
+    // What is this small beside the curve is the rounding of zero.
+    const shown = Math.abs(value) < 1e-9 * Math.max(...range.map(Math.abs)) ? 0 : value;
+    this.cursor.setAttribute("x1", x);
+    this.cursor.setAttribute("x2", x);
+    this.dot.style.display = Number.isFinite(value) ? "" : "none";
+    this.dot.setAttribute("cx", x);
+    this.dot.setAttribute("cy", Number.isFinite(value) ? this.y(value) : 0);
+    const also = fast ? ` = ${withUnit(short(shown * fast.factor), fast.unit)}` : "";
+    this.value.textContent = withUnit(short(shown), unit) + also;
+  }
+}
+
+// A curve's value at a share of the turn, between two poses.
+function between(values, share, closed) {
+  const along = share * (closed ? values.length : values.length - 1), k = Math.min(Math.floor(along), values.length - 1);
+  const next = closed ? (k + 1) % values.length : Math.min(k + 1, values.length - 1);
+  return (1 - along + k) * values[k] + (along - k) * values[next];
+}
