@@ -32,6 +32,7 @@ from sweep.numerics.curves import TableCurve, table_curve
 
 if TYPE_CHECKING:
     from sweep.families.members import Member
+    from sweep.families.relations import Frame
 
 KEYS = ("thread", "stock", "tension", "stiffness", "radius", "allowed")
 GF = 9.80665e-3  # N
@@ -97,10 +98,14 @@ class ThreadBalance:
         return (Parameter(f"{self.name}_stock", "length", text, default=self.stock),)
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Coordinates of the moving points, and what the take-ups give."""
+        """Coordinates of the moving points, and what the take-ups give; where they are bent too if that is wanted."""
         names = [f"{place}_{axis}" for place in self.path if isinstance(place, str) for axis in AXES]
-        taken = [name for place in self.path if isinstance(place, TakeUp) for name in (place.taken, place.wrap)]
-        return frozenset((*names, *taken))
+        taken = [place.taken for place in self.path if isinstance(place, TakeUp)]
+        wraps = [place.wrap for place in self.path if isinstance(place, TakeUp) and self._bent(wanted)]
+        return frozenset((*names, *taken, *wraps))
+
+    def _bent(self, wanted: frozenset[str]) -> bool:
+        return not wanted.isdisjoint((f"{self.name}_wrap", f"{self.name}_tension"))
 
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
         """The outputs, (n, m); ``found`` has the main shaft's angle as "phi", and the stock."""
@@ -112,13 +117,13 @@ class ThreadBalance:
         for place in self.path:
             if isinstance(place, TakeUp):
                 taken, before, along = taken + found[place.taken], None, None
-                wraps.append(found[place.wrap])
+                wraps += [found[place.wrap]] if self._bent(wanted) else []
                 continue
             point = _point(place, found)
             if before is not None:
                 length, direction = _piece(before, point)
                 needed = needed + length
-                if along is not None:
+                if along is not None and self._bent(wanted):
                     wraps.append(bend(along, direction))
                 along = direction
             before = point
