@@ -44,6 +44,9 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
 
 def _margin_ns(family: Family, suffix: str, accuracy: Accuracy) -> float:
     """Estimated time of the margin of a stage, which all stages before it drive."""
+    if isinstance(family, Machine):
+        name, own = suffix.split(".")
+        return _margin_ns(family.member(name).family, own, accuracy)
     found = own_step(family, suffix, accuracy)
     if found is None:
         *driving, last = stages_of(family)[: int(suffix or 1)]
