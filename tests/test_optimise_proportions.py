@@ -13,6 +13,7 @@ from sweep.errors import StudyError
 from sweep.optimise import proportions
 from sweep.optimise.evolution import evolved
 from sweep.optimise.linear import Elimination, elimination
+from sweep.optimise.made import changes
 from sweep.optimise.merit import merit
 from sweep.optimise.proportions import from_proportions, widened
 from sweep.optimise.study import problem_of
@@ -117,3 +118,19 @@ def test_other_mechanisms_and_problems_are_refused() -> None:
     other = load_study(FOLDER.parent / "needle51")
     with pytest.raises(StudyError, match=r"optimise\.global"):
         study_from_data(other.data | {"optimise": {"global": "proportions"}}, other.path)
+
+
+def test_guides_that_the_program_shrinks_to_nothing_are_no_solution() -> None:
+    study = record()
+    study = study_from_data(study.data | {"tolerance": study.data["tolerance"] | {"robust": "95 %"}}, study.path)
+    made = elimination(problem_of(study, accepted()), study.tolerance)
+    assert made is not None and made.sigma is not None and made.level > 1.9
+    finished = made._finished(accepted(), np.array([[0.0, 0.0, 1.0, 1.0, 0.0], [1.0, 0.0, 1.0, 1.0, 0.0]]))
+    assert np.isnan(finished[0]).any() and np.isfinite(finished[1]).all()
+    # With all the room that the tolerances need the least acceleration is larger, and the stroke reaches further.
+    spoiled = accepted()[:1]
+    designs, worth, solved = made.solve(spoiled)
+    plain = elimination(problem_of(study, accepted()))
+    assert plain is not None and solved.all() and worth[0] > plain.solve(spoiled)[1][0]
+    assert changes(study.family, finished, made.sigma, ("dev",), np.zeros(1))["dev"].shape == (2, 16, 1)
+    assert np.isfinite(designs).all()

@@ -35,6 +35,7 @@ POSES = 64  # per turn on which the linear program sees the motion
 SPREAD_AT = 2  # every second pose tells what tolerances do: that changes slowly along the turn
 PASSES = 2  # of solving with the room that the tolerances of the solution before need
 EXCESS = 0.5  # price of a deviation twice as large as allowed, in strokes
+SMALLEST = 1e-9  # scale of a guide that has any
 DIRECTIONS = 3  # in which the least scale of a guide is asked for
 BOTH = 4.0  # a deviation misses its limit on either side, and in two places that know little of each other
 TURN: Array = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
@@ -110,7 +111,7 @@ class Elimination:
             off = np.abs((motion.across * x[:, None, :]).sum(axis=2)) + across - bound
             v = np.maximum(off.max(axis=1), 0.0)
             t = t * (1.0 + np.maximum(need + along - (motion.ends * x).sum(axis=1), 0.0) / self.stroke)
-        return out, t + price * v, np.isfinite(t + v)
+        return out, t + price * v, np.isfinite(t + v) & np.isfinite(out).all(axis=1)
 
     def _motion(self, base: Array) -> _Motion:
         """What is linear in the unknowns, of designs without point and line."""
@@ -139,17 +140,16 @@ class Elimination:
     def _finished(self, designs: Array, x: Array) -> Array:
         """Designs with the point, line and scale that belong to the unknowns."""
         scale: Array = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
+        scale[scale < SMALLEST] = np.nan  # a guide without size is no solution, and its poses are undefined
         along, aside, line, offset = (
             self.column(n) for n in (*self.guide.arms, self.guide.direction, self.guide.offset)
         )
-        with np.errstate(divide="ignore", invalid="ignore"):  # a guide without size is missing what is asked of it
-            grown = designs[:, self.column(self.guide.links[1])] / scale
+        grown = designs[:, self.column(self.guide.links[1])] / scale
         out = designs.copy()
         for name in self.guide.links:
             out[:, self.column(name)] *= scale
         # numpy's arctan2 and complex products depend on the processor, the C library's arctan2 does not
         lam = np.array([math.atan2(-y, x) for x, y in x[:, :2]])
-        grown[scale == 0.0] = np.nan
         out[:, along] = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * grown
         out[:, aside] = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * grown
         out[:, offset], out[:, line] = x[:, 4], self._turned(lam)

@@ -24,13 +24,17 @@ def changes(family: Family, designs: Array, sigma: Array, outputs: Sequence[str]
     Returns
     -------
     For each output (n, q, m), one row per dimension that is not exact.  The root of the sum of their squares is the
-    standard deviation of the curve there, to first order and for independent dimensions.
+    standard deviation of the curve there, to first order and for independent dimensions; nan for designs with a nan.
     """
     own = np.flatnonzero(sigma)
-    stepped = np.repeat(designs.astype(np.complex128), len(own), axis=0)
-    stepped[np.arange(len(stepped)), np.tile(own, len(designs))] += 1j * STEP * np.tile(sigma[own], len(designs))
+    # Complex kernels raise where they divide by zero: designs that do not exist are left out.
+    known = np.flatnonzero(np.isfinite(designs).all(axis=1))
+    stepped = np.repeat(designs[known].astype(np.complex128), len(own), axis=0)
+    stepped[np.arange(len(stepped)), np.tile(own, len(known))] += 1j * STEP * np.tile(sigma[own], len(known))
     angles = Angles.of(phi[None, :].astype(np.complex128))
     with np.errstate(all="ignore"):  # a design may not reach every pose; its nan is answered by the caller
         found = family.poses(np.ascontiguousarray(stepped), angles, frozenset(outputs))
-    shape = (len(designs), len(own), len(phi))
-    return {name: np.asarray(found[name].imag / STEP, np.float64).reshape(shape) for name in outputs}
+    out = {name: np.full((len(designs), len(own), len(phi)), np.nan) for name in outputs}
+    for name, values in out.items():
+        values[known] = (found[name].imag / STEP).reshape(len(known), len(own), len(phi))
+    return out
