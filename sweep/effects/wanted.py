@@ -8,6 +8,7 @@ from sweep.effects import NAMES, applicable
 from sweep.effects.placing import Placed
 from sweep.families.base import Family, Output
 from sweep.families.members import Machine
+from sweep.quantities.names import stem
 from sweep.quantities.reduction import prefixes
 
 AXES = ("_x", "_y", "_z")
@@ -28,7 +29,7 @@ def expanded(family: Family, wanted: Iterable[str], *, poses: bool = False) -> l
     wanted : names of outputs and of effects
     """
     asked = list(wanted)
-    if all(name.rpartition(".")[2].rstrip("0123456789") not in NAMES for name in asked):
+    if all(stem(name) not in NAMES for name in asked):
         return asked
     stand = names_of_effects(family, poses)
     found = [part for name in asked for part in stand.get(name, (name,))]

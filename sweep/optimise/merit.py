@@ -10,6 +10,7 @@ import numpy as np
 from sweep.families.base import Accuracy, Array
 from sweep.families.chain import Chain
 from sweep.optimise.linear import POSES, Elimination
+from sweep.quantities.names import stem
 
 if TYPE_CHECKING:
     from sweep.study import Limit
@@ -32,7 +33,7 @@ def merit(linear: Elimination, designs: Array) -> tuple[Array, Array]:
     family, names = problem.family, problem.family.parameter_names
     limits = [x for x in problem.limits if not x.output.startswith(("rotatable", "stroke", "max_abs_dev"))]
     margins = [f"margin{stage.number}" for stage in family.stages] if isinstance(family, Chain) else []
-    first = [x for x in limits if x.output.rstrip("0123456789") in BEFORE]
+    first = [x for x in limits if stem(x.output) in BEFORE]
     wanted = list(dict.fromkeys([*margins, *(x.output for x in first)]))
     columns = design_outputs(family, designs, wanted, ACCURACY, problem.window)
     margin = np.min([np.nan_to_num(columns[name], nan=-1e3) for name in margins], axis=0)

@@ -47,6 +47,16 @@ def at_stage(name: str, number: str) -> str:
     return name.removesuffix(number) if name.endswith(number) else ""
 
 
+def reduced(prefix: str, name: str) -> str:
+    """The name of a reduction of an output.
+
+    >>> reduced("max_abs", "needle.d2s")
+    'needle.max_abs_d2s'
+    """
+    member, dot, rest = name.rpartition(".")
+    return f"{member}{dot}{prefix}_{rest}"
+
+
 def is_error(name: str) -> bool:
     """Whether a column holds the error of another."""
     return without_error(name) != name

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.evaluation.curves import coordinate
-from sweep.quantities.names import stem
+from sweep.quantities.names import is_largest, reduced, stem
 from sweep.report.figures import LIMIT, OPTIMUM, REFERENCE, WIDTH, crank_axis, new_figure
 from sweep.report.quantities import Quantity, quantity
 
@@ -170,11 +170,11 @@ def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
     found = []
     for limit in limits:
         for value, outputs in (
-            (limit.maximum, (f"max_abs_{name}", f"max_{name}")),
-            (limit.minimum, (f"min_{name}",)),
+            (limit.maximum, (reduced("max_abs", name), reduced("max", name))),
+            (limit.minimum, (reduced("min", name),)),
         ):
             if value is None or limit.output not in outputs:
                 continue
-            both = limit.output.startswith("max_abs_") and stem(name) != "pressure_angle"
+            both = is_largest(limit.output, magnitude=True) and stem(name) != "pressure_angle"
             found += [value, -value] if both else [value]
     return found
