@@ -50,5 +50,5 @@ FAMILY = Family(
     outward="branch",
     pose_outputs=OUTPUTS,
     poses=poses,
-    steps=(Step("bill", (Output("bill", "1", "exp p + q^2"),), bill, 1.0),),
+    steps=(Step("bill", (Output("bill", "1", "exp p + q^2"),), bill),),
 )

@@ -12,7 +12,7 @@ import pytest
 
 import sweep
 import sweep.optimise.study
-from sweep.errors import StudyError
+from sweep.errors import SearchCutShort, StudyError
 from sweep.optimise import Problem, explore
 from sweep.optimise.brake import Brake
 from sweep.optimise.study import read_survey
@@ -109,7 +109,9 @@ def test_brake_that_is_pulled_after_the_starts_is_told(tmp_path: Path, monkeypat
 
     monkeypatch.setattr(sweep.optimise.study, "explore", explored)
     (tmp_path / "study.toml").write_text(ROBUST)
-    out = sweep.run(tmp_path, tmp_path / "designs", jobs=1)
+    out = tmp_path / "designs"
+    with pytest.raises(SearchCutShort, match="not all that follows them"):
+        sweep.run(tmp_path, out, jobs=1)
     survey = read_survey(out.parent / "_optimum.parquet")
     assert survey is not None and survey.ended == "time" and survey.late
     assert "not all that follows" in survey.warnings[0]

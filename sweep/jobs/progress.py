@@ -80,7 +80,7 @@ class Progress:
         with self._listener():
             if self.bar is not None:
                 self.bar.close()
-            elif self.show and (self.said is not None or not self.quiet):
+            elif self.show and (not self.quiet or self.said is not None or self._is_due()):
                 self._line()
 
     def advance(self, designs: int) -> None:
@@ -100,10 +100,12 @@ class Progress:
                 else:
                     self._line_if_due()
 
-    def _line_if_due(self) -> None:
+    def _is_due(self) -> bool:
         now = time.monotonic()
-        waited = now - self.begin > FIRST_SECONDS if self.said is None else now - self.said > LINE_SECONDS
-        if self.show and waited:
+        return now - self.begin > FIRST_SECONDS if self.said is None else now - self.said > LINE_SECONDS
+
+    def _line_if_due(self) -> None:
+        if self.show and self._is_due():
             self._line()
 
     @contextmanager

@@ -116,6 +116,8 @@ def robust(
     # The objective of designs that miss their limits still says little.
     order = sorted(found, key=lambda r: (r.violation > NEARLY, r.objective if r.violation <= NEARLY else r.violation))
     ends = _different(problem, order)[:ENDED]
+    if not ends:  # stopped before any of them was begun
+        return None
     numbers = {r.start: k for k, r in enumerate(ends)}
     last = _Calibrate(problem, tuple(ends), tolerance, level, settings.seed, settings.looks)
     made = spread_over(last, list(numbers.values()), asked, jobs) or [

@@ -73,7 +73,7 @@ class Survey:
         if self.ended in CUT:
             why = "time ran out" if self.ended == "time" else "interrupted"
             of = started(min(self.asked, self.offered))
-            after = ", but not all that follows them: neighbouring values, robust designs" if self.late else ""
+            after = "; not all that follows them, neighbouring values and robust designs, was" if self.late else ""
             found.append(f"{why}: {self.starts} of {of}{after}")
         elif self.starts < self.asked and not self.enough:
             found.append(
