@@ -22,8 +22,8 @@ $(VENV)/ready: pyproject.toml constraints.txt
 
 setup: $(VENV)/ready  ## create the environment in .venv
 
-test: $(VENV)/ready  ## run the tests
-	$(BIN)/python -m pytest
+test: $(VENV)/ready  ## run the tests, in two processes
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 test-long: $(VENV)/ready  ## the tests that take minutes: thousands of hostile tables
 	$(BIN)/python -m pytest -m long
