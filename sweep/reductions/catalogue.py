@@ -11,7 +11,7 @@ from sweep.errors import InputError, nearest
 from sweep.families.base import Accuracy, Family, Output
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
-from sweep.families.domain import Turn
+from sweep.families.domain import Interval, Turn
 from sweep.families.members import Machine, Member
 from sweep.quantities.names import parts, without_minus
 from sweep.quantities.reduction import Mode, prefixes, reduction_of, split
@@ -252,6 +252,7 @@ def _limit(family: Family, name: str) -> Quantity | None:
         if kind is None:
             continue
         unit = family.pose_output[position].unit
+        over = f"the whole range of {family.domain.name}" if isinstance(family.domain, Interval) else "one turn"
         units = {"phi_ext": "rad", "phi_fold": "rad", "phi0": "rad", "stroke_ratio": "1"}
         first, second = limit_order(family, position)
         texts = {
@@ -262,7 +263,7 @@ def _limit(family: Family, name: str) -> Quantity | None:
             "phi0": "crank angle from the extended to the folded position, in [0, 2 pi)",
             "stroke_ratio": "phi0/(2 pi - phi0)",
             "swing": f"{position} at the folded minus the extended position, where it is {first}",
-            "stroke": f"largest minus smallest {position} over one turn",
+            "stroke": f"largest minus smallest {position} over {over}",
         }
         found = Output(name, units.get(kind, unit), texts[kind])
         return Quantity(found, "limits", kind, position, stage, locates=kind in PLACES)
