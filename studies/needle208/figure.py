@@ -92,7 +92,9 @@ def chart(table: pd.DataFrame, mechanisms: pd.DataFrame) -> Figure:
     axes.plot(kept["deviation"], kept["acceleration"], "o-", color=OPTIMUM, label="least for 95 % of what is made")
     for row in mechanisms[mechanisms["mechanism"] != "reference"].itertuples():
         axes.plot(row[4], row[2], "s", color=REFERENCE)
-        axes.annotate(str(row.mechanism), (row[4], row[2]), xytext=(5, 5), textcoords="offset points")
+        words = {"optimum": "to be built", "nominal": "best drawing"}.get(str(row.mechanism), str(row.mechanism))
+        axes.annotate(words, (row[4], row[2]), xytext=(0, 8), textcoords="offset points", ha="center")
+    axes.margins(0.1)
     axes.set_xlabel("deviation that 95 % of what is made keep [mm]")
     axes.set_ylabel("max |s″| [mm/rad²]")
     axes.legend()
