@@ -22,13 +22,6 @@ SPEED, CHANGE = 50.0, 300.0
 NEAR = 2e-13
 
 
-# Forces of these families stand in the frames of rssp and rssr (docs/frames.md): turned into those of their joints.
-TURNS = {
-    "slider_crank": np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
-    "kim_dison": np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
-}
-
-
 def bodies(follower):
     """Bodies without any symmetry, in t and t mm^2: no entry of a tensor and no coordinate of a centre is zero."""
     found = {}
@@ -114,7 +107,7 @@ def apart(name, design, file, phis):
     kind = "slider" if family(name).position == "s" and name != "guide" else "rocker"
     wanted = [f"force_{joint}_{axis}" for joint in "abcd" for axis in "xyz"] + ["drive_torque"]
     ours = sweep.evaluate(name, design, wanted, phi=phis)
-    loop, turn = Loop(file, design["speed"], design["speed_change"]), TURNS.get(name, np.eye(3))
+    loop = Loop(file, design["speed"], design["speed_change"])
     theirs = []
     for phi in phis:
         force, torque, rest = loop.at(phi)
@@ -124,7 +117,7 @@ def apart(name, design, file, phis):
             joints = frame | {"b": loop.held("coupler"), "c": -force}
         else:  # it hangs on the follower; force is that of the coupler on the crank
             joints = frame | {"b": -force, "c": -loop.held("coupler")}
-        theirs.append([*(x for joint in "abcd" for x in turn.T @ joints[joint]), 1000.0 * torque])
+        theirs.append([*(x for joint in "abcd" for x in joints[joint]), 1000.0 * torque])
     theirs, found = np.array(theirs), ours[wanted].to_numpy()
     columns = {joint: slice(3 * k, 3 * k + 3) for k, joint in enumerate("abcd")} | {"torque": slice(12, 13)}
     gaps = {of: np.abs(theirs[:, at] - found[:, at]).max() for of, at in columns.items()}

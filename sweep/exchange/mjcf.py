@@ -138,7 +138,7 @@ def _loop(one: Placed, finger: float, metres: float) -> Loop:
         part.family, part.parameters | {"finger": finger}, ["n_x", "n_y", "n_z"], phi=part.crank[:1], angles="rad"
     )
     n = found[["n_x", "n_y", "n_z"]].to_numpy(np.float64)[0]
-    # The records of a family may stand in the frame of another one whose effects it shares.
+    # Where the records count from is the crank's axis; where the joints stand, the frame of the family.
     crank = np.column_stack([rho_b, tau_b, u])
     turn = _triad(part.joints["b"][0] - part.joints["a"][0], part.axes["a"]) @ crank.T
     slider = records.follower == "slider"

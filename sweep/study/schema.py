@@ -34,6 +34,10 @@ def study_schema() -> Schema:
     tables["design"] = _each({"anyOf": [ENTRY, _each(ENTRY)]}) | {
         "properties": {"sample": _model(SampleTable, definitions)}
     }
+    tables["bodies"] = _each({"anyOf": [ENTRY, _each(ENTRY)]})
+    # a load is a parameter, or changes over the turn; in a machine it stands under its member
+    load = {"anyOf": [ENTRY, *([tables["loads"]["additionalProperties"]] if "loads" in tables else [])]}
+    tables["loads"] = _each({"anyOf": [*load["anyOf"], _each(load)]})
     limit = {"anyOf": [{"const": True}, {"type": "string"}, _model(LimitEntry, definitions)]}
     tables["limits"] = _each({"anyOf": [*limit["anyOf"], _each(limit)]})
     tables["pareto"]["properties"] |= dict.fromkeys(("at_most", "at_least"), ENTRY)
