@@ -25,7 +25,8 @@ setup: $(VENV)/ready  ## create the environment in .venv
 test: $(VENV)/ready  ## run the tests, in two processes
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-test-long: $(VENV)/ready  ## the tests that take minutes: thousands of hostile tables
+test-long: $(VENV)/ready  ## the tests that take minutes, thousands of hostile tables; loads against Pinocchio, which it installs
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,peers]'
 	$(BIN)/python -m pytest -m long
 
 test-faults: $(VENV)/ready  ## kills, signals, full disks, damage: 150 kills and 170 other faults, a table; about 15 minutes
