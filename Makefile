@@ -72,10 +72,11 @@ study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accur
 smoke-accuracy: $(VENV)/ready  ## the same on few designs, writes no page
 	$(BIN)/python -m studies.accuracy --smoke --out results/smoke/accuracy
 
-bench-peers: $(VENV)/ready  ## the planar case next to pylinkage, which gets an environment of its own
+bench-peers: $(VENV)/ready  ## motion next to pylinkage, loads next to Pinocchio, in an environment of their own
 	$(PYTHON) -m venv .venv-peers
-	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable . 'pylinkage[numba]'
+	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable '.[peers]' 'pylinkage[numba]'
 	.venv-peers/bin/python -m studies.accuracy.peers --out results/accuracy
+	.venv-peers/bin/python -m studies.accuracy.peer_loads --out results/accuracy
 
 bench-scale: $(VENV)/ready  ## 10^5 to 10^9 samples, to 10^8 designs, and reading them: writes docs/scale.md, about 10 minutes
 	$(BIN)/python -m tests.bench.scale --out docs/scale.md

@@ -1,6 +1,6 @@
 """Joint loads and driving torque against Pinocchio: every family with loads, chains, a machine; with tools and without.
 
-What is ours in its models and what is its own: tests/multibody.py.  `make test-long` installs it.
+What is ours in its models and what is its own: studies/accuracy/multibody.py.  `make test-long` installs it.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import pytest
 
 import sweep
 from kernels import status as st
+from studies.accuracy.multibody import Multibody
 from sweep.evaluation.joints import parts
 from sweep.families import family
 from sweep.families.capabilities import JointRecords
 from sweep.study import load_study
-from tests.multibody import Multibody
 from tests.reference.linked import POSES, READERS, Z
 from tests.test_export import LINKED, scaled
 from tests.test_link_loads import DESIGNS, FORCE, GRAVITY, TIPS, TOOL, WEIGHT, design, masses, vectors
@@ -226,7 +226,7 @@ def on_line(points):
         for body, place, (mass, force, lam) in points:
             joint = model.ids[body]
             local = place - model.origin[joint]
-            needed = mass * (model._acceleration(joint, local) @ lam - GRAVITY @ lam) - force
+            needed = mass * (model.acceleration(joint, local) @ lam - GRAVITY @ lam) - force
             found.append((joint, local, -needed * lam))
         return found
 
