@@ -11,8 +11,10 @@ import pytest
 
 from kernels import status as codes
 from sweep.quantities.names import negative
+from sweep.report.alternatives import shown_designs
+from sweep.report.groups import groups
 from sweep.report.made import TELLING, histogram_svg, made, made_sentence
-from sweep.report.optima import groups, optima, optima_sentence
+from sweep.report.optima import optima, optima_sentence
 from sweep.study import study_from_data
 
 DATA = {
@@ -67,6 +69,17 @@ def test_optima_of_what_is_made_large_come_largest_first() -> None:
     large = DATA | {"objective": {"maximise": "max_abs_d2psi"}}
     found = groups(data_of(row("optimum", 0.9), row(value=0.5, b=60.0), row(value=0.7, c=25.0), **large))
     assert [-group.row[negative("max_abs_d2psi")] for group in found] == [0.9, 0.7, 0.5]
+
+
+def test_designs_to_look_at_are_the_cards_in_the_same_order() -> None:
+    large = DATA | {"objective": {"maximise": "max_abs_d2psi"}}
+    data = data_of(row("optimum", 0.9), row(value=0.5, b=60.0), row(value=0.7, c=25.0), row(value=0.5, b=60.1), **large)
+    data.result, data.result_name, data.front, data.reference = data.optimum, "optimum", None, None
+    found = groups(data)
+    shown = shown_designs(data, found)
+    assert [one.name for one in shown] == [group.title(k) for k, group in enumerate(found)]
+    assert [one.row["max_abs_d2psi"] for one in shown] == [0.9, 0.7, 0.5]
+    assert "= 0.7" in shown[1].note
 
 
 def test_same_objective_alone_is_no_mirror() -> None:

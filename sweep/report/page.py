@@ -17,6 +17,7 @@ from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.drawing import mechanism_caption
 from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
 from sweep.report.files import copy_tables, write_survivors
+from sweep.report.groups import groups
 from sweep.report.live import live
 from sweep.report.scan import Cells, Scan, most_telling, scan
 from sweep.report.sections import buildable
@@ -34,20 +35,23 @@ def write(folder: Path, out: Path, say: Say = unsaid) -> Path:
     """Write everything the report consists of into ``out`` and return the path of ``report.html``."""
     say("report", 0, STEPS, "steps")
     data, found, cells = gather(folder)
+    several = groups(data)
     try:
         out.mkdir(parents=True, exist_ok=True)
         with house_style():
             say("report", 1, STEPS, "steps")
             figures = draw(data, found, cells, out / "figures")
             say("report", 2, STEPS, "steps")
-            more = buildable(data, out / "figures")
+            more = buildable(data, several, out / "figures")
         say("report", 3, STEPS, "steps")
         copy_tables(folder, out)
         write_survivors(data.parts, out / "survivors.parquet")
         target = out / "report.html"
         partial = out / "_tmp-report.html"
         own = own_figures(data.study, out / "figures")
-        partial.write_text(render(data, found, cells, figures, own, more), encoding="utf-8")
+        partial.write_text(
+            render(data, found, cells, figures, own, more | live(data, cells, several)), encoding="utf-8"
+        )
         partial.replace(target)
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
@@ -135,7 +139,7 @@ def render(
     own: list[OwnFigure],
     more: dict[str, Any],
 ) -> str:
-    """The HTML text; ``more`` are the sections about what can be built."""
+    """The HTML text; ``more`` are the sections about what can be built, and what moves."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -174,6 +178,5 @@ def render(
         axes=len(cells),
         speed=answer.rpm(data.study.speed),
         today=date.today().isoformat(),
-        **live(data, cells),
         **more,
     )

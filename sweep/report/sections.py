@@ -6,16 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from sweep.report.dataset import Dataset
+from sweep.report.groups import Group
 from sweep.report.made import TELLING, histogram_svg, made, made_sentence
-from sweep.report.optima import MOST, groups, optima, optima_sentence
+from sweep.report.optima import MOST, optima, optima_sentence
 from sweep.report.robust import tolerance_words
 
 COSTS = 8  # dimensions that are shown
 
 
-def buildable(data: Dataset, folder: Path) -> dict[str, Any]:
+def buildable(data: Dataset, several: list[Group], folder: Path) -> dict[str, Any]:
     """Names of the template with what they stand for; pictures are saved in ``folder``, in the style in force."""
-    several, make, within = groups(data), made(data), tolerance_words(data)
+    make, within = made(data), tolerance_words(data)
     costs = (
         ()
         if make is None
