@@ -12,11 +12,11 @@ import numpy as np
 from sweep.optimise.tolerance import deviating
 from sweep.reductions.dimensions import size
 from sweep.report.dataset import Dataset
-from sweep.report.drawing import small_figures
 from sweep.report.figures import save
 from sweep.report.groups import Group
+from sweep.report.mechanisms import small_figures
 from sweep.report.quantities import change, number, quantity, with_unit
-from sweep.report.turns import curves
+from sweep.report.turns import parts_over_turn
 
 MOST = 6  # are shown
 ROUNDING = 1e-9  # of the largest length: what is smaller is 0
@@ -49,7 +49,7 @@ def optima(data: Dataset, found: list[Group], folder: Path) -> list[Optimum]:
     if len(found) < 2 or objective is None:
         return []
     found = found[:MOST]
-    drawn = small_figures(curves(data.study, {str(k): group.row for k, group in enumerate(found)}))
+    drawn = small_figures(parts_over_turn(data.study, {str(k): group.row for k, group in enumerate(found)}), "mm")
     pictures = {key: save(figure, folder / f"optimum-{int(key) + 1}.svg").uri for key, figure in drawn.items()}
     shown = quantity(objective.output, data.units.get(objective.output, ""))
     best = float(found[0].row[objective.output])
