@@ -96,7 +96,7 @@ def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
         merged = here if kept.empty else pd.concat([kept, here], ignore_index=True)
         order = np.argsort(compared(output, merged[output].to_numpy()), kind="stable")[:count]
         kept = merged.iloc[order].reset_index(drop=True)
-    return kept
+    return _with_units(kept, source)
 
 
 def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
@@ -130,7 +130,15 @@ def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
         least = np.minimum.accumulate(y[order])
         unbeaten = np.concatenate([[True], least[1:] < least[:-1]])[: len(order)]
         kept = merged.iloc[order[unbeaten]].reset_index(drop=True)
-    return kept
+    return _with_units(kept, source)
+
+
+def _with_units(rows: pd.DataFrame, source: Any) -> pd.DataFrame:
+    """The rows with the units that stand in the schema."""
+    rows.attrs["units"] = {
+        field.name: field.metadata[b"unit"].decode() for field in source.schema if b"unit" in (field.metadata or {})
+    }
+    return rows
 
 
 def histogram(
