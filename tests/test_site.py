@@ -120,6 +120,10 @@ def test_tutorial_shows_what_the_first_study_says():
         ("sin^2(t/2)", "<msup><mi>sin</mi><mrow><mn>2</mn></mrow></msup><mrow><mo>(</mo><mfrac><mrow><mi>t</mi></mrow>"
                        "<mrow><mn>2</mn></mrow></mfrac><mo>)</mo></mrow>"),
         ("least of max_abs_d2psi", "<mtext>least of</mtext><mtext>max_abs_d2psi</mtext>"),
+        ("mid-stroke", "<mtext>mid-stroke</mtext>"),
+        ("psi-phi", "<mi>ψ</mi><mo>−</mo><mi>φ</mi>"),
+        ("sum (a)/r", "<mo>∑</mo><mfrac><mrow><mi>a</mi></mrow><mrow><mi>r</mi></mrow></mfrac>"),
+        ("by swing/2", "<mtext>by</mtext><mfrac><mrow><mtext>swing</mtext></mrow><mrow><mn>2</mn></mrow></mfrac>"),
         ("the rack's speed", "<mtext>the rack's speed</mtext>"),
     ],
 )  # fmt: skip
