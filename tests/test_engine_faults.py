@@ -28,6 +28,7 @@ from sweep.errors import (
     Interrupted,
     LinksweepError,
     LockedError,
+    ProgramFault,
     StoreError,
     StudyError,
     TimeUsedUp,
@@ -319,10 +320,10 @@ def test_bug_in_a_worker_surfaces_with_its_chunk(study: Study, tmp_path: Path, m
         raise ZeroDivisionError("broken")
 
     monkeypatch.setattr("sweep.engine.worker.compute_chunk", broken)
-    with pytest.raises(ZeroDivisionError) as caught:
+    with pytest.raises(ProgramFault, match=f"ZeroDivisionError: broken, in chunk 0, designs 0:{CHUNK}") as caught:
         run(study, tmp_path / "out", jobs=1)
-    assert read_runs(tmp_path / "out")[-1]["outcome"] == "ZeroDivisionError"
-    assert f"in chunk 0, designs 0:{CHUNK}" in "".join(caught.value.__notes__)
+    assert read_runs(tmp_path / "out")[-1]["outcome"] == "ProgramFault"
+    assert 'raise ZeroDivisionError("broken")' in caught.value.trace
 
 
 def test_memory_of_a_chunk_is_its_rows_not_its_designs(tmp_path: Path) -> None:

@@ -201,7 +201,7 @@ The same outputs with `accuracy = 1e-8`: true extrema instead of a grid.
 
 ## Memory
 
-Memory is that of the chunks at work, not of the sweep. A chunk takes two seconds of computing, 64 MB before it is
+Memory is that of the chunks at work, not of the sweep. A chunk takes two seconds of computing, 32 MB before it is
 encoded, or a sixteenth of all designs, whichever is least. So memory grows with a small sweep, and no more from about
 10^7 designs on: the cut of 10^8 or 10^12 of these designs has the chunks of 10^7. Each further job adds a chunk.
 
