@@ -63,10 +63,10 @@ class ChunkTask:
         except LinksweepError as error:
             return Done(number, error=error)
         except Exception as error:  # a bug: the parent raises it, with the trace of this worker
-            what = f"{type(error).__name__}: {error}".removesuffix(": ")
+            fault = f"{type(error).__name__}: {error}".removesuffix(": ")
             message = (
-                f"{self.folder}: {what}, in chunk {number}, designs {start}:{end}; this is an error in the program, not "
-                "in the study: please report it with the trace above; finished chunks are kept, run again to continue"
+                f"{self.folder}: {fault}, in chunk {number}, designs {start}:{end}; this is an error in the program, "
+                "not in the study: report it with the trace above; finished chunks are kept, run again to continue"
             )
             return Done(number, error=ProgramFault(message, traceback.format_exc()))
         return Done(number, end - start)

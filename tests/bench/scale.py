@@ -207,8 +207,8 @@ encoded, or a sixteenth of all designs, whichever is least. So memory grows with
 
 ## Reading 10^{power} rows
 
-In batches of 131072 rows, one file after the other (`sweep.dataset.reading`): pandas sees no more than one batch and
-the rows that are kept.
+In batches of 131072 rows, one file after the other (`sweep.dataset.reading`): first the columns that decide, of all
+rows within the limits, then all columns of the rows that are kept. pandas never sees more than one batch.
 
 {read}
 """
