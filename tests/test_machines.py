@@ -196,3 +196,13 @@ def test_accepted_machine_of_stitch208_has_its_figures_and_keeps_the_limits() ->
             slack = 1e-8  # the optimiser keeps limits to 1e-9 of their size
             value = found[limit.output].to_numpy() * np.array([1.0 - slack, 1.0 + slack])
             assert meets(limit, value).any(), limit.output
+
+
+def test_needle_of_stitch208_is_the_one_that_needle208_found_to_be_built() -> None:
+    import json
+    from pathlib import Path
+
+    studies = Path(__file__).parents[1] / "studies"
+    ours, theirs = (json.loads((studies / name / "expected.json").read_text()) for name in ("stitch208", "needle208"))
+    drive = theirs["optimum"]["design"]
+    assert {name: ours["optimum"]["design"][f"needle.{name}"] for name in drive} == drive
