@@ -34,7 +34,6 @@ from sweep.errors import (
     TimeUsedUp,
     WorkerDied,
 )
-from sweep.jobs.progress import Progress
 from sweep.study import Budget, Study, load_study
 from tests.engine_study import CHUNK, ROOT, SMALL, SMALL_CHUNKS, chunk_bytes, write_study
 
@@ -259,25 +258,6 @@ def test_code_is_what_was_imported_whatever_its_files_have_become(monkeypatch: p
     sweep.chunks.plan.optimiser_hash.cache_clear()
     monkeypatch.setattr(Path, "read_bytes", lambda path: b"edited")
     assert (sweep.chunks.plan.code_hash(), sweep.chunks.plan.optimiser_hash()) == imported
-
-
-def test_progress_that_nobody_reads_any_more_does_not_stop_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("FIRST_SECONDS", "LINE_SECONDS"):
-        monkeypatch.setattr(f"sweep.jobs.progress.{name}", -1.0)
-    reading, writing = os.pipe()
-    stream = os.fdopen(writing, "w", buffering=1)
-    with Progress("x", 3, 0, True, stream) as shown:
-        shown.advance(1)
-        assert os.read(reading, 100).startswith(b"x: 1 of 3 designs (33%)")
-        os.close(reading)
-        shown.advance(1)
-        assert not shown.show
-        shown.advance(1)
-    with pytest.raises(BrokenPipeError):
-        stream.close()
-    monkeypatch.setattr(sys, "stderr", None)
-    with Progress("x", 1, 0, True) as shown:
-        shown.advance(1)
 
 
 def test_held_lock_is_refused_with_its_holder(study: Study, whole: dict[str, bytes], tmp_path: Path) -> None:

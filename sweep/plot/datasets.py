@@ -127,16 +127,13 @@ def tolerance(folder: str | Path) -> Axes:
     if not rows:
         raise InputError("folder", str(folder), "a dataset with an optimum and [tolerance]", "plot")
     with house_style():
-        figure = new_figure(7.0, 0.45 * len(rows) + 1.2)
-        axes = figure.subplots()
+        names = [str(row["output"]) for row in rows]
+        axes = _lying([quantity(name, data.units.get(name, "")).symbol for name in names], 0.45)
         for k, row in enumerate(rows):
             low, mean, high = (100.0 * (row[key] / row["nominal"] - 1.0) for key in ("low", "mean", "high"))
             axes.plot([low, high], [k, k], color=OPTIMUM, linewidth=5.0, solid_capstyle="butt", alpha=0.5)
             axes.plot(mean, k, "o", color=OPTIMUM)
         axes.axvline(0.0, color=QUIET, linewidth=0.8)
-        names = [str(row["output"]) for row in rows]
-        axes.set_yticks(range(len(rows)), [quantity(name, data.units.get(name, "")).symbol for name in names])
-        axes.invert_yaxis()
         axes.set_xlabel("change from the nominal value [%]")
         axes.set_title(f"as it is made, {tolerance_words(data)}")
     return axes
@@ -172,18 +169,23 @@ def sensitivity(folder: str | Path) -> Axes:
     if not ranked or objective is None:
         raise InputError("folder", str(folder), "a dataset with an optimum and its sensitivities", "plot")
     with house_style():
-        figure = new_figure(7.0, 0.38 * len(ranked) + 1.2)
-        axes = figure.subplots()
+        axes = _lying([f"{s.name}, by {s.step}" for s in ranked], 0.38)
         for offset, values, colour, label in (
             (-0.2, [s.growing for s in ranked], OPTIMUM, "larger"),
             (0.2, [s.shrinking for s in ranked], REFERENCE, "smaller"),
         ):
             axes.barh(np.arange(len(ranked)) + offset, values, 0.38, color=colour, label=label)
         axes.axvline(0.0, color=QUIET, linewidth=0.8)
-        axes.set_yticks(range(len(ranked)), [f"{s.name}, by {s.step}" for s in ranked])
-        axes.invert_yaxis()
         axes.set_xlabel(f"change of the {objective.words} [%]")
         axes.legend()
+    return axes
+
+
+def _lying(labels: list[str], height: float) -> Axes:
+    """Open a figure with one line for each label, ``height`` [inch] each, the first on top."""
+    axes = new_figure(7.0, height * len(labels) + 1.2).subplots()
+    axes.set_yticks(range(len(labels)), labels)
+    axes.invert_yaxis()
     return axes
 
 
