@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import random
 import signal
 import subprocess
@@ -25,12 +24,9 @@ from sweep.engine.run import run
 from sweep.errors import (
     IncompleteWarning,
     InputError,
-    Interrupted,
-    LinksweepError,
     LockedError,
     ProgramFault,
     StoreError,
-    StudyError,
     TimeUsedUp,
     WorkerDied,
 )
@@ -316,19 +312,6 @@ def test_memory_of_a_chunk_is_its_rows_not_its_designs(tmp_path: Path) -> None:
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.2 * peaks[0] < 10e6, f"{peaks}: five times the designs"
-
-
-@pytest.mark.parametrize(
-    "error",
-    [InputError("a", -1.0, "a positive length", "row 3"), StudyError("study.toml", ["x", "y"]), Interrupted(2, "bye")],
-)
-def test_errors_come_back_whole_from_a_worker_process(error: LinksweepError) -> None:
-    again = pickle.loads(pickle.dumps(error))
-    assert type(again) is type(error) and str(again) == str(error) and vars(again) == vars(error)
-
-
-def test_interrupted_knows_its_exit_code() -> None:
-    assert (Interrupted(2, "").exit_code, Interrupted(15, "").exit_code) == (130, 143)
 
 
 def test_a_sweep_that_outlasts_its_budget_stops_with_124_and_continues(

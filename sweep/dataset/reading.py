@@ -132,6 +132,14 @@ def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
     return _whole(source, kept["design"].to_numpy(np.int64))
 
 
+def _with_units(rows: pd.DataFrame, source: Any) -> pd.DataFrame:
+    """The rows with the units that stand in the schema."""
+    rows.attrs["units"] = {
+        field.name: field.metadata[b"unit"].decode() for field in source.schema if b"unit" in (field.metadata or {})
+    }
+    return rows
+
+
 def histogram(
     folder: str | Path, output: str, bins: int = 100, ends: tuple[float, float] | None = None
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -200,7 +208,7 @@ def _whole(source: Any, designs: NDArray[np.int64]) -> pd.DataFrame:
     scanner = source.scanner(filter=wanted, batch_size=BATCH_ROWS, batch_readahead=1, fragment_readahead=1)
     rows: pd.DataFrame = scanner.to_table().to_pandas()
     order = np.argsort(rows["design"].to_numpy())[np.argsort(np.argsort(designs))]
-    return rows.iloc[order].reset_index(drop=True)
+    return _with_units(rows.iloc[order].reset_index(drop=True), source)
 
 
 def _known(source: Any, names: Sequence[str], place: str) -> Sequence[str]:
