@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import os
 import re
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -113,3 +115,22 @@ def test_every_part_of_a_run_is_told(tmp_path, quick, monkeypatch, capsys) -> No
         counted = [line for line in lines if re.match(rf"{label}: \d+ of \d+ {unit} ", line)]
         assert any(line.endswith(" left") for line in counted), (label, counted)
     assert any(line.startswith("optimum: 3 of 3 starts (100%)") for line in lines)
+
+
+def test_progress_that_nobody_reads_any_more_does_not_stop_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("FIRST_SECONDS", "LINE_SECONDS"):
+        monkeypatch.setattr(f"sweep.jobs.progress.{name}", -1.0)
+    reading, writing = os.pipe()
+    stream = os.fdopen(writing, "w", buffering=1)
+    with Progress("x", 3, 0, True, stream) as shown:
+        shown.advance(1)
+        assert os.read(reading, 100).startswith(b"x: 1 of 3 designs (33%)")
+        os.close(reading)
+        shown.advance(1)
+        assert not shown.show
+        shown.advance(1)
+    with pytest.raises(BrokenPipeError):
+        stream.close()
+    monkeypatch.setattr(sys, "stderr", None)
+    with Progress("x", 1, 0, True) as shown:
+        shown.advance(1)

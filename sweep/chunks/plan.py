@@ -30,7 +30,7 @@ FORMAT = 2
 # A chunk should take a few seconds on one core by the routes' own cost figures, so every machine cuts alike; it should
 # hold at most this much before it is encoded; and there should be enough of them to keep the workers even to the end.
 CHUNK_SECONDS = 2.0
-CHUNK_BYTES = 64 * 2**20
+CHUNK_BYTES = 32 * 2**20
 CHUNKS_AT_LEAST = 16
 SECONDS_AT_LEAST = 0.1
 CHUNK_STEP = 512
