@@ -61,9 +61,9 @@ def table():
 
 def test_lines_say_what_the_table_says():
     families = table()
-    assert "multiplied by 2.00 in the middle of 3 mechanisms, by 4.00 at most (three)" in front._refined(families)
+    assert "multiplied by 2.00 (median of 3 mechanisms), at most by 4.00 (three)" in front._refined(families)
     assert "3 of 3 keep 1e-9" in front._refined(families)
-    assert "by 2.0e-04 of it in the middle, by 4.0e-04 in the worst family (three)" in front._grid(families)
+    assert "by 2.0e-04 of it (median), by 4.0e-04 in the worst family (three)" in front._grid(families)
     edge = front._edge(families)
     assert "off by up to 90 %" in edge and "for 10 times the time" in edge
 

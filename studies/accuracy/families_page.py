@@ -48,7 +48,8 @@ def families_page(m: Measured) -> list[str]:
         "",
         *prose(
             "*No answer* counts designs that some way refuses with a status, or that the reference cannot judge.",
-            "`-`: nothing to judge, or not offered (a march has no `accuracy=`; few families prove their maxima).",
+            "`-`: nothing to judge, or not offered (a march has no `accuracy=`; few families prove their maxima). A",
+            "family has no row near a change point if no design within 90 % of its ordinary one fails to move.",
             "Times: processor time of one thread.",
         ),
         "",
@@ -105,14 +106,11 @@ def _planar(m: Measured) -> list[str]:
         [str(what), *(_cell(row) for _, row in part.sort_values("setting").iterrows())]
         for what, part in m.peers.groupby("what", sort=False)
     ]
-    swept = m.families[(m.families["family"] == family) & (m.families["method"] == GRID)]
-    swept = swept[swept["region"] == swept["region"].iloc[0]].sort_values("setting")
-    rows.append(["linksweep, many designs at once", *(_cell(row) for _, row in swept.iterrows())])
     return [
         *lines,
         *prose(
             f"Largest acceleration of ordinary designs of `{family}` on a grid, each program by its fastest way",
-            "(`make bench-peers`, on this machine). Equal errors mean equal accelerations.",
+            "(`make bench-peers`, on this machine). All have the same designs: equal errors mean equal accelerations.",
         ),
         "",
         *pipe_table(["program", *(f"grid {n}" for n in SAMPLES)], rows),

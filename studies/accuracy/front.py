@@ -81,9 +81,9 @@ def _refined(table: pd.DataFrame) -> str:
     kept = judged["largest_error"] <= np.maximum(FINE, judged["reference_error"])
     return (
         f"**Ask for the accuracy you need: `accuracy=`.** From {power(COARSE)} to {power(FINE)} the time of an ordinary"
-        f" design is multiplied by {ratio.median():.2f} in the middle of {len(ratio)} mechanisms, by {ratio.max():.2f}"
-        f" at most ({ratio.idxmax()}). {int(kept.sum())} of {len(kept)} keep"
-        f" {power(FINE)} when asked for it, as far as the reference can tell."
+        f" design is multiplied by {ratio.median():.2f} (median of {len(ratio)} mechanisms), at most by"
+        f" {ratio.max():.2f} ({ratio.idxmax()}). {int(kept.sum())} of {len(kept)} keep {power(FINE)} when asked for"
+        " it, as far as the reference can tell."
     )
 
 
@@ -94,9 +94,9 @@ def _grid(table: pd.DataFrame) -> str:
     ratio = (found["ns_per_design"] / refined).dropna()
     return (
         f"**A fixed grid pays for every digit.** {USUAL:.0f} crank angles miss the largest acceleration by"
-        f" {sig(error.median())} of it in the middle, by {sig(error.max())} in the worst family ({error.idxmax()}), and"
-        f" take {sig(ratio.median())} times as long as `accuracy={power(FINE)}`. The error falls with the square"
-        " of their number: one digit more takes three times as many."
+        f" {sig(error.median())} of it (median), by {sig(error.max())} in the worst family ({error.idxmax()}), and take"
+        f" {sig(ratio.median())} times as long as `accuracy={power(FINE)}`. The error falls with the square of their"
+        " number: one digit more takes three times as many."
     )
 
 
@@ -113,7 +113,7 @@ def _edge(table: pd.DataFrame) -> str:
         f"**Near a change point only `accuracy=` can be trusted.** There a grid of {USUAL:.0f} is off by up to {off} %"
         f" ({both['largest_error_grid'].idxmax()}), `accuracy={power(FINE)}` by {sig(both['largest_error'][worst])} at"
         f" most ({worst}, where the reference is sure to {sig(both['reference_error'][worst])}), for {slower} times the"
-        " time of an ordinary design in the middle. Where it cannot, its status says so."
+        " time of an ordinary design (median). Where it cannot, its status says so."
     )
 
 
@@ -167,7 +167,7 @@ def _study(whole: pd.DataFrame) -> list[str]:
         *prose(
             f"A Sobol sample of {int(first['designs'])} crank-rockers, limits on swing and pressure angle,"
             f" {int(first['kept'])} kept, least of the largest acceleration searched from four starts; one worker.",
-            "Errors are relative, against the reference of accuracy/families.md.",
+            "Errors are relative, against the reference of [every family](accuracy/families.md).",
         ),
         "",
         *pipe_table(head, rows),

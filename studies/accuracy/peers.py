@@ -19,15 +19,16 @@ import numpy as np
 from studies.accuracy.machine import description
 from studies.accuracy.prices import GRID, SAMPLES
 from studies.accuracy.subjects import ORDINARY, measure, regions_of
-from studies.accuracy.timing import spread
+from studies.accuracy.timing import per_design, spread
 from studies.accuracy.witness import reference
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
-from sweep.families.base import Array
+from sweep.families.base import Accuracy, Array
 from sweep.reductions.sampling import turn
 
 PLANAR = "four_bar"
 DESIGNS = 4  # a linkage of pylinkage is one design, so few do
-OWN = "linksweep, one design at a time"
+OWN, SWEPT = "linksweep, one design at a time", "linksweep, many designs at once"
 
 
 def main() -> None:
@@ -46,6 +47,7 @@ def main() -> None:
         for row in (
             _row(f"pylinkage {version('pylinkage')}", samples, _pylinkage, region.designs, exact),
             _row(OWN, samples, _own, region.designs, exact),
+            _swept(samples, region.designs, exact),
         )
     ]
     table = pd.DataFrame(rows)
@@ -66,6 +68,18 @@ def _row(
 
     head: dict[str, object] = {"what": what, "family": PLANAR, "method": GRID, "setting": float(samples)}
     return head | {"largest_error": error} | spread(together).columns(len(runs), "design")
+
+
+def _swept(samples: int, designs: Array, exact: Array) -> dict[str, object]:
+    mechanism, accuracy = family(PLANAR), Accuracy(samples=samples)
+    name = measure(mechanism)
+
+    def run(some: Array) -> Array:
+        return np.asarray(design_outputs(mechanism, some, [name], accuracy)[name], np.float64)
+
+    error = float(np.abs(run(designs) / exact - 1.0).max())
+    head: dict[str, object] = {"what": SWEPT, "family": PLANAR, "method": GRID, "setting": float(samples)}
+    return head | {"largest_error": error} | per_design(run, designs)
 
 
 def _own(design: Array, samples: int) -> Callable[[], float]:

@@ -43,8 +43,8 @@ def pipe_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> list[st
 def duration(nanoseconds: Any) -> str:
     """A time per design in the unit in which it is read."""
     ns = float(nanoseconds)
-    for unit, size in (("ns", 1.0), ("us", 1e3), ("ms", 1e6)):
-        if ns < 1e3 * size or unit == "ms":
+    for unit, size in (("ns", 1.0), ("us", 1e3), ("ms", 1e6), ("s", 1e9)):
+        if ns < 1e3 * size or unit == "s":
             return f"{ns / size:.3g} {unit}" if ns < 999.5 * size else f"{ns / size:.0f} {unit}"
     raise AssertionError(ns)
 

@@ -26,6 +26,7 @@ from sweep.reductions.sampling import TWO_PI, Index, pose_columns
 
 GRID, FINER, ROUNDS = 2048, 33, 3
 RANGE_ROUNDS = 7  # the height of a kink is sharpened by 16 a round
+ROUGH = 8  # of the last samples, the highest of which show how rough the curve is
 PEAKS = 8  # of the second differences of one design, the highest
 NODES, WIDEST, NARROWER, WIDTHS = 33, 1.2, 0.75, 40
 INNER = 0.3  # share of an interval in which the polynomial's second derivative is sharp
@@ -93,7 +94,7 @@ def extreme(mechanism: Family, designs: Array, name: str, sign: int) -> Known:
 
 
 def _narrowed(curve: Curve, count: int, turned: int) -> Known:
-    """Highest value of every curve, and by how much the last narrowing raised it."""
+    """Highest value of every curve, and how sure it is."""
     reach = TWO_PI / GRID
     phi = np.arange(GRID) * reach
     y = curve(np.arange(count), np.tile(phi, (count, 1)), None)
@@ -106,7 +107,9 @@ def _narrowed(curve: Curve, count: int, turned: int) -> Known:
         places = centres[:, None] + reach * np.linspace(-1.0, 1.0, FINER)
         y = curve(rows, places, turned * height)
         centres, top = places[np.arange(rows.size), y.argmax(axis=1)], y.max(axis=1)
-        rise, height = np.abs(top - height), np.fmax(height, top)
+        # What the last grids add, and by how much neighbours differ where only rounding is left of the curve.
+        rise = np.abs(top - height) + top - np.sort(y, axis=1)[:, -ROUGH]
+        height = np.fmax(height, top)
         reach /= (FINER - 1) / 2
     value, error = np.full(count, np.nan), np.full(count, np.nan)
     for k in range(count):
