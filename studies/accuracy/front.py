@@ -122,11 +122,12 @@ def _effects(table: pd.DataFrame) -> str:
     kept = found["largest_error"] <= np.maximum(CLOSE, found["reference_error"])
     times = found["ns_per_design"].sort_values()
     others = ", ".join(f"{name} ({sig(found['largest_error'][name])})" for name in kept.index[~kept])
+    but = f"; not so {others}" if others else ""
     return (
         f"**Effects have prices of their own.** {int(kept.sum())} of {len(kept)} effects are right to {power(CLOSE)}"
-        f" over the turn when asked for it{f'; not so {others}' if others else ''}. They take {duration(times.iloc[0])}"
-        f" ({times.index[0]}) to {duration(times.iloc[-1])} ({times.index[-1]}) a design: want only those that the"
-        " scene calls for."
+        f" over the turn when asked for it, as far as their references can tell{but}. They take"
+        f" {duration(times.iloc[0])} ({times.index[0]}) to {duration(times.iloc[-1])} ({times.index[-1]}) a design:"
+        " want only those that the scene calls for."
     )
 
 

@@ -78,12 +78,13 @@ def _priced(mechanism: Family, designs: Array, accuracy: Accuracy, known: Known)
     columns = design_outputs(mechanism, designs, [measure(mechanism)], accuracy)
     value = np.asarray(columns[measure(mechanism)], np.float64)
     answered = np.isfinite(value) & np.isin(columns["status"], MOVES)
-    judged = answered & (known.error <= JUDGED)
-    error = np.abs(value - known.value) / np.where(known.value != 0.0, np.abs(known.value), 1.0)
+    size = np.where(known.value != 0.0, np.abs(known.value), 1.0)
+    error, sure = np.abs(value - known.value) / size, known.error / size
+    judged = answered & (sure <= JUDGED)
     return {
         "largest_error": float(error[judged].max()) if judged.any() else float("nan"),
         "median_error": float(np.median(error[judged])) if judged.any() else float("nan"),
-        "reference_error": float(known.error[judged].max()) if judged.any() else float("nan"),
+        "reference_error": float(sure[judged].max()) if judged.any() else float("nan"),
         "unanswered": int((~answered).sum()),
         "unjudged": int((answered & ~judged).sum()),
         **per_design(lambda some: design_outputs(mechanism, some, [measure(mechanism)], accuracy), designs),

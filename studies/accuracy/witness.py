@@ -41,7 +41,7 @@ Curve: TypeAlias = Callable[[Index, Array, Array | None], Array]
 
 
 class Known(NamedTuple):
-    """Values of a design output by the reference, (n,), and its own relative error, (n,)."""
+    """Values of a design output by the reference, (n,), and its own absolute error, (n,)."""
 
     value: Array
     error: Array
@@ -55,7 +55,7 @@ def reference(mechanism: Family, designs: Array) -> Known:
     if name.startswith("range_"):
         ends = [extreme(precise, designs, precise.position, sign) for sign in (1, -1)]
         value = ends[0].value - ends[1].value
-        return Known(value, (ends[0].error + ends[1].error) / np.where(value != 0.0, value, 1.0))
+        return Known(value, ends[0].error + ends[1].error)
     return _sharpest(precise, designs)
 
 
@@ -67,7 +67,7 @@ def _marched(mechanism: Family, designs: Array) -> Known:
         )
         for n in MARCHED
     )
-    return Known(fine, np.abs(coarse - fine) / np.where(fine != 0.0, np.abs(fine), 1.0))
+    return Known(fine, np.abs(coarse - fine))
 
 
 def position(mechanism: Family, designs: Array, phi: Array) -> Array:
@@ -132,7 +132,7 @@ def _sharpest(mechanism: Family, designs: Array) -> Known:
             if smooth.size == 0:
                 continue
             best = smooth[np.argmax(heights[smooth])]
-            value[k], error[k] = heights[best], errors[best] / heights[best]
+            value[k], error[k] = heights[best], errors[best]
     return Known(value, error)
 
 
