@@ -74,6 +74,7 @@ def test_navigation_has_every_page_once():
     settings = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     named = re.findall(r": ([\w/-]+\.md)$", settings, flags=re.MULTILINE)
     pages = [path.name for path in (ROOT / "docs").glob("*.md")]
+    pages += [f"accuracy/{path.name}" for path in (ROOT / "docs" / "accuracy").glob("*.md")]
     pages += [f"notebooks/{path.stem}.md" for path in (ROOT / "docs" / "notebooks").glob("*.ipynb")]
     assert sorted(named) == sorted([*pages, "reference/python.md", "reference/families.md"])
     assert yaml.safe_load(settings)["strict"] is True and yaml.safe_load(settings)["theme"]["font"] is False
