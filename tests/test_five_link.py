@@ -15,7 +15,6 @@ from kernels import status as st
 from kernels.families import five_link
 from sweep.families import family
 from sweep.families.base import Angles
-from sweep.synthesis.five_link import five_links_with_limits
 from tests.reference import five_link as naive
 from tests.rssr_designs import random_designs
 
@@ -300,30 +299,6 @@ def test_five_link_near_a_dead_point_keeps_what_the_inputs_fix():
         expected = float(naive.outputs(values, angle, row.psi)["psi"])
         # psi goes like the root of the distance, so one rounding of phi moves it by 2^-53 phi over that
         assert abs(row.psi - expected) < 200.0 * 2.0**-53 * 6.3 / math.sqrt(distance)
-
-
-def test_five_links_with_limits_keep_the_limit_positions_of_the_crank_rocker():
-    designs = random_designs(12, 21, rotatable=True)
-    table = dict(zip(("a", "b", "c", "e", "f", "g", "alpha", "branch"), designs.T, strict=True))
-    wanted = ["psi_ext", "psi_fold", "phi_ext", "phi0", "swing"]
-    theirs = sweep.summarise("rssr", table, wanted, accuracy=1e-10)
-    for h in (0.5, -1.5):
-        found = five_links_with_limits(table, h)
-        good = (found.status == st.OK) & (theirs.status == st.OK)
-        assert good.sum() >= 4
-        ours = sweep.summarise("five_link", found[good].drop(columns="status"), wanted, accuracy=1e-10)
-        assert (ours.status == st.OK).all()
-        for name in wanted:
-            apart = np.exp(1j * ours[name].to_numpy()) - np.exp(1j * theirs.loc[good, name].to_numpy())
-            assert np.abs(apart).max() < 1e-8, name  # phi at an extremum is known to the root of its target
-
-
-def test_five_links_with_limits_do_not_exist_for_a_joint_longer_than_the_reach():
-    designs = random_designs(6, 21, rotatable=True)
-    table = dict(zip(("a", "b", "c", "e", "f", "g", "alpha", "branch"), designs.T, strict=True))
-    found = five_links_with_limits(table, 1e4)
-    assert (found.status != st.OK).all() and (found.status == st.NOT_ADMISSIBLE).any()
-    assert found.loc[found.status == st.NOT_ADMISSIBLE, ["a", "b"]].isna().all().all()
 
 
 def test_five_link_with_complex_numbers_has_a_status_where_the_coupler_reaches_just_not_at_all():

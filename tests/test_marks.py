@@ -76,6 +76,11 @@ def test_files_stay_short(room):
     assert statistics.median(lengths.values()) <= 120
 
 
+def test_files_of_tests_stay_short():
+    lengths = {path.name: len(path.read_text().splitlines()) for path in sources("tests")}
+    assert [name for name, length in lengths.items() if length > 350] == []
+
+
 def test_kernels_explain_their_numerical_tricks():
     """Three lines in a hundred carry a comment; what only steers the formatter does not count."""
     lines, comments = 0, 0

@@ -19,10 +19,9 @@ from sweep.dataset.lock import locked
 from sweep.errors import InputError, LockedError
 from sweep.nights import Settings, folders, nightly
 from sweep.nights.carry import carry
-from sweep.nights.changes import changes, slower
+from sweep.nights.changes import changes
 from sweep.nights.chosen import chosen, in_order
-from sweep.nights.night import exit_code
-from sweep.nights.records import NightRecord, StudyRecord, append_history, read_history, read_night, write_night
+from sweep.nights.records import NightRecord, StudyRecord, write_night
 from sweep.study import load_study
 from tests.faults.ground import SLOW_DISK
 from tests.test_optimise_study import STUDY as OPTIMUM
@@ -295,49 +294,6 @@ def test_two_studies_of_one_name_and_no_study_are_refused(tmp_path: Path) -> Non
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="studies = "):
         night(tmp_path / "nights", [tmp_path / "empty"])
-
-
-def times(*seconds: float) -> list[NightRecord]:
-    return [NightRecord(str(k), s, 0, {"one": StudyRecord("complete", seconds=s)}) for k, s in enumerate(seconds)]
-
-
-@pytest.mark.parametrize(
-    ("before", "now", "code"),
-    [
-        ((10, 11, 9), 30, 0),  # one slow night
-        ((10, 11, 9, 10, 30), 30, 12),  # the second
-        ((10, 11, 9, 10, 30), 11, 0),  # over again
-        ((10, 30), 30, 0),  # too few nights to tell
-        ((1, 1, 1, 1, 4), 4, 0),  # too short to tell
-    ],
-)
-def test_slower_is_what_two_nights_in_a_row_say(before: tuple[float, ...], now: float, code: int) -> None:
-    assert slower("one", now, times(*before)).code == code
-
-
-@pytest.mark.parametrize(
-    ("records", "code"),
-    [
-        ([GOOD], 0),
-        ([StudyRecord("complete", changed=10), StudyRecord("complete", changed=11), CUT], 11),
-        ([StudyRecord("complete", changed=10), StudyRecord("complete", changed=12)], 10),
-        ([StudyRecord("complete", changed=12), StudyRecord("waiting", 124)], 124),
-        ([StudyRecord("complete", changed=12), GOOD], 12),
-        ([StudyRecord("failed", 2), StudyRecord("failed", 74), StudyRecord("complete", changed=11)], 74),
-    ],
-)
-def test_the_gravest_of_the_studies_decides_the_exit_code(records: list[StudyRecord], code: int) -> None:
-    assert exit_code({str(k): record for k, record in enumerate(records)}) == code
-
-
-def test_a_record_passes_through_its_files_and_torn_lines_are_left_out(tmp_path: Path) -> None:
-    record = NightRecord("n", 2.5, 10, {"one": StudyRecord("complete", figures={"x": 1 / 3}, changes=("a",))})
-    write_night(tmp_path, record)
-    assert read_night(tmp_path) == record
-    append_history(tmp_path, record)
-    with (tmp_path / "history.jsonl").open("a") as file:
-        file.write('{"name": "torn", "sec')
-    assert read_history(tmp_path) == [record]
 
 
 def test_optimum_and_dimension_that_moved_are_named(tmp_path: Path) -> None:

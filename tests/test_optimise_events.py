@@ -18,7 +18,7 @@ from sweep.optimise.sensitivity import sensitivities
 from sweep.study.study import Limit
 from tests.test_machine_events import MEMBERS, RELATIONS, TABLE
 
-MACHINE = sweep.machine(MEMBERS, RELATIONS)
+MACHINE = sweep.machine(MEMBERS, RELATIONS | {"hit": {"value": ["pace", "phi_arrive"]}})
 NAMES = list(MACHINE.parameter_names)
 DESIGN = np.array([TABLE.iloc[0].get(n, p.default) for n, p in zip(NAMES, MACHINE.parameters, strict=True)], np.float64)
 
@@ -28,7 +28,7 @@ def summarised(design: np.ndarray, output: str) -> float:
     return float(sweep.summarise(MACHINE, table, [output], accuracy=1e-12)[output][0])
 
 
-@pytest.mark.parametrize("output", ["phi_arrive", "phi_plane", "stay"])
+@pytest.mark.parametrize("output", ["phi_arrive", "phi_plane", "stay", "hit"])
 def test_slopes_of_events_are_exact(output: str) -> None:
     rows = pd.DataFrame(sensitivities(MACHINE, DESIGN, [output])).set_index("parameter")
     assert rows["value"].iloc[0] == pytest.approx(summarised(DESIGN, output), abs=1e-13)

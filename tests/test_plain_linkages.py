@@ -1,4 +1,4 @@
-"""Slider-crank, four-bar, inverted slider-crank, epicyclic dwell and cams against points and printed numbers."""
+"""Slider-crank, four-bar, inverted slider-crank, epicyclic dwell against points and printed numbers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from mpmath import mp
 
 import sweep
 from kernels import status as st
@@ -14,50 +13,8 @@ from kernels.families import epicyclic_dwell, inverted_slider_crank
 from kernels.families.cam import swinging, translating
 from sweep.families import family
 from sweep.families.base import Angles
+from tests.plain_designs import DESIGNS, PHI, evaluated
 from tests.reference import plain_linkages as naive
-
-RANDOM = np.random.default_rng(12)
-PHASES = {"rise": 1.1, "dwell": 0.6, "fall": 1.7, "start": 0.3}
-WAVES = {f"{letter}{k}": 0.3 / k * (1 if letter == "c" else -1) for letter in "cs" for k in range(1, 7)}
-
-
-def spread(count, /, **ranges):
-    """Random designs: a pair is an interval, a list the choices, a number itself."""
-    columns = {}
-    for name, values in ranges.items():
-        if isinstance(values, tuple):
-            columns[name] = RANDOM.uniform(*values, count)
-        else:
-            columns[name] = RANDOM.choice(np.atleast_1d(values).astype(float), count)
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-
-
-# Proportions that keep away from dead points, where no number of digits of the input fixes the output.
-DESIGNS = {
-    "slider_crank": spread(12, a=(0.2, 1.0), b=(2.0, 4.0), e=(-0.8, 0.8), branch=[1, -1]),
-    "four_bar": spread(
-        12, a=(0.5, 1.0), b=(2.6, 3.0), c=(2.3, 2.6), e=(2.7, 3.0), xi=(-2, 2), eta=(-2, 2), branch=[1, -1]
-    ),
-    "inverted_slider_crank": [
-        *spread(8, a=(0.5, 1.0), e=(1.5, 3.0), h=(-0.4, 0.4), branch=[1, -1]),
-        *spread(8, a=(1.5, 2.0), e=(-1.0, 1.0), h=(-0.4, 0.4), branch=[1, -1]),
-    ],
-    "epicyclic_dwell": spread(16, k=(0.5, 1.5), a=(-0.4, 0.4), n=[2, 3, 4, 7], mesh=[1, -1]),
-    "cam": [
-        *spread(12, lift=(5, 15), r0=(20, 40), e=(-8, 8), law=[1, 2, 3], **PHASES),
-        *spread(4, lift=(5, 15), r0=(20, 40), e=(-8, 8), law=[4], **WAVES),
-    ],
-    "cam_lever": [
-        *spread(12, lift=(0.1, 0.5), r0=(25, 40), c=(45, 60), e=(55, 70), law=[1, 2, 3], branch=[1, -1], **PHASES),
-        *spread(4, lift=(0.05, 0.2), r0=(25, 40), c=(45, 60), e=(55, 70), law=[4], branch=[1, -1], **WAVES),
-    ],
-}
-MOST = {"inverted_slider_crank": ("psi", "dpsi", "d2psi", "d3psi", "s", "ds", "d2s")}
-PHI = (0.13, 0.9, 1.55, 2.4, 3.3, 4.1, 5.7)
-
-
-def evaluated(name, design, want, phi):
-    return sweep.evaluate(name, design, list(want), phi=[phi]).iloc[0]
 
 
 @pytest.mark.parametrize("name", DESIGNS)
@@ -284,78 +241,3 @@ def test_epicyclic_cross_slide_has_the_published_dwell():
     for part, degrees in ((0.01, 63.23), (0.001, 43.18)):
         inside = phi[across > across.max() - part * stroke]
         assert math.degrees(inside.max() - inside.min()) == pytest.approx(degrees, abs=0.01)
-
-
-def test_cam_laws_have_their_printed_extremes():
-    table = {"lift": 1.0, "r0": 5.0, "rise": 1.0, "fall": 1.0, "dwell": 1.0, "law": [1.0, 2.0, 3.0]}
-    frame = sweep.summarise("cam", table, ["max_abs_ds", "max_abs_d2s", "max_abs_d3s", "stroke"], accuracy=1e-9)
-    # velocity, acceleration and jerk coefficients of the handbooks
-    np.testing.assert_allclose(frame.max_abs_ds, [1.875, 4.0 * math.pi / (4.0 + math.pi), 2.0], rtol=1e-9)
-    modified = 4.0 * math.pi**2 / (4.0 + math.pi)
-    np.testing.assert_allclose(frame.max_abs_d2s, [10.0 / math.sqrt(3.0), modified, 2.0 * math.pi], rtol=1e-9)
-    np.testing.assert_allclose(frame.max_abs_d3s, [60.0, 4.0 * math.pi * modified, 4.0 * math.pi**2], rtol=1e-7)
-    np.testing.assert_allclose(frame.stroke, 1.0, rtol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["cam", "cam_lever"])
-def test_cam_pressure_angle_is_that_of_the_pitch_curve(name):
-    for k, design in enumerate(DESIGNS[name]):
-        phi = PHI[k % len(PHI)]
-        row = evaluated(name, design, ["pressure_angle", "x_p", "y_p", family(name).position], phi)
-        curves = getattr(naive, name)
-
-        def pitch(x, design=design, curves=curves):
-            numbers = {key: mp.mpf(value) for key, value in design.items()}
-            value = next(iter(curves(numbers, x).values()))
-            if name == "cam":
-                base = mp.sqrt(numbers["r0"] ** 2 - numbers["e"] ** 2)
-                return mp.mpc(base + value, -numbers["e"]) * mp.expj(-x)
-            return (numbers["e"] + numbers["c"] * mp.expj(value)) * mp.expj(-x)
-
-        centre = complex(row.x_p, row.y_p) * complex(math.cos(phi), math.sin(phi))
-        velocity = 1.0 if name == "cam" else 1j * complex(math.cos(row.psi), math.sin(row.psi))
-        assert row.pressure_angle == pytest.approx(naive.contact_pressure(pitch, centre, velocity, phi), abs=1e-9), (
-            design
-        )
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"rise": 4.0, "fall": 3.0},
-        {"law": 2.5},
-        {"rise": 0.0},
-        {"dwell": -0.1},
-        {"r0": 0.0},
-        {"e": 40.0},
-        {"c3": math.nan},
-    ],
-)
-def test_cam_that_means_nothing_is_invalid(change):
-    mechanism = family("cam")
-    design = {"lift": 5.0, "r0": 30.0} | change
-    values = [design.get(p.name, p.default if p.default is not None else 0.0) for p in mechanism.parameters]
-    columns = mechanism.poses(np.array([values]), Angles.of(np.array([[0.4]])), frozenset({"s", "pressure_angle"}))
-    assert columns["status"][0, 0] == st.INVALID_INPUT
-    assert np.isnan(columns["s"][0, 0]) and np.isnan(columns["pressure_angle"][0, 0])
-
-
-def test_cam_drives_a_linkage_as_the_first_stage_of_a_chain():
-    table = {"lift1": 0.5, "r01": 30.0, "c1": 50.0, "e1": 60.0, "law1": 2.0}
-    table |= {"a2": 2.0, "b2": 3.0, "e2": 0.5, "f2": 0.0, "alpha2": 0.0, "offset2": 0.4}
-    phi = np.linspace(0.0, 6.2, 9)
-    frame = sweep.evaluate(["cam_lever", "rssp"], table, ["s", "ds"], phi)
-    lever = sweep.evaluate(
-        "cam_lever", {"lift": 0.5, "r0": 30.0, "c": 50.0, "e": 60.0, "law": 2.0}, ["psi", "dpsi"], phi
-    )
-    rod = {"a": 2.0, "b": 3.0, "e": 0.5, "f": 0.0, "alpha": 0.0, "phi": lever.psi + 0.4}
-    alone = sweep.evaluate("rssp", rod, ["s", "ds"])
-    np.testing.assert_allclose(frame.s, alone.s, atol=1e-14)
-    np.testing.assert_allclose(frame.ds, alone.ds * lever.dpsi, atol=1e-13)
-
-
-def test_negative_control_cycloidal_curve_is_not_the_modified_sine():
-    row = evaluated("cam", {"lift": 1.0, "r0": 5.0, "law": 3.0}, ["s"], 0.5)
-    with mp.workdps(30):
-        other = naive.rise(2, mp.mpf(0.5) / (mp.pi / 2))
-    assert abs(float(other) - row.s) > 1e-3

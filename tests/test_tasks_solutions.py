@@ -1,8 +1,6 @@
-"""Tasks 1 to 8: each solved once, the mechanism then checked by the families alone, without the task's own formulas."""
+"""Tasks 1 to 4 and the engineering method: the mechanisms are checked by the families, without the task's formulas."""
 
 from __future__ import annotations
-
-from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -13,88 +11,27 @@ from kernels import status as st
 from sweep.synthesis.tasks import (
     EngineeringMethod,
     Position,
-    Setting,
-    SlotPosition,
     Task1,
     Task2,
-    Task3,
-    Task4,
-    Task5,
-    Task6,
-    Task7,
-    Task8,
     adjustments,
     solve,
 )
-
-RSSR = ("a", "b", "c", "e", "f", "g", "alpha", "branch")
-SPACE = {"e": 1.0, "g": 1.0, "alpha": 1.3}
-DRIVE = {"a": 0.4, "b": 1.8, "c": 1.2, "e": 1.5, "f": 1.2, "g": 1.0, "alpha": 1.3, "branch": -1.0}
-BOUNDS = {"b": (0.3, 8.0), "c": (0.3, 5.0)}
-STAGE_BOUNDS = {"b1": (0.3, 8.0), "c1": (0.3, 5.0)}
-
-
-@cache
-def best(problem):
-    """The best solution; problems are frozen, so each is solved once."""
-    solutions = solve(problem.build(), candidates=2048, starts=4)
-    assert solutions
-    assert solutions[0].feasible, str(solutions[0])
-    return solutions[0]
-
-
-class Case:
-    """A problem by name, hashable."""
-
-    def __init__(self, kind, **numbers):
-        self.kind, self.numbers = kind, numbers
-
-    def build(self):
-        return self.kind(**self.numbers)
-
-
-TASK1 = Case(
-    Task1, swing=0.9, phi0=3.3, **SPACE, positions=(Position(1.0, 0.25),), bounds=BOUNDS, max_pressure_angle=1.2
+from tests.task_cases import (
+    BOUNDS,
+    DRIVE,
+    RSSR,
+    SPACE,
+    TASK1,
+    TASK2,
+    TASK3,
+    TASK3_THREE,
+    TASK4,
+    Case,
+    best,
+    check_limits,
+    check_position,
+    rocker,
 )
-TASK2 = Case(Task2, swing_range=(0.5, 1.2), phi0_range=(2.9, 3.5), **SPACE, max_pressure_angle=1.2, bounds=BOUNDS,
-             positions=(Position(1.0, 0.2), Position(2.0, 0.6)))  # fmt: skip
-TASK3 = Case(Task3, swing=0.8, phi0=3.2, settings=(Setting(0.6, 3.2),), adjusted="f", adjusted_range=(-4.0, 4.0),
-             **SPACE, f_range=(-3.0, 3.0), max_pressure_angle=1.3, bounds=BOUNDS)  # fmt: skip
-TASK3_THREE = Case(Task3, swing=0.8, phi0=3.2, settings=(Setting(0.7, 3.2), Setting(0.6)), adjusted="g",
-                   adjusted_range=(-4.0, 4.0), **SPACE, f_range=(-3.0, 3.0), g_range=(0.2, 2.0), max_pressure_angle=1.3,
-                   bounds=BOUNDS)  # fmt: skip
-TASK4 = Case(Task4, swing=np.radians(45.0), phi0=np.radians(165.0), e=1.0, objective="pressure_angle")
-TASK5 = Case(Task5, swing=0.8, phi0=3.2, **SPACE, f_range=(-3.0, 3.0), rho0=0.5, bounds=STAGE_BOUNDS,
-             max_pressure_angle=1.2, positions=(SlotPosition(1.0, 0.1), SlotPosition(2.0, 0.38)))  # fmt: skip
-TASK6 = Case(Task6, drive=DRIVE, start=(0.0, 0.0), end=(1.0, 0.2), start_direction=0.5, end_direction=-0.1)
-TASK7 = Case(Task7, drive=DRIVE, stroke=1.0, start_acceleration=0.6, end_acceleration=-0.5)
-TASK8 = Case(Task8, swing=0.8, phi0=3.2, **SPACE, f_range=(-3.0, 3.0), stroke=1.0, dwell=1.0, tolerance=0.004,
-             limit="folded", bounds=STAGE_BOUNDS)  # fmt: skip
-
-
-def chain_columns(solution, second):
-    names = sweep.families.family(["rssr", second]).parameter_names
-    return {name: [solution.mechanism[name]] for name in names}
-
-
-def rocker(solution):
-    return {name: [solution.mechanism[name]] for name in RSSR}
-
-
-def check_limits(table, swing, phi0, largest_pressure):
-    wanted = ["swing", "phi0", "max_pressure_angle", "phi_ext", "psi_ext"]
-    turn = sweep.summarise("rssr", table, wanted, accuracy=1e-12).iloc[0]
-    assert turn["status"] == st.OK
-    assert turn["swing"] == pytest.approx(swing, abs=1e-9)
-    assert turn["phi0"] == pytest.approx(phi0, abs=1e-9)
-    assert turn["max_pressure_angle"] <= largest_pressure + 1e-7
-    return turn
-
-
-def check_position(table, turn, position):
-    psi = sweep.evaluate("rssr", table, "psi", phi=[turn["phi_ext"] + position.dphi])["psi"][0]
-    error = psi - turn["psi_ext"] - position.dpsi
-    assert abs(error - 2.0 * np.pi * np.round(error / (2.0 * np.pi))) < 1e-9
 
 
 def test_task1_one_position():
@@ -257,105 +194,3 @@ def test_engineering_method_keeps_the_joint_in_its_box():
     inside = (dense.limits >= 0.0).all(axis=1)
     assert inside.sum() > 50
     assert free.objective < kept.objective <= np.abs(dense.curve[inside]).max(axis=1).min() * (1.0 + 1e-9)
-
-
-def test_task5_pin_goes_as_prescribed():
-    m = best(TASK5).mechanism
-    table = {name: [m[f"{name}1"]] for name in RSSR}
-    turn = check_limits(table, 0.8, 3.2, 1.2)
-    dphi = np.array([0.0, 1.0, 2.0, 3.2])
-    psi = sweep.evaluate("rssr", table, "psi", phi=turn["phi_ext"] + dphi)["psi"].to_numpy() - turn["psi_ext"]
-    angle = m["t1"] + m["kappa"] * psi
-    pin = m["a2"] * np.exp(1j * angle)  # the pin on the rocker and the pivot at distance e2
-    rho = np.abs(pin - m["e2"])
-    np.testing.assert_allclose(rho - rho[0], [0.0, 0.1, 0.38, 0.5], atol=1e-9)
-    grid = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
-    law = sweep.evaluate("rssr", table, "psi", phi=grid)["psi"].to_numpy() - turn["psi_ext"]
-    rho = np.abs(m["a2"] * np.exp(1j * (m["t1"] + m["kappa"] * law)) - m["e2"])
-    assert rho.max() - rho.min() == pytest.approx(0.5, abs=1e-4)  # no way back beyond the limits
-    second = (np.roll(rho, 1) - 2.0 * rho + np.roll(rho, -1)) / (grid[1] ** 2)
-    assert np.abs(second).max() == pytest.approx(best(TASK5).objective, rel=5e-3)
-
-
-def test_task6_point_goes_between_the_places_along_the_tangents():
-    solution = best(TASK6)
-    m = solution.mechanism
-    limits = sweep.summarise("rssr", DRIVE, ["phi_ext", "phi_fold"], accuracy=1e-12).iloc[0]
-    phi = np.array([limits["phi_ext"], limits["phi_fold"]])
-    near = np.concatenate([phi, phi + np.array([2e-3, -2e-3])])  # just after the start, just before the end
-    poses = sweep.evaluate(["rssr", "guide"], chain_columns(solution, "guide"), ["x_m", "y_m"], phi=near)
-    assert (poses["status"] == st.OK).all()
-    point = m["x0"] + 1j * m["y0"] + np.exp(1j * m["beta0"]) * (poses["x_m"] + 1j * poses["y_m"]).to_numpy()
-    assert abs(point[0]) < 1e-9
-    assert abs(point[1] - (1.0 + 0.2j)) < 1e-9
-    assert np.angle(point[2] - point[0]) == pytest.approx(0.5, abs=1e-4)
-    assert np.angle(point[1] - point[3]) == pytest.approx(-0.1, abs=1e-4)
-    turn = sweep.summarise(["rssr", "guide"], chain_columns(solution, "guide"), ["max_abs_d2s", "max_pressure_angle2"])
-    assert turn["status"][0] == st.OK
-    assert turn["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=5e-3)
-    assert turn["max_pressure_angle2"][0] < np.radians(60.5)
-
-
-def test_task7_stroke_and_accelerations_at_its_ends():
-    solution = best(TASK7)
-    columns = chain_columns(solution, "rssp")
-    limits = sweep.summarise("rssr", DRIVE, ["phi_ext", "phi_fold"], accuracy=1e-12).iloc[0]
-    ends = sweep.evaluate(
-        ["rssr", "rssp"], columns, ["s", "ds", "d2s"], phi=limits[["phi_ext", "phi_fold"]].to_numpy(float)
-    )
-    assert ends["s"][1] - ends["s"][0] == pytest.approx(1.0, abs=1e-9)
-    assert ends["ds"].abs().max() < 1e-9
-    assert ends["d2s"].tolist() == pytest.approx([0.6, -0.5], abs=1e-9)
-    turn = sweep.summarise(["rssr", "rssp"], columns, ["stroke", "max_abs_d2s"])
-    assert turn["stroke"][0] == pytest.approx(1.0, abs=1e-7)
-    # The whole turn is looked at, not only the ends.
-    assert turn["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=2e-3)
-    assert turn["max_abs_d2s"][0] >= 0.6 - 1e-9
-
-
-def test_task7_surplus_goes_to_the_pressure_angle():
-    smooth, easy = best(TASK7), best(Case(Task7, **TASK7.numbers, objective="pressure_angle"))
-    wanted = ["max_pressure_angle2", "max_abs_d2s"]
-    one, other = (sweep.summarise(["rssr", "rssp"], chain_columns(s, "rssp"), wanted).iloc[0] for s in (smooth, easy))
-    assert np.sin(other["max_pressure_angle2"]) == pytest.approx(easy.objective, rel=2e-3)
-    assert other["max_pressure_angle2"] < one["max_pressure_angle2"] - 0.01
-    assert other["max_abs_d2s"] > one["max_abs_d2s"]
-    assert max(abs(residual) for residual in easy.equations.values()) < 1e-9
-
-
-def test_task8_dwells_within_its_tolerance():
-    solution = best(TASK8)
-    columns = chain_columns(solution, "rssp")
-    table = {name: [solution.mechanism[f"{name}1"]] for name in RSSR}
-    turn = check_limits(table, 0.8, 3.2, np.radians(60.0))
-    phi = turn["phi_ext"] + np.linspace(-0.5, 0.5, 2001)
-    s = sweep.evaluate(["rssr", "rssp"], columns, "s", phi=phi)["s"].to_numpy()
-    deviation = np.abs(s - s[1000]).max()
-    assert deviation <= 0.004 * (1.0 + 1e-8)
-    assert deviation == pytest.approx(solution.mechanism["dwell_deviation"], rel=1e-6)
-    whole = sweep.summarise(["rssr", "rssp"], columns, ["stroke", "max_abs_d2s"])
-    assert whole["stroke"][0] == pytest.approx(1.0, abs=1e-7)
-    assert whole["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=2e-3)
-    # Fourth order: velocity to jerk vanish in the middle, and a tenth of the angle leaves a ten-thousandth.
-    middle = sweep.evaluate(["rssr", "rssp"], columns, ["ds", "d2s", "d3s"], phi=[turn["phi_ext"]]).iloc[0]
-    assert middle[["ds", "d2s", "d3s"]].abs().max() < 1e-7
-    tenth = np.abs(s[950:1051] - s[1000]).max()
-    assert tenth < 3e-4 * deviation
-    # Without its limit the dwell is missed: the tolerance is what shapes the mechanism.
-    free = solve(Task8(**(TASK8.numbers | {"tolerance": 1.0})), candidates=1024, starts=3)[0]
-    assert free.feasible
-    assert free.mechanism["dwell_deviation"] > 0.004
-    assert free.objective < solution.objective
-
-
-def test_task8_spatial_slider_dwells_too():
-    solution = best(Case(Task8, **TASK8.numbers, f2_ratio=0.4, alpha2=0.5))
-    columns = chain_columns(solution, "rssp")
-    assert columns["alpha2"] == [0.5] and columns["f2"][0] == pytest.approx(0.4 * columns["a2"][0], rel=1e-12)
-    turn = check_limits({name: [solution.mechanism[f"{name}1"]] for name in RSSR}, 0.8, 3.2, np.radians(60.0))
-    phi = turn["phi_ext"] + np.linspace(-0.5, 0.5, 2001)
-    s = sweep.evaluate(["rssr", "rssp"], columns, "s", phi=phi)["s"].to_numpy()
-    assert np.abs(s - s[1000]).max() <= 0.004 * (1.0 + 1e-8)
-    assert sweep.summarise(["rssr", "rssp"], columns, "stroke")["stroke"][0] == pytest.approx(1.0, abs=1e-7)
-    middle = sweep.evaluate(["rssr", "rssp"], columns, ["ds", "d2s", "d3s"], phi=[turn["phi_ext"]]).iloc[0]
-    assert middle[["ds", "d2s", "d3s"]].abs().max() < 1e-7

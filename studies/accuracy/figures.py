@@ -45,9 +45,9 @@ KINDS = {
 
 
 def draw(work: pd.DataFrame, costs: pd.DataFrame, regions: tuple[tuple[str, str], ...], folder: Path) -> list[Saved]:
-    """The headline figure, one figure per quantity with a panel per region, and the prices of the outputs."""
+    """All methods on ordinary designs, a figure per quantity with a panel per region, and the prices of outputs."""
     with house_style():
-        figures = {"accuracy": _headline(work, regions[0][0])}
+        figures = {"accuracy-methods": _methods(work, regions[0][0])}
         figures |= {f"accuracy-{name}": _by_region(work, name, regions) for name in TITLES}
         figures["accuracy-prices"] = _prices(costs)
         return [save(figure, folder / f"{name}.svg") for name, figure in figures.items()]
@@ -81,7 +81,7 @@ def _plain_figure(width: float, height: float, **margins: float) -> Figure:
     return figure
 
 
-def _headline(work: pd.DataFrame, region: str) -> Figure:
+def _methods(work: pd.DataFrame, region: str) -> Figure:
     figure = _plain_figure(WIDTH * 1.15, 4.4, left=0.075, right=0.99, bottom=0.36, top=0.93, wspace=0.16)
     panels = figure.subplots(1, len(TITLES), sharey=True)
     for axes, (quantity, title) in zip(panels, TITLES.items(), strict=True):

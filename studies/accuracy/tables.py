@@ -43,8 +43,8 @@ def pipe_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> list[st
 def duration(nanoseconds: Any) -> str:
     """A time per design in the unit in which it is read."""
     ns = float(nanoseconds)
-    for unit, size in (("ns", 1.0), ("us", 1e3), ("ms", 1e6)):
-        if ns < 1e3 * size or unit == "ms":
+    for unit, size in (("ns", 1.0), ("us", 1e3), ("ms", 1e6), ("s", 1e9)):
+        if ns < 1e3 * size or unit == "s":
             return f"{ns / size:.3g} {unit}" if ns < 999.5 * size else f"{ns / size:.0f} {unit}"
     raise AssertionError(ns)
 
@@ -93,13 +93,13 @@ def reached_table(table: pd.DataFrame, bound: float) -> list[str]:
 
 
 def html_body(page: str, images: Mapping[str, str]) -> str:
-    """Headings, paragraphs, lists, tables and images of the page as HTML; ``images``: the data URI of each path."""
+    """Headings, paragraphs, lists, tables and images of the page as HTML; ``images``: data URIs by file name."""
     blocks = []
     for block in page.split("\n\n"):
         lines = block.strip().split("\n")
         picture = re.fullmatch(r"!\[(.*)\]\((.*)\)", lines[0])
         if picture:
-            blocks.append(f'<img alt="{escape(picture[1])}" src="{images[picture[2]]}">')
+            blocks.append(f'<img alt="{escape(picture[1])}" src="{images[picture[2].rpartition("/")[2]]}">')
         elif lines[0].startswith("|"):
             head, *body = (re.split(r"(?<!\\)\|", line)[1:-1] for line in (lines[0], *lines[2:]))
             cells = "".join(f"<th>{_inline(cell)}</th>" for cell in head)
@@ -119,4 +119,5 @@ def html_body(page: str, images: Mapping[str, str]) -> str:
 def _inline(text: str) -> str:
     text = escape(text.strip().replace("\\|", "|"), quote=False)
     text = re.sub(r"`([^`]*)`", r"<code>\1</code>", text)
+    text = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text)  # all pages are one here
     return re.sub(r"\*\*([^*]*)\*\*", r"<strong>\1</strong>", text)

@@ -52,24 +52,25 @@ CRANK_ROCKER: dict[str, Any] = {
     "objective": {"minimise": "max_abs_d2psi"},
     "accuracy": {"target": 1e-6},
 }
+LOOKS = 500  # designs that each start may look at: counted, so that a busy machine finds the same
 OUTPUTS = ["max_abs_d2psi", "max_pressure_angle", "swing", "stroke_ratio"]
 
 
-def crank_rocker(ratio: float, known: list[Array], starts: int, seconds: float) -> Result:
+def crank_rocker(ratio: float, known: list[Array], starts: int) -> Result:
     """The crank-rocker of least acceleration found for a stroke ratio, from drawn and from known designs."""
     locus = CRANK_ROCKER["locus"] | {"phi0": f"{360.0 * ratio / (1.0 + ratio)!r} deg"}
     study = study_from_data(CRANK_ROCKER | {"locus": locus}, Path("crank-rocker"))
-    designs = np.array([*known, *drawn(study, starts, 56)])
-    settings = OptimiseSettings(starts=len(designs), time_budget=seconds)
+    designs = np.array([*known, *drawn(study, starts, 56)[:starts]])
+    settings = OptimiseSettings(starts=len(designs), looks=LOOKS)
     return minimise(problem_of(study, designs), designs, settings)[0]
 
 
-def crank_rockers(ratios: list[float], starts: int, seconds: float) -> pd.DataFrame:
+def crank_rockers(ratios: list[float], starts: int) -> pd.DataFrame:
     """One row per stroke ratio, searched upwards and then downwards again, each also from its neighbour's answer."""
     best: dict[float, Result] = {}
     for ratio in (*ratios, *ratios[-2::-1]):
         known = [best[other].design for other in ratios if other in best]
-        now = crank_rocker(ratio, known, 0 if ratio in best else starts, seconds)
+        now = crank_rocker(ratio, known, 0 if ratio in best else starts)
         if ratio not in best or merit(now) < merit(best[ratio]):
             best[ratio] = now
     designs = np.array([best[ratio].design for ratio in ratios])
@@ -84,10 +85,10 @@ def merit(result: Result) -> tuple[bool, float]:
     return result.status == LIMIT_EXCEEDED, result.objective
 
 
-def table(front: pd.DataFrame, starts: int, seconds: float) -> pd.DataFrame:
+def table(front: pd.DataFrame, starts: int) -> pd.DataFrame:
     """One row per stroke ratio and mechanism; one that misses a limit has status LIMIT_EXCEEDED."""
     slotted = front.sort_values("bound").assign(mechanism="slotted link", ratio=lambda rows: rows["bound"])
-    others = crank_rockers(slotted["ratio"].tolist(), starts, seconds).assign(mechanism="crank-rocker")
+    others = crank_rockers(slotted["ratio"].tolist(), starts).assign(mechanism="crank-rocker")
     both = pd.concat([slotted, others], ignore_index=True)
     return both[["mechanism", "ratio", *OUTPUTS, "status", "a", "b", "c", "e", "f", "g", "alpha", "s", "branch"]]
 
@@ -113,7 +114,7 @@ def main() -> None:
     folder: Path = parser.parse_args().folder
     front = pd.read_parquet(folder / "_pareto.parquet")
     small = len(front) < 4  # smoke
-    drives = table(front, 2 if small else 60, 1.0 if small else 25.0)
+    drives = table(front, 2 if small else 160)
     drives.to_parquet(folder / "drives.parquet", index=False)
     print(drives.to_string(index=False, float_format="{:.4g}".format))  # noqa: T201
     with house_style():

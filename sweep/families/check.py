@@ -7,6 +7,7 @@ import re
 from kernels.links import DRIVEN
 from sweep.families.base import Family
 from sweep.families.capabilities import Assembly, Dimensions, JointRecords, LinkTree, OutputLink, Points, Skeleton
+from sweep.families.check_outputs import output_faults
 from sweep.families.domain import Turn
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -26,7 +27,7 @@ def check_family(family: Family) -> Family:
     FamilyError
         naming the family, what is wrong and how it is mended.
     """
-    faults = [*_names(family), *_outputs(family), *_capabilities(family), *_example(family)]
+    faults = [*_names(family), *output_faults(family), *_drawing(family), *_capabilities(family), *_example(family)]
     if faults:
         raise FamilyError("\n".join([f"family {family.name}: {len(faults)} faults", *(f"  {x}" for x in faults)]))
     return family
@@ -56,32 +57,42 @@ def _names(family: Family) -> list[str]:
 def _example(family: Family) -> list[str]:
     needed = [p.name for p in family.parameters if p.default is None]
     faults = [f"example lacks {name!r}: give an ordinary design" for name in needed if name not in family.example]
-    return faults + [
-        f"example has {x!r}, which is no parameter" for x in family.example if x not in family.parameter_names
-    ]
+    parameters = {p.name: p for p in family.parameters}
+    for name, value in family.example.items():
+        p = parameters.get(name)
+        if p is None:
+            faults.append(f"example has {name!r}, which is no parameter")
+        elif p.choices is not None and value not in p.choices:
+            faults.append(f"example has {name} = {value:g}: give {p.choice}")
+        elif (p.positive and value <= 0.0) or (p.not_negative and value < 0.0):
+            faults.append(f"example has {name} = {value:g}: give a {p.sign} number")
+    return faults
 
 
-def _outputs(family: Family) -> list[str]:
-    names, faults = family.pose_output, []
-    if family.position not in names:
-        faults.append(f"position {family.position!r} is no pose output: name the follower's coordinate")
-    for name, of in family.derivative_of.items():
-        missing = [one for one in (name, of) if one not in names]
-        faults += [f"derivative_of names {one!r}, which is no pose output: add it or leave it out" for one in missing]
-    steps = [step.name for step in family.steps]
-    faults += [f"two steps are called {name!r}: rename one" for name in set(steps) if steps.count(name) > 1]
-    if "size" in steps:
-        faults.append("a step is called 'size', as one that every family is given: rename it")
-    if family.outward:
-        sign = next((p for p in family.parameters if p.name == family.outward), None)
-        if sign is None or sign.choices != (-1.0, 1.0):
-            faults.append(f"outward {family.outward!r} is no parameter with the choices -1 and +1")
-    faults += [f"event {e.name} is about {e.of!r}, which is no pose output" for e in family.events if e.of not in names]
-    for o in family.pose_outputs:
-        if o.windowed and family.position in names and names[family.position].wraps:
-            faults.append(f"{o.name} is windowed, but the position is an angle: a window is a part of a stroke")
-        if not o.text or not o.unit:
-            faults.append(f"pose output {o.name}: give its unit and its definition")
+def _drawing(family: Family) -> list[str]:
+    if family.find(Skeleton) is None:
+        return [
+            "no Skeleton among the capabilities: give fixed points with their axes, and links by their joints; "
+            "drawings, reports and exports are made from it"
+        ]
+    names, faults = set(family.pose_names), []
+    for skeleton in family.every(Skeleton):
+        moving = {point for points in family.every(Points) for point in points.at}
+        known = moving.union(skeleton.fixed, skeleton.made)
+        faults += [
+            f"link {link.name}: {joint!r} is no point: name it in Points, or in fixed or made of the Skeleton"
+            for link in skeleton.links
+            for joint in link.joints
+            if joint not in known
+        ]
+        faults += [
+            f"point {name} needs {one!r}, which is no pose output"
+            for name, made in skeleton.made.items()
+            for one in made.needs
+            if one not in names
+        ]
+        if not skeleton.links:
+            faults.append("the Skeleton has no links: name each with its joints, its pivot first")
     return faults
 
 
@@ -118,21 +129,6 @@ def _capabilities(family: Family) -> list[str]:
             for point, at in points.at.items()
             for one in at
             if one is not None and one not in names
-        ]
-    for skeleton in family.every(Skeleton):
-        moving = {point for points in family.every(Points) for point in points.at}
-        known = moving.union(skeleton.fixed, skeleton.made)
-        faults += [
-            f"link {link.name}: {joint!r} is no point: name it in Points, or in fixed or made of the Skeleton"
-            for link in skeleton.links
-            for joint in link.joints
-            if joint not in known
-        ]
-        faults += [
-            f"point {name} needs {one!r}, which is no pose output"
-            for name, made in skeleton.made.items()
-            for one in made.needs
-            if one not in names
         ]
     lengths = {p.name for p in family.parameters if p.unit == "length"}
     for dimensions in family.every(Dimensions):

@@ -42,7 +42,7 @@ PARAMETERS = (
 CLOSED_OUTPUTS = (
     Output("x0", "rad", "event: crank angle at which the rack rises through the plate", "(1)"),
     Output("v_entry", "length/time", "speed of the rack there", "(1)"),
-    Output("omega_n", "rad/time", "natural frequency of foot and spring", "(2)"),
+    Output("omega_n", "rad/s", "natural frequency of foot and spring", "(2)"),
     Output("jump_height_free", "length", "height of the first jump, if nothing is met", "(6)"),
     Output("flight_time_free", "time", "its time until the plate level, if nothing is met before", "(6)"),
     Output("k_min_contact", "force/length", "spring that keeps contact at the top", "(3)"),
@@ -66,7 +66,7 @@ EVENT_OUTPUTS = (
     Output("lost_travel", "length", "way of the rack along the feed meanwhile", "(11)"),
     Output("stitch_error", "1", "lost_travel over the way of the rack above the plate", "(11)"),
     Output("impact_speed", "length/time", "greatest relative speed of an impact in a turn", "(7)"),
-    Output("impulse", "N s", "greatest impulse of an impact in a turn", "(9)"),
+    Output("impulse", "N*s", "greatest impulse of an impact in a turn", "(9)"),
     Output("least_force", "N", "least contact force above the plate, if the foot follows the rack; (5) at the nodes; "
            "on fabric the least of the march", "(5), (14)"),
     Output("most_force", "N", "greatest force between the foot and rack or plate, impacts apart", "(5)"),

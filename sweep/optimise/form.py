@@ -77,7 +77,9 @@ class Program:
         self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
         self.scalars = tuple(dict.fromkeys(name for m in measures for name in m.numbers))
         self.pieces = {name: piece for m in measures for name, piece in zip(m.numbers, m.pieces, strict=False)}
-        self.places = any(m.is_angle for m in measures)
+        self.places = any(m.follows_angles for m in measures)
+        readings = (m.parts[0] if m.kind == "minus" else m for m in measures)
+        self.readings = {m.name: m for m in readings if m.kind == "scalar" and m.parts}
 
     def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
         """Lay out the rows for a design; ``points`` are its extrema, ``scale`` divides the objective."""
@@ -89,6 +91,11 @@ class Program:
             layout.add(term, shift, -1.0 / scale, 0.0, 1.0, False, Label(self.objective.name, "objective"))
         reaches = all(curves.series.index(s) in points.series for s in self.turning.series)
         return layout.form(complete and layout.has_objective, reaches)
+
+    def place(self, name: str, curves: Curves, design: Array, points: Points) -> int:
+        """Number of the point where one of the ``readings`` is taken; -1 where the design has none."""
+        found = _Layout(curves, points, design, self.scalars).upper(self.readings[name].parts[0])
+        return next(iter(found[0][0])) - len(points) if found else -1
 
     def value(self, found: Measure, form: Form, curves: Curves, design: Array, atoms: Array) -> float:
         """Give the value of a measure in its own unit; nan where it does not exist."""

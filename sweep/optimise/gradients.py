@@ -72,6 +72,21 @@ def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tup
     return values, moves
 
 
+def reading_gradient(curves: Curves, designs: Any, output: str, phi: float, moves: Array) -> Array:
+    """Gradient of a pose output at a crank angle that moves with the design.
+
+    Parameters
+    ----------
+    curves, designs : as of :func:`gradients`
+    output : the pose output
+    phi : where it is read [rad];  moves : (n,) derivatives of that angle by the scaled variables
+    """
+    wanted = frozenset((output,))
+    standing = curves.poses(designs, np.array([phi]), wanted)[output][:, 0].imag / STEP
+    along = curves.poses(designs[:1].real, np.array([phi + 1j * STEP]), wanted)[output][0, 0].imag / STEP
+    return np.asarray(standing + along * moves, np.float64)
+
+
 def scalar_gradient(function: Any, fractions: Array) -> Array:
     """Gradient of a function of scaled variables that comes as a plain number, from five values per variable.
 

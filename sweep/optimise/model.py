@@ -13,7 +13,7 @@ from sweep.families.base import Array
 from sweep.optimise.certificate import ACTIVE, Multipliers, multipliers
 from sweep.optimise.dense import times
 from sweep.optimise.form import Program
-from sweep.optimise.gradients import gradients, scalar_gradient, stepped
+from sweep.optimise.gradients import gradients, reading_gradient, scalar_gradient, stepped
 from sweep.optimise.points import STEP, Curves, Points
 from sweep.optimise.problem import Problem
 from sweep.optimise.rows import Form
@@ -130,7 +130,7 @@ class Model:
         """Gradients (R, n) of the form's rows by the scaled variables, at followed points."""
         designs = stepped(self.problem, self.base, fractions)
         values, moves = gradients(self.curves, designs, points, self.program.places)
-        scalars = [self._scalar_gradient(name, fractions, designs)[None, :] for name in form.scalars]
+        scalars = [self._scalar_gradient(name, fractions, designs, points, moves)[None, :] for name in form.scalars]
         jacobian = np.concatenate([values, moves, *scalars])
         # What has no derivative, as the angle of a vanishing extremum, spoils the rows that ask for it and no others.
         lost = ~np.isfinite(jacobian).all(axis=1)
@@ -163,9 +163,13 @@ class Model:
         self.price = max(2.0 * float(sum(limits)), 0.5 * self.price, 1.0)
         return found.residual
 
-    def _scalar_gradient(self, name: str, fractions: Array, designs: Any) -> Array:
+    def _scalar_gradient(self, name: str, fractions: Array, designs: Any, points: Points, moves: Array) -> Array:
         if name in self.problem.family.parameter_names or name in self.program.pieces:
             return np.asarray(self._scalar(name, designs).imag / STEP, np.float64)
+        if name in self.program.readings:
+            k, of = self.program.place(name, self.curves, designs[0].real, points), self.program.readings[name].of
+            none = np.full(len(fractions), math.nan)
+            return none if k < 0 else reading_gradient(self.curves, designs, of, points.phi[k], moves[k])
         return scalar_gradient(lambda f: self._scalar(name, self.problem.placed(self.base, f)), fractions)
 
     def _scalar(self, name: str, designs: Any) -> Any:

@@ -96,7 +96,7 @@ class Curves:
         self.places = places
         self.calls = 0
 
-    def poses(self, designs: Any, phi: Any) -> dict[str, Any]:
+    def poses(self, designs: Any, phi: Any, wanted: frozenset[str] | None = None) -> dict[str, Any]:
         """Pose outputs at angles phi (m,) shared by all designs (n, P); complex if either is."""
         self.calls += 1
         angles = np.asarray(phi)[None, :]
@@ -104,7 +104,7 @@ class Curves:
             angles, designs = angles.astype(np.complex128), np.asarray(designs).astype(np.complex128)
         # A trial design may leave the domain of its kernel; the nan it gives is answered by a shorter step.
         with np.errstate(all="ignore"):
-            return self.family.poses(np.ascontiguousarray(designs), Angles.of(angles), self.wanted)
+            return self.family.poses(np.ascontiguousarray(designs), Angles.of(angles), wanted or self.wanted)
 
     def scan(self, design: Array, samples: int) -> tuple[Points, bool]:
         """All extrema of all curves that can matter, refined, and whether the design has every pose of the turn.

@@ -62,7 +62,8 @@ class Series:
 class Measure:
     """A design output as ``sign`` * (reduction ``kind`` of its series), read back through ``inner``.
 
-    ``parts`` are the two angles of a "difference", the second minus the first; of "minus" what it is the negative of.
+    ``parts`` are the two angles of a "difference", the second minus the first; of "minus" what it is the negative of;
+    of a "scalar" that is the pose output ``of`` where an event happens, that event.
     ``numbers`` are plain numbers instead of series: the output itself ("scalar"), parameters of which it is the largest
     magnitude ("lengths"), or the pieces of which it is the "least" or the "most".  ``pieces`` computes the latter.
     """
@@ -75,6 +76,7 @@ class Measure:
     numbers: tuple[str, ...] = ()
     parts: tuple[Measure, ...] = ()
     pieces: tuple[Piece, ...] = ()
+    of: str = ""
 
     @property
     def is_angle(self) -> bool:
@@ -82,6 +84,11 @@ class Measure:
         if self.kind == "minus":
             return self.parts[0].is_angle
         return self.kind.startswith("phi") or self.kind == "difference"
+
+    @property
+    def follows_angles(self) -> bool:
+        """Whether its slopes need those of crank angles."""
+        return self.is_angle or any(part.follows_angles for part in self.parts)
 
     def to_inner(self, value: float) -> float:
         """Inner value that stands for a value of the output."""
@@ -156,7 +163,10 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
         return _margin_measure(name, "rotatable", ())
     timing = next((t for t in family.timings if t.name == name), None) if isinstance(family, Machine) else None
     if isinstance(timing, Reading):
-        return Measure(name, "scalar", (), numbers=(name,))
+        place = measure(family, timing.places[0], window)
+        # The angle of a passage has an exact slope; that of an extremum no better one than differences have.
+        at = (place,) if place.kind == "phi_event" else ()
+        return Measure(name, "scalar", place.series if at else (), numbers=(name,), parts=at, of=timing.of.name)
     if timing is not None:
         ends = tuple(measure(family, place, window) for place in timing.places)
         if not all(end.is_angle for end in ends):

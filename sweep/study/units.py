@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from sweep.errors import nearest
+from sweep.families.unit_words import spelt_out
 
 if TYPE_CHECKING:
     import pint
@@ -69,23 +70,6 @@ _EXAMPLES = {
     "1": "a pure number: no unit, or 1 or %",
 }
 
-# Words of parameters and outputs that are not powers of length.
-WORDS = {
-    "angle": "rad",
-    "mass": "t",
-    "inertia": "t*mm^2",
-    "force": "N",
-    "torque": "N*mm",
-    "pressure": "MPa",
-    "stiffness": "N/mm",
-    "damping": "N*s/mm",
-    "rotary_damping": "N*mm*s",
-    "speed": "rad/s",
-    "angular_acceleration": "rad/s^2",
-    "acceleration": "mm/s^2",
-    "time": "s",
-}
-
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
 _TERM = re.compile(r"([A-Za-z%°\u00b5\u03bc]+|1)(?:\^(-?[1-9]))?")
 
@@ -100,8 +84,8 @@ def example(internal: str) -> str:
 
 
 def internal_unit(word: str) -> str:
-    """Internal unit of a parameter's or output's unit word ("length" -> "mm", "length^4" -> "mm^4", "sign" -> "1")."""
-    word = WORDS.get(word, word).replace("length", "mm")
+    """Return the internal unit of a unit word: "length" -> "mm", "force/length" -> "N/mm", "sign" -> "1"."""
+    word = spelt_out(word)
     names = re.findall(r"[A-Za-z]+", word)
     return word if names and set(names) <= set(SYMBOLS) else "1"
 
