@@ -79,6 +79,25 @@ class WorkerDied(LinksweepError):
     exit_code = 70
 
 
+class ProgramFault(LinksweepError):
+    """An error in the program itself, not in what it was given, ended a chunk; finished chunks are kept.
+
+    Parameters
+    ----------
+    message : where it happened, what it was, and what to do
+    trace : of the worker, for whoever mends the program; the command line prints it before the message
+    """
+
+    exit_code = 70
+
+    def __init__(self, message: str, trace: str) -> None:
+        self.trace = trace
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[type[ProgramFault], tuple[str, str]]:
+        return type(self), (str(self), self.trace)
+
+
 class TimeUsedUp(LinksweepError):
     """The time that the study allows is over; finished chunks are kept and the next run continues."""
 

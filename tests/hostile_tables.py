@@ -11,10 +11,13 @@ import pandas as pd
 import sweep
 from sweep.effects import extended, offered
 from sweep.errors import InputError
-from sweep.families import family
+from sweep.families import NAMES, family
 from sweep.families.base import Parameter
 
-FAMILIES = ("rssr", "rssp", "guide", "geared_dwell", ["rssr", "guide"])
+# Every family of the register, whatever its domain, and chains of them.
+FAMILIES: tuple[str | list[str], ...] = (
+    *NAMES, ["rssr", "guide"], ["rssr", "rssr"], ["rssr", "slotted"], ["rssr", "rssr", "guide"],
+)  # fmt: skip
 PLAIN = ("rotatable", "margin", "max_pressure_angle")
 BASES = ("max_abs", "max", "min", "range", "rms", "phi_max_abs")
 SPECIAL = (0.0, 1.0, -1.0, 2.0, 0.5 * np.pi, np.pi, 1e-8, 1e-160, 1e160, -1e160, 1e-300, 1e300, 5e-324, 1e5, 1e-20)

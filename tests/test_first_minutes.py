@@ -57,6 +57,44 @@ def test_first_study_of_every_family_is_sound_and_runs(family, tmp_path):
     assert len(rows) >= 1 and rows[study.objective.output].notna().all()
 
 
+@pytest.mark.parametrize("members", [
+    ("needle=rssr+guide", "looper=rssr"),
+    ("cam=cam", "bar=slider_crank"),
+    ("feed=feed", "takeup=eyelet", "dwell=geared_dwell"),
+])  # fmt: skip
+def test_first_study_of_a_machine_is_sound_and_runs(members, tmp_path):
+    options = [x for member in members for x in ("--member", member)]
+    done = call("init", "first", *options, "--into", tmp_path)
+    assert done.exit_code == 0, done.output
+    folder = tmp_path / "first"
+    text = (folder / "study.toml").read_text(encoding="utf-8")
+    assert not list(CHECKER.iter_errors(tomllib.loads(text)))
+    study = load_study(folder)
+    assert study.space.count == 25 and study.objective is not None
+    assert load_study(folder, smoke=True).space.count == 4
+    assert len(study.family.members) == len(members)
+    assert sum(line.startswith("lag_") for line in text.splitlines()) == len(members) - 1
+    done = call("run", folder, "--smoke", "--jobs", 1, "--out", tmp_path / "out" / "designs")
+    assert done.exit_code == 0, done.output
+    rows = sweep.load(tmp_path / "out" / "designs")
+    assert len(rows) >= 1 and rows[study.objective.output].notna().all()
+    for line in ("offset = ", "ratio = "):
+        text = text.replace(f"# {line}", line, 1)
+    (folder / "study.toml").write_text(text)
+    load_study(folder)
+
+
+@pytest.mark.parametrize("options", [
+    (), ("--member", "a=rssr"), ("--member", "rssr"), ("--member", "a=rssr", "--member", "a=rssp"),
+    ("--family", "rssr", "--member", "a=rssr", "--member", "b=rssp"), ("--member", "a=rssr", "--member", "b=backrest"),
+    ("--member", "a=rssr", "--member", "b=rsrs"), ("--member", "a.b=rssr", "--member", "b=rssp"),
+])  # fmt: skip
+def test_init_says_what_a_machine_needs(options, tmp_path):
+    done = call("init", "first", *options, "--into", tmp_path)
+    assert done.exit_code == 2 and not (tmp_path / "first").exists()
+    assert "Traceback" not in done.output and "allowed" in done.output
+
+
 def test_tables_left_as_comments_are_sound_too(tmp_path):
     folder = written(tmp_path, "rssr")
     text = (folder / "study.toml").read_text(encoding="utf-8")
@@ -68,8 +106,15 @@ def test_tables_left_as_comments_are_sound_too(tmp_path):
     assert study.optimise.starts == 12 and study.tolerance.lengths == 0.02 and study.speed > 300.0
 
 
-def test_check_takes_a_first_study(tmp_path):
-    done = call("check", written(tmp_path, "slider_crank"))
+@pytest.mark.parametrize("family", ["slider_crank", "backrest", "foot", "free_cam_friction", "rssr+guide"])
+def test_check_takes_a_first_study_over_every_domain(family, tmp_path):
+    done = call("check", written(tmp_path, family))
+    assert done.exit_code == 0 and "25 designs" in done.output
+
+
+def test_check_takes_a_first_study_of_a_machine(tmp_path):
+    call("init", "first", "--member", "needle=rssr+guide", "--member", "looper=rssr", "--into", tmp_path)
+    done = call("check", tmp_path / "first")
     assert done.exit_code == 0 and "25 designs" in done.output
 
 

@@ -12,8 +12,8 @@ import pytest
 import sweep
 from sweep.exchange.scene import over
 from sweep.families import NAMES, family
-from sweep.plot.space import draw_frame, is_spatial, projection
 from sweep.report.figures import new_figure
+from sweep.report.space import draw_frame, is_spatial, projection
 
 DOCS = Path(__file__).parents[1] / "docs"
 PHI = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)

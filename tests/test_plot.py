@@ -14,6 +14,8 @@ import sweep
 from sweep.cli import main
 from sweep.dataset import store
 from sweep.families import family
+from sweep.report import write_report
+from sweep.report.figures import house_style, save
 from tests.report_dataset import study_data, write_dataset, write_table
 
 RSSR = dict(family("rssr").example)
@@ -91,6 +93,20 @@ def test_tolerance_shows_the_spread_in_percent_of_the_nominal_value(folder):
     low, high = axes.lines[0].get_xdata()
     assert (low, high) == (pytest.approx(-5.0), pytest.approx(10.0))
     assert "0.02" in axes.get_title(loc="left")
+
+
+def test_report_shows_the_pictures_of_the_functions(folder, tmp_path):
+    """Same figure, same bytes: the page carries what ``sweep.plot`` draws."""
+    out = write_report(folder, tmp_path / "report").parent / "figures"
+    for name in ("tolerance", "sensitivity"):
+        figure = getattr(sweep.plot, name)(folder).figure
+        with house_style():
+            assert save(figure, tmp_path / f"{name}.svg").path.read_bytes() == (out / f"{name}.svg").read_bytes()
+
+
+def test_mechanism_is_drawn_in_as_many_positions_as_asked():
+    one, several = (sweep.plot.mechanism("rssr", RSSR, positions=n)[0] for n in (1, 8))
+    assert len(several.lines) - len(one.lines) == 7 * 3  # crank, coupler, rocker
 
 
 def test_sensitivity_has_the_most_telling_dimension_first(folder):

@@ -7,11 +7,18 @@ import os
 import re
 import sys
 import time
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from sweep.chunks.plan import pilot
 from sweep.engine.run import run
+from sweep.jobs.executors import Here
 from sweep.jobs.progress import Phases, Progress
+from sweep.jobs.signals import Stop
+from sweep.proof.question import question_of
+from sweep.proof.rounds import Cores, explored
 from sweep.report import write_report
 from sweep.study import load_study
 from tests.test_study_words import STUDY
@@ -50,6 +57,42 @@ def test_remaining_time_is_that_of_this_run_after_a_resume(monkeypatch: pytest.M
         now[0] += 20.0
         shown.advance(10)
         assert stream.getvalue().splitlines()[-1] == "x: 70 of 100 designs (70%), 20 s, 60 s left"
+
+
+def test_remaining_time_follows_what_is_expected_by_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hundred of a million in 10 s; then it turns out that two hundred are enough."""
+    now = [1000.0]
+    monkeypatch.setattr("sweep.jobs.progress.time.monotonic", lambda: now[0])
+    stream = io.StringIO()
+    with Phases(True, stream) as phases:
+        phases.say("proof", 0, 1_000_000, "boxes")
+        now[0] += 10.0
+        phases.say("proof", 100, 200, "boxes")
+        assert stream.getvalue().splitlines()[-1] == "proof: 100 of 200 boxes (50%), 10 s, 10 s left"
+
+
+def test_proof_expects_no_more_boxes_than_it_comes_to_need(tmp_path: Path) -> None:
+    """Of a space that is proven in the first round, later rounds are not expected."""
+    told: list[tuple[int, int]] = []
+    study = load_study(Path(__file__).parents[1] / "studies" / "crank-rocker-proof", smoke=True)
+    question = question_of(study)
+    asked = replace(study.optimise.prove, boxes=1_000_000)
+    least = question.in_kernel(1e-3)  # far below what any design reaches: proven soon
+    leaves, judged, cut = explored(
+        question, least, asked, tmp_path, Cores(Here(), 1, Stop()), lambda *t: told.append(t)
+    )
+    assert not cut and not leaves.open.any()
+    assert told[-1] == (judged, judged)
+    assert max(expected for _, expected in told) < 100 * judged < asked.boxes
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+
+
+def test_pilot_of_planning_is_told_part_by_part() -> None:
+    told: list[tuple[int, int]] = []
+    study = load_study(Path(__file__).parents[1] / "studies" / "geared-dwell", smoke=True)
+    whole = pilot(study, lambda *t: told.append(t))
+    assert told == [(0, 4), (1, 4), (2, 4), (3, 4)]
+    assert whole == pilot(study)
 
 
 def test_every_part_of_a_run_is_told(tmp_path, quick, monkeypatch, capsys) -> None:

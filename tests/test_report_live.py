@@ -14,6 +14,7 @@ import pytest
 import sweep
 from sweep.report import write_report
 from sweep.report.alternatives import Shown, shown_designs
+from sweep.report.groups import groups
 from sweep.report.live import live
 from sweep.report.moving import POSES, moving, runs
 from sweep.report.page import gather
@@ -59,7 +60,7 @@ def numbers(text):
 
 def test_design_moves_as_its_joints_and_curves_do(four_bars):
     data, *_ = gather(four_bars)
-    shown = shown_designs(data)
+    shown = shown_designs(data, groups(data))
     assert [one.role for one in shown] == ["result", "reference"]
     found = moving(data, shown)
     assert json.loads(json.dumps(found, allow_nan=False)) == found
@@ -89,7 +90,7 @@ def test_design_moves_as_its_joints_and_curves_do(four_bars):
 def test_lines_are_rows_of_the_dataset_the_best_among_them(four_bars):
     data, _, cells = gather(four_bars)
     rows = sweep.load(four_bars)
-    found = parallel(data, cells, shown_designs(data))
+    found = parallel(data, cells, shown_designs(data, groups(data)))
     names = [axis["name"] for axis in found["axes"]]
     assert names == ["a", "b", "max_abs_d2psi", "max_pressure_angle"]
     assert found["objective"] == 2 and found["of"] == (rows["status"] == 0).sum()
@@ -105,17 +106,18 @@ def test_study_without_curves_or_designs_has_nothing_to_move(gathered, tmp_path)
     data, _, cells = gathered
     assert moving(data, []) is None
     silent = replace(data, study=replace(data.study, output=replace(data.study.output, curves="none")))
-    assert moving(silent, shown_designs(data)) is None
+    assert moving(silent, shown_designs(data, groups(data))) is None
     assert parallel(replace(data, parts=()), cells, []) is None
 
 
-def test_starts_that_ended_in_other_basins_are_offered_once_each_the_best_first(gathered):
+def test_different_optima_are_offered_once_each_the_best_first(gathered):
     data, *_ = gathered
     start = data.optima[data.optima["role"] == "start"].iloc[0]
-    ends = [(1, 8.5, 0), (2, 9.5, 0), (1, 8.6, 0), (3, 9.0, 0), (0, 8.0, 0), (4, 1.0, 5)]
-    rows = [dict(start) | {"basin": basin, "max_abs_d2s": value, "status": code} for basin, value, code in ends]
-    kept = data.optima[data.optima["role"] != "start"].assign(basin=0)
-    shown = shown_designs(replace(data, optima=pd.concat([kept, pd.DataFrame(rows)])))
+    ends = [(30.0, 8.5, 0), (60.0, 9.5, 0), (30.1, 8.6, 0), (45.0, 9.0, 0), (90.0, 1.0, 5)]
+    rows = [dict(start) | {"a2": a, "max_abs_d2s": value, "status": code} for a, value, code in ends]
+    kept = data.optima[data.optima["role"] != "start"].assign(a2=75.0)
+    changed = replace(data, optima=pd.concat([kept, pd.DataFrame(rows)]))
+    shown = shown_designs(changed, groups(changed))
     assert [one.name for one in shown] == [
         "optimum", "another optimum, 1", "another optimum, 2", "another optimum, 3", "reference",
     ]  # fmt: skip
@@ -130,8 +132,8 @@ def test_runs_of_poses_have_their_ends():
 def test_no_word_of_a_study_ends_the_script(gathered, monkeypatch):
     data, _, cells = gathered
     evil = [Shown("</script><b>", "result", "<!--", data.result)]
-    monkeypatch.setattr("sweep.report.live.shown_designs", lambda data: evil)
-    made = live(data, cells)
+    monkeypatch.setattr("sweep.report.live.shown_designs", lambda data, different: evil)
+    made = live(data, cells, [])
     assert "<" not in made["motion_data"] and json.loads(made["motion_data"])["designs"][0]["name"] == "</script><b>"
 
 

@@ -8,11 +8,17 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_rgba
 
+import sweep
 from kernels import status as codes
 from sweep.quantities.names import negative
-from sweep.report.made import TELLING, histogram_svg, made, made_sentence
-from sweep.report.optima import groups, optima, optima_sentence
+from sweep.report.alternatives import shown_designs
+from sweep.report.figures import LIMIT
+from sweep.report.groups import groups
+from sweep.report.made import TELLING, histogram, made, made_sentence
+from sweep.report.made_figures import histogram_figure
+from sweep.report.optima import optima, optima_sentence
 from sweep.study import study_from_data
 
 DATA = {
@@ -69,12 +75,23 @@ def test_optima_of_what_is_made_large_come_largest_first() -> None:
     assert [-group.row[negative("max_abs_d2psi")] for group in found] == [0.9, 0.7, 0.5]
 
 
+def test_designs_to_look_at_are_the_cards_in_the_same_order() -> None:
+    large = DATA | {"objective": {"maximise": "max_abs_d2psi"}}
+    data = data_of(row("optimum", 0.9), row(value=0.5, b=60.0), row(value=0.7, c=25.0), row(value=0.5, b=60.1), **large)
+    data.result, data.result_name, data.front, data.reference = data.optimum, "optimum", None, None
+    found = groups(data)
+    shown = shown_designs(data, found)
+    assert [one.name for one in shown] == [group.title(k) for k, group in enumerate(found)]
+    assert [one.row["max_abs_d2psi"] for one in shown] == [0.9, 0.7, 0.5]
+    assert "= 0.7" in shown[1].note
+
+
 def test_same_objective_alone_is_no_mirror() -> None:
     assert len(groups(data_of(row("optimum", 0.5), row(value=0.5, b=60.0)))) == 2
 
 
 def test_cards_have_picture_sizes_and_yield(tmp_path) -> None:
-    data = data_of(row("optimum", 0.5), row(value=0.7, b=60.0, g=1e-15))
+    data = data_of(row("optimum", 0.5), row(value=0.7, c=17.0, g=1e-15))
     found = groups(data)
     first, second = optima(data, found, tmp_path)
     assert (tmp_path / "optimum-1.svg").is_file() and second.picture.startswith("data:image/svg+xml")
@@ -111,8 +128,22 @@ def test_dimension_that_costs_most_is_the_one_that_the_limit_is_about() -> None:
 
 
 def test_histogram_marks_what_misses_the_limit() -> None:
-    text = histogram_svg(made(data_of(row("optimum", 0.5))).histogram)
-    assert text.count('class="bad"') > 5 and text.count('class="good"') > 5 and text.count("<line") == 1
+    found = made(data_of(row("optimum", 0.5))).histogram
+    (axes,) = histogram_figure(found).axes
+    red = to_rgba(LIMIT, 0.75)
+    below = [bar.get_facecolor() == red for bar in axes.patches]
+    middle = [bar.get_x() + 0.5 * bar.get_width() for bar in axes.patches]
+    assert below == [x < 11.99 for x in middle] and 5 < sum(below) < len(below) - 5
+    assert sum(bar.get_height() for bar in axes.patches) == pytest.approx(100.0, abs=1e-9)
+    assert [line.get_xdata()[0] for line in axes.lines] == [pytest.approx(11.99)]
+
+
+def test_histogram_of_any_output_is_to_be_had() -> None:
+    data = data_of(row("optimum", 0.5))
+    np.testing.assert_array_equal(histogram(data, "least_link").shares, made(data).histogram.shares)
+    free = histogram(data, "swing")
+    assert free.low is None and free.high is None and free.shown.unit == "°"
+    assert free.edges[0] < abs(math.degrees(sweep.summarise("rssr", BEST, "swing")["swing"][0])) < free.edges[-1]
 
 
 @pytest.mark.parametrize("missing", ["tolerance", "limits"])

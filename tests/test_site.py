@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 import yaml
@@ -22,7 +23,15 @@ def script(name):
     return module
 
 
-hooks, links = script("hooks"), script("links")
+hooks, links, equations = script("hooks"), script("links"), script("equations")
+
+
+def mathml(text):
+    """The MathML of an equation without spaces and attributes, parsed and written again: it is well-formed."""
+    tree = ElementTree.fromstring(equations.expression(text))
+    for element in tree.iter():
+        element.attrib.clear()
+    return ElementTree.tostring(tree, encoding="unicode").replace("<mspace />", "")
 
 
 def test_reference_has_every_public_name():
@@ -94,3 +103,47 @@ def test_tutorial_shows_what_the_first_study_says():
     (block,) = re.findall(r"```toml\n(.*?)```", tutorial, flags=re.DOTALL)
     for line in filter(None, block.splitlines()):
         assert line in text.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("a g sa/c", "<mi>a</mi><mi>g</mi><mfrac><mrow><mi>sa</mi></mrow><mrow><mi>c</mi></mrow></mfrac>"),
+        ("K/(2c)", "<mfrac><mrow><mi>K</mi></mrow><mrow><mn>2</mn><mi>c</mi></mrow></mfrac>"),
+        ("psi'^2", "<msup><mrow><mi>ψ</mi><mo>′</mo></mrow><mrow><mn>2</mn></mrow></msup>"),
+        ("G_phipsi", "<msub><mi>G</mi><mi>φψ</mi></msub>"),
+        ("sqrt(Delta)", "<msqrt><mrow><mi>Δ</mi></mrow></msqrt>"),
+        ("-|w||f|", "<mo>−</mo><mo>|</mo><mrow><mi>w</mi></mrow><mo>|</mo><mo>|</mo><mrow><mi>f</mi></mrow><mo>|</mo>"),
+        ("d1 x d2", "<msub><mi>d</mi><mi>1</mi></msub><mo>×</mo><msub><mi>d</mi><mi>2</mi></msub>"),
+        ("x C + y S", "<mi>x</mi><mi>C</mi><mo>+</mo><mi>y</mi><mi>S</mi>"),
+        ("e^{-i lam}", "<msup><mrow><mi>e</mi></mrow><mrow><mo>−</mo><mi>i</mi><mi>λ</mi></mrow></msup>"),
+        ("sin^2(t/2)", "<msup><mi>sin</mi><mrow><mn>2</mn></mrow></msup><mrow><mo>(</mo><mfrac><mrow><mi>t</mi></mrow>"
+                       "<mrow><mn>2</mn></mrow></mfrac><mo>)</mo></mrow>"),
+        ("least of max_abs_d2psi", "<mtext>least of</mtext><mtext>max_abs_d2psi</mtext>"),
+        ("the rack's speed", "<mtext>the rack's speed</mtext>"),
+    ],
+)  # fmt: skip
+def test_equation_is_set_as_it_is_meant(text, wanted):
+    assert mathml(text) == f"<mrow>{wanted}</mrow>"
+
+
+@pytest.mark.parametrize("text", ["(a + b", "a + b)", "a /", "a ~ b", "|a"])
+def test_equation_that_is_not_understood_is_refused(text):
+    with pytest.raises(equations.NotUnderstood):
+        equations.expression(text)
+
+
+def test_every_numbered_equation_of_the_pages_is_set_and_no_program_is():
+    number = re.compile(r"^    \S.*\s{2,}\(\d+\s?[a-z]?\*?\)$", re.MULTILINE)
+    numbered = 0
+    for page in sorted((ROOT / "docs").glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        made = equations.typeset(text)
+        assert not number.search(made), page.name
+        numbered += len(number.findall(text))
+        assert made.count("<math") == made.count("</math>")
+        for block in re.findall(r'<div class="equations".*?\n</div>', made, re.DOTALL):
+            ElementTree.fromstring(block)
+            assert "import" not in block and "sweep run" not in block, page.name
+    assert numbered > 200
+    assert "    sweep init press" in equations.typeset((ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"))

@@ -16,7 +16,9 @@ NOTEBOOKS = ROOT / "docs" / "notebooks"
 CODE = re.compile(r"(^```.*?^```|`[^`\n]+`|^(?: {4}|\t).*?$)", re.DOTALL | re.MULTILINE)
 PAGE = re.compile(r"(?<![\w/])(?<!\]\()docs/([\w-]+)\.md")
 
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
+
+from equations import typeset  # noqa: E402
 
 
 def on_files(files: Any, config: Any) -> Any:
@@ -38,7 +40,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
-    """Pages named in the text, docs/x.md, become links; what stands in code stays as it is."""
+    """Pages named in the text, docs/x.md, become links, equations are set; what stands in code stays as it is."""
     up = "../" * page.file.src_uri.count("/")
     own = page.file.src_uri
 
@@ -47,7 +49,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
         return match[0] if name == own else f"[{titles(files)[name]}]({up}{name})"
 
     pieces = CODE.split(markdown)
-    return "".join(piece if k % 2 else PAGE.sub(linked, piece) for k, piece in enumerate(pieces))
+    return typeset("".join(piece if k % 2 else PAGE.sub(linked, piece) for k, piece in enumerate(pieces)))
 
 
 def titles(files: Any) -> dict[str, str]:

@@ -75,7 +75,9 @@ class Batch:
         return Batch(self.index[which], self.designs[which], outputs, self.status[which])
 
     def ordered(self) -> Batch:
-        """Sort the designs by their index."""
+        """Sort the designs by their index; the same batch where they are in order."""
+        if bool(np.all(self.index[1:] >= self.index[:-1])):
+            return self
         order = np.argsort(self.index, kind="stable")
         outputs = {name: values[order] for name, values in self.outputs.items()}
         return Batch(self.index[order], self.designs[order], outputs, self.status[order])
@@ -138,21 +140,20 @@ class Cascade:
         """
         for number in range(len(self._levels)):
             self._work(number, whole=True)
-        found = []
-        for batch in self._left:
-            missing = np.full(batch.index.size, np.nan)
-            outputs = {name: batch.outputs.get(name, missing) for name in names}
-            found.append(Batch(batch.index, batch.designs, outputs, batch.status))
-        self._left.clear()
-        nothing = np.empty(0)
-        empty = Batch(
-            np.empty(0, np.int64),
-            np.empty((0, len(self.study.family.parameters))),
-            dict.fromkeys(names, nothing),
-            np.empty(0, np.uint8),
-        )
-        result = Batch.joined([empty, *found])
-        return result.ordered()
+        left, width = self._left, len(self.study.family.parameters)
+        index = np.concatenate([np.empty(0, np.int64), *(batch.index for batch in left)])
+        order = np.argsort(index, kind="stable")
+        # Column by column, each let go of once it is collected: a chunk is in memory once, not three times.
+        outputs: dict[str, Array] = {}
+        for name in names:
+            taken = [batch.outputs.pop(name, None) for batch in left]
+            missing = [np.full(batch.index.size, np.nan) for batch in left]
+            columns = [gap if values is None else values for values, gap in zip(taken, missing, strict=True)]
+            outputs[name] = np.concatenate([np.empty(0), *columns])[order]
+        designs = np.concatenate([np.empty((0, width)), *(batch.designs for batch in left)])[order]
+        status = np.concatenate([np.empty(0, np.uint8), *(batch.status for batch in left)])[order]
+        left.clear()
+        return Batch(index[order], designs, outputs, status)
 
     def _work(self, number: int, whole: bool) -> None:
         """Work on what waits at a level and at those behind it: on full batches only, or on everything."""

@@ -157,7 +157,7 @@ def _result(study: Study, cascades: Sequence[Cascade]) -> ChunkResult:
     found = Batch.joined([cascade.end(tuple(types)) for cascade in cascades]).ordered()
     columns: Columns = {"design": found.index}
     columns |= {name: found.designs[:, k] for k, name in enumerate(study.family.parameter_names)}
-    columns |= {name: found.outputs[name].astype(dtype) for name, dtype in types.items()}
+    columns |= {name: found.outputs[name].astype(dtype, copy=False) for name, dtype in types.items()}
     columns |= {"status": found.status}
     total = np.sum([cascade.counts for cascade in cascades], axis=0)
     counts = {code: int(total[code]) for code in np.flatnonzero(total).tolist()}

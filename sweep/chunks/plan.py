@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args
@@ -29,12 +30,12 @@ FORMAT = 2
 # A chunk should take a few seconds on one core by the routes' own cost figures, so every machine cuts alike; it should
 # hold at most this much before it is encoded; and there should be enough of them to keep the workers even to the end.
 CHUNK_SECONDS = 2.0
-CHUNK_BYTES = 64 * 2**20
+CHUNK_BYTES = 32 * 2**20
 CHUNKS_AT_LEAST = 16
 SECONDS_AT_LEAST = 0.1
 CHUNK_STEP = 512
 
-PILOT_RUNS, PILOT_LENGTH = 32, 32
+PILOT_RUNS, PILOT_LENGTH, PILOT_PARTS = 32, 32, 4
 
 PARAMETER_UNITS = {word: internal_unit(word) for word in get_args(Unit)}
 
@@ -133,12 +134,12 @@ def designs_fingerprint(study: Study) -> str:
     return replace(study, optimise=None, pareto=None, tolerance=None, reference=None, output=output).fingerprint
 
 
-def choose_chunk_size(study: Study) -> int:
+def choose_chunk_size(study: Study, known: Pilot | None = None) -> int:
     """Designs per chunk: a multiple of 512 from the routes' cost, the memory and the number of designs.
 
-    Neither the number of workers nor the clock of the machine enters.
+    Neither the number of workers nor the clock of the machine enters.  ``known`` is a pilot that was already sent.
     """
-    seconds = max(pilot(study).seconds_per_design, 1e-10)
+    seconds = max((pilot(study) if known is None else known).seconds_per_design, 1e-10)
     by_time = CHUNK_SECONDS / seconds
     by_memory = CHUNK_BYTES / row_bytes(study)
     by_count = max(study.space.count / CHUNKS_AT_LEAST, SECONDS_AT_LEAST / seconds)
@@ -149,8 +150,10 @@ TRIED = (512, 4096)  # designs that are sent through the limits where some that 
 RUN = 8  # of them that stand side by side: what one call costs is shared
 
 
-def pilot(study: Study) -> Pilot:
+def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -> Pilot:
     """Send about a thousand designs, spread over the space, through the cascade.
+
+    ``tell`` is called with how many parts of them are done, and how many there are.
 
     The time counts parameters, and each route as often as designs reached it, by their own cost figures, so it is the
     same on every machine.
@@ -160,16 +163,24 @@ def pilot(study: Study) -> Pilot:
     golden = (math.sqrt(5.0) - 1.0) / 2.0
     starts = sorted({int((k * golden) % 1.0 * (count - length + 1)) for k in range(PILOT_RUNS)})
     blocks = [parameter_matrix(study, start, start + length) for start in starts]
-    designs, status = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-    cascade = Cascade(study)
-    cascade.feed(np.arange(len(designs)), designs, status)
-    cascade.end(())
-    shares = [reached / len(designs) for reached in cascade.reached]
+    length = -(-len(blocks) // PILOT_PARTS)
+    parts = [blocks[k : k + length] for k in range(0, len(blocks), length)]
+    reached, feasible, total = np.zeros(len(levels(study))), 0, 0
+    for k, part in enumerate(parts):
+        tell(k, len(parts))
+        designs, status = (np.concatenate(columns) for columns in zip(*part, strict=True))
+        cascade = Cascade(study)
+        cascade.feed(np.arange(len(designs)), designs, status)
+        cascade.end(())
+        reached += cascade.reached
+        feasible += int(cascade.counts[OK])
+        total += len(designs)
+    shares = [float(share) for share in reached / total]
     seconds, calls = 1e-9 * parameter_ns(study), 1.0 / BLOCK
     for share, level in zip(shares, levels(study), strict=True):
         seconds += 1e-9 * share * level.ns_per_design
         calls += share / level.batch
-    return Pilot(seconds + CALL_SECONDS * calls, float(cascade.counts[OK] / len(designs)))
+    return Pilot(seconds + CALL_SECONDS * calls, feasible / total)
 
 
 def spread_designs(study: Study, number: int) -> Array:

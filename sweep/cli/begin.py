@@ -6,11 +6,14 @@ import json
 import os
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from sweep.cli import completion
+
+if TYPE_CHECKING:
+    from sweep.families.members import Machine
 
 SCHEMA = "study.schema.json"
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
@@ -18,8 +21,12 @@ NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 
 @click.command()
 @click.argument("name")
+@click.option("--family", shell_complete=completion.families, help="A family, or a chain such as rssr+guide.")
 @click.option(
-    "--family", required=True, shell_complete=completion.families, help="A family, or a chain such as rssr+guide."
+    "--member",
+    "members",
+    multiple=True,
+    help="Of a machine, once for each: NAME=FAMILY, such as needle=rssr+guide.",
 )
 @click.option(
     "--into",
@@ -27,25 +34,34 @@ NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
     default=Path(),
     help="Where the folder NAME is made; default: here.",
 )
-def init(name: str, family: str, into: Path) -> None:
-    """Write a first study of FAMILY: NAME/study.toml, every line explained, and its tiny version NAME/smoke.toml.
+def init(name: str, family: str | None, members: tuple[str, ...], into: Path) -> None:
+    """Write a first study of a mechanism or a machine: NAME/study.toml, every line explained, and its tiny version.
 
-    It holds the example of the family with two dimensions swept, passes `sweep check` and runs as it is.  Its first
-    line names the JSON schema by which an editor completes and checks it; the schema lies beside it.
+    It holds the example of the family, or of every --member, with two dimensions swept, passes `sweep check` and runs
+    as it is.  Its first line names the JSON schema by which an editor completes and checks it; the schema lies beside.
     """
+    from sweep.cli.first_machine import machine_smoke_text, machine_text
     from sweep.cli.first_study import smoke_text, study_text
     from sweep.cli.listing import family_names
     from sweep.errors import InputError, StoreError
     from sweep.families import family as find_family
 
+    if (family is None) == (not members):
+        raise InputError("--family", family, "either --family, or --member once for each member", "command line")
     if NAME.fullmatch(name) is None:
         raise InputError("NAME", name, "a plain word of a-z, 0-9 and '-'", "command line")
-    mechanism = find_family(family_names(family))
+    machine = _machine(members)
     folder = into / name
     if folder.exists():
         raise InputError("NAME", name, f"a folder that is not there yet; {folder} is", "command line")
     shared = _shared_schema(into)
-    files = {"study.toml": study_text(name, mechanism, _seen_from(folder, shared)), "smoke.toml": smoke_text(mechanism)}
+    seen = _seen_from(folder, shared)
+    if machine is not None:
+        files = {"study.toml": machine_text(name, machine, seen), "smoke.toml": machine_smoke_text(machine)}
+    else:
+        assert family is not None
+        mechanism = find_family(family_names(family))
+        files = {"study.toml": study_text(name, mechanism, seen), "smoke.toml": smoke_text(mechanism)}
     if shared is None:
         files[SCHEMA] = _current_schema()
     try:
@@ -55,6 +71,28 @@ def init(name: str, family: str, into: Path) -> None:
     except OSError as error:
         raise StoreError(f"{folder}: cannot be written: {error.strerror}") from error
     click.echo(f"study: {folder / 'study.toml'}\nnext: sweep check {folder}")
+
+
+def _machine(members: tuple[str, ...]) -> Machine | None:
+    """The machine of NAME=FAMILY texts; None where there are none."""
+    from sweep.cli.listing import family_names
+    from sweep.errors import InputError
+    from sweep.families import family as find_family
+    from sweep.families.members import Machine
+
+    found: dict[str, str | list[str]] = {}
+    for text in members:
+        name, _, family = text.partition("=")
+        if not family or name in found:
+            raise InputError(
+                "--member", text, "NAME=FAMILY, every name once, such as needle=rssr+guide", "command line"
+            )
+        found[name] = family_names(family)
+    if len(found) == 1:
+        raise InputError("--member", members[0], "two members or more; --family takes one mechanism", "command line")
+    machine = find_family(found) if found else None
+    assert machine is None or isinstance(machine, Machine)
+    return machine
 
 
 @click.command()

@@ -30,6 +30,10 @@ ENDINGS = (".svg", ".png", ".pdf")
 @click.option("--phi", type=float, default=0.0, show_default=True, help="Of mechanism: crank angle [rad].")
 @ANGLES
 @click.option("--view", help="Of mechanism: space, xy, zy or xz.")
+@click.option(
+    "--positions", type=click.IntRange(min=1), default=1, show_default=True, help="Of mechanism, over its turn."
+)
+@click.option("--output", help="Of tolerance: the output whose histogram is drawn; all in percent if left out.")
 def draw(
     what: str,
     source: str,
@@ -40,6 +44,8 @@ def draw(
     want: str | None,
     phi: float,
     view: str | None,
+    positions: int,
+    output: str | None,
     angles: AngleUnit | None,
 ) -> None:
     """Draw one picture.
@@ -57,11 +63,12 @@ def draw(
     if what in OF_DATASETS:
         if table is not None or not Path(source).is_dir():
             raise InputError("SOURCE", source, f"a dataset folder for {what}", "command line")
-        drawn: Any = getattr(plot, what)(source)
+        drawn: Any = getattr(plot, what)(source, **({"output": output} if what == "tolerance" else {}))
     else:
         mechanism, columns = _of_one(source, table, design, row)
         unit: AngleUnit | None = "rad" if table is None else angles
-        known: dict[str, dict[str, Any]] = {"motion": {"want": want}, "mechanism": {"phi": phi, "view": view}}
+        shown = {"phi": phi, "view": view, "positions": positions}
+        known: dict[str, dict[str, Any]] = {"motion": {"want": want}, "mechanism": shown}
         options = known.get(what, {}) | {"angles": unit}
         if table is None:
             grid_in_radians("phi", "rad", phi, None)  # a design out of a folder is in rad, --phi may not be

@@ -28,7 +28,7 @@ def study_text(name: str, family: Family, schema: str) -> str:
     """A study.toml that passes `sweep check`; ``schema`` is where its JSON schema lies, seen from the file."""
     from sweep.families.domain import March
 
-    wanted = _wanted(family)
+    wanted = wanted_outputs(family)
     goal = next((w for w in wanted if w.startswith("max_abs_d2")), wanted[-1])
     lines = [
         f"#:schema {schema}",
@@ -45,7 +45,7 @@ def study_text(name: str, family: Family, schema: str) -> str:
         'question = "What do small changes of two dimensions do?"',
         "",
         "[mechanism]",
-        _mechanism(family),
+        mechanism_line(family),
         "",
         "[scene]",
         '# speed = "3000 rpm"                       # for accelerations in time, and for loads',
@@ -53,11 +53,11 @@ def study_text(name: str, family: Family, schema: str) -> str:
         "",
         "# One value as a text with its unit; several as { values = [...], unit = ... } or { from, to, count, unit }.",
         "[design]",
-        *_design(family),
+        *design_lines(family, swept_names(family)),
         "",
         "# Designs beyond a limit are counted and dropped: { min = ..., max = ..., unit = ... }, or true.",
         "[limits]",
-        *_limits(family),
+        *limit_lines(family),
         "",
         "[objective]",
         f'minimise = "{goal}"',
@@ -83,7 +83,7 @@ def study_text(name: str, family: Family, schema: str) -> str:
 def smoke_text(family: Family) -> str:
     """The tiny version beside it."""
     return "# The same question with few designs.\n[design]\n" + "".join(
-        f"{name} = {{ count = 2 }}\n" for name in _swept(family)
+        f"{name} = {{ count = 2 }}\n" for name in swept_names(family)
     )
 
 
@@ -93,7 +93,8 @@ def _names(family: Family) -> list[str]:
     return [stage.family.name for stage in stages_of(family)]
 
 
-def _mechanism(family: Family) -> str:
+def mechanism_line(family: Family) -> str:
+    """The family, or the families of a chain."""
     names = _names(family)
     if len(names) == 1:
         return f'family = "{names[0]}"'
@@ -110,7 +111,7 @@ def _example(family: Family) -> dict[str, float]:
     return {f"{name}{stage.number}": value for stage in stages for name, value in stage.family.example.items()}
 
 
-def _wanted(family: Family) -> list[str]:
+def wanted_outputs(family: Family) -> list[str]:
     """What a designer asks first: size of the motion, pressure angle, greatest acceleration; else what there is."""
     from sweep.cli.listing import main_outputs
     from sweep.quantities.names import is_flag, parts
@@ -126,7 +127,7 @@ def _wanted(family: Family) -> list[str]:
     return chosen + [name for name in offered if name not in chosen][: max(0, FEWEST_WANTED - len(chosen))]
 
 
-def _swept(family: Family) -> list[str]:
+def swept_names(family: Family) -> list[str]:
     """The first two dimensions: lengths that are not zero, or any numbers where there are none."""
     example = _example(family)
     usable = [p for p in family.parameters if p.choices is None and example.get(p.name)]
@@ -134,8 +135,9 @@ def _swept(family: Family) -> list[str]:
     return (lengths or [p.name for p in usable if p.unit in ("ratio", "none")] or [p.name for p in usable])[:SWEPT]
 
 
-def _design(family: Family) -> Iterator[str]:
-    example, swept = _example(family), _swept(family)
+def design_lines(family: Family, swept: list[str]) -> Iterator[str]:
+    """Every parameter with its meaning: ``swept`` ones as ranges, those with a default as comments."""
+    example = _example(family)
     given = {p.unit for p in family.parameters}
     units = OTHERS | (SI if given & {"mass", "force", "stiffness", "torque"} else LENGTHS)
     for p in family.parameters:
@@ -160,7 +162,8 @@ def _words(p: Parameter) -> str:
     return p.text + (f" ({', '.join(notes)})" if notes else "")
 
 
-def _limits(family: Family) -> list[str]:
+def limit_lines(family: Family) -> list[str]:
+    """Full rotation as a limit, pressure angles as comments."""
     from sweep.cli.listing import main_outputs
     from sweep.quantities.names import is_flag, stem
 

@@ -21,7 +21,7 @@ from sweep.cli.studies import check, compare, report, run
 from sweep.cli.tables import evaluate_table, summarise_table
 from sweep.cli.task import task
 from sweep.cli.verify import verify
-from sweep.errors import LinksweepError, LinksweepWarning, StoreError
+from sweep.errors import LinksweepError, LinksweepWarning, ProgramFault, StoreError
 from sweep.jobs.signals import leaving_within
 
 SIGNALLED = 128  # and the number of the signal: what a shell expects of an interrupted command
@@ -41,6 +41,8 @@ class Verbs(click.Group):
                 warnings.showwarning = _said
                 return super().invoke(ctx)
         except LinksweepError as error:
+            if isinstance(error, ProgramFault):
+                click.echo(error.trace, err=True)
             click.echo(f"sweep: {error}", err=True)
             ctx.exit(error.exit_code)
         except KeyboardInterrupt as error:

@@ -88,15 +88,14 @@ def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_BEST:
         raise InputError("count", count, f"a whole number from 1 to {MOST_BEST}", "best")
     source = scan(folder)
-    names = _known(source, [output], "best")
-    kept = pd.DataFrame({name: [] for name in source.schema.names})
-    for batch in _feasible(source, source.schema.names):
-        size = compared(output, batch[names[0]].to_numpy())
-        here = batch[np.isfinite(size)]
+    _known(source, [output], "best")
+    kept = pd.DataFrame({name: [] for name in ("design", output)})
+    for batch in _feasible(source, list(kept.columns)):
+        here = batch[np.isfinite(batch[output].to_numpy())]
         merged = here if kept.empty else pd.concat([kept, here], ignore_index=True)
         order = np.argsort(compared(output, merged[output].to_numpy()), kind="stable")[:count]
-        kept = merged.iloc[order].reset_index(drop=True)
-    return kept
+        kept = merged.iloc[order]
+    return _whole(source, kept["design"].to_numpy(np.int64))
 
 
 def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
@@ -121,16 +120,24 @@ def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
 
     source = scan(folder)
     _known(source, [first, second], "pareto")
-    kept = pd.DataFrame({name: [] for name in source.schema.names})
-    for batch in _feasible(source, source.schema.names):
+    kept = pd.DataFrame({name: [] for name in dict.fromkeys(["design", first, second])})
+    for batch in _feasible(source, list(kept.columns)):
         here = batch[np.isfinite(batch[first].to_numpy()) & np.isfinite(batch[second].to_numpy())]
         merged = here if kept.empty else pd.concat([kept, here], ignore_index=True)
         x, y = (compared(name, merged[name].to_numpy()) for name in (first, second))
         order = np.lexsort((merged["design"].to_numpy(), y, x))
         least = np.minimum.accumulate(y[order])
         unbeaten = np.concatenate([[True], least[1:] < least[:-1]])[: len(order)]
-        kept = merged.iloc[order[unbeaten]].reset_index(drop=True)
-    return kept
+        kept = merged.iloc[order[unbeaten]]
+    return _whole(source, kept["design"].to_numpy(np.int64))
+
+
+def _with_units(rows: pd.DataFrame, source: Any) -> pd.DataFrame:
+    """The rows with the units that stand in the schema."""
+    rows.attrs["units"] = {
+        field.name: field.metadata[b"unit"].decode() for field in source.schema if b"unit" in (field.metadata or {})
+    }
+    return rows
 
 
 def histogram(
@@ -191,6 +198,17 @@ def _feasible(source: Any, names: Sequence[str]) -> Iterator[pd.DataFrame]:
     for batch in scanner.to_batches():
         if batch.num_rows:
             yield batch.to_pandas()
+
+
+def _whole(source: Any, designs: NDArray[np.int64]) -> pd.DataFrame:
+    """All columns of some designs, in the order given; of files without any of them only the statistics are read."""
+    import pyarrow.compute as pc
+
+    wanted = pc.field("design").isin(designs) & (pc.field("status") == 0)
+    scanner = source.scanner(filter=wanted, batch_size=BATCH_ROWS, batch_readahead=1, fragment_readahead=1)
+    rows: pd.DataFrame = scanner.to_table().to_pandas()
+    order = np.argsort(rows["design"].to_numpy())[np.argsort(np.argsort(designs))]
+    return _with_units(rows.iloc[order].reset_index(drop=True), source)
 
 
 def _known(source: Any, names: Sequence[str], place: str) -> Sequence[str]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 import warnings
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -168,8 +168,10 @@ def named_counts(counts: Mapping[int, int]) -> dict[str, int]:
     return {STATUS_NAMES.get(code, str(code)): number for code, number in sorted(counts.items())}
 
 
-def finished_chunks(folder: Path, plan: Plan) -> dict[int, Part]:
+def finished_chunks(folder: Path, plan: Plan, tell: Callable[[int, int], None] = lambda _, __: None) -> dict[int, Part]:
     """Chunks of the plan that need not be computed again; damaged ones are moved to ``_bad/``.
+
+    ``tell`` is called with how many were read, and how many there are.
 
     Raises
     ------
@@ -177,7 +179,9 @@ def finished_chunks(folder: Path, plan: Plan) -> dict[int, Part]:
         if a chunk belongs to another study or another version of the code.
     """
     finished: dict[int, Part] = {}
-    for part in parts(folder):
+    there = parts(folder)
+    for k, part in enumerate(there):
+        tell(k, len(there))
         if part.identity != plan.identity or part.index >= plan.chunks:
             raise foreign(folder, f"the chunk {part.path.name}", plan)
         if not is_whole(part):

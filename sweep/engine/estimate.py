@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,13 +46,14 @@ class Estimate:
     optimise_seconds: float | None
 
 
-def estimate(study: Study, jobs: int) -> Estimate:
+def estimate(study: Study, jobs: int, tell: Callable[[int, int], None] = lambda _, __: None) -> Estimate:
     """Estimate a run from the routes' cost figures and a pilot of about a thousand designs spread over the space.
 
     Parameters
     ----------
     study : the question
     jobs : workers it will run on
+    tell : called with how many parts of the pilot are done, and how many there are
 
     Returns
     -------
@@ -64,8 +66,8 @@ def estimate(study: Study, jobs: int) -> Estimate:
     from sweep.chunks.cascade import CALL_SECONDS, levels
     from sweep.chunks.plan import choose_chunk_size, describe_columns, pilot, row_bytes
 
-    found = pilot(study)
-    chunk_size = choose_chunk_size(study)
+    found = pilot(study, tell)
+    chunk_size = choose_chunk_size(study, found)
     designs = study.space.count
     kept = 1.0 if study.output.keep == "all" else max(found.feasible, LEAST_KEPT)
     results = sum(

@@ -36,9 +36,14 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
         return
     boxes = study.optimise.prove.boxes
     with stop_on_signal() as stop, Progress("proof", boxes, 0, progress, unit="boxes") as shown:
+
+        def tell(judged: int, expected: int) -> None:
+            shown.expect(expected)
+            shown.advance(judged - shown.done)
+
         place: Executor = Here() if jobs == 1 else executor(backend, jobs)
         try:
-            prove_study(study, folder, Cores(place, jobs, stop), lambda judged: shown.advance(judged - shown.done))
+            prove_study(study, folder, Cores(place, jobs, stop), tell)
         except KeyboardInterrupt:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while proving; run again to continue"

@@ -6,7 +6,7 @@ import math
 import signal
 import time
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -94,8 +94,7 @@ def run(
     model = _model(study, smoke, accuracy, certify)
     with Phases(progress) as phases:
         warm(model, lambda done, total: phases.say("compiling", done, total))
-        phases.say("planning")
-        _check_budget(model, jobs, force)
+        _check_budget(model, jobs, force, lambda done, total: phases.say("planning", done, total))
     default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
     folder = default if out is None else store.located(out)
     refuse_or_clear_older(folder, force)
@@ -140,18 +139,19 @@ def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certi
     return model if accuracy is None and certify is None else with_accuracy(model, accuracy, certify)
 
 
-def _check_budget(study: Study, jobs: int, force: bool) -> None:
+def _check_budget(study: Study, jobs: int, force: bool, tell: Callable[[int, int], None]) -> None:
     from sweep.engine.estimate import check_budget, estimate
 
     if not force:
-        check_budget(study, estimate(study, jobs))
+        check_budget(study, estimate(study, jobs, tell))
 
 
 def _sweep(study: Study, folder: Path, jobs: int, place: Executor, force: bool, progress: bool) -> int:
     """Compute the missing chunks and note the totals; returns the number of chunks computed."""
     computed = 0
     with stop_on_signal() as stop, Phases(progress) as phases:
-        phases.say("reading what is there")
+        reading = "reading what is there"
+        phases.say(reading, 0, 0, "chunks")
         store.remove_temporary(folder)
         plan: Plan | None = None
         with stop.raising():  # a pilot may have to compile
@@ -159,7 +159,7 @@ def _sweep(study: Study, folder: Path, jobs: int, place: Executor, force: bool, 
         _raise_if_signalled(stop, folder)
         assert plan is not None
         for _ in range(ROUNDS + 1):
-            finished = store.finished_chunks(folder, plan)
+            finished = store.finished_chunks(folder, plan, lambda done, of: phases.say(reading, done, of, "chunks"))
             missing = [index for index in part_range(folder, plan.chunks) if index not in finished]
             phases.end()
             if not missing:

@@ -12,7 +12,7 @@ from sweep.chunks import plan as plans
 from sweep.chunks.cascade import Dropped
 from sweep.chunks.chunk import compute_chunk
 from sweep.dataset.store import parts, write_chunk
-from sweep.errors import InputError, LinksweepError, StoreError
+from sweep.errors import InputError, LinksweepError, ProgramFault, StoreError
 
 if TYPE_CHECKING:
     from sweep.chunks.plan import Plan
@@ -62,9 +62,13 @@ class ChunkTask:
             return Done(number, dropped=True)
         except LinksweepError as error:
             return Done(number, error=error)
-        except Exception as error:  # a bug: the parent raises it again, with the trace of this worker
-            error.add_note(f"in chunk {number}, designs {start}:{end}\n{traceback.format_exc()}")
-            return Done(number, error=error)
+        except Exception as error:  # a bug: the parent raises it, with the trace of this worker
+            fault = f"{type(error).__name__}: {error}".removesuffix(": ")
+            message = (
+                f"{self.folder}: {fault}, in chunk {number}, designs {start}:{end}; this is an error in the program, "
+                "not in the study: report it with the trace above; finished chunks are kept, run again to continue"
+            )
+            return Done(number, error=ProgramFault(message, traceback.format_exc()))
         return Done(number, end - start)
 
     def _known(self, number: int) -> Columns | None:

@@ -220,3 +220,8 @@ def _refuse(bad: np.ndarray[Any, np.dtype[np.bool_]], values: Array, name: str, 
     if bad.any():
         row = int(np.argmax(bad))
         raise InputError(name, float(values[row]), allowed, f"column {name}, row {row}")
+
+
+def parameter_units(parameters: Iterable[Parameter]) -> dict[str, str]:
+    """Units of parameters as result tables name them: "length" is that of the user, angles are in rad."""
+    return {p.name: {"angle": "rad", "ratio": "1", "sign": "1"}.get(p.unit, p.unit) for p in parameters}

@@ -17,7 +17,7 @@ LINE_SECONDS = 10.0
 TICK_SECONDS = 0.5
 
 Say: TypeAlias = Callable[[str, int, int, str], None]
-"""``say(label, done, total, unit)``: what is worked on, and how much of it is done."""
+"""``say(label, done, total, unit)``: what is worked on, and how much of it is done; ``total`` as is known by now."""
 
 
 def unsaid(label: str, done: int, total: int, unit: str) -> None:
@@ -92,6 +92,13 @@ class Progress:
             else:
                 self._line_if_due()
 
+    def expect(self, total: int) -> None:
+        """So much there is in all, as is known by now."""
+        with self._listener():
+            self.total = total
+            if self.bar is not None:
+                self.bar.total = total or None
+
     def _tick(self) -> None:
         while not self.over.wait(TICK_SECONDS):
             with self._listener():
@@ -149,7 +156,10 @@ class Phases:
         if self.now is None or self.now.label != label:
             self.end()
             self.now = Progress(label, total, done, self.show, self.stream, unit, quiet=True).__enter__()
-        elif done > self.now.done:
+            return
+        if total != self.now.total:
+            self.now.expect(total)
+        if done > self.now.done:
             self.now.advance(done - self.now.done)
 
     def end(self) -> None:

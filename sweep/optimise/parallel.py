@@ -84,19 +84,27 @@ def in_processes(
     return over_processes(SearchTask(problem, starts, allowed), numbers, asked, jobs)
 
 
-def spread_over(task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int) -> list[T]:
-    """What a task gives for each number, in their order, here or in processes; those not begun are left out."""
+def spread_over(
+    task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int, tell: Callable[[], None] = lambda: None
+) -> list[T]:
+    """What a task gives for each number, in their order, here or in processes; those not begun are left out.
+
+    ``tell`` is called after each of them.
+    """
     if jobs == 1 or len(numbers) == 1:
         out = []
         for number in numbers:
             if asked():
                 break
             out.append(task(number, asked))
+            tell()
         return out
-    return over_processes(task, numbers, asked, jobs)
+    return over_processes(task, numbers, asked, jobs, tell)
 
 
-def over_processes(task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int) -> list[T]:
+def over_processes(
+    task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int, tell: Callable[[], None] = lambda: None
+) -> list[T]:
     """What a task gives for each number that was begun before ``asked`` became true, in their order.
 
     They run on the cluster of the run, if it has one.
@@ -107,6 +115,7 @@ def over_processes(task: Task[T], numbers: list[int], asked: Callable[[], bool],
     numbers : what it is called with
     asked : looked at in this process; workers learn of it, and what does not answer soon is given up
     jobs : how many workers
+    tell : called after each of them
 
     Raises
     ------
@@ -120,6 +129,7 @@ def over_processes(task: Task[T], numbers: list[int], asked: Callable[[], bool],
         for outcome in place_of_searches().outcomes(checked, iter(numbers), min(jobs, len(numbers)), stop):
             if outcome is not None:
                 found[outcome[0]] = outcome[1]
+                tell()
     except WorkerDied as error:
         if not stop:  # the signal that stops us may have hit them too
             raise WorkerDied(f"optimiser: {error}; run again") from error

@@ -78,6 +78,7 @@ def robust(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
     more: Array | None = None,
+    tell: Callable[[int, int], None] = lambda _, __: None,
 ) -> Robust | None:
     """The best design of which the wanted share of toleranced mechanisms keeps all limits.
 
@@ -93,6 +94,7 @@ def robust(
     tolerance : with ``robust``, the share
     settings, stop, jobs : as for ``minimise``
     more : (k, P) designs that a search for insensitive ones has found, to begin with as well
+    tell : called with how many searches are done, and how many there are at most
 
     Returns
     -------
@@ -112,7 +114,8 @@ def robust(
     asked = stop or _never
     level = NormalDist().inv_cdf(1.0 - (1.0 - (tolerance.robust or 0.0)) / BOTH)
     near = _Approach(problem, np.array(begin), tuple(starts), tolerance, level, min(HEAT, settings.looks))
-    found = spread_over(near, list(range(len(begin))), asked, jobs)
+    count = _Count(tell, len(begin) + min(ENDED, len(begin)))
+    found = spread_over(near, list(range(len(begin))), asked, jobs, count)
     # The objective of designs that miss their limits still says little.
     order = sorted(found, key=lambda r: (r.violation > NEARLY, r.objective if r.violation <= NEARLY else r.violation))
     ends = _different(problem, order)[:ENDED]
@@ -120,12 +123,25 @@ def robust(
         return None
     numbers = {r.start: k for k, r in enumerate(ends)}
     last = _Calibrate(problem, tuple(ends), tolerance, level, settings.seed, settings.looks)
-    made = spread_over(last, list(numbers.values()), asked, jobs) or [
+    count.total = len(begin) + len(ends)
+    made = spread_over(last, list(numbers.values()), asked, jobs, count) or [
         Robust(r, _share(problem, r.design, tolerance, settings.seed), True) for r in ends[:1]
     ]
     good = [x for x in made if x.share >= (tolerance.robust or 0.0)]
     best = min(good, key=lambda x: x.result.objective) if good else max(made, key=lambda x: x.share)
     return replace(best, cut=best.cut or any(x.cut for x in made) or len(made) < len(ends) or len(found) < len(begin))
+
+
+class _Count:
+    """Counts what is done and tells it."""
+
+    def __init__(self, tell: Callable[[int, int], None], total: int) -> None:
+        self.tell, self.done, self.total = tell, 0, total
+        tell(0, total)
+
+    def __call__(self) -> None:
+        self.done += 1
+        self.tell(self.done, self.total)
 
 
 def _never() -> bool:

@@ -227,7 +227,10 @@ def optimise_study(
     if study.tolerance is not None and study.tolerance.robust is not None and found.ended not in CUT:
         say("robust design", 0, 0, "steps")
         whole, more = insensitive(study, settings, problem, brake, jobs)
-        made = robust(whole, results, study.tolerance, settings, brake, jobs, more)
+        made = robust(
+            whole, results, study.tolerance, settings, brake, jobs, more,
+            lambda done, total: say("robust design", done, total, "searches"),
+        )  # fmt: skip
         results = results if made is None else [made.result, *results]
     if brake.pulled and found.ended not in CUT:
         found = later(found)

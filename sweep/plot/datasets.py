@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.dataset import store
 from sweep.errors import InputError
-from sweep.quantities.names import is_flag
 from sweep.report import pictures
 from sweep.report.dataset import read_dataset
-from sweep.report.figures import OPTIMUM, QUIET, REFERENCE, house_style, new_figure
+from sweep.report.figures import house_style
+from sweep.report.made import histogram
+from sweep.report.made_figures import histogram_figure
 from sweep.report.page import gather
-from sweep.report.quantities import quantity
-from sweep.report.robust import optimum_rows, slopes, tolerance_words
+from sweep.report.robust import tolerance_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,22 +92,25 @@ def front(folder: str | Path) -> Axes:
     return _drawn(figure, folder, "a study with an objective and a second criterion").axes[0]
 
 
-def tolerance(folder: str | Path) -> Axes:
-    """Spread of the optimum's outputs as it is made, each in parts of its nominal value; the dot is the mean.
+def tolerance(folder: str | Path, output: str | None = None) -> Axes:
+    """What manufacture makes of the optimum: the spread of its outputs, or one of them as a histogram.
 
     Parameters
     ----------
     folder : what ``sweep run`` left behind
+    output : a design output: its histogram over 8192 mechanisms made within the tolerances, what misses its limit in
+        another colour.  If left out all outputs of the study, each in parts of its nominal value; the dot is the mean,
+        the bar holds 95 % of what is made
 
     Returns
     -------
     Axes
-        a bar for each output
+        a bar for each output, or a histogram
 
     Raises
     ------
     InputError
-        for a study without tolerances.
+        for a study without tolerances, an output that the mechanism does not have.
 
     Examples
     --------
@@ -119,24 +120,14 @@ def tolerance(folder: str | Path) -> Axes:
     'change from the nominal value [%]'
     """
     data = read_dataset(Path(folder))
-    rows = [
-        row
-        for row in optimum_rows(data, store.TOLERANCE)
-        if not math.isnan(row["nominal"]) and row["nominal"] != 0.0 and not is_flag(str(row["output"]))
-    ]
-    if not rows:
-        raise InputError("folder", str(folder), "a dataset with an optimum and [tolerance]", "plot")
+    allowed = "a dataset with an optimum and [tolerance]"
+    if output is None:
+        with house_style():
+            return _drawn(pictures.tolerance(data), folder, allowed).axes[0]
+    found = histogram(data, output)
     with house_style():
-        names = [str(row["output"]) for row in rows]
-        axes = _lying([quantity(name, data.units.get(name, "")).symbol for name in names], 0.45)
-        for k, row in enumerate(rows):
-            low, mean, high = (100.0 * (row[key] / row["nominal"] - 1.0) for key in ("low", "mean", "high"))
-            axes.plot([low, high], [k, k], color=OPTIMUM, linewidth=5.0, solid_capstyle="butt", alpha=0.5)
-            axes.plot(mean, k, "o", color=OPTIMUM)
-        axes.axvline(0.0, color=QUIET, linewidth=0.8)
-        axes.set_xlabel("change from the nominal value [%]")
-        axes.set_title(f"as it is made, {tolerance_words(data)}")
-    return axes
+        figure = None if found is None else histogram_figure(found, tolerance_words(data))
+    return _drawn(figure, folder, allowed).axes[0]
 
 
 def sensitivity(folder: str | Path) -> Axes:
@@ -164,29 +155,9 @@ def sensitivity(folder: str | Path) -> Axes:
     3
     """
     data = read_dataset(Path(folder))
-    ranked = slopes(data)
-    objective = pictures.shown_objective(data)
-    if not ranked or objective is None:
-        raise InputError("folder", str(folder), "a dataset with an optimum and its sensitivities", "plot")
     with house_style():
-        axes = _lying([f"{s.name}, by {s.step}" for s in ranked], 0.38)
-        for offset, values, colour, label in (
-            (-0.2, [s.growing for s in ranked], OPTIMUM, "larger"),
-            (0.2, [s.shrinking for s in ranked], REFERENCE, "smaller"),
-        ):
-            axes.barh(np.arange(len(ranked)) + offset, values, 0.38, color=colour, label=label)
-        axes.axvline(0.0, color=QUIET, linewidth=0.8)
-        axes.set_xlabel(f"change of the {objective.words} [%]")
-        axes.legend()
-    return axes
-
-
-def _lying(labels: list[str], height: float) -> Axes:
-    """Open a figure with one line for each label, ``height`` [inch] each, the first on top."""
-    axes = new_figure(7.0, height * len(labels) + 1.2).subplots()
-    axes.set_yticks(range(len(labels)), labels)
-    axes.invert_yaxis()
-    return axes
+        figure = pictures.sensitivity(data)
+    return _drawn(figure, folder, "a dataset with an optimum and its sensitivities").axes[0]
 
 
 def _drawn(figure: Figure | None, folder: str | Path, allowed: str) -> Figure:

@@ -18,9 +18,10 @@ from sweep.exchange.scene import over, shown_name
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.domain import Interval
-from sweep.plot.space import VIEWS, draw_frame, is_spatial, projection
 from sweep.report.curves import motion_figure
 from sweep.report.figures import OPTIMUM, house_style, new_figure
+from sweep.report.mechanisms import exists, mechanism_figure
+from sweep.report.space import VIEWS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,16 +90,18 @@ def mechanism(
     phi: float = 0.0,
     *,
     view: str | None = None,
+    positions: int = 1,
     unit: str = "mm",
     angles: AngleUnit | None = None,
 ) -> NDArray[Any]:
-    """The mechanism in one position with the paths of its joints, axes and senses; a panel for each frame.
+    """The mechanism in one or several positions with paths of its joints, axes and senses; a panel for each frame.
 
     Parameters
     ----------
     mechanism, design : as of :func:`sweep.joints`
     phi : angle of the driving shaft [rad]
     view : "space", from a corner with z upwards, or "xy", "zy", "xz"; if left out "space" for what is spatial
+    positions : that are drawn at equal steps over the turn; the first stands out.  The report draws 8
     unit : the length unit of the design, for the axes
     angles : the unit of the angles of ``design`` and ``phi``, "rad" or "deg", as of :func:`sweep.evaluate`
 
@@ -119,23 +122,11 @@ def mechanism(
     design = in_radians(find_family(mechanism), design, angles)
     start = float(np.asarray(grid_in_radians("phi", "rad", phi, angles), np.float64))
     found = over(mechanism, design, start, 180)
-    frames = list(dict.fromkeys(part.frame for part in found))
+    if not exists(found):
+        raise InputError("design", dict(found[0].parameters), "one with a pose in which all its joints exist", "plot")
     with house_style():
-        figure = new_figure(5.4 * len(frames), 4.6)
-        panels = figure.subplots(1, len(frames), squeeze=False)[0]
-        for axes, frame in zip(panels, frames, strict=True):
-            same = [part for part in found if part.frame == frame]
-            seen = view or ("space" if is_spatial(same) else "xy")
-            draw_frame(axes, same, projection(seen))
-            if seen in VIEWS:
-                axes.set_xlabel(f"{seen[0]} [{unit}]")
-                axes.set_ylabel(f"{seen[1]} [{unit}]")
-            else:
-                axes.set_axis_off()
-            axes.set_title(", ".join(part.label for part in same))
-            if axes.get_legend_handles_labels()[0]:
-                axes.legend(fontsize="small")
-    return np.array(panels, dtype=object)
+        figure = mechanism_figure({"": found}, unit, None if view is None else (view,), positions)
+    return np.array(figure.axes, dtype=object)
 
 
 def polar_load(

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ UNITS = 64
 SHARES = (0.1, 0.15, 0.25, 0.5)  # of all boxes, round by round: later ones know better where to look
 COMBINED = 5
 OPEN, TOO_SMALL, BOUND, EMPTY = range(4)
+Tell: TypeAlias = Callable[[int, int], None]
 OUTCOMES = ("open", "too small", "bound", "empty")
 
 
@@ -125,7 +126,7 @@ def _read(path: Path) -> tuple[Leaves, int]:
 
 
 def explored(
-    question: Question, target: float, asked: ProveSettings, folder: Path, cores: Cores, tell: Callable[[int], None]
+    question: Question, target: float, asked: ProveSettings, folder: Path, cores: Cores, tell: Tell
 ) -> tuple[Leaves, int, bool]:
     """Halve boxes until all is proven or as many as asked were judged.
 
@@ -136,7 +137,8 @@ def explored(
     asked : how many boxes to judge, and how small they may become
     folder : where finished units are kept; the same question must find the same folder
     cores : where units run, and what stops them
-    tell : called with the number of boxes judged so far
+    tell : called with the boxes judged so far and those expected in all: a round ends early where units prove all of
+        their boxes
 
     Returns
     -------
@@ -154,7 +156,10 @@ def explored(
         most = max(int(asked.boxes * share) // UNITS, 1)
         unit = Unit(question, target, _split(todo, question), most, asked.smallest, folder, number)
         for _ in _run(unit, cores):
-            tell(judged + sum(_read(p)[1] for p in _finished(unit)))
+            known = [_read(path) for path in _finished(unit)]
+            here = sum(count for _, count in known)
+            further = int(asked.boxes * sum(SHARES[number + 1 :])) if any(x.open.any() for x, _ in known) else 0
+            tell(judged + here, judged + here * UNITS // len(known) + further)
         if cores.stop:
             return joined([*done, todo]), judged, True
         results = [_read(path) for path in _finished(unit)]

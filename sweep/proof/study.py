@@ -6,7 +6,6 @@ import hashlib
 import json
 import shutil
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,7 @@ from sweep.dataset import store
 from sweep.errors import InputError
 from sweep.proof.certificate import PROOF, Proof, concluded, read_proof, write
 from sweep.proof.question import Question, described, question_of
-from sweep.proof.rounds import SHARES, UNITS, Cores, explored
+from sweep.proof.rounds import SHARES, UNITS, Cores, Tell, explored
 
 if TYPE_CHECKING:
     from sweep.study import ProveSettings, Study
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 NEVER = 1e300  # the target where no feasible design is known: then only emptiness can be proven
 
 
-def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Callable[[int], None] = lambda _: None) -> Proof:
+def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lambda _, __: None) -> Proof:
     """Prove that no design of the study's space is better than its optimum by more than the gap it asks for.
 
     Parameters
@@ -34,7 +33,7 @@ def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Callable[[
     study : with ``optimise.prove``
     folder : its dataset, with the optimum beside it
     cores : where the boxes are judged; the certificate does not depend on it.  A stopped proof goes on in the next run
-    tell : called with the number of boxes judged so far
+    tell : called with the boxes judged so far and those expected in all
 
     Returns
     -------

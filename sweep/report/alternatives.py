@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from kernels import status as codes
 from sweep.report.dataset import Dataset, Row
+from sweep.report.groups import Group
 from sweep.report.quantities import quantity
 
 MOST = 5  # other optima, and as many designs of the front
@@ -24,27 +26,20 @@ class Shown:
     row: Row
 
 
-def shown_designs(data: Dataset) -> list[Shown]:
-    """Designs in the order in which they are offered; empty where no design was found."""
+def shown_designs(data: Dataset, different: Sequence[Group]) -> list[Shown]:
+    """Designs in the order in which they are offered; empty where no design was found.
+
+    ``different`` are the optima of :func:`sweep.report.groups.groups`, the study's answer first.
+    """
     if data.result is None:
         return []
     found = [Shown(data.result_name, "result", _objective(data, data.result), data.result)]
-    others = enumerate(_other_basins(data), 1)
-    found += [Shown(f"another optimum, {k}", "alternative", _objective(data, row), row) for k, row in others]
+    others = [one for one in different if one.row["role"] != "optimum"][:MOST]
+    found += [Shown(one.title(k), "alternative", _objective(data, one.row), one.row) for k, one in enumerate(others, 1)]
     found += _of_front(data)
     if data.reference is not None:
         found.append(Shown("reference", "reference", _objective(data, data.reference), data.reference))
     return found
-
-
-def _other_basins(data: Dataset) -> list[Row]:
-    """Where other starts of the optimiser ended within all limits, one row for each basin, the best first."""
-    objective = data.study.objective
-    if data.optima is None or data.optimum is None or objective is None or "basin" not in data.optima:
-        return []
-    ends = data.optima[(data.optima["role"] == "start") & (data.optima["status"] == codes.OK)]
-    ends = ends[ends["basin"] != data.optimum["basin"]].sort_values(objective.output, key=np.abs)
-    return [_row(row) for row in ends.drop_duplicates("basin").head(MOST).to_dict("records")]
 
 
 def _of_front(data: Dataset) -> list[Shown]:

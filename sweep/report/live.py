@@ -13,15 +13,16 @@ from sweep.report.parallel import parallel
 
 if TYPE_CHECKING:
     from sweep.report.dataset import Dataset
+    from sweep.report.groups import Group
     from sweep.report.scan import Cells
 
 LIVE = TEMPLATES / "live"
 SPATIAL, PLANE = ("three.min.js", "view.js"), ("charts.js", "lines.js", "page.js")
 
 
-def live(data: Dataset, cells: Sequence[Cells]) -> dict[str, Any]:
+def live(data: Dataset, cells: Sequence[Cells], different: Sequence[Group]) -> dict[str, Any]:
     """Variables of the template: the data of both moving sections as JSON, empty where there is nothing to show."""
-    shown = shown_designs(data)
+    shown = shown_designs(data, different)
     motion = moving(data, shown)
     lines = parallel(data, cells, shown)
     spatial = motion is not None and motion["size"] > 0.0

@@ -10,14 +10,16 @@ import numpy as np
 from sweep.chunks.cascade import compared, meets
 from sweep.evaluation.summaries import design_outputs
 from sweep.optimise.tolerance import deviating, touched
+from sweep.reductions import catalogue
 from sweep.report.dataset import Dataset
 from sweep.report.quantities import Quantity, number, quantity
+from sweep.study import Limit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sweep.families.base import Array
-    from sweep.study import Limit, Study
+    from sweep.study import Study
 
 SAMPLES = 8192  # as the optimiser's yield: the same mechanisms, the same share
 SINGLE = 1024  # for what each dimension costs
@@ -99,33 +101,17 @@ def made_sentence(found: Made | None, tolerance: str) -> str:
     return f"{missed}: were it exact, {most.gain_words} more would." if most.gain >= TELLING else f"{missed}."
 
 
-def histogram_svg(found: Histogram, width: float = 620.0, height: float = 150.0) -> str:
-    """The histogram as SVG: what misses the limit is drawn in another colour."""
-    low, high = float(found.edges[0]), float(found.edges[-1])
-    span, top = high - low or 1.0, float(found.shares.max()) or 1.0
-
-    def x(value: float) -> float:
-        return width * (value - low) / span
-
-    bars = []
-    for left, right, share in zip(found.edges[:-1], found.edges[1:], found.shares, strict=True):
-        middle = 0.5 * (left + right)
-        good = (found.low is None or middle >= found.low) and (found.high is None or middle <= found.high)
-        tall = height * float(share) / top
-        bars.append(
-            f'<rect class="{"good" if good else "bad"}" x="{x(left):.1f}" y="{height - tall:.1f}" '
-            f'width="{max(x(right) - x(left) - 1.0, 0.5):.1f}" height="{tall:.1f}"/>'
-        )
-    lines = [
-        f'<line x1="{x(bound):.1f}" x2="{x(bound):.1f}" y1="0" y2="{height:g}"/>'
-        for bound in (found.low, found.high)
-        if bound is not None and low <= bound <= high
-    ]
-    first, last = (found.shown.show(end / found.shown.factor, 4) for end in (low, high))
-    ends = f'<text x="0" y="{height + 16:g}">{first}</text>'
-    ends += f'<text x="{width:g}" y="{height + 16:g}" text-anchor="end">{last}</text>'
-    box = f'viewBox="0 0 {width:g} {height + 22:g}" role="img"'
-    return f'<svg class="histogram" {box}>{"".join([*bars, *lines])}{ends}</svg>'
+def histogram(data: Dataset, output: str) -> Histogram | None:
+    """One output of the optimum over what is made; None without tolerances or an optimum."""
+    study, row = data.study, data.optimum
+    if study.tolerance is None or study.optimise is None or row is None:
+        return None
+    catalogue.output(study.family, output)  # refuses a name that is none
+    design = np.array([float(row[name]) for name in study.family.parameter_names])
+    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, SAMPLES)
+    values = design_outputs(study.family, designs, [output], study.accuracy, study.window)[output]
+    limit = next((x for x in study.output_limits if x.output == output), Limit(output, None, None))
+    return _histogram(data, limit, compared(output, np.asarray(values, np.float64)))
 
 
 def _kept(
@@ -160,7 +146,7 @@ def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
 
 
 def _histogram(data: Dataset, limit: Limit, values: Array) -> Histogram:
-    shown = quantity(limit.output, data.units.get(limit.output, ""))
+    shown = quantity(limit.output, catalogue.output(data.study.family, limit.output).unit)
     known = values[np.isfinite(values)] * shown.factor
     bounds = [None if x is None else x * shown.factor for x in (limit.minimum, limit.maximum)]
     ends = [*(np.percentile(known, (0.1, 99.9)) if known.size else (0.0, 1.0)), *(x for x in bounds if x is not None)]

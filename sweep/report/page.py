@@ -14,15 +14,17 @@ from sweep.jobs.progress import Say, unsaid
 from sweep.report import answer, front, limits, pictures, robust, tables
 from sweep.report.curves import motion_caption
 from sweep.report.dataset import Dataset, read_dataset
-from sweep.report.drawing import mechanism_caption
 from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
 from sweep.report.files import copy_tables, write_survivors
+from sweep.report.groups import groups
 from sweep.report.live import live
+from sweep.report.mechanisms import mechanism_caption
 from sweep.report.scan import Cells, Scan, most_telling, scan
 from sweep.report.sections import buildable
 from sweep.report.turns import curves, reference_row
 
 if TYPE_CHECKING:
+    from sweep.evaluation.joints import Part
     from sweep.study import Study
 
 CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
@@ -34,20 +36,31 @@ def write(folder: Path, out: Path, say: Say = unsaid) -> Path:
     """Write everything the report consists of into ``out`` and return the path of ``report.html``."""
     say("report", 0, STEPS, "steps")
     data, found, cells = gather(folder)
+    several, parts = groups(data), pictures.drawn_parts(data)
     try:
         out.mkdir(parents=True, exist_ok=True)
         with house_style():
             say("report", 1, STEPS, "steps")
-            figures = draw(data, found, cells, out / "figures")
+            figures = draw(data, found, cells, parts, out / "figures")
             say("report", 2, STEPS, "steps")
-            more = buildable(data, out / "figures")
+            more = buildable(data, several, out / "figures")
         say("report", 3, STEPS, "steps")
         copy_tables(folder, out)
         write_survivors(data.parts, out / "survivors.parquet")
         target = out / "report.html"
         partial = out / "_tmp-report.html"
         own = own_figures(data.study, out / "figures")
-        partial.write_text(render(data, found, cells, figures, own, more), encoding="utf-8")
+        partial.write_text(
+            render(
+                data,
+                found,
+                cells,
+                figures,
+                own,
+                more | live(data, cells, several) | {"mechanism": mechanism_caption(parts)},
+            ),
+            encoding="utf-8",
+        )
         partial.replace(target)
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
@@ -91,13 +104,17 @@ def divided_axes(study: Study, feasible: int) -> list[Cells]:
     return [Cells.of_values(axis.name, axis.values, most) for axis in swept if axis.values is not None]
 
 
-def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[str, Saved]:
+def draw(
+    data: Dataset, found: Scan, cells: list[Cells], parts: dict[str, list[Part]], folder: Path
+) -> dict[str, Saved]:
     """Every figure the data allow, saved; keys are the names the template knows."""
     made = {
         "map": pictures.design_map(data, found, cells),
         "trade_off": pictures.trade_off(data, found),
         "motion": pictures.motion(data),
-        "mechanism": pictures.mechanism(data),
+        "mechanism": pictures.mechanism(parts),
+        "tolerance": pictures.tolerance(data),
+        "sensitivity": pictures.sensitivity(data),
     }
     files = {"trade_off": "trade-off"}
     return {
@@ -135,7 +152,7 @@ def render(
     own: list[OwnFigure],
     more: dict[str, Any],
 ) -> str:
-    """The HTML text; ``more`` are the sections about what can be built."""
+    """The HTML text; ``more`` are the sections about what can be built, and what moves."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -166,7 +183,6 @@ def render(
         tolerances=robust.tolerance_rows(data),
         tolerance=robust.tolerance_words(data),
         slopes=robust.slope_rows(data),
-        mechanism="" if data.curves is None else mechanism_caption(data.curves),
         motion=""
         if data.curves is None
         else motion_caption(data.curves, data.study.family.position, answer.rpm(data.study.speed), data.study.window),
@@ -174,6 +190,5 @@ def render(
         axes=len(cells),
         speed=answer.rpm(data.study.speed),
         today=date.today().isoformat(),
-        **live(data, cells),
         **more,
     )

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from sweep.chunks.cascade import compared
-from sweep.evaluation.curves import coordinate
+from sweep.dataset import store
+from sweep.quantities.names import is_flag
 from sweep.report import front
 from sweep.report.curves import motion_figure
 from sweep.report.dataset import Dataset
-from sweep.report.drawing import mechanism_figure
+from sweep.report.made_figures import slopes_figure, spread_figure
 from sweep.report.maps import Overlay, line_figure, map_figure, trade_off_figure
+from sweep.report.mechanisms import POSITIONS, mechanism_figure
 from sweep.report.quantities import Quantity, quantity
+from sweep.report.robust import optimum_rows, slopes, tolerance_words
 from sweep.report.scan import Cells, Scan, most_telling
+from sweep.report.turns import parts_over_turn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from sweep.evaluation.joints import Part
     from sweep.study import Study
 
 
@@ -76,12 +83,42 @@ def motion(data: Dataset) -> Figure | None:
     return motion_figure(data.curves, data.units, study.family.position, study.speed, study.limits, study.window)
 
 
-def mechanism(data: Dataset) -> Figure | None:
-    """The stages in several positions."""
-    if data.curves is None or not len(data.curves):
+def mechanism(parts: Mapping[str, Sequence[Part]]) -> Figure | None:
+    """The designs of :func:`drawn_parts` in several positions, the result above or beside the reference."""
+    return mechanism_figure(parts, "mm", positions=POSITIONS) if parts else None
+
+
+def drawn_parts(data: Dataset) -> dict[str, list[Part]]:
+    """Result and reference with their joints over a turn; empty where the study wants none, or they have none."""
+    if data.study.output.curves == "none":
+        return {}
+    rows = {role: row for role, row in marked(data).items() if row is not None}
+    return parts_over_turn(data.study, rows)
+
+
+def tolerance(data: Dataset) -> Figure | None:
+    """Spread of the optimum's outputs as it is made."""
+    rows = [
+        row
+        for row in optimum_rows(data, store.TOLERANCE)
+        if not math.isnan(row["nominal"]) and row["nominal"] != 0.0 and not is_flag(str(row["output"]))
+    ]
+    if not rows:
         return None
-    joint = next((name for name in data.curves.columns if coordinate(str(name))), "")
-    return mechanism_figure(data.curves, quantity("joint", data.units.get(joint, "mm")).unit)
+    spread = [
+        (
+            quantity(str(row["output"]), data.units.get(str(row["output"]), "")),
+            *(100.0 * (row[key] / row["nominal"] - 1.0) for key in ("low", "mean", "high")),
+        )
+        for row in rows
+    ]
+    return spread_figure(spread, tolerance_words(data))
+
+
+def sensitivity(data: Dataset) -> Figure | None:
+    """By how much each dimension changes the objective."""
+    ranked, objective = slopes(data), shown_objective(data)
+    return slopes_figure(ranked, objective) if ranked and objective is not None else None
 
 
 def marked(data: Dataset) -> dict[str, Any]:

@@ -31,18 +31,13 @@ class ToleranceRow:
 
 @dataclass(frozen=True)
 class SlopeRow:
-    """One dimension: change of the objective in percent where it grows, and where it shrinks, by ``step``.
-
-    ``up`` and ``down`` are the same as lengths of bars, 50 for the largest change of all.
-    """
+    """One dimension: change of the objective in percent where it grows, and where it shrinks, by ``step``."""
 
     name: str
     text: str
     step: str
     growing: str
     shrinking: str
-    up: float
-    down: float
 
 
 def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
@@ -87,16 +82,10 @@ class Slope:
 def slope_rows(data: Dataset) -> list[SlopeRow]:
     """Dimensions by how much they change the objective, the most telling first."""
     texts = {p.name: p.text for p in data.study.family.parameters}
-    ranked = slopes(data)
-    most = max((abs(x) for s in ranked for x in (s.growing, s.shrinking)), default=0.0)
-    scale = 50.0 / most if most > 0.0 else 0.0
     return [
-        SlopeRow(
-            s.name, texts.get(s.name, ""), s.step, _percent(s.growing), _percent(s.shrinking),
-            scale * s.growing, scale * s.shrinking,
-        )
-        for s in ranked
-    ]  # fmt: skip
+        SlopeRow(s.name, texts.get(s.name, ""), s.step, _percent(s.growing), _percent(s.shrinking))
+        for s in slopes(data)
+    ]
 
 
 def slopes(data: Dataset) -> list[Slope]:

@@ -7,16 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweep.errors import InputError
 from sweep.evaluation.curves import joint_curves, motion_curves
+from sweep.exchange.scene import over
 from sweep.families.base import Angles
 from sweep.families.domain import Interval
+from sweep.report.mechanisms import exists
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from sweep.evaluation.joints import Part
     from sweep.study import Study
 
 POSES = 720
+JOINT_POSES = 180  # of paths in a drawing
 
 
 def reference_row(study: Study) -> dict[str, float] | None:
@@ -30,6 +35,20 @@ def reference_row(study: Study) -> dict[str, float] | None:
     outputs = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)
     parameters = dict(zip(study.family.parameter_names, matrix[0].tolist(), strict=True))
     return parameters | {name: float(values[0]) for name, values in outputs.items()}
+
+
+def parts_over_turn(study: Study, rows: Mapping[str, Mapping[str, Any]]) -> dict[str, list[Part]]:
+    """Joints and links over one closed turn, for every role whose design has a pose."""
+    found = {}
+    for role, row in rows.items():
+        design = {name: float(row[name]) for name in study.family.parameter_names}
+        try:
+            parts = over(study.family, design, 0.0, JOINT_POSES)
+        except InputError:  # a mechanism without joints has curves only
+            return {}
+        if exists(parts):
+            found[role] = parts
+    return found
 
 
 def curves(study: Study, rows: Mapping[str, Mapping[str, Any] | None]) -> pd.DataFrame:

@@ -9,7 +9,7 @@ import numpy as np
 from kernels import status as st
 from kernels.families import five_link, rssr
 from sweep.evaluation.summaries import design_outputs
-from sweep.evaluation.tables import design_matrix
+from sweep.evaluation.tables import design_matrix, parameter_units
 from sweep.families import family
 from sweep.families.base import Accuracy
 
@@ -60,4 +60,5 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
     status[there] = turning["status"]
     frame = pd.DataFrame(matrix, columns=list(family("five_link").parameter_names))
     frame["status"] = status
+    frame.attrs["units"] = parameter_units(family("five_link").parameters)
     return frame

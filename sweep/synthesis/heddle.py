@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
 Mode = Literal["exact", "printed"]
+ANGLES = {"mu", "xi_1", "xi_2", "lever_angle_1", "lever_angle_2", "lever_swing"}
 
 _SIDE = Parameter("side_B", "sign", "side of B: +1 left of the ray O2-C", default=1.0, choices=(-1.0, 1.0))
 _FRAME = (
@@ -112,8 +114,6 @@ def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
     InputError
         for a missing or misspelt column, a bad number, an unknown mode, O1O3 not longer than O1O2.
     """
-    import pandas as pd
-
     with_rod = "BC" in table or "O2B" in table
     matrix = (_LEVER if with_rod else _EXTREMES).read(table)
     found, status = _positions(matrix, mode)
@@ -126,7 +126,7 @@ def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
         kernels.heddle_lever_angles(_closure(matrix, found, matrix[:, 6:9]), angles, closed)
         columns |= dict(zip(("lever_angle_1", "lever_angle_2", "lever_swing"), angles.T, strict=True))
         status = np.where(status == st.OK, closed, status)
-    return pd.DataFrame(columns | {"status": status}, index=_index(table, len(matrix)))
+    return _frame(columns | {"status": status}, _index(table, len(matrix)))
 
 
 def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
@@ -148,8 +148,6 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
     InputError
         as :func:`extremes`, and for a swing of pi or more.
     """
-    import pandas as pd
-
     matrix = _RODS.read(table)
     _refuse(matrix[:, 7] >= np.pi, matrix[:, 7], "swing", "an angle below pi")
     found, status = _positions(matrix, mode)
@@ -167,7 +165,7 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
     angles[np.isnan(rod)] = np.nan
     columns = {"rod": number + 1, "BC": rod}
     columns |= dict(zip(("lever_angle_1", "lever_angle_2", "lever_swing"), angles.T, strict=True))
-    return pd.DataFrame(columns | {"status": code[which]}, index=_index(table, len(matrix))[which])
+    return _frame(columns | {"status": code[which]}, _index(table, len(matrix))[which])
 
 
 def shed(table: Table) -> pd.DataFrame:
@@ -188,11 +186,9 @@ def shed(table: Table) -> pd.DataFrame:
     InputError
         for a missing or misspelt column, a bad number.
     """
-    import pandas as pd
-
     number, d1, t, stroke, reference = _SHED.read(table).T
     strokes = stroke * (d1 + (number - 1.0) * t) / (d1 + (reference - 1.0) * t)
-    return pd.DataFrame({"stroke": strokes}, index=_index(table, len(strokes)))
+    return _frame({"stroke": strokes}, _index(table, len(strokes)))
 
 
 def arms(table: Table) -> pd.DataFrame:
@@ -213,15 +209,23 @@ def arms(table: Table) -> pd.DataFrame:
     InputError
         for a missing or misspelt column, a bad number, mu_3 of a right angle or more.
     """
-    import pandas as pd
-
     matrix = _ARMS.read(table)
     _refuse(matrix[:, 4] >= 0.5 * np.pi, matrix[:, 4], "mu_3", "an angle below pi/2")
     found, status = np.empty((len(matrix), 4)), np.empty(len(matrix), np.uint8)
     kernels.heddle_shaft_arms(matrix, found, status)
     columns = dict(zip(("O3D", "DF", "y_high", "y_low"), found.T, strict=True))
     columns |= {"asymmetry": found[:, 2] + found[:, 3]}
-    return pd.DataFrame(columns | {"status": status}, index=_index(table, len(matrix)))
+    return _frame(columns | {"status": status}, _index(table, len(matrix)))
+
+
+def _frame(columns: Mapping[str, np.ndarray], index: pd.Index) -> pd.DataFrame:
+    """The columns with their units: angles by their names, all others but number and status are lengths."""
+    import pandas as pd
+
+    found = pd.DataFrame(columns, index=index)
+    kinds = {name: "rad" if name in ANGLES else "length" for name in columns if name != "status"}
+    found.attrs["units"] = kinds | ({"rod": "1"} if "rod" in columns else {})
+    return found
 
 
 def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:

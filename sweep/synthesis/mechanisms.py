@@ -12,6 +12,7 @@ from kernels.synthesis import acceptance
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import parameter_units
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array
 from sweep.synthesis.locus import TWO_PI, Found, Locus, locus
@@ -92,7 +93,19 @@ def synthesise(
         columns["root"] = matrix[:, -1]
     columns |= _limits(way, found, amplitude)
     columns |= _verdict(family, found, max_pressure_angle)
-    return pd.DataFrame(columns, index=index)
+    solutions = pd.DataFrame(columns, index=index)
+    solutions.attrs["units"] = _units(way)
+    return solutions
+
+
+def _units(way: Locus) -> dict[str, str]:
+    """Units of the columns that have one, by the letter of the output: an angle psi, a displacement s."""
+    mechanism, amplitude = find_family(way.family), way.parameter_names[0]
+    letter, unit = mechanism.position, mechanism.pose_output[mechanism.position].unit
+    angles = dict.fromkeys(("phi_ext", "phi_fold", "phi0", "max_pressure_angle"), "rad")
+    own = dict.fromkeys((f"{letter}_ext", f"{letter}_fold", amplitude), unit)
+    root = {"root": "1"} if way.has_roots else {}
+    return parameter_units(mechanism.parameters) | root | own | angles | {"margin": "1"}
 
 
 def _limits(way: Locus, found: Found, amplitude: Array) -> dict[str, object]:

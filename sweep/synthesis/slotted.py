@@ -11,7 +11,7 @@ from kernels import status as st
 from kernels.families.slotted import crank_of_phi0
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
-from sweep.evaluation.tables import design_matrix
+from sweep.evaluation.tables import design_matrix, parameter_units
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Parameter
 
@@ -84,4 +84,6 @@ def central_slots(table: Table) -> pd.DataFrame:
         values[alive] = turn[name]
         frame[name] = values
     frame["status"] = status
+    limits = dict.fromkeys(_LIMITS, "rad") | {"margin": "1"}
+    frame.attrs["units"] = parameter_units(slotted.parameters) | limits
     return frame

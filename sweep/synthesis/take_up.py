@@ -15,7 +15,7 @@ import numpy as np
 
 from kernels.families import eyelet
 from sweep.errors import InputError
-from sweep.evaluation.tables import design_matrix, numbers
+from sweep.evaluation.tables import design_matrix, numbers, parameter_units
 from sweep.families import family
 from sweep.families.base import Array
 
@@ -96,6 +96,7 @@ def fit_eyelet(
     problem = _Problem(np.cos(angles)[None], np.sin(angles)[None], wanted, share / share.sum(), sought)
     rows = [problem.solved(start) for start in matrix]
     frame = pd.DataFrame(rows).sort_values("rms", kind="stable", ignore_index=True)
+    frame.attrs["units"] = parameter_units(family("eyelet").parameters) | {"rms": "length", "largest": "length"}
     return TakeUpFit(frame)
 
 

@@ -201,14 +201,14 @@ The same outputs with `accuracy = 1e-8`: true extrema instead of a grid.
 
 ## Memory
 
-Memory is that of the chunks at work, not of the sweep. A chunk takes two seconds of computing, 64 MB before it is
+Memory is that of the chunks at work, not of the sweep. A chunk takes two seconds of computing, 32 MB before it is
 encoded, or a sixteenth of all designs, whichever is least. So memory grows with a small sweep, and no more from about
 10^7 designs on: the cut of 10^8 or 10^12 of these designs has the chunks of 10^7. Each further job adds a chunk.
 
 ## Reading 10^{power} rows
 
-In batches of 131072 rows, one file after the other (`sweep.dataset.reading`): pandas sees no more than one batch and
-the rows that are kept.
+In batches of 131072 rows, one file after the other (`sweep.dataset.reading`): first the columns that decide, of all
+rows within the limits, then all columns of the rows that are kept. pandas never sees more than one batch.
 
 {read}
 """

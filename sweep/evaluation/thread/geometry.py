@@ -101,7 +101,7 @@ def wrap(table: Table) -> pd.DataFrame:
     guide_line(guides, place, off, along, half)
     status[np.isnan(off) & (status[:, 0] == OK)] = SINGULAR
     columns = {"L": total, "wrap": angle, "x": off, "y": along, "half_distance_c": half}
-    return frame(table, columns | {"status": status})
+    return frame(table, columns | {"status": status}, {"length": "L x y half_distance_c", "rad": "wrap"})
 
 
 def feed(table: Table) -> pd.DataFrame:
@@ -133,7 +133,8 @@ def feed(table: Table) -> pd.DataFrame:
     status, out = np.zeros((n, 1), np.uint8), [np.empty((n, 1)) for _ in range(4)]
     thread_over_point(guides, place, first, second, status, *out)
     names = ("L", "dL_dphi", "d2L_dphi2", "wrap")
-    return frame(table, dict(zip(names, out, strict=True)) | {"status": status})
+    units = {"length": "L dL_dphi d2L_dphi2", "rad": "wrap"}
+    return frame(table, dict(zip(names, out, strict=True)) | {"status": status}, units)
 
 
 def eyelet(table: Table) -> pd.DataFrame:
@@ -170,7 +171,9 @@ def eyelet(table: Table) -> pd.DataFrame:
     difference, weight = np.empty((n, 1)), np.empty((n, 1))
     eyelet_kernels.weighted_difference(designs, cos, sin, given["P"][:, None], difference, weight, judged)
     columns |= {"length_error": (given["P_h"] + given["P"])[:, None] - columns["L"], "dq": difference, "weight": weight}
-    return frame(table, columns | {"status": np.where(status == OK, judged, status)})
+    lengths = "dL_dphi d2L_dphi2 L X_E Y_E Z_E length_error weight"
+    units = {"length": lengths, "rad": "wrap", "length^2": "dq"}
+    return frame(table, columns | {"status": np.where(status == OK, judged, status)}, units)
 
 
 def follower(table: Table) -> pd.DataFrame:
@@ -200,7 +203,8 @@ def follower(table: Table) -> pd.DataFrame:
     guided_cam_kernels.follower(data, status, *out[:3])
     guided_cam_kernels.jam_angles(side_by_side(given, ("mu1", "mu2")), out[3], out[4])
     names = ("S", "dS", "d2S", "theta_jam", "tan_half_theta_jam")
-    return frame(table, dict(zip(names, out, strict=True)) | {"status": status})
+    units = {"length": "S dS d2S", "rad": "theta_jam", "1": "tan_half_theta_jam"}
+    return frame(table, dict(zip(names, out, strict=True)) | {"status": status}, units)
 
 
 def free_cam(table: Table) -> pd.DataFrame:
@@ -240,4 +244,5 @@ def free_cam(table: Table) -> pd.DataFrame:
     friction = side_by_side(given, ("tension_ratio", "mu_thread", "mu"))
     limits: dict[str, Array] = {name: np.empty((n, 1)) for name in ("y_limit_plus", "y_limit_minus")}
     free_cam_kernels.limit_points(designs, friction, cos, sin, judged, *limits.values())
-    return frame(table, columns | limits | {"status": np.where(status == OK, judged, status)})
+    units = {"length": "L y_contact X Y y_limit_plus y_limit_minus", "rad": "wrap", "1": "contact n_minima"}
+    return frame(table, columns | limits | {"status": np.where(status == OK, judged, status)}, units)

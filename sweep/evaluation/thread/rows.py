@@ -45,12 +45,19 @@ def side_by_side(columns: Mapping[str, Array], names: tuple[str, ...]) -> Array:
     return np.ascontiguousarray(np.column_stack([columns[name] for name in names]))
 
 
-def frame(table: Table, columns: Mapping[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]) -> pd.DataFrame:
-    """A DataFrame of columns (n,) or (n, 1) with the index of the table it answers."""
+def frame(
+    table: Table, columns: Mapping[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]], units: Mapping[str, str]
+) -> pd.DataFrame:
+    """A DataFrame of columns (n,) or (n, 1) with the index of the table it answers.
+
+    A key of ``units`` is a unit, its value the columns that have it, separated by blanks.
+    """
     import pandas as pd
 
     index = table.index if isinstance(table, pd.DataFrame) else None
-    return pd.DataFrame({name: np.asarray(x).reshape(len(x)) for name, x in columns.items()}, index=index)
+    found = pd.DataFrame({name: np.asarray(x).reshape(len(x)) for name, x in columns.items()}, index=index)
+    found.attrs["units"] = {name: unit for unit, names in units.items() for name in names.split()}
+    return found
 
 
 def warn_outside(values: Array, measured: Range, constants: tuple[Parameter, ...], table: Table) -> None:

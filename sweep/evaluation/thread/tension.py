@@ -88,7 +88,8 @@ def contour(table: Table) -> pd.DataFrame:
     data = side_by_side(given, COLUMNS)
     thread_contour(given["T1"][:, None], given["theta_deg"][:, None], data, status, *out)
     names = ("T2", "capstan", "bending", "adhesion", "r_thread")
-    return frame(table, dict(zip(names, out, strict=True)) | {"status": status})
+    units = {"gf": "T2 capstan bending adhesion", "mm": "r_thread"}
+    return frame(table, dict(zip(names, out, strict=True)) | {"status": status}, units)
 
 
 def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> pd.DataFrame:
@@ -124,8 +125,6 @@ def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> 
         T1      T2     T3  status
     0  5.0  15.667  27.37       0
     """
-    import pandas as pd
-
     given = columns_of(_CONTOURS if theta_deg is not None else _CONTOURS_WITH_ANGLES, contours)
     warn_outside(given["R"], MEASURED_RADIUS, FITTED, contours)
     count = len(given["R"])
@@ -146,7 +145,7 @@ def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> 
         thread_contour(tension, angle, data[k : k + 1], status, behind, None, None, None, None)
         tension = behind
         columns[f"T{k + 2}"] = behind[0]
-    return pd.DataFrame(columns | {"status": status[0]})
+    return frame({}, columns | {"status": status[0]}, {"gf": " ".join(columns)})
 
 
 def least_tension_radius(table: Table) -> pd.DataFrame:
@@ -178,7 +177,7 @@ def least_tension_radius(table: Table) -> pd.DataFrame:
     thread, status = np.empty((n, 1)), np.zeros((n, 1), np.uint8)
     thread_contour(zero, zero, data, status, None, None, None, None, thread)
     status[np.isnan(radius) & (status[:, 0] == 0)] = SINGULAR
-    return frame(table, {"R_least": radius, "r_thread": thread, "status": status})
+    return frame(table, {"R_least": radius, "r_thread": thread, "status": status}, {"mm": "R_least r_thread"})
 
 
 def speed(table: Table) -> pd.DataFrame:
@@ -215,7 +214,7 @@ def speed(table: Table) -> pd.DataFrame:
     n = len(given["v"])
     status, ratio = np.zeros((n, 1), np.uint8), np.empty((n, 1))
     thread_speed(given["v"][:, None], side_by_side(given, SPEED_COLUMNS), status, ratio)
-    return frame(table, {"ratio_to_ref": ratio, "status": status})
+    return frame(table, {"ratio_to_ref": ratio, "status": status}, {"1": "ratio_to_ref"})
 
 
 def capstan(table: Table) -> pd.DataFrame:
@@ -241,4 +240,4 @@ def capstan(table: Table) -> pd.DataFrame:
     n = len(given["T1"])
     status, out = np.zeros((n, 1), np.uint8), [np.empty((n, 1)) for _ in range(2)]
     capstan_kernel(given["T1"][:, None], given["wrap"][:, None], given["mu"], status, *out)
-    return frame(table, {"T2": out[0], "force": out[1], "status": status})
+    return frame(table, {"T2": out[0], "force": out[1], "status": status}, {"force": "T2 force"})

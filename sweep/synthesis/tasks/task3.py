@@ -178,16 +178,16 @@ def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
 
     matrix, _ = design_matrix(RSSR, design)
     names = ("psi_ext", "phi_ext", "psi_fold", "phi_fold")
-    found = design_outputs(RSSR, matrix, names, _EXACT)
-    if found["status"][0] != 0:
+    limits = design_outputs(RSSR, matrix, names, _EXACT)
+    if limits["status"][0] != 0:
         raise InputError("design", dict(design), "a crank-rocker that turns fully and oscillates", "adjustments")
     rates = np.empty((1, len(PARAMETERS), 4))
-    arguments = [matrix, *(np.asarray(found[name], np.float64) for name in names), rates]
+    arguments = [matrix, *(np.asarray(limits[name], np.float64) for name in names), rates]
     kernels.limit_sensitivities(*arguments)
     psi_ext, phi_ext, psi_fold, phi_fold = rates[0].T
     swing, phi0 = psi_fold - psi_ext, phi_fold - phi_ext
     units = np.where(np.array(PARAMETERS) == "alpha", 1.0, matrix[0, 2])  # lengths by the rocker
-    return pd.DataFrame(
+    found = pd.DataFrame(
         {
             "dswing": swing,
             "dphi0": phi0,
@@ -197,6 +197,8 @@ def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
         },
         index=pd.Index(PARAMETERS, name="dimension"),
     )
+    found.attrs["units"] = dict.fromkeys(("dswing", "dphi0", "dpsi_ext", "dpsi_fold"), "rad per unit of the dimension")
+    return found
 
 
 def _adjusts(swing: float, phi0: float) -> str:

@@ -39,8 +39,8 @@ def is_spatial(parts: Sequence[Part]) -> bool:
     return lean or float(np.nanmax(np.abs(points[:, 2]))) > 1e-9 * float(np.nanmax(np.abs(points)))
 
 
-def draw_frame(axes: Axes, parts: Sequence[Part], seen: Array, *, labels: bool = True) -> None:
-    """Draw parts in their first pose with paths, joints, axes and the coordinate arrows of their common frame."""
+def draw_frame(axes: Axes, parts: Sequence[Part], seen: Array, *, pose: int = 0, labels: bool = True) -> None:
+    """Draw parts in one pose with paths, joints, axes and the coordinate arrows of their common frame."""
     size = _size(parts)
     for letter, tip in zip("xyz", 0.3 * size * np.eye(3), strict=True):
         end = seen @ tip
@@ -52,25 +52,29 @@ def draw_frame(axes: Axes, parts: Sequence[Part], seen: Array, *, labels: bool =
     for part in parts:
         for name, axis in part.axes.items():
             _axis(axes, part.joints[name][0], axis, part.kinds[name], seen, 0.22 * size)
-        draw_links(axes, part, seen, 0)
+        draw_links(axes, part, seen, pose)
         for name, path in part.joints.items():
-            _joint(axes, path, seen, fixed=name in part.kinds)
+            _joint(axes, path, seen, pose, fixed=name in part.kinds)
             if labels:
-                at = seen @ path[0]
+                at = seen @ path[pose]
                 axes.annotate(name.upper() if len(name) < 3 else name, at, (6, 5), textcoords="offset points", zorder=8)
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(False)
 
 
-def draw_links(axes: Axes, part: Part, seen: Array, pose: int, *, alpha: float = 1.0, named: bool = True) -> None:
-    """The links of a part in one pose; a link of more than two joints as the polygon that it is."""
+def draw_links(axes: Axes, part: Part, seen: Array, pose: int, *, faint: bool = False) -> None:
+    """The links of a part in one pose; a link of more than two joints as the polygon that it is.
+
+    ``faint`` is for the further positions of a picture that has one in full.
+    """
+    width, alpha, layer = (0.9, 0.35, 3) if faint else (2.2, 1.0, 4)
     for k, link in enumerate(part.links):
         corners = np.array([part.joints[name][pose] for name in link.joints]) @ seen.T
         if len(corners) < 2 or not np.isfinite(corners).all():
             continue
         closed = np.vstack([corners, corners[:1]]) if len(corners) > 2 else corners
-        label = link.name if named else None
-        axes.plot(*closed.T, color=COLOURS[k % len(COLOURS)], linewidth=2.2, alpha=alpha, zorder=4, label=label)
+        label = None if faint else link.name
+        axes.plot(*closed.T, color=COLOURS[k % len(COLOURS)], linewidth=width, alpha=alpha, zorder=layer, label=label)
 
 
 def _size(parts: Sequence[Part]) -> float:
@@ -78,12 +82,12 @@ def _size(parts: Sequence[Part]) -> float:
     return float(np.nanmax(np.ptp(points[np.isfinite(points).all(axis=1)], axis=0)))
 
 
-def _joint(axes: Axes, path: Array, seen: Array, *, fixed: bool) -> None:
+def _joint(axes: Axes, path: Array, seen: Array, pose: int, *, fixed: bool) -> None:
     flat = path @ seen.T
     if not fixed:
         axes.plot(*np.vstack([flat, flat[:1]]).T, color=QUIET, linewidth=0.7, zorder=2)
     axes.scatter(
-        flat[0, 0], flat[0, 1], marker="^" if fixed else "o", s=52 if fixed else 24, zorder=6, linewidths=1.2,
+        flat[pose, 0], flat[pose, 1], marker="^" if fixed else "o", s=52 if fixed else 24, zorder=6, linewidths=1.2,
         facecolors=FRAME if fixed else "white", edgecolors=FRAME,
     )  # fmt: skip
 
