@@ -56,7 +56,7 @@ OWN_LEVELS = 2
 
 
 def _digests() -> dict[str, str]:
-    """Return the hash of every kernel source, by its path in the package."""
+    """Hash of every kernel source, by its path in the package."""
     return {
         path.relative_to(SOURCES).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(SOURCES.rglob("*.py"))
@@ -67,14 +67,12 @@ HASHED = _digests()
 
 
 def source_hash() -> str:
-    """Return the hash of every kernel source as it was when this process began to import them,
-    and of the numba version.
-    """
+    """Hash of every kernel source as it was when this process began to import them, and of the numba version."""
     return hashlib.sha256(f"{numba.__version__} {sorted(HASHED.items())}".encode()).hexdigest()[:16]
 
 
 def cache_root() -> Path:
-    """Return the folder that holds the compiled kernels of every version (what ``sweep cache clear`` removes).
+    """Folder that holds the compiled kernels of every version (what ``sweep cache clear`` removes).
 
     It is the user's cache folder.  Where somebody else could have put something there, it is a private folder under the
     system's one for temporary files, and that is said in a line on the standard error.
@@ -91,7 +89,7 @@ def cache_root() -> Path:
 
 
 def distrust(folder: Path) -> str | None:
-    """Say why what lies in a folder could be somebody else's; None if only this user can have put it there.
+    """Why what lies in a folder could be somebody else's, in words; None if only this user can have put it there.
 
     The folder and its parent must be this user's and nobody else may write to them; a folder further up may be the
     system's, and others may write to it if they cannot rename there what is not theirs.
@@ -136,7 +134,7 @@ class _Imported:
         self.unchanged = True
 
     def as_hashed(self) -> bool:
-        """Return whether every module imported so far is the one that was hashed."""
+        """Whether every module imported so far is the one that was hashed."""
         prefix = f"{PACKAGE}."
         for name in [name for name in sys.modules if name.startswith(prefix) and name not in self.known]:
             self.known.add(name)
@@ -170,7 +168,7 @@ class _Place(UserProvidedCacheLocator):
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> _Place | None:
-        """Return the folder, made if need be; None where it cannot be written."""
+        """The folder, made if need be; None where it cannot be written."""
         place = cls(function, file)
         try:
             _made(CACHE_DIR)
@@ -180,7 +178,7 @@ class _Place(UserProvidedCacheLocator):
         return place
 
     def get_source_stamp(self) -> str:
-        """Return nothing: the folder's name is made of the sources' hash already, so numba need not compare them."""
+        """Nothing: the folder's name is made of the sources' hash already, so numba need not compare them."""
         return CACHE_DIR.name
 
 
@@ -229,7 +227,7 @@ class _Checked(IndexDataCacheFile):
 
 
 def _checked(path: Path) -> bytes:
-    """Return what stands behind the hash at the beginning of a file.
+    """What stands behind the hash at the beginning of a file.
 
     Raises
     ------
@@ -254,7 +252,7 @@ class KernelCache(FunctionCache):
         self._cache_file = _Checked(self._cache_path, base, stamp)  # type: ignore[no-untyped-call]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled code of one signature, or None; of files that are damaged nothing is kept."""
+        """The compiled code of one signature, or None; of files that are damaged nothing is kept."""
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except DAMAGED:
@@ -270,8 +268,7 @@ class KernelCache(FunctionCache):
 
 
 def kept(dispatcher: Any) -> Any:
-    """Return a dispatcher that loads its machine code and keeps what it compiles,
-    where that is safe and there is room.
+    """A dispatcher that loads its machine code and keeps what it compiles, where that is safe and there is room.
 
     A function from outside of the package, as a bench or a study may have, is in no hash: every process compiles it.
     """

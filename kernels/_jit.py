@@ -37,7 +37,7 @@ def kernel(function: F) -> F:
 
 
 def kernel_fused(function: F) -> F:
-    """Compile as :func:`kernel` does, for the dense sweep loops: products and sums may be contracted."""
+    """As :func:`kernel`, for the dense sweep loops: products and sums may be contracted."""
     return _compiled(function, fastmath={"contract"})
 
 
@@ -51,7 +51,7 @@ def inline(function: F) -> F:
 
 
 def inline_fused(helper: F) -> F:
-    """Return the same helper again, for :func:`kernel_fused` loops: products and sums may be contracted in it too.
+    """The same helper again, for :func:`kernel_fused` loops: products and sums may be contracted in it too.
 
     The flag belongs to the instructions of the function that was compiled, so a helper made by :func:`inline` keeps
     its products and sums apart wherever it is folded in.

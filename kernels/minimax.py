@@ -32,7 +32,7 @@ PIVOT = 1e-12  # smallest element to exchange on
 
 @inline
 def _row(number: int, g: Array, d: Array, e: Array, bound: Array, need: Array, far: float, row: Array) -> float:
-    """Return coefficients of a row of ``A (x, t, v) >= b``, and b."""
+    """Coefficients of a row of ``A (x, t, v) >= b``, and b."""
     mg, md, me = g.shape[0], d.shape[0], e.shape[0]
     for k in range(SIZE):
         row[k] = 0.0
@@ -64,7 +64,7 @@ def _row(number: int, g: Array, d: Array, e: Array, bound: Array, need: Array, f
 @inline
 def _inverse(basis: NDArray[np.int64], g: Array, d: Array, e: Array, bound: Array, need: Array, far: float,
              a: Array, b: Array, out: Array, row: Array) -> bool:  # fmt: skip
-    """Return the inverse of the basis' rows (Gauss-Jordan with row exchange); false where they depend on each other."""
+    """Inverse of the basis' rows (Gauss-Jordan with row exchange); false where they depend on each other."""
     for i in range(SIZE):
         b[i] = _row(basis[i], g, d, e, bound, need, far, row)
         for k in range(SIZE):
@@ -106,7 +106,7 @@ def _finite(rows: Array) -> bool:
 def _most_violated(
     g: Array, d: Array, e: Array, bound: Array, need: Array, price: float, size: float, z: Array
 ) -> int:  # fmt: skip
-    """Return the number of the row that a point z misses most, -1 where it keeps all of them to rounding."""
+    """Number of the row that a point z misses most, -1 where it keeps all of them to rounding."""
     mg, md = g.shape[0], d.shape[0]
     t, v = z[UNKNOWNS], z[UNKNOWNS + 1]
     entering, worst = -1, ROUNDING * (abs(t) + price * abs(v) + size)

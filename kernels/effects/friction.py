@@ -85,9 +85,7 @@ def _of_moving(f: Friction, load: Loads) -> Friction:
 
 @inline
 def supports(force: Vector, moment: Vector, axis: Vector, z1: float, z2: float) -> tuple[float, float, float]:
-    """Return radial loads of the two supports of a shaft and the axial force,
-    from force and moment about the origin of z.
-    """
+    """Radial loads of the two supports of a shaft and the axial force, from force and moment about the origin of z."""
     axial = dot(force, axis)
     radial = mix(1.0, force, -axial, axis)
     second = scale(1.0 / (z2 - z1), mix(1.0, cross(moment, axis), -z1, radial))
@@ -121,7 +119,7 @@ def friction_loads(
     contraction: Array | None,
     wrench: Array | None = None,
 ) -> None:
-    """Compute joint reactions and driving torque with friction.
+    """Joint reactions and driving torque with friction.
 
     Parameters
     ----------
@@ -263,7 +261,7 @@ def _total(answers: Array, x: float, y: float, z: float, total: Array) -> None:
 
 @inline
 def _guidance(total: Array, axis: Vector, f: Friction) -> tuple[float, float, float]:
-    """Return loads of the two supports of the follower and the force along its axis."""
+    """Loads of the two supports of the follower and the force along its axis."""
     return supports((total[9], total[10], total[11]), (total[15], total[16], total[17]), axis, f.z_d1, f.z_d2)
 
 
@@ -309,7 +307,7 @@ def _leap(along: float, square: float) -> float:
 
 @inline
 def _largest_change(x: float, dx: float, y: float, dy: float, z: float, dz: float) -> float:
-    """Return the largest change of a couple in proportion to that couple."""
+    """Largest change of a couple in proportion to that couple."""
     worst = 0.0
     for old, change in ((x, dx), (y, dy), (z, dz)):
         size = max(abs(old), abs(old + change))

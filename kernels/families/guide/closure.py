@@ -63,7 +63,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
     _, exponent = math.frexp(designs[i, 2].real)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
@@ -106,7 +106,7 @@ def place(r: Reduced, u: Any, v: Any) -> Place:
 
 @inline
 def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
-    """Return the rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (7)."""
+    """Rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (7)."""
     t = 8.0 * EPS
     first = abs(x.real) * r.x_size + abs(y.real) * r.a.real + abs(w.real) * r.w_size
     return t * first + t * t * (r.x_size * r.x_size + r.a.real * r.a.real + r.w_size * r.w_size)

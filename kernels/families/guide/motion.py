@@ -47,8 +47,7 @@ def poses(
     pressure_angle: Array | None,
     joints: Array | None,
 ) -> None:
-    """Compute the travel along the line, deviation across it, and their derivatives,
-    of every design at its crank angles.
+    """Travel along the line, deviation across it, and their derivatives, of every design at its crank angles.
 
     Equations (1)-(6) of docs/guide.md.
 

@@ -44,14 +44,14 @@ class Second(NamedTuple):
 
 @inline
 def rocker(at: Place, t: Any, per: Any) -> Rocker:
-    """Return the rocker from T and ``per`` = 1/(R T): one division gives both reciprocals, 1/R and 1/T."""
+    """The rocker from T and ``per`` = 1/(R T): one division gives both reciprocals, 1/R and 1/T."""
     per_r, per_t = t * per, at.rr * per
     return Rocker((at.x * at.w + at.y * t) * per_r, (at.x * t - at.y * at.w) * per_r, t, per_t)
 
 
 @inline
 def velocity(k1: Any, k2: Any, to: Rocker, at: Place) -> First:
-    """Evaluate equation (3)."""
+    """Equation (3)."""
     w_ph = k1 * at.u + k2 * at.v
     g_ph = w_ph - (at.v * to.c - at.hu * to.s)
     return First(w_ph, g_ph, g_ph * to.per_t)
@@ -59,7 +59,7 @@ def velocity(k1: Any, k2: Any, to: Rocker, at: Place) -> First:
 
 @inline
 def acceleration(to: Rocker, at: Place, first: First) -> Second:
-    """Evaluate equation (4)."""
+    """Equation (4)."""
     g_phps = at.v * to.s + at.hu * to.c
     g_phph = at.w1 - (at.u * to.c + at.hv * to.s)
     # A sum instead of a product with 2: it leaves float32 what it is.
@@ -69,7 +69,7 @@ def acceleration(to: Rocker, at: Place, first: First) -> Second:
 
 @inline
 def jerk(to: Rocker, at: Place, first: First, second: Second) -> Any:
-    """Evaluate equation (5): psi''' with its own sign."""
+    """Equation (5): psi''' with its own sign."""
     p, q = first.p, second.q
     g_phphps, g_phpsps = at.u * to.s - at.hv * to.c, first.w_ph - first.g_ph
     by_p = p * (3.0 * g_phphps - p * (3.0 * g_phpsps + to.t * p))
@@ -87,7 +87,7 @@ jerk_fused = inline_fused(jerk)
 def follower(
     e: float, y0: float, ca: float, k0: float, k1: float, k2: float, u: float, v: float
 ) -> tuple[float, float, float, float]:
-    """Return psi', psi'', psi''', psi'''' of the mirrored mechanism at (cos phi, sin phi) = (u, v).
+    """psi', psi'', psi''', psi'''' of the mirrored mechanism at (cos phi, sin phi) = (u, v).
 
     It is meant for designs that turn fully.  There is no branch in it, so that it vectorises over whatever the loop
     runs over, and what the caller does not use is not computed.
@@ -109,7 +109,7 @@ def follower(
 
 @inline
 def order_pair(order: int, p: float, q: float, j: float, k: float) -> tuple[float, float]:
-    """Return the transfer function of that order and its derivative."""
+    """The transfer function of that order and its derivative."""
     if order == 1:
         return p, q
     if order == 2:
