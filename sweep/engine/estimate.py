@@ -94,12 +94,15 @@ def estimate(study: Study, jobs: int, tell: Callable[[int, int], None] = lambda 
 
 
 def other_accuracies(study: Study, jobs: int) -> tuple[tuple[str, float], ...]:
-    """What the same sweep would take at the accuracies of :func:`neighbours`: in words, and the estimated seconds."""
+    """Return what the same sweep would take at the accuracies of :func:`neighbours`:
+    in words, and the estimated seconds.
+    """
     return tuple((words, estimate(other, jobs).seconds) for words, other in neighbours(study))
 
 
 def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
-    """The same study with one digit less and one more, or with half and twice the samples; in words, and the study.
+    """Return the same study with one digit less and one more, or with half and twice the samples;
+    in words, and the study.
 
     With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range
     of `sweep.summarise` is left out.

@@ -31,7 +31,8 @@ def proportion_starts(
     stop: Callable[[], bool],
     jobs: int,
 ) -> tuple[Problem, Array]:
-    """The problem with bounds that hold the starts, and the starts: a few of the sweep, then of the global search.
+    """Return the problem with bounds that hold the starts, and the starts:
+    a few of the sweep, then of the global search.
 
     Parameters
     ----------
@@ -59,7 +60,9 @@ def proportion_starts(
 def insensitive(
     study: Study, settings: OptimiseSettings, problem: Problem, stop: Callable[[], bool], jobs: int
 ) -> tuple[Problem, Array]:
-    """The problem with bounds that hold them, and designs that keep stroke and straightness when they are made."""
+    """Return the problem with bounds that hold them,
+    and designs that keep stroke and straightness when they are made.
+    """
     if settings.globally != "proportions":
         return problem, np.empty((0, len(problem.family.parameters)))
     linear = _linear(study, problem, study.tolerance)
