@@ -39,13 +39,13 @@ class Measured:
     peers: pd.DataFrame | None
 
     def tables(self) -> Iterator[tuple[str, pd.DataFrame]]:
-        """The tables by name."""
+        """Yield the tables by name."""
         names = [field.name for field in fields(self)][3:-1]  # the peers have been written by their own command
         return ((name, getattr(self, name)) for name in names)
 
 
 def markdown(m: Measured) -> str:
-    """The whole page."""
+    """Return the whole page."""
     parts = [
         "# What accuracy costs in time",
         "",
@@ -86,7 +86,7 @@ def _picture(name: str, text: str) -> list[str]:
 
 
 def marks_table(marks: pd.DataFrame) -> list[str]:
-    """The marks: what was asked, what was measured, whether it was met."""
+    """Return the marks: what was asked, what was measured, whether it was met."""
     rows = [[mark, asked, measured, "yes" if met else "**no**"] for mark, asked, measured, met in marks.to_numpy()]
     return pipe_table(["mark", "asked", "measured", "met"], rows)
 
@@ -287,7 +287,7 @@ def _peers(m: Measured) -> list[str]:
 
 
 def _known(m: Measured) -> list[str]:
-    """Largest factors: one line per table, then by quantity and kind of row, then what the search found."""
+    """Return the largest factors: one line per table, then by quantity and kind of row, then what the search found."""
     lines = [
         "",
         "## Largest known factors",
@@ -336,7 +336,7 @@ def _known(m: Measured) -> list[str]:
 
 
 def html(page: str, figures: list[Saved]) -> str:
-    """The page with its diagrams, self-contained."""
+    """Return the page with its diagrams, self-contained."""
     images = {f"figures/{figure.path.name}": figure.uri for figure in figures}
     style = "body{font:15px/1.45 system-ui,sans-serif;max-width:1350px;margin:2em auto;padding:0 1em;color:#222}" \
         "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.15em .5em;border-bottom:1px solid #e4e7eb;" \

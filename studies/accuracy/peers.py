@@ -79,7 +79,9 @@ def _pylinkage() -> tuple[Callable[[], tuple[Array, Array, Array]], Array]:
 
 
 def _distance(trace: Array) -> float:
-    """Largest distance of the two tools' rocker pins, for the better of the two assembly modes, at equal crank pins."""
+    """Return the largest distance of the two tools' rocker pins, for the better of the two assembly modes,
+    at equal crank pins.
+    """
     pins = np.asarray(trace)[:, -2], np.asarray(trace)[:, -1]
     phi = np.arctan2(pins[0][:, 1], pins[0][:, 0])[None, :]
     distances = []

@@ -12,7 +12,7 @@ def seconds(
     least: float = 2e-3,
     clock: Callable[[], float] = time.process_time,
 ) -> float:
-    """Shortest of several timings of one call [s]; the first call, which may compile, is not counted.
+    """Return the shortest of several timings of one call [s]; the first call, which may compile, is not counted.
 
     Calls shorter than ``least`` are timed in groups, so that the clock does not show.  Processor time, which other work
     on the machine disturbs least; what runs in several threads needs ``time.perf_counter``.
