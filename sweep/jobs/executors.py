@@ -30,7 +30,7 @@ UNTRACKED = "ignore:resource_tracker:UserWarning"
 
 
 class Here:
-    """One after the other in the thread that asks."""
+    """Runs tasks one after the other in the thread that asks."""
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """See `Executor`."""

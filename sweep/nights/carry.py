@@ -22,7 +22,7 @@ TABLES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store
 
 @dataclass(frozen=True)
 class Carried:
-    """From which night how many chunks were linked; ``whole`` if there is nothing left to compute."""
+    """The night from which chunks were linked, and how many; ``whole`` if there is nothing left to compute."""
 
     night: str
     chunks: int

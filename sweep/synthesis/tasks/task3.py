@@ -48,7 +48,7 @@ class Setting(NamedTuple):
 
 @dataclass(frozen=True)
 class Task3:
-    """To be found: phi1, f, and for every further setting the value of the one dimension that differs.
+    """The unknowns are phi1, f, and for every further setting the value of the one dimension that differs.
 
     Parameters
     ----------

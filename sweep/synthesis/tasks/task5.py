@@ -56,7 +56,7 @@ def slot(a2: Array, e2: Array, t: Array) -> Slot:
 
 @dataclass(frozen=True)
 class Task5:
-    """To be found: phi1 and f of stage 1, the angle t1 and the ratio e2/a2 of the slotted link; a2 follows from rho0.
+    """The unknowns are phi1 and f of stage 1, angle t1 and ratio e2/a2 of the slotted link; a2 follows from rho0.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ WINDOW = 33  # poses of the dwell; the deviation is largest at its ends, but thi
 
 @dataclass(frozen=True)
 class Task8:
-    """To be found: phi1 and f of the crank-rocker, proportions of the slider-crank; its size follows from the stroke.
+    """The unknowns are phi1 and f of the crank-rocker, proportions of the slider-crank; its size is that of the stroke.
 
     Both stages stand in a limit position at the same time, the first in its extended one: velocity, acceleration and
     jerk vanish there, and the slider moves by psi''^2 S'' dphi^4/8 to leading order.
