@@ -65,16 +65,17 @@ nightly: $(VENV)/ready  ## all studies into a dated folder under nights/, and wh
 smoke-nightly: $(VENV)/ready  ## the same with every study's tiny version, into nights/smoke
 	$(SWEEP) nightly studies --smoke --into $(NIGHTS)/smoke --budget 1h --keep 3
 
-study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accuracy.md, about 10 minutes
+study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accuracy.md and docs/accuracy/, about 10 minutes
 	$(BIN)/python -m studies.accuracy --out results/accuracy
 
 smoke-accuracy: $(VENV)/ready  ## the same on few designs, writes no page
 	$(BIN)/python -m studies.accuracy --smoke --out results/smoke/accuracy
 
-bench-peers: $(VENV)/ready  ## the planar case next to pylinkage, which gets an environment of its own
+bench-peers: $(VENV)/ready  ## next to pylinkage, which gets an environment of its own, and loads next to MuJoCo
 	$(PYTHON) -m venv .venv-peers
 	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable . 'pylinkage[numba]'
 	.venv-peers/bin/python -m studies.accuracy.peers --out results/accuracy
+	$(BIN)/python -m tests.bench.loads --out results/accuracy
 
 bench-scale: $(VENV)/ready  ## 10^5 to 10^9 samples, to 10^8 designs, and reading them: writes docs/scale.md, about 10 minutes
 	$(BIN)/python -m tests.bench.scale --out docs/scale.md

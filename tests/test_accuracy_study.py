@@ -145,7 +145,7 @@ def test_one_digit_more_multiplies_the_time_of_a_grid_by_what_was_measured():
 
 
 def test_marks_stand_in_the_page():
-    assert "| mark | asked | measured | met |" in (ROOT / "docs" / "accuracy.md").read_text()
+    assert "| mark | asked | measured | met |" in (ROOT / "docs" / "accuracy" / "marks.md").read_text()
 
 
 def test_tables_of_the_turn_give_angles_between_their_samples(areas):
@@ -177,7 +177,7 @@ def test_a_digit_more_costs_the_optimiser_looks_that_can_be_counted():
 def test_page_becomes_html_with_tables_lists_and_pictures():
     page = "# Title\n\n![what it shows](figures/a.svg)\n\nText with `code` and **no**.\n\n* one\n* two\n\n"
     page += "| a | b |\n|---|---|\n| 1 \\| 2 | 3 < 4 |\n"
-    body = tables.html_body(page, {"figures/a.svg": "data:image/svg+xml;base64,AA"})
+    body = tables.html_body(page, {"a.svg": "data:image/svg+xml;base64,AA"})
     assert '<h1>Title</h1>\n<img alt="what it shows" src="data:image/svg+xml;base64,AA">' in body
     assert "<ul><li>one</li><li>two</li></ul>" in body
     assert "<td>1 | 2</td><td>3 &lt; 4</td>" in body

@@ -16,7 +16,7 @@ from sweep.effects.costs import designs
 from sweep.effects.placing import Placed
 from sweep.families import NAMES as FAMILIES
 from sweep.families import family
-from sweep.families.capabilities import JointRecords, ThreadPath
+from sweep.families.capabilities import JointRecords, LinkTree, ThreadPath
 from sweep.study.units import factor, internal_unit
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -49,7 +49,8 @@ def test_no_two_outputs_of_a_family_share_a_name(name):
     of_effects = [o.name for o in offered(found)]
     assert len(set(of_effects)) == len(of_effects)
     assert not set(of_effects) & set(names)
-    assert (found.find(JointRecords) is None and found.find(ThreadPath) is None) == (not of_effects)
+    kinds = (JointRecords, LinkTree, ThreadPath)
+    assert all(found.find(kind) is None for kind in kinds) == (not of_effects)
 
 
 def test_an_effect_comes_after_what_it_needs():
@@ -80,7 +81,15 @@ def test_every_rule_of_negligibility_that_has_a_number_is_applied():
         every = [o.name for placed in applicable(bare) for o in placed.outputs]
         full = extended(bare, every)
         judged = {finding.name for finding in findings(bare, full, designs(full, 4), every)}
-        without = {"tool", "shaking", "pressure_extrema", "sliding_bearings", "rolling_bearings", "bearing_life"}
+        without = {
+            "tool",
+            "tip_tool",
+            "shaking",
+            "pressure_extrema",
+            "sliding_bearings",
+            "rolling_bearings",
+            "bearing_life",
+        }
         assert judged == {placed.name for placed in applicable(bare)} - without
 
 

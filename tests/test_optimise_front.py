@@ -22,6 +22,8 @@ from sweep.errors import Interrupted, StudyError
 from sweep.optimise import front_study
 from sweep.optimise.front import saved, within
 from sweep.report import write_report
+from sweep.report.dataset import read_dataset
+from sweep.report.front import front_note
 from sweep.study import ParetoSettings, Study, load_study
 from tests.test_optimise_study import STUDY
 
@@ -163,6 +165,21 @@ def test_report_shows_the_front(whole: tuple[Study, Path], tmp_path: Path) -> No
     assert (tmp_path / "report" / "pareto.parquet").read_bytes() == (beside(folder) / PARETO).read_bytes()
 
 
+def test_points_are_placed_and_the_report_says_so(whole: tuple[Study, Path], tmp_path: Path) -> None:
+    study = written(tmp_path / "study", TABLE.replace("count = 3", "count = 2") + "points = 4\n")
+    folder = copied(whole[1], tmp_path / "copy")
+    state: list[tuple[int, int]] = []
+    front_study(study, folder, "k", say=lambda label, done, total, unit: state.append((done, total)))
+    table = pd.read_parquet(beside(folder) / PARETO)
+    assert len(table) == 4 and table["bound"].is_monotonic_decreasing and state[-1] == (6, 6)
+    assert np.degrees(table["bound"].iloc[[0, -1]]).tolist() == pytest.approx([50.0, 30.0])
+    assert table["max_abs_d2psi"].is_monotonic_increasing
+    front = saved(beside(folder) / PARETO, "k")
+    assert front is not None and front.complete and front.given == 2 and len(front.bounds) == 4
+    data = replace(read_dataset(folder), study=study)
+    assert "2 of the bounds were placed where the front bends" in front_note(data)
+
+
 @pytest.mark.parametrize(
     ("table", "message"),
     [
@@ -177,6 +194,8 @@ def test_report_shows_the_front(whole: tuple[Study, Path], tmp_path: Path) -> No
         ('[pareto]\noutput = "max_pressure_angle"\nat_most = "95 deg"\n', "between 0 and 90 deg"),
         ('[pareto]\noutput = "swing"\nat_most = "40 deg"\nstart = 2\n', "did you mean 'starts'"),
         ('[pareto]\noutput = "swing"\nat_most = "40 deg"\ntime_budget = "0 s"\n', "positive"),
+        (TABLE + "points = 3\n", "more than the 3 bounds given"),
+        ('[pareto]\noutput = "swing"\nat_most = "40 deg"\npoints = 4\n', "there must be two or more"),
         ('[pareto]\noutput = "swing"\nat_most = { from = 1, to = 9, count = 65, unit = "deg" }\n', "at most 64"),
     ],
 )

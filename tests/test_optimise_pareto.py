@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,13 +16,16 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem, minimise, pareto
+from sweep.optimise.gaps import gaps
 from sweep.optimise.pareto import Front, advance, bounded, steps
 from sweep.study import Limit, OptimiseSettings, ParetoSettings
 from tests.optimise_family import FAMILY
 
 
-def settings(output: str, *bounds: float, at_least: bool = False, time_budget: float | None = None) -> ParetoSettings:
-    return ParetoSettings(output, bounds, at_least, 1, time_budget)
+def settings(
+    output: str, *bounds: float, at_least: bool = False, time_budget: float | None = None, points: int | None = None
+) -> ParetoSettings:
+    return ParetoSettings(output, bounds, at_least, 1, time_budget, points)
 
 
 def bowl(*limits: Limit) -> Problem:
@@ -141,3 +146,100 @@ def test_step_cut_short_by_the_brake_is_taken_again() -> None:
     assert cut.taken == 0 and cut.known()[0][1].ended == "time"
     *_, again = advance(problem, asked, replace(cut, results=(None, None), found=(-1, -1)), starts)
     assert [r.objective for _, r in again.known()] == [r.objective for _, r in whole.known()]
+
+
+def between(front: Front, bends: Callable[[np.ndarray], np.ndarray]) -> float:
+    """Largest error of the front drawn as a polygon, over all bounds from the tightest to the loosest."""
+    bounds, values = (np.array(x) for x in zip(*[(b, r.objective) for b, r in front.known()], strict=True))
+    dense = np.linspace(min(bounds), max(bounds), 2000)
+    order = np.argsort(bounds)
+    return float(np.abs(np.interp(dense, bounds[order], values[order]) - bends(dense)).max())
+
+
+def last(problem: Problem, asked: ParetoSettings, starts: np.ndarray) -> Front:
+    *_, front = advance(problem, asked, Front.of(asked), starts)
+    return front
+
+
+def test_bounds_are_placed_where_the_front_bends() -> None:
+    """1 + (1 - bound)^2 below a bound of 1, flat above: nothing is worth knowing between 1 and 4."""
+    placed = last(bowl(), settings("max_abs_swell", 4.0, 0.05, points=9), BOWL_START)
+    assert len(placed.bounds) == 9 and placed.complete and not placed.filled
+    assert placed.bounds == tuple(sorted(placed.bounds, reverse=True))
+    assert sum(bound > 1.0 for bound in placed.bounds) == 1
+    evenly = last(bowl(), settings("max_abs_swell", *np.linspace(4.0, 0.05, 9)), BOWL_START)
+
+    def truth(bounds: np.ndarray) -> np.ndarray:
+        return 1.0 + np.maximum(1.0 - bounds, 0.0) ** 2
+
+    assert [r.objective for _, r in placed.known()] == pytest.approx(truth(np.array(placed.bounds)), abs=1e-8)
+    # The flat part is known by what the loosest result reaches of the second output.
+    known = replace(placed, bounds=(1.0, *placed.bounds[1:]))
+    assert between(known, truth) < 0.02 < 0.05 < between(evenly, truth)
+
+
+def test_placed_bounds_go_on_half_way_to_the_same_bits() -> None:
+    problem, starts = linkage()
+    asked = settings("max_pressure_angle", 0.9, 0.6, points=5)
+    states = list(advance(problem, asked, Front.of(asked), starts))
+    assert [state.taken for state in states] == list(range(1, len(steps(2)) + 4))
+    assert states[-1].complete and len(states[-1].bounds) == 5
+    for state in (states[0], states[-3], states[-2]):
+        *_, again = advance(problem, asked, state, starts)
+        assert again.bounds == states[-1].bounds and again.found == states[-1].found
+        for (_, one), (_, other) in zip(again.known(), states[-1].known(), strict=True):
+            np.testing.assert_array_equal(one.design, other.design)
+    objectives = [result.objective for _, result in states[-1].known()]
+    assert objectives == sorted(objectives)  # a tighter bound never has the better design
+
+
+def test_end_of_a_front_is_looked_for() -> None:
+    """With |p| at least 0.4 no design keeps a bound below it: points close in on 0.4."""
+    problem = bowl(Limit("max_abs_swell", 0.4, None))
+    front = last(problem, settings("max_abs_swell", 0.9, 0.1, points=8), problem.rows(np.array([[0.6, 0.0]])))
+    kept = [bound for bound, result in front.known() if result.status != st.LIMIT_EXCEEDED]
+    missed = [bound for bound, result in front.known() if result.status == st.LIMIT_EXCEEDED]
+    assert min(kept) >= 0.4 > max(missed) and min(kept) - max(missed) < 0.15
+
+
+def test_flat_front_gets_no_further_points() -> None:
+    front = last(bowl(), settings("max_abs_swell", 4.0, 2.0, points=9), BOWL_START)
+    assert front.filled and front.complete and len(front.bounds) == 2
+
+
+def test_placing_stops_when_asked_and_keeps_what_is_finished() -> None:
+    asked, calls = settings("max_abs_swell", 4.0, 0.05, points=9), itertools.count()
+    states = list(advance(bowl(), asked, Front.of(asked), BOWL_START, lambda: next(calls) > 60))
+    assert not states[-1].complete
+    kept = max((state for state in states if state.taken < 12), key=lambda state: state.taken)
+    *_, again = advance(bowl(), asked, kept, BOWL_START)
+    assert again.bounds == last(bowl(), asked, BOWL_START).bounds
+
+
+@pytest.mark.parametrize(
+    ("bounds", "values", "number", "area"),
+    [
+        ([4.0, 2.0, 0.0], [1.0, 1.0, 3.0], 1, 0.25),
+        ([0.0, 2.0, 4.0], [1.0, 2.0, 2.0], 0, 0.25),
+        ([4.0, 3.0, 0.0], [1.0, 2.0, math.nan], 1, 0.375),  # no end is known: any height
+    ],
+)
+def test_largest_gap_is_that_of_the_largest_triangle(
+    bounds: list[float], values: list[float], number: int, area: float
+) -> None:
+    found = gaps(np.array(bounds), np.array(bounds), np.array(values))
+    assert (found[0].number, found[0].area) == (number, pytest.approx(area))
+    assert found[0].middle == pytest.approx(0.5 * (bounds[number] + bounds[number + 1]))
+
+
+def test_gap_begins_where_the_looser_point_ends() -> None:
+    """At a bound of 4 the design reaches 1: nothing happens between."""
+    (gap,) = gaps(np.array([4.0, 0.0]), np.array([1.0, 0.0]), np.array([1.0, 2.0]))
+    assert (gap.area, gap.middle) == (0.5, 0.5)
+    assert gaps(np.array([4.0, 2.0]), np.array([1.0, 1.0]), np.array([1.0, 1.0])) == []
+
+
+def test_jump_is_no_gap_that_a_point_could_fill() -> None:
+    bounds = np.array([1.0, 0.5001, 0.5, 0.0])
+    assert gaps(bounds, bounds, np.array([0.0, 0.0, 1.0, 1.0])) == []
+    assert gaps(np.empty(0), np.empty(0), np.empty(0)) == []

@@ -80,3 +80,14 @@ def test_caption_says_only_what_is_drawn() -> None:
     assert "frame of its own" in several and "Triangles" in several
     alone = mechanism_caption({"optimum": over("rssr", RSSR, 0.0, TURN)})
     assert "frame of its own" not in alone
+
+
+def test_members_of_a_machine_share_a_frame_and_a_legend() -> None:
+    machine = {"one": "four_bar", "other": {"family": "four_bar", "place": {"at": [0.0, 0.0, 2.0]}}}
+    bars = {"a": 1.0, "b": 3.0, "c": 3.0, "e": 3.0}
+    found = over(machine, {f"{m}.{k}": v for m in machine for k, v in bars.items()}, 0.0, TURN)
+    (axes,) = mechanism_figure({"": found}, "mm").axes
+    assert axes.get_title(loc="left") == "one, other"
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert len(labels) == len(set(labels)) == 3
+    assert "machine's frame" in mechanism_caption({"": found}) and "kappa2" not in mechanism_caption({"": found})

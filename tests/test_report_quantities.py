@@ -114,3 +114,9 @@ def test_changes_of_sizes_angles_and_signed_values() -> None:
 def test_what_stands_against_the_objective_is_found_for_members_too(want: tuple[str, ...], second: str | None) -> None:
     study = SimpleNamespace(pareto=None, objective=SimpleNamespace(output=want[0]), want=want)
     assert Dataset.second.func(SimpleNamespace(study=study)) == second
+
+
+def test_heading_names_a_member_once() -> None:
+    assert quantity("needle.d2s", "mm").title == "acceleration of the needle s″ [mm/rad²]"
+    assert quantity("needle.max_abs_d2s", "mm").heading == "largest acceleration of the needle max |s″|"
+    assert quantity("d2s", "mm").title == "acceleration s″ [mm/rad²]"

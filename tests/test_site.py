@@ -74,6 +74,7 @@ def test_navigation_has_every_page_once():
     settings = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     named = re.findall(r": ([\w/-]+\.md)$", settings, flags=re.MULTILINE)
     pages = [path.name for path in (ROOT / "docs").glob("*.md")]
+    pages += [f"accuracy/{path.name}" for path in (ROOT / "docs" / "accuracy").glob("*.md")]
     pages += [f"notebooks/{path.stem}.md" for path in (ROOT / "docs" / "notebooks").glob("*.ipynb")]
     assert sorted(named) == sorted([*pages, "reference/python.md", "reference/families.md"])
     assert yaml.safe_load(settings)["strict"] is True and yaml.safe_load(settings)["theme"]["font"] is False
@@ -120,6 +121,10 @@ def test_tutorial_shows_what_the_first_study_says():
         ("sin^2(t/2)", "<msup><mi>sin</mi><mrow><mn>2</mn></mrow></msup><mrow><mo>(</mo><mfrac><mrow><mi>t</mi></mrow>"
                        "<mrow><mn>2</mn></mrow></mfrac><mo>)</mo></mrow>"),
         ("least of max_abs_d2psi", "<mtext>least of</mtext><mtext>max_abs_d2psi</mtext>"),
+        ("mid-stroke", "<mtext>mid-stroke</mtext>"),
+        ("psi-phi", "<mi>ψ</mi><mo>−</mo><mi>φ</mi>"),
+        ("sum (a)/r", "<mo>∑</mo><mfrac><mrow><mi>a</mi></mrow><mrow><mi>r</mi></mrow></mfrac>"),
+        ("by swing/2", "<mtext>by</mtext><mfrac><mrow><mtext>swing</mtext></mrow><mrow><mn>2</mn></mrow></mfrac>"),
         ("the rack's speed", "<mtext>the rack's speed</mtext>"),
     ],
 )  # fmt: skip

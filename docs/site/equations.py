@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 LABEL = re.compile(r"^(.*?\S)\s{2,}\((\d+\s?[a-z]?\*?|[A-Z]\*)\)$|^(.*?\S)\s\((\d+\s?[a-z]?\*?)\)$")
 TOKEN = re.compile(
-    r"\s*(?:(?P<code>`[^`]*`|docs/[\w-]+\.md)|(?P<index>_\w+)|(?P<number>\d+(?:\.\d+)?(?:e-?\d+)?)|(?P<name>[A-Za-z](?:\w|(?<=\d),(?=\d)|(?<=[a-z]{3})'(?=s\b))*)"
+    r"\s*(?:(?P<code>`[^`]*`|docs/[\w-]+\.md)|(?P<index>_\w+)|(?P<number>\d+(?:\.\d+)?(?:e-?\d+)?)|(?P<name>[A-Za-z](?:\w|(?<=\d),(?=\d)|(?<=[a-z]{3})'(?=s\b)|(?<=[a-z]{3})-(?=[a-z]{3}))*)"
     r"|(?P<prime>'+)|(?P<op>\.\.\.|<=|>=|:=|\+-|[-+=<>.,;:|/^(){}\[\]*]))"
 )
 GREEK = {
@@ -85,6 +85,11 @@ def _row(line: str) -> str:
     return f'<div class="equation"><span class="said"{style}>{" ".join(pieces)}</span>{number}</div>'
 
 
+def _hyphened(text: str) -> bool:
+    """Whether a name with a hyphen is one word, not a difference."""
+    return all(part not in GREEK and part not in FUNCTIONS and part.isalpha() for part in text.split("-"))
+
+
 def _pieces(text: str) -> list[str]:
     """What stands apart by more than one blank, outside of brackets."""
     pieces = [""]
@@ -113,8 +118,11 @@ def expression(text: str) -> str:
         if found is None:
             raise NotUnderstood(text[at:])
         kind = str(found.lastgroup)
-        tokens.append(Token(kind, found[kind], found.start(kind) > at))
-        at = found.end()
+        text_here = found[kind]
+        if kind == "name" and not _hyphened(text_here):
+            text_here = text_here.split("-")[0]
+        tokens.append(Token(kind, text_here, found.start(kind) > at))
+        at = found.start(kind) + len(text_here)
     reader = _Reader(tokens)
     made = reader.terms("")
     if reader.at < len(tokens):
@@ -240,7 +248,9 @@ class _Reader:
         """A function with its power and its argument: in brackets, or the next factor."""
         if function == "sqrt" and self.peek().text in ("(", "["):
             return f"<msqrt><mrow>{self.atom()[1]}</mrow></msqrt>", ""
-        head = "<mo>∑</mo>" if function == "sum" else f"<mi>{function}</mi>"
+        if function == "sum":  # of all that follows, its divisor too
+            return "<mo>∑</mo>", ""
+        head = f"<mi>{function}</mi>"
         if self.peek().text == "^":
             self.at += 1
             head = f"<msup>{head}<mrow>{self.exponent()}</mrow></msup>"
@@ -257,7 +267,7 @@ class _Reader:
         if token.kind != "name":
             return False
         text = token.text
-        plain = text.replace("'", "").isalpha() and text not in FUNCTIONS and text not in GREEK
+        plain = text.replace("'", "").replace("-", "").isalpha() and text not in FUNCTIONS and text not in GREEK
         if plain and len(text) == 1:
             return text in "aA" and self.longer(ahead + 1) and (self.at + ahead == 0 or self.longer(ahead - 1))
         return text in SHORT_WORDS or (plain and len(text) > 2 and not _greeks(text))
@@ -270,7 +280,7 @@ class _Reader:
     def words(self) -> str:
         """Words that follow each other."""
         found = []
-        while self.word(0) and (not found or self.peek().spaced):
+        while self.word(0) and (not found or (self.peek().spaced and self.peek(1).text not in ("/", "^"))):
             found.append(self.peek().text)
             self.at += 1
         return f"<mtext>{' '.join(found)}</mtext>"

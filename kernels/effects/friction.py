@@ -21,7 +21,16 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.effects.coupler import Coupler, orientation
-from kernels.effects.kinetostatics import SPEED, Loads, inertia_loads, loaded, pose_status, solve, store_forces
+from kernels.effects.kinetostatics import (
+    SPEED,
+    Loads,
+    inertia_loads,
+    loaded,
+    loaded_follower,
+    pose_status,
+    solve,
+    store_forces,
+)
 from kernels.joints import Joints, read
 from kernels.vectors import Vector, cross, dot, mix, norm, scale, sub
 
@@ -118,6 +127,7 @@ def friction_loads(
     losses: Array | None,
     contraction: Array | None,
     wrench: Array | None = None,
+    on_follower: Array | None = None,
 ) -> None:
     """Joint reactions and driving torque with friction.
 
@@ -131,6 +141,7 @@ def friction_loads(
     contraction : (n, m) or None; rho(L), below 1 the solution is proven unique; known also where the iteration jams
     status : also JAMMED where the iteration does not contract
     wrench : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
+    on_follower : (n, m, 6) or None; force and moment about D that act on the follower besides, fixed axes
     """
     answers, total, matrix = np.empty((4, ANSWER)), np.empty(ANSWER), np.empty((3, 3))
     for i in range(poses.shape[0]):
@@ -142,6 +153,8 @@ def friction_loads(
             load = inertia_loads(j, coupler, bodies[i], drive[i, k if drive.shape[1] > 1 else 0])
             if wrench is not None:
                 load = loaded(load, wrench[i, k])
+            if on_follower is not None:
+                load = loaded_follower(load, on_follower[i, k])
             f = _of_moving(given, load)
             speed_a = drive[i, k if drive.shape[1] > 1 else 0, SPEED]
             speed_d = speed_a * j.dpsi

@@ -151,6 +151,17 @@ def loaded(on: Loads, wrench: Array) -> Loads:
 
 
 @inline
+def loaded_follower(on: Loads, wrench: Array) -> Loads:
+    """The loads with a force and a moment about D, (6,), that act on the follower from outside."""
+    force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
+    return Loads(
+        on.f1, on.t1, on.d1, on.f2, on.t2, on.d2,
+        sub(on.f3, force), add(sub(on.t3, moment), cross(on.d3, force)), on.d3,
+        on.torque, on.omega1, on.omega2, on.omega3, on.j_red, on.dj_red, on.a_g2,
+    )  # fmt: skip
+
+
+@inline
 def _about_axis(body: Body, axis: Vector) -> float:
     """Moment of inertia about an axis through the frame origin."""
     across = cross(axis, body.centre)
@@ -200,6 +211,7 @@ def kinetostatics(
     couples: Array | None,
     inertia: Array | None,
     wrench: Array | None = None,
+    on_follower: Array | None = None,
 ) -> None:
     """Frictionless joint reactions, driving torque and reduced inertia.
 
@@ -217,6 +229,7 @@ def kinetostatics(
     couples : (n, m, 2) or None; couple of the finger along n x w, torque on the crank about u
     inertia : (n, m, 2) or None; inertia reduced to the crank and its derivative
     wrench : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
+    on_follower : (n, m, 6) or None; force and moment about D that act on the follower besides, fixed axes
 
     Notes
     -----
@@ -232,6 +245,8 @@ def kinetostatics(
             load = inertia_loads(j, coupler, bodies[i], drive[i, k if drive.shape[1] > 1 else 0])
             if wrench is not None:
                 load = loaded(load, wrench[i, k])
+            if on_follower is not None:
+                load = loaded_follower(load, on_follower[i, k])
             if inertia is not None:
                 inertia[i, k, 0], inertia[i, k, 1] = good * load.j_red, good * load.dj_red
             if forces is not None or couples is not None:

@@ -1,4 +1,4 @@
-"""U3: a tool on the coupler, such as a needle bar: its inertia, weight and working force as a load of the coupler.
+"""U3: a tool on the coupler or the rocker, such as a needle bar: its inertia, weight and working force as a load.
 
 The equation numbers are those of docs/tool.md.  A rod of mass m moves along a fixed direction lam
 with the point M of the coupler that it hangs on.  Its momentum along lam gives the force of the rod on the coupler,
@@ -8,6 +8,8 @@ with the point M of the coupler that it hangs on.  Its momentum along lam gives 
 with F the working force on the rod along lam, of which a part may act while the rod pierces the fabric (5).  What the
 rod's own guide bears across lam is statically undetermined: the coupler guides the point already.  Its least value is
 zero, and zero is taken.
+
+A tool whose point moves freely, on the coupler or at the tip of a rocker, puts -(m (a_P - g) - F) on its link, (6).
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from kernels._jit import inline, kernel
 from kernels.effects.coupler import orientation
 from kernels.effects.kinetostatics import CHANGE, SPEED, pose_status
 from kernels.joints import Joints, read
-from kernels.vectors import Vector, add, cross, dot, mix, scale, spun
+from kernels.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
 
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
@@ -98,3 +100,63 @@ def tool_load(
                 inertia[i, k, 0], inertia[i, k, 1] = good * mass * first * first, good * 2.0 * mass * first * second
             if along is not None:
                 along[i, k, 0], along[i, k, 1], along[i, k, 2] = good * on_tool, good * first, good * second
+
+
+@kernel
+def free_tool(
+    poses: Array,
+    designs: Array,
+    data: Array,
+    drive: Array,
+    working: Array,
+    finger: Array,
+    on_rocker: bool,
+    status: Status,
+    wrench: Array | None,
+    inertia: Array | None,
+    along: Array | None,
+) -> None:
+    """Force of a tool that moves freely with a point of the coupler or of the rocker, and its moment; (6), (7).
+
+    Parameters
+    ----------
+    data : (n, 7), mass; the point: of the coupler from B along it, across it (k x s) and along the rocker's axis, of
+        the rocker from D along rho, tau, k; gravity
+    working : (n, m or 1, 3), force F on the tool in fixed axes
+    on_rocker : whether the rocker carries the tool
+    wrench : (n, m, 6) or None; force and moment on the link, about B on the coupler, about D on the rocker
+    inertia : (n, m, 2) or None; m |P'|^2 and its derivative by the crank angle
+    along : (n, m, 2) or None; magnitude of the force on the tool; its power per unit crank speed
+    poses, designs, drive, finger, status : as in :func:`tool_load`
+    """
+    for i in range(poses.shape[0]):
+        mass, gravity = data[i, 0], (data[i, 4], data[i, 5], data[i, 6])
+        for k in range(poses.shape[1]):
+            j = read(poses[i, k], designs[i])
+            coupler = orientation(j, finger[i])
+            status[i, k] = pose_status(status[i, k], j, coupler)
+            good = 1.0 if status[i, k] == st.OK else math.nan
+            if on_rocker:
+                at = add(mix(data[i, 1], j.rho, data[i, 2], j.tau), scale(data[i, 3], j.k))
+                first = scale(j.dpsi, cross(j.k, at))
+                second = spun(scale(j.dpsi, j.k), scale(j.d2psi, j.k), at)
+            else:
+                at = arm(j, data[i])
+                first = add(coupler.v_b, cross(coupler.omega, at))
+                second = add(coupler.a_b, spun(coupler.omega, coupler.eps, at))
+            now = k if drive.shape[1] > 1 else 0
+            speed, change = drive[i, now, SPEED], drive[i, now, CHANGE]
+            now = k if working.shape[1] > 1 else 0
+            force = (working[i, now, 0], working[i, now, 1], working[i, now, 2])
+            on_tool = sub(scale(mass, sub(mix(speed * speed, second, change, first), gravity)), force)
+            if wrench is not None:
+                moment = cross(at, on_tool)
+                for x in range(3):
+                    wrench[i, k, x], wrench[i, k, 3 + x] = -good * on_tool[x], -good * moment[x]
+            if inertia is not None:
+                inertia[i, k, 0], inertia[i, k, 1] = (
+                    good * mass * dot(first, first),
+                    good * 2.0 * mass * dot(first, second),
+                )
+            if along is not None:
+                along[i, k, 0], along[i, k, 1] = good * norm(on_tool), good * dot(on_tool, first)

@@ -1,4 +1,4 @@
-"""``python -m studies.accuracy``: measure, keep the tables as Parquet, draw, and write the page."""
+"""``python -m studies.accuracy``: measure, keep the tables as Parquet, draw, and write the pages."""
 
 from __future__ import annotations
 
@@ -9,13 +9,17 @@ from pathlib import Path
 
 from studies.accuracy import costs, digits, oracle
 from studies.accuracy.diagrams import position_table, work_table
+from studies.accuracy.effect_prices import effect_prices
 from studies.accuracy.exact import exact_table
 from studies.accuracy.figures import draw
 from studies.accuracy.machine import description
 from studies.accuracy.marks import marks, smoke_mark, study_mark, tables_mark
-from studies.accuracy.page import Measured, html, markdown
-from studies.accuracy.publish import publish
+from studies.accuracy.measured import Measured, others
+from studies.accuracy.page import html, pages, write
+from studies.accuracy.price_figures import draw_prices
+from studies.accuracy.prices import family_prices
 from studies.accuracy.regions import regions
+from studies.accuracy.whole import whole_study
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = ROOT / "tests" / "oracle"
@@ -27,9 +31,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m studies.accuracy", description=__doc__)
     parser.add_argument("--smoke", action="store_true", help="few designs, no page in docs")
     parser.add_argument("--out", type=Path, default=None, help="folder of the results")
+    parser.add_argument(
+        "--pages", action="store_true", help="measure nothing: pages anew from the tables in the folder"
+    )
     arguments = parser.parse_args()
     smoke: bool = arguments.smoke
     out: Path = arguments.out or ROOT / "results" / ("smoke/accuracy" if smoke else "accuracy")
+    if arguments.pages:
+        found = Measured.read(out)
+    else:
+        found = measured(smoke, out)
+        found.write(out)
+    publish(found, out)
+    print(f"{out.relative_to(ROOT) if out.is_relative_to(ROOT) else out}/report.html")  # noqa: T201
+
+
+def measured(smoke: bool, out: Path) -> Measured:
+    """All tables, measured now."""
     start = time.perf_counter()
 
     def done(what: str) -> None:
@@ -37,51 +55,59 @@ def main() -> None:
 
     import pandas as pd
 
-    areas = regions(16 if smoke else 500, SEED)
+    machine, areas = description(), regions(16 if smoke else 500, SEED)
     done("regions")
+    families = family_prices(smoke)
+    done("every family")
+    effects = effect_prices(smoke)
+    done("every effect")
+    whole = whole_study(500, 1, smoke) if smoke else whole_study(20_000)
+    done("one whole study")
     work = work_table(areas, smoke)
     done("work and precision")
     positions, exact = position_table(areas, 10 if smoke else 400), exact_table(areas, 10 if smoke else 400)
     factors = oracle.frame(oracle.factors(TABLES, few=smoke))
     done("errors against 60 digits and the 25-digit tables")
     outputs, storage = costs.output_costs(areas[0].designs, smoke), costs.storage_costs(20_000 if smoke else 200_000)
-    optimiser = (
-        digits.optimiser_digits(1 if smoke else 4, 40 if smoke else 1),
-        digits.optimiser_targets(1 if smoke else 8),
-    )
+    optimiser = digits.optimiser_digits(1 if smoke else 4, 40 if smoke else 1)
+    targets = digits.optimiser_targets(1 if smoke else 8)
     done("outputs, storage, optimiser")
     reached = [*marks(*((500, 50) if smoke else (100_000, 2000))), tables_mark(factors)]
     if not smoke:
         reached += [smoke_mark(), study_mark(time.perf_counter() - start)]
     done("marks")
-    found = Measured(
-        machine=description(),
+    return Measured(
+        machine=machine,
         smoke=smoke,
         regions=tuple((area.name, area.text) for area in areas),
+        families=families,
+        effects=effects,
+        whole=whole,
         marks=pd.DataFrame([mark.__dict__ for mark in reached]),
         positions=positions,
         exact=exact,
         work=work,
         outputs=outputs,
         storage=storage,
-        digits=optimiser[0],
-        targets=optimiser[1],
+        digits=optimiser,
+        targets=targets,
         oracle=factors,
         worst=pd.DataFrame(json.loads((TABLES / "worst_found.json").read_text())["rows"])[
             ["poses", "region", "output", "factor"]
         ],
-        peers=pd.read_parquet(out / "peers.parquet") if (out / "peers.parquet").exists() else None,
+        **others(out),
     )
-    out.mkdir(parents=True, exist_ok=True)
-    for name, table in found.tables():
-        table.to_parquet(out / f"{name}.parquet", index=False)
-    figures = draw(found.work, found.outputs, found.regions, out / "figures")
-    page = markdown(found)
-    (out / "accuracy.md").write_text(page, encoding="utf-8")
-    (out / "report.html").write_text(html(page, figures), encoding="utf-8")
-    if not smoke:
-        publish(page, figures, ROOT)
-    done(f"{out.relative_to(ROOT) if out.is_relative_to(ROOT) else out}/report.html")
+
+
+def publish(found: Measured, out: Path) -> None:
+    """Draw and write into the folder of the results, and into docs unless it is the smoke version."""
+    figures = draw_prices(found, out / "figures")
+    figures += draw(found.work, found.outputs, found.regions, out / "figures")
+    written = pages(found)
+    write(written, figures, out)
+    (out / "report.html").write_text(html(written, figures), encoding="utf-8")
+    if not found.smoke:
+        write(written, figures, ROOT / "docs")
 
 
 if __name__ == "__main__":

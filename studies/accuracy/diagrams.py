@@ -11,7 +11,7 @@ from studies.accuracy import reference
 from studies.accuracy.lookup import position_methods
 from studies.accuracy.methods import Method, acceleration_methods, swing_methods
 from studies.accuracy.regions import Region
-from studies.accuracy.timing import seconds
+from studies.accuracy.timing import Spread, spread
 from sweep.families.base import Angles, Array
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _position_rows(region: Region, samples: tuple[int, ...], count: int) -> list
                 for pair in zip(found, exact, strict=True)
             ]
         )
-        took = seconds(_call(timed.run, designs), repeats=3)
+        took = spread(_call(timed.run, designs))
         rows.append(_row("psi", region, judged, error, took))
     return rows
 
@@ -78,13 +78,13 @@ def _extremum_rows(
             region,
             method,
             np.abs(method.run(designs) - exact) / exact,
-            seconds(_call(method.run, designs), repeats=3),
+            spread(_call(method.run, designs)),
         )
         for method in methods
     ]
 
 
-def _row(quantity: str, region: Region, method: Method, error: Array, took: float) -> dict[str, object]:
+def _row(quantity: str, region: Region, method: Method, error: Array, took: Spread) -> dict[str, object]:
     answered = np.isfinite(error)
     return {
         "quantity": quantity,
@@ -93,9 +93,9 @@ def _row(quantity: str, region: Region, method: Method, error: Array, took: floa
         "setting": method.setting,
         "largest_error": float(error[answered].max(initial=0.0)),
         "median_error": float(np.median(error[answered])) if answered.any() else float("nan"),
-        "ns_per_design": 1e9 * took / len(error),
         "designs": len(error),
         "unanswered": int((~answered).sum()),
+        **took.columns(len(error), "design"),
     }
 
 

@@ -45,9 +45,9 @@ KINDS = {
 
 
 def draw(work: pd.DataFrame, costs: pd.DataFrame, regions: tuple[tuple[str, str], ...], folder: Path) -> list[Saved]:
-    """Return the headline figure, one figure per quantity with a panel per region, and the prices of the outputs."""
+    """All methods on ordinary designs, a figure per quantity with a panel per region, and the prices of outputs."""
     with house_style():
-        figures = {"accuracy": _headline(work, regions[0][0])}
+        figures = {"accuracy-methods": _methods(work, regions[0][0])}
         figures |= {f"accuracy-{name}": _by_region(work, name, regions) for name in TITLES}
         figures["accuracy-prices"] = _prices(costs)
         return [save(figure, folder / f"{name}.svg") for name, figure in figures.items()]
@@ -65,7 +65,7 @@ def _curves(axes: Axes, points: pd.DataFrame) -> None:
 
 
 def _decades(axes: Axes, times: pd.Series) -> None:
-    """Set whole decades on the axis of time, so that every figure can be read and compared."""
+    """Whole decades on the axis of time, so that every figure can be read and compared."""
     low, high = (round_(np.log10(value)) for round_, value in ((np.floor, times.min()), (np.ceil, times.max())))
     axes.set_ylim(10.0**low, 10.0**high)
     ticks = 10.0 ** np.arange(low, high + 1.0)
@@ -74,14 +74,14 @@ def _decades(axes: Axes, times: pd.Series) -> None:
 
 
 def _plain_figure(width: float, height: float, **margins: float) -> Figure:
-    """Return a figure with given margins: to let the layout be solved for eight panels takes seconds."""
+    """A figure with given margins: to let the layout be solved for eight panels takes seconds."""
     figure = new_figure(width, height)
     figure.set_layout_engine(None)
     figure.subplots_adjust(**margins)
     return figure
 
 
-def _headline(work: pd.DataFrame, region: str) -> Figure:
+def _methods(work: pd.DataFrame, region: str) -> Figure:
     figure = _plain_figure(WIDTH * 1.15, 4.4, left=0.075, right=0.99, bottom=0.36, top=0.93, wspace=0.16)
     panels = figure.subplots(1, len(TITLES), sharey=True)
     for axes, (quantity, title) in zip(panels, TITLES.items(), strict=True):
@@ -118,7 +118,7 @@ def _by_region(work: pd.DataFrame, quantity: str, regions: tuple[tuple[str, str]
 
 
 def _prices(costs: pd.DataFrame) -> Figure:
-    """Return bars on a logarithmic axis: per pose on the left, per design on the right."""
+    """Bars on a logarithmic axis: per pose on the left, per design on the right."""
     parts = [costs[costs["per"] == per] for per in ("pose", "design")]
     longest = max(len(part) for part in parts)
     figure = new_figure(WIDTH * 1.25, 0.6 + 0.21 * longest)

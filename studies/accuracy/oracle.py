@@ -51,7 +51,10 @@ def factors(folder: Path, few: bool = False) -> list[Worst]:
     """
     if few:
         return [*_rssr(folder), *_limits(folder)]
-    judges = (_rssr, _rssp, _needle, _composite, _limits, _pressure, _largest_pressure, _synthesis, _geared_dwell)
+    from studies.accuracy.effect_oracle import effect_factors
+
+    judges = (_rssr, _rssp, _needle, _composite, _limits, _pressure, _largest_pressure, _synthesis, _geared_dwell,
+              effect_factors)  # fmt: skip
     return [worst for judge in judges for worst in judge(folder)]
 
 
@@ -62,7 +65,7 @@ def frame(found: Sequence[Worst]) -> pd.DataFrame:
     return pd.DataFrame([worst.__dict__ for worst in found])
 
 
-def _judge(
+def judge(
     table: str,
     rows: Sequence[Row],
     got: pd.DataFrame,
@@ -124,7 +127,7 @@ def _rssr(folder: Path) -> list[Worst]:
     table = {name: _column(rows, name) for name in ("a", "b", "c", "e", "f", "g", "alpha", "phi")}
     wanted = _orders("psi", "psi") | {"discriminant": ("D", ["D"])}
     got = sweep.evaluate("rssr", table | {"branch": _column(rows, "sigma")}, list(wanted))
-    return _judge("rssr", rows, got, wanted, 8.0, ("psi",), lambda row, k: _unit_size(row, k))
+    return judge("rssr", rows, got, wanted, 8.0, ("psi",), lambda row, k: _unit_size(row, k))
 
 
 def _unit_size(row: Row, key: str) -> float | None:
@@ -137,7 +140,7 @@ def _rssp(folder: Path) -> list[Worst]:
     rows = [row for row in read(folder, "rssp") if row["feasible"]]
     table = {name: _column(rows, name) for name in ("a", "b", "e", "f", "alpha", "phi")}
     wanted = _orders("S", "s") | {"discriminant": ("Q", ["Q"])}
-    return _judge(
+    return judge(
         "rssp", rows, sweep.evaluate("rssp", table | {"branch": _column(rows, "sigma")}, list(wanted)), wanted, 8.0
     )
 
@@ -155,7 +158,7 @@ def _needle(folder: Path) -> list[Worst]:
     wanted = {"s": ("along", ["along"]), "dev": ("dev", ["dev"]), "x_m": ("x", ["x"]), "y_m": ("y", ["y"])}
     wanted |= {name: (along[k], along[: k + 1]) for k, name in enumerate(("ds", "d2s", "d3s"))}
     wanted |= {name: (across[k], across[: k + 1]) for k, name in enumerate(("ddev", "d2dev"))}
-    return _judge("needle208", rows, sweep.evaluate(["rssr", "guide"], table, list(wanted)), wanted, 8.0)
+    return judge("needle208", rows, sweep.evaluate(["rssr", "guide"], table, list(wanted)), wanted, 8.0)
 
 
 def _composite(folder: Path) -> list[Worst]:
@@ -171,7 +174,7 @@ def _composite(folder: Path) -> list[Worst]:
         table |= {"kappa2": _column(rows, "kappa"), "offset2": _column(rows, "theta0"), "phi": _column(rows, "phi")}
         wanted = _orders("y", name)
         got = sweep.evaluate(["rssr", second], table, list(wanted))
-        found += _judge(f"composite rssr + {second}", rows, got, wanted, 8.0, ("psi",))
+        found += judge(f"composite rssr + {second}", rows, got, wanted, 8.0, ("psi",))
     return found
 
 
@@ -183,7 +186,7 @@ def _limits(folder: Path) -> list[Worst]:
     table = {name: _column(rows, name) for name in ("a", "b", "c", "e", "f", "g", "alpha")}
     got = sweep.summarise("rssr", table | {"branch": _column(rows, "sigma")}, [*LIMITS, "swing"], accuracy=FINEST)
     wanted = {name: (name, [name]) for name in LIMITS} | {"swing": ("psi0", ["psi0"])}
-    return _judge("limits", rows, got, wanted, 16.0, ("phi_ext", "psi_ext", "phi_fold", "psi_fold"))
+    return judge("limits", rows, got, wanted, 16.0, ("phi_ext", "psi_ext", "phi_fold", "psi_fold"))
 
 
 def _pressure(folder: Path) -> list[Worst]:
@@ -199,7 +202,7 @@ def _pressure(folder: Path) -> list[Worst]:
         "theta3": ("theta3", ["theta3"]),
     }
     got = sweep.evaluate("rssr", table, list(wanted))
-    return _judge("pressure", rows, got, wanted, 64.0, (), lambda row, k: float(row["sens"][k]))
+    return judge("pressure", rows, got, wanted, 64.0, (), lambda row, k: float(row["sens"][k]))
 
 
 def _largest_pressure(folder: Path) -> list[Worst]:
@@ -215,7 +218,7 @@ def _largest_pressure(folder: Path) -> list[Worst]:
         got = sweep.summarise(family, table, "max_pressure_angle", accuracy=FINEST)
         keys = {"max_pressure_angle": ("theta_max", ["theta_max"])}
         rows = [{key: value for key, value in row.items() if key != "case"} for row in rows]
-        found += _judge("largest pressure angle", rows, got, keys, 64.0, (), lambda row, key: 1.0)
+        found += judge("largest pressure angle", rows, got, keys, 64.0, (), lambda row, key: 1.0)
     return found
 
 
@@ -233,7 +236,7 @@ def _synthesis(folder: Path) -> list[Worst]:
         nearest = both.assign(off=(both["a"] / crank - 1.0).abs().fillna(np.inf)).sort_values("off", kind="stable")
         got = nearest[~nearest.index.duplicated()].sort_index()
         wanted = {name: (key, [key]) for name, key in (outputs | {"phi_ext": "phi1"}).items()}
-        found += _judge(f"synthesis of {family}", rows, got, wanted, 16.0, ("phi_ext",))
+        found += judge(f"synthesis of {family}", rows, got, wanted, 16.0, ("phi_ext",))
     return found
 
 
@@ -253,7 +256,7 @@ def _geared_dwell(folder: Path) -> list[Worst]:
         return max(abs(float(row[key])), abs(float(row["alpha"]) * float(row[following])))
 
     points = [row | {"kind": "point"} for row in points]
-    found = _judge("geared_dwell", points, sweep.evaluate("geared_dwell", table, list(wanted)), wanted, 16.0, (), size)
+    found = judge("geared_dwell", points, sweep.evaluate("geared_dwell", table, list(wanted)), wanted, 16.0, (), size)
     for kind, names in (
         ("dwell", {"dwell_angle": "alpha0", "dwell_deviation": "delta", "dwell_band": "band_dwell"}),
         ("turn", {"max_abs_d2psi": "max_abs_d2phi", "phi_max_abs_d2psi": "alpha_of_max_in_0_pi"}),
@@ -262,5 +265,5 @@ def _geared_dwell(folder: Path) -> list[Worst]:
         table = {"k": _column(rows, "k"), "a": _column(rows, "a")}
         got = sweep.summarise("geared_dwell", table, list(names), accuracy=FINEST)
         keys = {ours: (key, [key]) for ours, key in names.items()}
-        found += _judge("geared_dwell", rows, got, keys, 16.0, (), lambda row, key: abs(float(row[key])))
+        found += judge("geared_dwell", rows, got, keys, 16.0, (), lambda row, key: abs(float(row[key])))
     return found

@@ -1,7 +1,8 @@
 """The planar case next to pylinkage: ``make bench-peers``, in an environment of its own; never a dependency, not in CI.
 
-One four-bar, position, velocity and acceleration of the rocker at evenly spaced crank angles, each tool by its fastest
-way: pylinkage's compiled stepping, the poses of the crank-rocker for one design, and the loop over a grid.
+Ordinary four-bars of the price list: position, velocity and acceleration of the rocker at evenly spaced crank angles,
+and the largest acceleration of the turn, each program by its fastest way: pylinkage's compiled stepping, the poses of
+one design, and the sweep over many.
 """
 
 from __future__ import annotations
@@ -9,90 +10,106 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from kernels.families import rssr
 from studies.accuracy.machine import description
-from studies.accuracy.reference import RSSR
-from studies.accuracy.timing import seconds
-from sweep.families.base import Array
+from studies.accuracy.prices import GRID, SAMPLES
+from studies.accuracy.subjects import ORDINARY, measure, regions_of
+from studies.accuracy.timing import per_design, spread
+from studies.accuracy.witness import reference
+from sweep.evaluation.summaries import design_outputs
+from sweep.families import family
+from sweep.families.base import Accuracy, Array
 from sweep.reductions.sampling import turn
 
-A, B, C, E = 1.0, 3.0, 2.5, 3.2  # crank, coupler, rocker, frame; turns fully
-ANGLES = 7200
-DESIGNS = 2000  # side by side, as a sweep has them
+PLANAR = "four_bar"
+DESIGNS = 4  # a linkage of pylinkage is one design, so few do
+OWN, SWEPT = "linksweep, one design at a time", "linksweep, many designs at once"
 
 
 def main() -> None:
-    """Time both, compare the rocker's positions, keep the table."""
+    """Time both, compare their accelerations, keep the table."""
     parser = argparse.ArgumentParser(prog="python -m studies.accuracy.peers", description=__doc__)
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
     out: Path = parser.parse_args().out
 
     import pandas as pd
 
-    phi = turn(ANGLES)
-    design = np.array([[A, B, C, E, 0.0, 0.0, 0.0, 1.0]])
-    wanted = frozenset({"psi", "dpsi", "d2psi"})
-    least, found = np.empty(DESIGNS), np.empty(DESIGNS)
-    many, grid = np.tile(design, (DESIGNS, 1)), turn(720)
-
-    def sweep_all() -> None:
-        rssr.dense_maxima(many, grid.cos[0], grid.sin[0], least, None, found, None)
-
-    stepped, trace = _pylinkage()
+    region = next(region for region in regions_of(PLANAR, (DESIGNS, 0, 0)) if region.name == ORDINARY)
+    exact = reference(family(PLANAR), region.designs).value
     rows = [
-        (f"pylinkage {version('pylinkage')}: position, velocity, acceleration", seconds(stepped) / ANGLES),
-        ("linksweep: position, velocity, acceleration", seconds(lambda: RSSR.poses(design, phi, wanted)) / ANGLES),
-        ("linksweep: largest acceleration over a grid", seconds(sweep_all) / (DESIGNS * 720)),
+        row
+        for samples in SAMPLES
+        for row in (
+            _row(f"pylinkage {version('pylinkage')}", samples, _pylinkage, region.designs, exact),
+            _row(OWN, samples, _own, region.designs, exact),
+            _swept(samples, region.designs, exact),
+        )
     ]
-    table = pd.DataFrame(
-        [{"what": what, "ns_per_angle": 1e9 * took, "ratio": rows[0][1] / took} for what, took in rows]
-    )
-    table["distance_of_rocker_pins"] = _distance(trace)
+    table = pd.DataFrame(rows)
     out.mkdir(parents=True, exist_ok=True)
     table.to_parquet(out / "peers.parquet", index=False)
     print(f"{description()}\n{table.to_string(index=False)}")  # noqa: T201
 
 
-def _pylinkage() -> tuple[Callable[[], tuple[Array, Array, Array]], Array]:
+def _row(
+    what: str, samples: int, make: Callable[[Array, int], Callable[[], float]], designs: Array, exact: Array
+) -> dict[str, object]:
+    runs = [make(design, samples) for design in designs]
+    error = max(abs(run() / value - 1.0) for run, value in zip(runs, exact, strict=True))
+
+    def together() -> None:
+        for run in runs:
+            run()
+
+    head: dict[str, object] = {"what": what, "family": PLANAR, "method": GRID, "setting": float(samples)}
+    return head | {"largest_error": error} | spread(together).columns(len(runs), "design")
+
+
+def _swept(samples: int, designs: Array, exact: Array) -> dict[str, object]:
+    mechanism, accuracy = family(PLANAR), Accuracy(samples=samples)
+    name = measure(mechanism)
+
+    def run(some: Array) -> Array:
+        return np.asarray(design_outputs(mechanism, some, [name], accuracy)[name], np.float64)
+
+    error = float(np.abs(run(designs) / exact - 1.0).max())
+    head: dict[str, object] = {"what": SWEPT, "family": PLANAR, "method": GRID, "setting": float(samples)}
+    return head | {"largest_error": error} | per_design(run, designs)
+
+
+def _own(design: Array, samples: int) -> Callable[[], float]:
+    mechanism, one, angles = family(PLANAR), design[None, :], turn(samples)
+    wanted = frozenset({"psi", "dpsi", "d2psi"})
+    assert measure(mechanism) == "max_abs_d2psi"
+    return lambda: float(np.abs(mechanism.poses(one, angles, wanted)["d2psi"]).max())
+
+
+def _pylinkage(design: Array, samples: int) -> Callable[[], float]:
+    """The rocker's angular acceleration from its pin's, as the program gives no angles."""
     from pylinkage.actuators import Crank
     from pylinkage.components import Ground
     from pylinkage.dyads import RRRDyad
     from pylinkage.simulation import Linkage
 
-    step = 2.0 * math.pi / ANGLES
-    left, right = Ground(0.0, 0.0, name="A"), Ground(E, 0.0, name="D")
-    crank = Crank(anchor=left, radius=A, angular_velocity=step, name="B")
-    rocker = RRRDyad(anchor1=crank.output, anchor2=right, distance1=B, distance2=C, name="C")
+    a, b, c, e = (float(x) for x in design[:4])
+    left, right = Ground(0.0, 0.0, name="A"), Ground(e, 0.0, name="D")
+    crank = Crank(anchor=left, radius=a, angular_velocity=2.0 * math.pi / samples, name="B")
+    rocker = RRRDyad(anchor1=crank.output, anchor2=right, distance1=b, distance2=c, name="C")
     linkage = Linkage([left, right, crank, rocker], name="four-bar")
     linkage.set_input_velocity(crank, omega=1.0, alpha=0.0)
-
-    def run() -> tuple[Array, Array, Array]:
-        traces: tuple[Array, Array, Array] = linkage.step_fast_with_kinematics(iterations=ANGLES)
-        return traces
-
-    return run, run()[0]
+    return partial(_largest, linkage, samples, e, c)
 
 
-def _distance(trace: Array) -> float:
-    """Return the largest distance of the two tools' rocker pins, for the better of the two assembly modes,
-    at equal crank pins.
-    """
-    pins = np.asarray(trace)[:, -2], np.asarray(trace)[:, -1]
-    phi = np.arctan2(pins[0][:, 1], pins[0][:, 0])[None, :]
-    distances = []
-    for branch in (1.0, -1.0):
-        design = np.array([[A, B, C, E, 0.0, 0.0, 0.0, branch]])
-        motion = RSSR.poses(
-            design, turn(1)._replace(phi=phi, cos=np.cos(phi), sin=np.sin(phi)), frozenset({"x_c", "y_c"})
-        )
-        own = np.stack([motion["x_c"][0], motion["y_c"][0]], axis=1)
-        distances.append(float(np.abs(own - pins[1]).max()))
-    return min(distances)
+def _largest(linkage: object, samples: int, frame: float, rocker: float) -> float:
+    traces = linkage.step_fast_with_kinematics(iterations=samples)  # type: ignore[attr-defined]
+    position, _, acceleration = (np.asarray(trace)[:, -1] for trace in traces)
+    x, y = position[:, 0] - frame, position[:, 1]
+    return float(np.abs(x * acceleration[:, 1] - y * acceleration[:, 0]).max()) / rocker**2
 
 
 if __name__ == "__main__":

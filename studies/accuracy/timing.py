@@ -3,16 +3,67 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from sweep.families.base import Array
+
+REPEATS = 5
+ENOUGH, MANY = 0.02, 4096  # seconds that a call over designs takes, and designs it has at most
+
+
+class Spread(NamedTuple):
+    """Median and quartiles of the times of one call [s]."""
+
+    median: float
+    lower: float
+    upper: float
+
+    @classmethod
+    def of(cls, times: Sequence[float]) -> Spread:
+        """Of given times."""
+        lower, median, upper = np.percentile(times, [25.0, 50.0, 75.0])
+        return cls(float(median), float(lower), float(upper))
+
+    def columns(self, units: int, per: str) -> dict[str, float]:
+        """As columns of a table, ns per unit: the median, and both quartiles."""
+        names = (f"ns_per_{per}", f"ns_per_{per}_lower", f"ns_per_{per}_upper")
+        return {name: 1e9 * took / units for name, took in zip(names, self, strict=True)}
 
 
 def seconds(
     call: Callable[[], object],
-    repeats: int = 5,
+    repeats: int = REPEATS,
     least: float = 2e-3,
     clock: Callable[[], float] = time.process_time,
 ) -> float:
-    """Return the shortest of several timings of one call [s]; the first call, which may compile, is not counted.
+    """Shortest of several timings of one call [s], see :func:`timings`."""
+    return min(timings(call, repeats, least, clock))
+
+
+def spread(call: Callable[[], object], repeats: int = REPEATS, least: float = 2e-3) -> Spread:
+    """Median and quartiles of several timings of one call, see :func:`timings`."""
+    return Spread.of(timings(call, repeats, least))
+
+
+def per_design(run: Callable[[Array], object], designs: Array) -> dict[str, float]:
+    """Columns of the time per design, of the same designs over and over: what a call itself takes must not show."""
+    start = time.process_time()
+    run(designs)
+    again = max(1, min(MANY // len(designs), round(ENOUGH / max(time.process_time() - start, 1e-6))))
+    many = np.tile(designs, (again, 1))
+    return spread(lambda: run(many)).columns(len(many), "design")
+
+
+def timings(
+    call: Callable[[], object],
+    repeats: int,
+    least: float,
+    clock: Callable[[], float] = time.process_time,
+) -> list[float]:
+    """Times of one call [s]; the first call, which may compile, is not counted.
 
     Calls shorter than ``least`` are timed in groups, so that the clock does not show.  Processor time, which other work
     on the machine disturbs least; what runs in several threads needs ``time.perf_counter``.
@@ -21,10 +72,10 @@ def seconds(
     start = clock()
     call()
     group = max(1, round(least / max(clock() - start, 1e-7)))
-    best = float("inf")
+    found = []
     for _ in range(repeats):
         start = clock()
         for _ in range(group):
             call()
-        best = min(best, (clock() - start) / group)
-    return best
+        found.append((clock() - start) / group)
+    return found

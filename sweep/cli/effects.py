@@ -78,7 +78,7 @@ def explain(entry: Effect) -> list[str]:
         lines += aligned(_output_rows(entry.design_result.outputs))
     if entry.inputs:
         lines += ["", "inputs"]
-        lines += aligned([(p.name, internal_unit(p.unit), input_words(p)) for p in (*entry.inputs, *entry.tool_inputs)])
+        lines += aligned([(p.name, internal_unit(p.unit), input_words(p)) for p in every_input(entry)])
     return lines
 
 
@@ -93,6 +93,11 @@ def input_words(p: Parameter) -> str:
     notes = [p.sign] if p.sign else []
     notes += [f"{p.default:g} if left out" if p.default is not None else "required"]
     return f"{p.text} ({', '.join(notes)})"
+
+
+def every_input(entry: Effect) -> tuple[Parameter, ...]:
+    """Inputs of an effect for whatever family, those of a tool behind its own."""
+    return tuple(dict.fromkeys((*entry.inputs, *(p for tool in entry.tool_inputs for p in tool))))
 
 
 def page() -> str:
@@ -112,8 +117,9 @@ def page() -> str:
         "",
         "In a chain inputs and outputs carry the number of their stage (`m_crank2`, `force_c2`), `speed` and",
         "`speed_change` that of the first; a later stage turns as the one before drives it, and its driving torque",
-        "loads that one. A tool at the guided point of a `guide` (`m_tool`, `tool_force`: needle bar and its force)",
-        "loads its joints and the stages before. What is not listed for a family the theory does not give: geared",
+        "loads that one. A tool (`m_tool` and its force: docs/tool.md) at the guided point of a `guide`, at the",
+        "coupler point of a `four_bar`, at the tip of another rocker or at the working point of a looper loads the",
+        "joints and the stages before. What is not listed for a family the theory does not give: geared",
         "dwells have no effects, sliders no shaft bearings.",
         "",
         "Units are any consistent set; in studies and datasets mm, t, s, hence N, N mm, MPa. Costs are measured on one",
@@ -139,10 +145,7 @@ def page() -> str:
             lines.append(f"| `{o.name}` | {internal_unit(o.unit)} | {_cell(o.text)}{per} | {o.equation} |")
         if e.inputs:
             lines += ["", "| input | unit | definition |", "|---|---|---|"]
-            lines += [
-                f"| `{p.name}` | {internal_unit(p.unit)} | {_cell(input_words(p))} |"
-                for p in (*e.inputs, *e.tool_inputs)
-            ]
+            lines += [f"| `{p.name}` | {internal_unit(p.unit)} | {_cell(input_words(p))} |" for p in every_input(e)]
     return "\n".join(lines) + "\n"
 
 

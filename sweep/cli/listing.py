@@ -59,6 +59,7 @@ def capability_words(family: Family) -> list[str]:
         GuidedPoint,
         JointRecords,
         LimitLocus,
+        LinkTree,
         OutputLink,
         Points,
         PressureEllipse,
@@ -68,6 +69,7 @@ def capability_words(family: Family) -> list[str]:
     words = [
         (Assembly, "rotatability"),
         (JointRecords, "loads"),
+        (LinkTree, "loads"),
         (PressureEllipse, "pressure extrema"),
         (CrankRockerLoop, "proofs"),
         (LimitLocus, "limit locus"),

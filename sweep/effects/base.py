@@ -12,21 +12,26 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.joints import PER_DESIGN, PER_POSE
+from kernels.links import PER_BODY, PER_LINE, Links
 from sweep.costs import nanoseconds
+from sweep.effects.places import tool_place
 from sweep.families import NAMES as FAMILY_NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import JointRecords, ToolPoint
+from sweep.families.capabilities import JointRecords, LinkTree
 from sweep.families.chain import drive, driving_names
 from sweep.numerics.curves import Curve
 
 # Loads that a curve over the turn of the crank can add to.
-CURVED = ("load_torque", "load_force", "tool_force")
+CURVED = ("load_torque", "load_force", "tool_force", "tool_force_x", "tool_force_y", "tool_force_z")
 # Inputs that stand in [loads] of a study; the others but the speed stand in [bodies].
 LOADS = (*CURVED, "pierce_force", "pierce_at", "pierce_sense", "resisting_torque", "motor_slope", "thread_tension")
 
+_PER_LINK = (PER_BODY, 3, PER_LINE)
+
 Status: TypeAlias = NDArray[np.uint8]
 Rows: TypeAlias = NDArray[np.intp]
+Index: TypeAlias = NDArray[np.int64]
 
 
 class Driven(NamedTuple):
@@ -71,8 +76,10 @@ class Scene:
 
     @cached_property
     def motion(self) -> Columns:
-        """Pose outputs of the family that the joint records are made of."""
-        return self.family.poses(self.designs, self.angles, frozenset(self._joints.needs))
+        """Pose outputs of the family that its joint records, or the poses of its links, are made of."""
+        tree = self.family.find(LinkTree)
+        needs = self._joints.needs if tree is None else tree.needs
+        return self.family.poses(self.designs, self.angles, frozenset(needs))
 
     @cached_property
     def records(self) -> tuple[Array, Array]:
@@ -80,6 +87,20 @@ class Scene:
         per_pose, per_design = np.empty((*self.shape, PER_POSE)), np.empty((len(self.designs), PER_DESIGN))
         self._joints.fill(self.designs, self.angles, self.motion, per_pose, per_design)
         return per_pose, per_design
+
+    @cached_property
+    def links(self) -> Links:
+        """Bodies of the family and their poses; see :mod:`kernels.links`."""
+        tree = self.family.find(LinkTree)
+        if tree is None:
+            raise TypeError(f"{self.family.name} has no tree of links")
+        n, every = len(self.designs), (len(tree.bodies), len(tree.freedoms), len(tree.ends))
+        bodies, axes, lines = (np.empty((*self.shape, k, per)) for k, per in zip(every, _PER_LINK, strict=True))
+        parents = np.array(tree.parents, np.int64)
+        freedoms, ends = (np.tile(np.array(given, np.int64), (n, 1, 1)) for given in (tree.freedoms, tree.ends))
+        found = Links(parents, freedoms, ends, bodies, axes, lines)
+        tree.fill(self.designs, self.angles, self.motion, found)
+        return found
 
     @cached_property
     def _joints(self) -> JointRecords:
@@ -236,9 +257,11 @@ class Effect:
     ``even_crank`` effects presume a crank that turns evenly, so they are no effects of a chain's later stages.
     ``takes_load`` is the key of the effect that hands back the load of a chain's later stages; without it their load
     does not enter.  ``requires`` is the capability that a family must have, ``followers`` are the kinds of
-    follower that the effect is made for, ``tool_inputs`` are further inputs where the family has a point that a tool
-    can hang on.  ``least`` are pose outputs of which the least value over the turn counts, as a life, not the largest
-    (:func:`sweep.effects.wanted.expanded`).  ``advise(scene)`` applies the effect's rule of negligibility to some
+    follower that the effect is made for, ``tool_inputs`` are further inputs where a tool can hang on the coupler and
+    moves along a line, where it moves freely, and where it hangs on the tip of a rocker.  ``least`` are pose outputs of
+    which the least value over the turn counts, as a life, not the largest (:func:`sweep.effects.wanted.expanded`).
+    ``tree`` is the tree of links of the one family that it is for, if it is for one; ``carried_at`` the place of a tool
+    that a family must have, if it must have one.  ``advise(scene)`` applies the effect's rule of negligibility to some
     designs over a turn; None where none turns.
     """
 
@@ -259,19 +282,24 @@ class Effect:
     design_result: DesignResult | None = None
     advise: AdviceFunction | None = None
     requires: type = JointRecords
-    tool_inputs: tuple[Parameter, ...] = ()
+    tool_inputs: tuple[tuple[Parameter, ...], ...] = ((), (), ())
     least: tuple[str, ...] = ()
     followers: tuple[str, ...] = ("rocker", "slider")
+    tree: LinkTree | None = None
+    carried_at: int | None = None
 
     def inputs_of(self, family: Family) -> tuple[Parameter, ...]:
-        """The inputs, with those of a tool where the family has a point that one can hang on."""
-        return self.inputs if family.find(ToolPoint) is None else (*self.inputs, *self.tool_inputs)
+        """The inputs, with those of a tool where the family has a place that one can hang on."""
+        place = tool_place(family)
+        return self.inputs if place is None else (*self.inputs, *self.tool_inputs[place])
 
     def serves(self, family: Family) -> bool:
         """Whether the family has what the effect requires, with a kind of follower that it is made for."""
         joints = family.find(JointRecords)
         follows = joints is None or joints.follower in self.followers
-        return family.find(self.requires) is not None and follows
+        own = self.tree is None or family.find(LinkTree) is self.tree
+        own = own and self.carried_at in (None, tool_place(family))
+        return family.find(self.requires) is not None and follows and own
 
     @cached_property
     def families(self) -> tuple[str, ...]:

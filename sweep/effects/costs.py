@@ -14,8 +14,8 @@ import numpy as np
 from sweep.effects import NAMES, effect, with_effects
 from sweep.effects.placing import Placed, first_scene
 from sweep.families import family
-from sweep.families.base import Accuracy, Angles, Array, Family
-from sweep.families.capabilities import JointRecords
+from sweep.families.base import Accuracy, Angles, Array, Family, Parameter
+from sweep.families.capabilities import JointRecords, LinkTree
 
 POSES = 360
 MOTION = "motion"
@@ -38,6 +38,10 @@ INPUTS = {
     "eyelet_radius": 1.0, "mu_eyelet": 0.2,
 }  # fmt: skip
 
+# Of linkages of a few units of length, by the beginning of an input's name.
+SMALL = {"speed": 520.0, "m_tool": 2.5e-5}
+KINDS = {"mu_": 0.05, "radius_": 0.1}
+
 
 class Cost(NamedTuple):
     """Processor time of some outputs of an effect, per "pose" or per "design"; the motion it needs is counted apart."""
@@ -51,12 +55,24 @@ class Cost(NamedTuple):
 def designs(full: Family, n: int, seed: int = 0) -> Array:
     """Crank-rockers or slider-cranks a few percent round a regular one, with the inputs of the family's effects."""
     noise = np.random.default_rng(seed).uniform(-0.05, 0.05, (n, len(full.parameters)))
-    values = [CENTRE.get(p.name, INPUTS.get(p.name, p.default)) for p in full.parameters]
+    values = [_value(full, p) for p in full.parameters]
     matrix = np.array(values, dtype=np.float64) * (1.0 + noise)
     for k, p in enumerate(full.parameters):
         if p.choices is not None or p.name not in CENTRE:
             matrix[:, k] = values[k]
     return matrix
+
+
+def _value(full: Family, p: Parameter) -> float | None:
+    """Value of a parameter or an input: of the small machine, or of the family's example and by the kind of input."""
+    for known in (CENTRE, INPUTS) if full.find(LinkTree) is None else (full.example, SMALL):
+        if p.name in known:
+            return known[p.name]
+    if p.default is not None:
+        return p.default
+    if p.name.startswith("support_"):
+        return -0.5 if p.name.endswith("1") else 0.6
+    return next((value for start, value in KINDS.items() if p.name.startswith(start)), None)
 
 
 def least_time(run: Callable[[], object], repeats: int = 5) -> float:

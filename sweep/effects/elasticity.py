@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from kernels import status as st
+from kernels.effects.elastic_drive import driven_steady_state
 from kernels.effects.elasticity import quasi_static, steady_state
 from sweep.effects import loads
-from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status
+from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status, take_over
+from sweep.effects.driven import DrivenSide, driven_side
+from sweep.effects.handed import INERTIAS, LOADS, behind
 from sweep.effects.loads import SPEED
 from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, optional_outputs
 
-EQUATION = "E1 (1), (2), E2 (3), (4)"
+EQUATION = "E1 (1), (2), (5), E2 (3)-(5)"
 FORMULAS = (
     "(1) lag = (M - J omega^2 psi'')/(k p^2), p = c t_tau; elongation = p lag",
     "(2) frequency ratio nu = sqrt(k/J) |p|/omega",
@@ -20,6 +23,8 @@ FORMULAS = (
     "    by its Fourier coefficients; slider: J is the driven mass, c = 1, eta a length (ours)",
     "(4) stable while the largest Floquet multiplier stays below 1, bounded at 1 (no damping); above 1, and where 1921",
     "    samples of the turn do not resolve it, the steady state is not converged",
+    "(5) stages behind, or a tool at the rocker's tip, need a torque T(psi, psi', psi'') and have an inertia Jd(psi):",
+    "    T is taken off M, Jd added to J, omega^2 Jd_psi psi' to the factor of eta', T_psi to that of eta (ours)",
 )
 
 _SHARED = (
@@ -29,7 +34,12 @@ _SHARED = (
 )
 INPUTS = {
     "rocker": (
-        Parameter("driven_inertia", "inertia", "inertia of rocker and all it drives about its axis", positive=True),
+        Parameter(
+            "driven_inertia",
+            "inertia",
+            "inertia of the rocker about its axis, and of what it drives besides the stages behind and its tool",
+            positive=True,
+        ),
         *_SHARED,
         Parameter("load_torque", "torque", "torque on the rocker about its axis", default=0.0),
     ),
@@ -59,6 +69,8 @@ def _dynamic_outputs(kind: loads.Follower) -> tuple[Output, ...]:
     )
 
 
+# A tool on the coupler itself moves with its elongation: it is not seen.
+_AT_TIP = ((), (), (*loads.TOOLS[2], *loads.GRAVITY))
 _KERNEL_NAMES = ("lag", "lag_displacement", "frequency_ratio")
 FLOQUET = Output(
     "floquet", "1", "largest modulus of the Floquet multipliers; stable below 1, exactly 1 without damping", EQUATION
@@ -81,12 +93,13 @@ def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     return per_pose[:, :, 21] * c[:, None], np.ascontiguousarray(per_pose[:, :, 23]), c, reach, data
 
 
-def _varying(scene: Scene) -> Array | None:
-    """What a curve adds to the constant load, (n, m); None where the load is constant."""
+def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
+    """What a curve and the driven side add to the constant load, (n, m); None where the load is constant."""
     load = loads.follower(scene).load.name
-    if load not in scene.curves:
+    if load not in scene.curves and driven is None:
         return None
-    return np.ascontiguousarray(np.broadcast_to(scene.load(load) - scene.inputs[load][:, None], scene.shape))
+    added = np.broadcast_to(scene.load(load) - scene.inputs[load][:, None], scene.shape)
+    return np.ascontiguousarray(added if driven is None else added - driven.torque)
 
 
 def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
@@ -95,9 +108,20 @@ def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
     lag, displacement, ratio = outputs
     status = scene.status()
     p, d2psi, c, reach, data = _arguments(scene)
-    quasi_static(p, d2psi, c, reach, data, status, lag, displacement, ratio, _varying(scene))
+    driven = driven_side(scene, False)
+    if driven is not None:
+        missing = ~np.isfinite(driven.torque)
+        take_over(status, np.where(missing, _status_behind(scene), st.OK))
+    quasi_static(p, d2psi, c, reach, data, status, lag, displacement, ratio, _varying(scene, driven))
+    if driven is not None and ratio is not None:
+        ratio *= np.sqrt(data[:, :1] / (data[:, :1] + driven.inertia))
     columns: Columns = {name: out for name, out in zip(_KERNEL_NAMES, outputs, strict=True) if out is not None}
     return columns | {"status": status}
+
+
+def _status_behind(scene: Scene) -> Status:
+    handed_back = behind(scene, LOADS, frozenset({"drive_torque", *INERTIAS}))
+    return scene.status() if handed_back is None else np.asarray(handed_back["status"], np.uint8)
 
 
 def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
@@ -110,8 +134,28 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
     status, floquet = np.empty(n, np.uint8), np.empty(n)
     lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
     p, d2psi, c, reach, data = _arguments(grid)
-    steady_state(p, d2psi, c, reach, data, phi, last, status, lag, elongation, floquet, _varying(grid))
+    driven = driven_side(grid, True)
+    if driven is None:
+        steady_state(p, d2psi, c, reach, data, phi, last, status, lag, elongation, floquet, _varying(grid))
+    else:
+        first, zeroth, right = _equation(grid, p, d2psi, data, driven)
+        driven_steady_state(p, first, zeroth, right, c, reach, phi, last, status, lag, elongation, floquet)
     return {"lag_dynamic": lag, "elongation_dynamic": elongation, "floquet": floquet}, status
+
+
+def _equation(scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenSide) -> tuple[Array, Array, Array]:
+    """Factors of eta' and of eta, and the right side, over that of eta''; (3) with (5), (n, N)."""
+    inertia, stiffness, damping, speed, _ = (data[:, k, None] for k in range(5))
+    square = p * p
+    orders = np.arange(p.shape[1] // 2 + 1)
+    slope = np.fft.irfft(1j * orders * np.fft.rfft(square, axis=1), n=p.shape[1], axis=1)
+    mass = (inertia + driven.inertia) * speed * speed
+    dpsi = scene.records[0][:, :, 22]
+    first = damping * speed * square + speed * speed * driven.bend * dpsi
+    zeroth = stiffness * square + 0.5 * damping * speed * slope + driven.slope
+    load = scene.load(loads.follower(scene).load.name)
+    right = load - driven.torque - inertia * speed * speed * d2psi
+    return first / mass, zeroth / mass, right / mass
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -172,6 +216,8 @@ def _static(kind: loads.Follower) -> Effect:
         followers=(kind.name,),
         needs=("pressure",),
         inputs=INPUTS[kind.name],
+        tool_inputs=_AT_TIP,
+        takes_load=LOADS,
         outputs=_static_outputs(kind),
         least=("frequency_ratio",),
         compute=compute_static,
@@ -193,6 +239,8 @@ def _dynamic(kind: loads.Follower) -> Effect:
         followers=(kind.name,),
         needs=(f"{kind.prefix}elasticity",),
         inputs=INPUTS[kind.name],
+        tool_inputs=_AT_TIP,
+        takes_load=LOADS,
         outputs=outputs,
         compute=compute_dynamic,
         called_for="max|lag''/nu^2|/max|lag| above a third of the tolerance",

@@ -10,11 +10,13 @@ from kernels.effects.friction import friction_loads
 from sweep.effects import loads
 from sweep.effects.base import Effect, Scene, largest, refuse, take_over
 from sweep.effects.bearings import together
+from sweep.effects.handed import FRICTION
+from sweep.effects.handed import behind as handed_behind
 from sweep.effects.kinetostatics import bodies, drive, force_outputs, vector_columns, wanted_groups
-from sweep.effects.tool import wrench_and_inertia
+from sweep.effects.tool import weighs
 from sweep.families.base import Columns, Output, Parameter, optional_outputs
 
-KEY = "D2"
+KEY = FRICTION
 EQUATION = "D2 (1)-(4)"
 FORMULAS = (
     "(1) ball joints: E = -mu r |R| w/|w|, w the speed of the coupler relative to crank or rocker",
@@ -95,12 +97,7 @@ def _outputs(kind: loads.Follower) -> tuple[Output, ...]:
 
 def behind(scene: Scene) -> Columns | None:
     """Driving torque with friction and status of the next stage; None at the end of the chain."""
-    if scene.driven is None:
-        return None
-    if "behind friction" not in scene.memo:
-        scene.memo["behind friction"] = compute(scene.driven, frozenset({"drive_torque_friction"}))
-    found: Columns = scene.memo["behind friction"]
-    return found
+    return handed_behind(scene, KEY, frozenset({"drive_torque_friction"}))
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
@@ -119,10 +116,11 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     )
     load = drive(scene, handed_back, "drive_torque_friction")
     poses, designs = scene.records
-    wrench, _ = wrench_and_inertia(scene, load, False)
+    tool = weighs(scene, load, False)
     finger = scene.inputs["finger"]
     friction_loads(
-        poses, designs, bodies(scene), load, data, finger, status, out[0], out[1], out[2], contraction, wrench
+        poses, designs, bodies(scene), load, data, finger, status, out[0], out[1], out[2], contraction, tool.coupler,
+        tool.follower,
     )  # fmt: skip
     columns = vector_columns(out[0], scene.records, wanted, SUFFIX)
     for names, values in ((tuple(_COUPLES), out[1]), (losses, out[2])):
@@ -143,7 +141,7 @@ def _effect(kind: loads.Follower) -> Effect:
         followers=(kind.name,),
         needs=(f"{kind.prefix}kinetostatics",),
         inputs=(*kind.parameters, *_data(kind)),
-        tool_inputs=loads.TOOL,
+        tool_inputs=loads.TOOLS,
         outputs=_outputs(kind),
         compute=compute,
         called_for="losses, drive sizing, a check against jamming",

@@ -8,10 +8,12 @@ from kernels import status as st
 from kernels.effects.kinetostatics import kinetostatics
 from sweep.effects import loads
 from sweep.effects.base import Advice, Effect, Scene, take_over
-from sweep.effects.tool import wrench_and_inertia
+from sweep.effects.handed import LOADS, carried, on_output
+from sweep.effects.handed import behind as handed_behind
+from sweep.effects.tool import weighs
 from sweep.families.base import Array, Columns, Output
 
-KEY = "D1, D3"
+KEY = LOADS
 EQUATION = "D1 (1)-(4), D3 (5)-(7)"
 FORMULAS = (
     "(1) F_i = m_i (a_Gi - gravity), T_i = J_i eps_i + omega_i x J_i omega_i; Q = T2 + (d2 - b s) x F2; q = n x w",
@@ -135,9 +137,7 @@ def drive(scene: Scene, handed_back: Columns | None, name: str = "drive_torque")
     ``handed_back``, acts on the rocker besides its own load.
     """
     speed, change = scene.crank()
-    load = scene.load(loads.follower(scene).load.name)
-    if handed_back is not None:
-        load = load - scene.after[0].kappa[:, None] * np.asarray(handed_back[name], np.float64)
+    load = on_output(scene, scene.load(loads.follower(scene).load.name), handed_back, name)
     return np.stack(np.broadcast_arrays(load, speed, change), axis=2)
 
 
@@ -148,12 +148,7 @@ def bodies(scene: Scene) -> Array:
 
 def behind(scene: Scene) -> Columns | None:
     """Driving torque, reduced inertia and status of the next stage; None at the end of the chain."""
-    if scene.driven is None:
-        return None
-    if "behind" not in scene.memo:
-        scene.memo["behind"] = compute(scene.driven, frozenset({"drive_torque", *INERTIAS}))
-    found: Columns = scene.memo["behind"]
-    return found
+    return handed_behind(scene, KEY, frozenset({"drive_torque", *INERTIAS}))
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
@@ -162,16 +157,17 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     sizes = zip((18, 2, 2), wanted_groups(wanted), strict=True)
     forces, couples, inertia = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
     load = drive(scene, handed_back)
-    wrench, of_tool = wrench_and_inertia(scene, load, inertia is not None)
+    tool = weighs(scene, load, inertia is not None)
     kinetostatics(
-        *scene.records, bodies(scene), load, scene.inputs["finger"], status, forces, couples, inertia, wrench
+        *scene.records, bodies(scene), load, scene.inputs["finger"], status, forces, couples, inertia, tool.coupler,
+        tool.follower,
     )  # fmt: skip
-    if inertia is not None and of_tool is not None:
-        inertia += of_tool
+    if inertia is not None and tool.inertia is not None:
+        inertia += tool.inertia
     if handed_back is not None:
         take_over(status, handed_back["status"])
         if inertia is not None:
-            inertia += _carried(scene, handed_back)
+            inertia += carried(scene, handed_back)
     if forces is not None:
         scene.memo["forces"] = forces, status
     columns = vector_columns(forces, scene.records, wanted)
@@ -179,13 +175,6 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
         if values is not None:
             columns |= {name: values[:, :, k] for k, name in enumerate(names) if name in wanted}
     return columns | {"status": status}
-
-
-def _carried(scene: Scene, handed_back: Columns) -> Array:
-    """Inertia of the later stages reduced to this crank and its derivative, (n, m, 2)."""
-    inertia, slope = (np.asarray(handed_back[name], np.float64) for name in INERTIAS)
-    first, second = scene.gear
-    return np.stack([first * first * inertia, 2.0 * first * second * inertia + first**3 * slope], axis=2)
 
 
 def advise(scene: Scene) -> Advice | None:
@@ -213,7 +202,7 @@ def _effect(kind: loads.Follower) -> Effect:
         followers=(kind.name,),
         needs=("coupler",),
         inputs=kind.parameters,
-        tool_inputs=loads.TOOL,
+        tool_inputs=loads.TOOLS,
         outputs=_outputs(kind.name),
         compute=compute,
         called_for="joint loads, drive torque, shaking force, balancing",

@@ -17,8 +17,8 @@ _FRAMES = {
 }
 
 
-def _body(body: str) -> tuple[Parameter, ...]:
-    frame = _FRAMES[body]
+def body_inputs(body: str, frame: str, default: float | None = None) -> tuple[Parameter, ...]:
+    """Mass, centre of mass and inertia of a body whose axes lie as ``frame`` says; ``default`` mass."""
     centre = (
         Parameter(f"com_{body}_{axis}", "length", f"centre of mass of the {body} ({frame})", default=0.0)
         for axis in "xyz"
@@ -32,7 +32,22 @@ def _body(body: str) -> tuple[Parameter, ...]:
         )
         for x, y in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
-    return Parameter(f"m_{body}", "mass", f"mass of the {body}", not_negative=True), *centre, *moments
+    mass = Parameter(f"m_{body}", "mass", f"mass of the {body}", default=default, not_negative=True)
+    return mass, *centre, *moments
+
+
+def _body(body: str) -> tuple[Parameter, ...]:
+    return body_inputs(body, _FRAMES[body])
+
+
+def rod_inputs(body: str, frame: str) -> tuple[Parameter, ...]:
+    """Mass, centre of mass and inertia of a slender rod."""
+    return (
+        Parameter(f"m_{body}", "mass", f"mass of {body}", default=0.0, not_negative=True),
+        Parameter(f"com_{body}_x", "length", f"centre of mass of {body} ({frame})", default=0.0),
+        Parameter(f"j_{body}", "inertia", f"inertia of {body} across it about its centre of mass", default=0.0,
+                  not_negative=True),
+    )  # fmt: skip
 
 
 GRAVITY = tuple(
@@ -41,9 +56,10 @@ GRAVITY = tuple(
 )
 SPEED = Parameter("speed", "speed", "speed of the crank (scene.speed of a study)", positive=True)
 CHANGE = Parameter("speed_change", "angular_acceleration", "angular acceleration of the crank", default=0.0)
-# Of families with a ToolPoint; without mass and force nothing is computed for them.
+# Of a tool that moves along a line; without mass and force nothing is computed for it.
+_MASS = Parameter("m_tool", "mass", "mass of the tool, such as a needle bar", default=0.0, not_negative=True)
 TOOL = (
-    Parameter("m_tool", "mass", "mass of the tool at the guided point (needle bar)", default=0.0, not_negative=True),
+    _MASS,
     Parameter("tool_force", "force", "force on the tool along its way; a resisting one opposes ds", default=0.0),
     Parameter("pierce_force", "force", "force that resists the tool on its way into the fabric", default=0.0,
               not_negative=True),
@@ -51,6 +67,21 @@ TOOL = (
     Parameter("pierce_sense", "sign", "side of pierce_at on which the fabric lies: towards growing or falling s",
               default=1.0, choices=(-1.0, 1.0)),
 )  # fmt: skip
+# Of a tool at a point that moves freely in space.
+FREE_TOOL = (
+    _MASS,
+    *(
+        Parameter(f"tool_force_{axis}", "force", f"force on the tool along {axis} of the fixed axes", default=0.0)
+        for axis in "xyz"
+    ),
+)
+TIP = tuple(
+    Parameter(f"tip_{axis}", "length", f"place of the tool along {axis} of the output link's axes", default=0.0)
+    for axis in "xyz"
+)
+# Of families with a point of the coupler that a tool hangs on: one that moves along a line, one that moves freely; and
+# of families whose rocker can carry a tool at its tip.
+TOOLS = (TOOL, FREE_TOOL, (*FREE_TOOL, *TIP))
 _TORQUE = Parameter(
     "load_torque", "torque", "torque on the rocker about its axis; a resisting one opposes dpsi", default=0.0
 )
@@ -75,6 +106,9 @@ def _follower(name: str, prefix: str, load: Parameter) -> Follower:
     return Follower(name, prefix, load, tuple(p.name for p in bodies), parameters)
 
 
+LINK_TORQUE = Parameter(
+    "load_torque", "torque", "torque on the output link about its axis; a resisting one opposes dpsi", default=0.0
+)
 ROCKER = _follower("rocker", "", _TORQUE)
 SLIDER = _follower("slider", "slider_", _FORCE)
 

@@ -168,7 +168,7 @@ def _effect(kind: loads.Follower) -> Effect:
         followers=(kind.name,),
         needs=(f"{kind.prefix}kinetostatics",),
         inputs=(*kind.parameters, FLYWHEEL, MOTOR),
-        tool_inputs=loads.TOOL,
+        tool_inputs=loads.TOOLS,
         outputs=OUTPUTS,
         compute=compute,
         called_for="unevenness of the speed asked for, a light drive",

@@ -93,7 +93,7 @@ def _effect(kind: loads.Follower) -> Effect:
         followers=(kind.name,),
         needs=(f"{kind.prefix}speed_fluctuation", f"{kind.prefix}friction"),
         inputs=(*rubbing.inputs, FLYWHEEL, MOTOR),
-        tool_inputs=loads.TOOL,
+        tool_inputs=loads.TOOLS,
         outputs=OUTPUTS,
         compute=partial(compute, loss=loss, suffix=SUFFIX),
         called_for="unevenness of a drive whose joints rub",

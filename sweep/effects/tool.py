@@ -1,82 +1,146 @@
-"""A tool at the guided point: what it weighs on the joints, for the effects of loads; and its own entry."""
+"""A tool on the coupler or at the tip of the rocker: what it weighs on the joints, and its own entry."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from kernels.effects.tool import tool_load
+from kernels.effects.tool import free_tool, tool_load
 from sweep.effects import loads
 from sweep.effects.base import Effect, Scene
 from sweep.effects.coupler import CONSTRUCTION
+from sweep.effects.places import ON_LINE, ON_TIP, tool_place
 from sweep.families.base import Array, Columns, Output
 from sweep.families.capabilities import ToolPoint
 
-EQUATION = "docs/tool.md (1), (2)"
+EQUATION = "docs/tool.md (1), (2), (6)"
+_SHARE = "in the torque about this stage's crank"
 OUTPUTS = (
-    Output("tool_load", "force", "force of the coupler on the tool along its way", EQUATION),
-    Output("tool_torque", "torque", "share of the tool in the torque about this stage's crank", EQUATION),
+    Output("tool_load", "force", "force of the coupler on the tool: along its way, or its magnitude if it moves freely",
+           EQUATION),
+    Output("tool_torque", "torque", f"share of the tool {_SHARE}", EQUATION),
+)  # fmt: skip
+TIP_OUTPUTS = (
+    Output("tip_load", "force", "magnitude of the force of the rocker on the tool at its tip", "docs/tool.md (6)"),
+    Output("tip_torque", "torque", f"share of the tool at the tip {_SHARE}", "docs/tool.md (6)"),
 )
+_FORCES = tuple(p.name for p in loads.FREE_TOOL[1:])
+
+
+class Weighs(NamedTuple):
+    """What a tool puts on coupler and rocker, (n, m, 6) each, and the inertia it adds, (n, m, 2); None for nothing."""
+
+    coupler: Array | None
+    follower: Array | None
+    inertia: Array | None
 
 
 def _loaded(scene: Scene) -> bool:
-    """Whether a tool with mass or force hangs on the coupler: without one nothing is computed."""
-    given = [scene.inputs[name] for name in ("m_tool", "tool_force", "pierce_force") if name in scene.inputs]
-    return "tool_force" in scene.curves or any(bool(values.any()) for values in given)
+    """Whether a tool with mass or force hangs on the linkage: without one nothing is computed."""
+    names = ("m_tool", "tool_force", "pierce_force", *_FORCES)
+    given = [scene.inputs[name] for name in names if name in scene.inputs]
+    return not scene.curves.keys().isdisjoint(names) or any(bool(values.any()) for values in given)
 
 
 def _data(scene: Scene) -> tuple[Array, Array]:
-    """Columns of the kernel, and the working force, (n, 1) or over the turn (n, m)."""
+    """Columns of the kernel of a tool on a line, and the working force, (n, 1) or over the turn (n, m)."""
     place = scene.family.find(ToolPoint)
-    assert place is not None
+    assert place is not None and place.direction is not None
     gravity = scene.table(tuple(p.name for p in loads.GRAVITY))
     mass, _, *pierce = (scene.inputs[p.name][:, None] for p in loads.TOOL)
     data = np.hstack([mass, place.point(scene.designs), place.direction(scene.designs), gravity, *pierce])
     return np.ascontiguousarray(data), np.ascontiguousarray(scene.load("tool_force"))
 
 
-def wrench_and_inertia(scene: Scene, drive: Array, reduced: bool) -> tuple[Array | None, Array | None]:
-    """Wrench (n, m, 6) of the tool on the coupler about B, and the inertia it adds (n, m, 2) if ``reduced``.
+def _free_data(scene: Scene) -> tuple[Array, Array]:
+    """Columns of the kernel of a tool that moves freely, and the working force, (n, m or 1, 3)."""
+    place = scene.family.find(ToolPoint)
+    tip = scene.table(tuple(p.name for p in loads.TIP)) if place is None else place.point(scene.designs)
+    gravity = scene.table(tuple(p.name for p in loads.GRAVITY))
+    data = np.column_stack([scene.inputs["m_tool"], tip, gravity])
+    return data, np.stack(np.broadcast_arrays(*(scene.load(name) for name in _FORCES)), axis=2)
 
-    None where no tool hangs on the coupler.  The status of the poses is what the kernel of loads finds as well.
+
+def weighs(scene: Scene, drive: Array, reduced: bool) -> Weighs:
+    """What the tool puts on the links, and the inertia that it adds if ``reduced``.
+
+    The status of the poses is what the kernel of loads finds as well.
     """
-    if not _loaded(scene):
-        return None, None
+    place = tool_place(scene.family)
+    if place is None or not _loaded(scene):
+        return Weighs(None, None, None)
     wrench = np.empty((*scene.shape, 6))
     inertia = np.empty((*scene.shape, 2)) if reduced else None
     poses, designs = scene.records
-    data, force = _data(scene)
     finger, status = scene.inputs["finger"], scene.status()
-    tool_load(poses, designs, data, drive, force, finger, status, wrench, inertia, None)
-    return wrench, inertia
+    if place == ON_LINE:
+        data, force = _data(scene)
+        tool_load(poses, designs, data, drive, force, finger, status, wrench, inertia, None)
+        return Weighs(wrench, None, inertia)
+    data, force = _free_data(scene)
+    free_tool(poses, designs, data, drive, force, finger, place == ON_TIP, status, wrench, inertia, None)
+    return Weighs(None, wrench, inertia) if place == ON_TIP else Weighs(wrench, None, inertia)
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Force at the guided point and its share in the driving torque."""
+    """Force at the working point and its share in the driving torque."""
     speed, change = scene.crank()
     drive = np.stack(np.broadcast_arrays(np.zeros_like(speed), speed, change), axis=2)
-    status, along = scene.status(), np.empty((*scene.shape, 3))
+    status, place = scene.status(), tool_place(scene.family)
     poses, designs = scene.records
-    data, force = _data(scene)
-    tool_load(poses, designs, data, drive, force, scene.inputs["finger"], status, None, None, along)
-    columns: Columns = {"tool_load": along[:, :, 0], "tool_torque": along[:, :, 0] * along[:, :, 1]}
+    finger = scene.inputs["finger"]
+    if place == ON_LINE:
+        along = np.empty((*scene.shape, 3))
+        data, force = _data(scene)
+        tool_load(poses, designs, data, drive, force, finger, status, None, None, along)
+        columns: Columns = {"tool_load": along[:, :, 0], "tool_torque": along[:, :, 0] * along[:, :, 1]}
+    else:
+        found = np.empty((*scene.shape, 2))
+        data, force = _free_data(scene)
+        free_tool(poses, designs, data, drive, force, finger, place == ON_TIP, status, None, None, found)
+        named = TIP_OUTPUTS if place == ON_TIP else OUTPUTS
+        columns = {o.name: found[:, :, k] for k, o in enumerate(named)}
     return {name: columns[name] for name in wanted} | {"status": status}
 
+
+_NEGLIGIBLE = "mass of the tool far below that of the links, reduced to the same way"
+_INPUTS = (*loads.GRAVITY, loads.SPEED, loads.CHANGE, CONSTRUCTION)
+_FREE = "(6) a tool that moves freely with its point P: its load is |m_tool (a_P - gravity) - tool_force|"
 
 EFFECT = Effect(
     key="U3",
     name="tool",
-    title="inertia, weight and working force of a tool at the guided point",
+    title="inertia, weight and working force of a tool at a point of the coupler",
     equation=EQUATION,
     formulas=(
         "(1) tool_load = m_tool (s'' omega^2 + s' eps - gravity . lam) - tool_force",
         "    + pierce_force on the way from pierce_at into the fabric, to the turning point",
         "(2) it acts on the coupler at the guided point, reversed: loads, friction, drive torque, inertia",
+        _FREE,
     ),
     needs=(),
-    inputs=(*loads.TOOL, *loads.GRAVITY, loads.SPEED, loads.CHANGE, CONSTRUCTION),
+    inputs=_INPUTS,
+    tool_inputs=loads.TOOLS,
     outputs=OUTPUTS,
     compute=compute,
     called_for="mass of the needle bar, force of the needle",
-    negligible="mass of the tool far below that of the links, reduced to the same way",
+    negligible=_NEGLIGIBLE,
     requires=ToolPoint,
+)
+
+TIP = Effect(
+    key="U3",
+    name="tip_tool",
+    title="inertia, weight and working force of a tool at the tip of the rocker",
+    equation="docs/tool.md (6), (7)",
+    formulas=(_FREE, "(7) it acts on the rocker, reversed: loads, friction, drive torque, inertia"),
+    needs=(),
+    inputs=_INPUTS,
+    tool_inputs=loads.TOOLS,
+    outputs=TIP_OUTPUTS,
+    compute=compute,
+    called_for="mass of a looper on its rocker, force of the thread",
+    negligible=_NEGLIGIBLE,
+    carried_at=ON_TIP,
 )

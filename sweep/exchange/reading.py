@@ -40,7 +40,7 @@ def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "")
     readers: dict[str, Callable[[Path], tuple[Groups, bool]]] = {".dxf": _of_dxf, ".glb": _of_glb}
     groups, exported = readers.get(file.suffix.lower(), _of_csv)(file)
     if not part and len(groups) > 1:
-        raise InputError("part", "none", f"one of {', '.join(groups)}", str(file))
+        raise InputError("part", None, f"one of {', '.join(groups)}: name it with --part", str(file))
     if part and part not in groups:
         raise InputError("part", part, f"one of {', '.join(groups)}", str(file))
     found = groups[part] if part else next(iter(groups.values()))

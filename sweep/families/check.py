@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 
+from kernels.links import DRIVEN
 from sweep.families.base import Family
-from sweep.families.capabilities import Assembly, Dimensions, JointRecords, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, JointRecords, LinkTree, OutputLink, Points, Skeleton
 from sweep.families.check_outputs import output_faults
 from sweep.families.domain import Turn
 
@@ -95,6 +96,21 @@ def _drawing(family: Family) -> list[str]:
     return faults
 
 
+def _tree(tree: LinkTree) -> list[str]:
+    """Faults of a tree of links: numbers that name nothing, loops that are closed by too few lines or too many."""
+    bodies, faults = range(len(tree.bodies)), []
+    faults += [f"LinkTree: parent {p} of body {k} is no earlier body" for k, p in enumerate(tree.parents) if p >= k]
+    if len(tree.parents) != len(tree.bodies) or any(body not in bodies for body, _ in tree.freedoms):
+        faults.append("LinkTree: give every body its parent, and freedoms of its bodies only")
+    undriven = sum(kind != DRIVEN for _, kind in tree.freedoms)
+    if undriven != len(tree.ends):
+        faults.append(f"LinkTree: {undriven} freedoms that nothing drives need as many lines, not {len(tree.ends)}")
+    lines = {line for j in tree.joints for line in range(j.lines[0], j.lines[0] + j.lines[1])}
+    if lines != set(range(len(tree.ends))) or sorted(j.body for j in tree.joints if j.body >= 0) != list(bodies):
+        faults.append("LinkTree: every body and every line belongs to one joint")
+    return faults
+
+
 def _capabilities(family: Family) -> list[str]:
     names, faults = set(family.pose_names), []
     for loop in family.every(Assembly):
@@ -104,6 +120,9 @@ def _capabilities(family: Family) -> list[str]:
         faults.append("a discriminant without an Assembly: say what divides it (rotatability needs it)")
     for records in family.every(JointRecords):
         faults += [f"JointRecords needs {one!r}, which is no pose output" for one in records.needs if one not in names]
+    for tree in family.every(LinkTree):
+        faults += [f"LinkTree needs {one!r}, which is no pose output" for one in tree.needs if one not in names]
+        faults += _tree(tree)
     for points in family.every(Points):
         faults += [
             f"point {point}: {one!r} is no pose output; None is a coordinate 0"
@@ -121,6 +140,6 @@ def _capabilities(family: Family) -> list[str]:
         faults += [
             f"{type(found).__name__} is about a closed turn: leave it out over another domain"
             for found in family.capabilities
-            if isinstance(found, Assembly | JointRecords | OutputLink)
+            if isinstance(found, Assembly | JointRecords | LinkTree | OutputLink)
         ]
     return faults

@@ -7,8 +7,21 @@ from itertools import chain
 import numpy as np
 
 from kernels.families import cylindrical_looper
+from kernels.families.cylindrical_looper.links import links as fill_links
+from kernels.links import DRIVEN, FRAME, SLIDE, TURN
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Points, Skeleton
+from sweep.families.capabilities import (
+    Assembly,
+    Dimensions,
+    Link,
+    LinkBody,
+    LinkJoint,
+    LinkTree,
+    Made,
+    Points,
+    Skeleton,
+)
+from sweep.families.linked import filled_by, point_of
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.skeletons import crank_axis, links, parameter, standing
 
@@ -123,6 +136,40 @@ def _on_shaft(designs: Array, height: Array) -> Array:
     return np.stack([e, np.zeros_like(height), height], axis=-1)
 
 
+_ON_AXIS = "from the axis at the height of the rocker's ball"
+_RATES = ("psi", "dpsi", "d2psi", "s", "ds", "d2s")
+LINKS = LinkTree(
+    bodies=(
+        LinkBody("crank1", "along crank 1, tangential, along its axis, from its centre"),
+        LinkBody("crank2", "along crank 2, tangential, along its axis, from its centre"),
+        LinkBody("shaft", f"along the rocker, tangential, along the shaft, {_ON_AXIS} at s = 0, moving with it"),
+        LinkBody("rocker", f"along the rocker, tangential, along the shaft, {_ON_AXIS}"),
+        LinkBody("coupler1", "along coupler 1, from crank 1", slender=True),
+        LinkBody("coupler2", "along coupler 2, from crank 2", slender=True),
+    ),
+    joints=(
+        LinkJoint("a1", "bearing of crank 1", "shaft", "frame on crank 1", body=0, freedom=0),
+        LinkJoint("b1", "ball of crank 1", "hinge", "crank 1 on coupler 1", body=4),
+        LinkJoint("c1", "rocker's ball", "ball", "coupler 1 on the rocker", lines=(0, 3)),
+        LinkJoint("key", "key of the rocker on the shaft", "guide", "shaft on the rocker", body=3, freedom=4),
+        LinkJoint("hold", "hold of the rocker along the shaft", "contact", "frame, or shaft, on the rocker",
+                  lines=(6, 1)),
+        LinkJoint("d", "guide of the shaft", "guide", "frame on the shaft", body=2, freedom=2),
+        LinkJoint("a2", "bearing of crank 2", "shaft", "frame on crank 2", body=1, freedom=1),
+        LinkJoint("b2", "ball of crank 2", "hinge", "crank 2 on coupler 2", body=5),
+        LinkJoint("c2", "ball of the sliding drive", "ball", "coupler 2 on the shaft", lines=(3, 3)),
+    ),
+    parents=(FRAME, FRAME, FRAME, 2, 0, 1),
+    freedoms=(
+        (0, DRIVEN), (1, DRIVEN), (2, TURN), (2, SLIDE), (3, SLIDE), (4, TURN), (4, TURN), (5, TURN), (5, TURN),
+    ),
+    ends=((3, 4),) * 3 + ((2, 5),) * 3 + ((3, FRAME),),
+    needs=_RATES,
+    fill=filled_by(fill_links, _RATES),
+    carrier=2,
+    tip=point_of(PARAMETERS, "p0x", "p0y", "p0z"),
+)  # fmt: skip
+
 FAMILY = Family(
     name="cylindrical_looper",
     title="looper on a cylinder",
@@ -140,6 +187,7 @@ FAMILY = Family(
     uses_phi=False,
     capabilities=(
         Dimensions(links("a1 b1 c1 a2 b2")),
+        LINKS,
         Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
         Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")}),

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from kernels.families import five_link
+from kernels.families.five_link.links import links as fill_links
+from kernels.links import DRIVEN, FRAME, TURN
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, Link, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Link, LinkBody, LinkJoint, LinkTree, OutputLink, Points, Skeleton
+from sweep.families.linked import filled_by
 from sweep.families.skeletons import CRANK, CRANK_ROCKER_SIZES, ROCKER, crank_axis, standing
 
 PARAMETERS = (
@@ -62,6 +65,30 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return filled_with_places(five_link.poses, designs, angles, _VALUES, _PLACES, wanted)
 
 
+_RATES = ("psi", "dpsi", "d2psi", "theta", "beta")
+LINKS = LinkTree(
+    bodies=(
+        LinkBody("crank", "along the crank, tangential, along its axis, from A"),
+        LinkBody("cross", "from axis 1 to axis 2, along axis 2, along axis 1, from B"),
+        LinkBody("coupler", "along the coupler, along axis 2, normal to both, from axis 2"),
+        LinkBody("rocker", "along the rocker, tangential, along its axis, from D"),
+    ),
+    joints=(
+        LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
+        LinkJoint("b", "axis 1 at the crank pin", "shaft", "crank on the cross-piece", body=1, freedom=1),
+        LinkJoint("h", "axis 2", "shaft", "cross-piece on the coupler", body=2, freedom=2),
+        LinkJoint("c", "rocker ball", "ball", "coupler on the rocker", lines=(0, 3)),
+        LinkJoint("d", "rocker bearing", "shaft", "frame on the rocker", body=3, freedom=3),
+    ),
+    parents=(FRAME, 0, 1, FRAME),
+    freedoms=((0, DRIVEN), (1, TURN), (2, TURN), (3, TURN)),
+    ends=((3, 2),) * 3,
+    needs=_RATES,
+    fill=filled_by(fill_links, _RATES),
+    carrier=3,
+    output=3,
+)
+
 FAMILY = Family(
     name="five_link",
     title="five-link with two revolutes at the crank pin",
@@ -78,6 +105,7 @@ FAMILY = Family(
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")}),
         OutputLink(crank_rocker.rocker_origin),
+        LINKS,
         Skeleton(
             {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")},
             (CRANK, Link("cross-piece", ("b", "h")), Link("coupler", ("h", "c")), ROCKER),

@@ -24,6 +24,7 @@ from sweep.families.capabilities import (
     Points,
     PressureEllipse,
     Skeleton,
+    ToolPoint,
 )
 from sweep.families.hardpoints import FOUR_BAR_POINTS
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, links, standing
@@ -119,7 +120,7 @@ def _as_ours(step: Step) -> Step:
 
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from; the coupler point bears no load."""
+    """Fill the joint records that effects work from."""
     crank_rocker.joint_records(as_crank_rocker(designs), angles, motion, per_pose, per_design)
 
 
@@ -151,6 +152,7 @@ FAMILY = Family(
         CrankRockerLoop(as_crank_rocker),
         Points({name: (f"x_{name}", f"y_{name}", None) for name in ("b", "c", "m")}),
         OutputLink(crank_rocker.rocker_origin),
+        ToolPoint(guide.tool_point),
         FOUR_BAR_POINTS,
         Skeleton(
             {"a": ORIGIN, "d": standing(PARAMETERS, "e")}, (CRANK, Link("coupler", ("b", "c", "m")), ROCKER)

@@ -8,8 +8,21 @@ from typing import Any
 import numpy as np
 
 from kernels.families import slotted
+from kernels.families.slotted.links import links as fill_links
+from kernels.links import DRIVEN, FRAME, SLIDE, TURN
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, Dimensions, Link, OutputLink, Points, Skeleton
+from sweep.families.capabilities import (
+    Assembly,
+    Dimensions,
+    Link,
+    LinkBody,
+    LinkJoint,
+    LinkTree,
+    OutputLink,
+    Points,
+    Skeleton,
+)
+from sweep.families.linked import filled_by
 from sweep.families.skeletons import CRANK, crank_axis, links, standing
 
 PARAMETERS = (
@@ -76,6 +89,30 @@ def pivot(designs: Array) -> Array:
     return np.stack([designs[:, 1], np.zeros(len(designs)), designs[:, 3]], axis=1)
 
 
+_RATES = ("psi", "dpsi", "d2psi", "rho", "drho", "d2rho")
+LINKS = LinkTree(
+    bodies=(
+        LinkBody("crank", "along the crank, tangential, along its axis, from A"),
+        LinkBody("link", "along the slot, across it, along the driven axis, from D"),
+        LinkBody("arm", "bar: along the arm, along the bar, normal to both, from the bar; fork: across the slot, along "
+                 "it, normal to both, from the ball"),
+    ),
+    joints=(
+        LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
+        LinkJoint("b", "ball of the crank", "ball", "crank on the arm, or on the block of the fork", lines=(0, 3)),
+        LinkJoint("c", "guide of the driven link", "guide", "driven link on the arm, or on the block", body=2,
+                  freedom=2),
+        LinkJoint("d", "bearing of the driven link", "shaft", "frame on the driven link", body=1, freedom=1),
+    ),
+    parents=(FRAME, FRAME, 1),
+    freedoms=((0, DRIVEN), (1, TURN), (2, SLIDE), (2, TURN)),
+    ends=((2, 0),) * 3,
+    needs=_RATES,
+    fill=filled_by(fill_links, _RATES),
+    carrier=1,
+    output=1,
+)  # fmt: skip
+
 FAMILY = Family(
     name="slotted",
     title="spatial slotted link",
@@ -93,6 +130,7 @@ FAMILY = Family(
         Assembly("discriminant", "pressure_angle", unit),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(pivot),
+        LINKS,
         Skeleton(
             {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")},
             (CRANK, Link("arm", ("b", "c")), Link("driven link", ("d", "c"))),

@@ -5,8 +5,11 @@ from __future__ import annotations
 from itertools import chain
 
 from kernels.families import swivel
+from kernels.families.swivel.links import links as fill_links
+from kernels.links import DRIVEN, FRAME, TURN
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Dimensions, Link, Points, Skeleton
+from sweep.families.capabilities import Dimensions, Link, LinkBody, LinkJoint, LinkTree, Points, Skeleton
+from sweep.families.linked import filled_by, point_of
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, point_outputs
 from sweep.families.skeletons import CRANK, crank_axis, links, standing
 
@@ -39,6 +42,26 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return filled_blocks(swivel.poses, designs, angles, _BLOCKS, wanted)
 
 
+_RATES, _DIRECTION = ("rho", "drho", "d2rho"), ("x_n", "y_n", "z_n")
+LINKS = LinkTree(
+    bodies=(
+        LinkBody("crank", "along the crank, tangential, along its axis, from A"),
+        LinkBody("rod", "along the rod, from B", slender=True),
+    ),
+    joints=(
+        LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
+        LinkJoint("b", "ball at the crank pin", "hinge", "crank on the rod", body=1),
+        LinkJoint("q", "swivel block", "contact", "block on the rod", lines=(0, 2)),
+    ),
+    parents=(FRAME, 0),
+    freedoms=((0, DRIVEN), (1, TURN), (1, TURN)),
+    ends=((1, FRAME),) * 2,
+    needs=(*_RATES, *_DIRECTION),
+    fill=filled_by(fill_links, _RATES, _DIRECTION),
+    carrier=1,
+    tip=point_of(PARAMETERS, "Lw"),
+)
+
 FAMILY = Family(
     name="swivel",
     title="crank and rod through a swivel block",
@@ -51,6 +74,7 @@ FAMILY = Family(
     uses_phi=False,
     capabilities=(
         Dimensions(links("a")),
+        LINKS,
         Points({"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")}),
         Skeleton(
             {

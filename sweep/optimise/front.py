@@ -18,7 +18,7 @@ from sweep.errors import InputError, SearchCutShort
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.certificate import Result
-from sweep.optimise.pareto import Front, advance, steps
+from sweep.optimise.pareto import Front, advance
 from sweep.optimise.starts import diverse
 from sweep.optimise.study import problem_and_starts
 from sweep.optimise.written import certificates, outputs, write
@@ -76,7 +76,7 @@ def front_study(
     front = saved(path, key) or Front.of(settings)
     if front.complete and path.exists():
         return path
-    many = len(steps(len(front.bounds)))
+    many = front.steps
     say("front", front.taken, many, "steps")
     _, problem, _ = problem_and_starts(study, place)
     starts = _starts(study, settings, problem, place)
@@ -90,7 +90,7 @@ def front_study(
         raise KeyboardInterrupt
     if not kept.complete:
         _write(path, study, settings, best, key, kept, "time")
-        done = f"{kept.taken} of {len(steps(len(kept.bounds)))} steps of the front"
+        done = f"{kept.taken} of {kept.steps} steps of the front"
         raise SearchCutShort(place, f"{path}: time ran out: {done}; run again to continue the front")
     return path
 
@@ -103,8 +103,9 @@ def saved(path: Path, key: str) -> Front | None:
     try:
         state = json.loads(about[STATE])
         return Front(
-            tuple(state["bounds"]), tuple(_result(r) for r in state["results"]), tuple(state["found"]), state["taken"]
-        )
+            tuple(state["bounds"]), tuple(_result(r) for r in state["results"]), tuple(state["found"]), state["taken"],
+            state["given"], state["points"], state["filled"],
+        )  # fmt: skip
     except (ValueError, KeyError, TypeError):  # damaged: the search begins anew
         return None
 
@@ -132,7 +133,7 @@ def _write(
     texts = {"bound": (_unit(study, settings.output), f"{side} bound on {settings.output}")}
     state = asdict(replace(kept, results=())) | {"results": [_noted(r) for r in kept.results]}
     about = {"output": settings.output, "side": "at least" if settings.at_least else "at most"}
-    about |= {"complete": str(best.complete).lower(), "steps": f"{kept.taken} of {len(steps(len(kept.bounds)))}"}
+    about |= {"complete": str(best.complete).lower(), "steps": f"{kept.taken} of {kept.steps}"}
     about |= {"ended": ended} if ended else {}
     about |= {KEY.decode(): key, STATE.decode(): json.dumps(state)}
     write(path, columns, study, texts, about)

@@ -9,6 +9,7 @@ import numpy as np
 
 from sweep.errors import InputError
 from sweep.families.base import Array
+from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.filling import kinds
 from sweep.optimise.linear import NEEDED, Elimination, elimination
 from sweep.optimise.problem import Problem
@@ -30,6 +31,7 @@ def proportion_starts(
     merit: Array,
     stop: Callable[[], bool],
     jobs: int,
+    say: Say = unsaid,
 ) -> tuple[Problem, Array]:
     """Return the problem with bounds that hold the starts, and the starts:
     a few of the sweep, then of the global search.
@@ -40,6 +42,7 @@ def proportion_starts(
     known, merit : designs (k, P) of the sweep, and what they are worth (k,), empty where none is feasible
     stop : true ends the global search early
     jobs : processes; the starts do not depend on it
+    say : called with what is worked on, and how much of it is done
 
     Raises
     ------
@@ -49,7 +52,7 @@ def proportion_starts(
     linear = _linear(study, problem)
     count = settings.starts
     own = diverse(problem, known, merit, count // SWEPT, ALIKE) if len(merit) else known[:0]
-    found = from_proportions(linear, kinds(study, problem, own), count - len(own), settings.seed, stop, jobs)
+    found = from_proportions(linear, kinds(study, problem, own), count - len(own), settings.seed, stop, jobs, say)
     starts = np.concatenate([own, found])
     if not len(starts):
         allowed = "proportions with which the mechanism turns"
@@ -58,7 +61,7 @@ def proportion_starts(
 
 
 def insensitive(
-    study: Study, settings: OptimiseSettings, problem: Problem, stop: Callable[[], bool], jobs: int
+    study: Study, settings: OptimiseSettings, problem: Problem, stop: Callable[[], bool], jobs: int, say: Say = unsaid
 ) -> tuple[Problem, Array]:
     """Return the problem with bounds that hold them,
     and designs that keep stroke and straightness when they are made.
@@ -67,7 +70,7 @@ def insensitive(
         return problem, np.empty((0, len(problem.family.parameters)))
     linear = _linear(study, problem, study.tolerance)
     signs = kinds(study, problem, np.empty((0, len(problem.family.parameters))))
-    found = from_proportions(linear, signs, settings.starts, settings.seed + OTHER_SEED, stop, jobs)
+    found = from_proportions(linear, signs, settings.starts, settings.seed + OTHER_SEED, stop, jobs, say)
     return _holding(study, problem, found), found
 
 

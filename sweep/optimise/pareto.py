@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kernels import status as st
+from sweep.chunks.cascade import compared
 from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array
 from sweep.optimise.certificate import Result
+from sweep.optimise.gaps import gaps
 from sweep.optimise.problem import PLACE, Problem
 from sweep.optimise.solve import minimise
 from sweep.optimise.survey import CUT
@@ -27,24 +30,35 @@ class Front:
     """Bounds on a second output, the loosest first, with the best result known for each.
 
     ``results`` holds None where no search has begun; ``found`` says in which step a result was found; ``taken`` counts
-    the steps that are finished.  A front is all that a search interrupted between two steps needs to go on.
+    the steps that are finished.  The first ``given`` bounds are those asked for, further ones are placed until there
+    are ``points``, or until the front is ``filled``: no gap is left that a point could fill.  A front is all that a
+    search interrupted between two steps needs to go on.
     """
 
     bounds: tuple[float, ...]
     results: tuple[Result | None, ...]
     found: tuple[int, ...]
     taken: int = 0
+    given: int = 0
+    points: int = 0
+    filled: bool = False
 
     @classmethod
     def of(cls, settings: ParetoSettings) -> Front:
         """Return a front of which nothing is known yet."""
         bounds = tuple(sorted(set(settings.bounds), reverse=not settings.at_least))
-        return cls(bounds, (None,) * len(bounds), (-1,) * len(bounds))
+        none, never = (None,) * len(bounds), (-1,) * len(bounds)
+        return cls(bounds, none, never, given=len(bounds), points=settings.points or len(bounds))
+
+    @property
+    def steps(self) -> int:
+        """How many there are: for the bounds that were given, and one for each further point."""
+        return len(steps(self.given)) + max(self.points - self.given, 0)
 
     @property
     def complete(self) -> bool:
         """Whether every step is finished."""
-        return self.taken == len(steps(len(self.bounds)))
+        return self.taken == self.steps or self.filled
 
     def known(self) -> list[tuple[float, Result]]:
         """Return the bounds that were begun, with their results."""
@@ -74,8 +88,10 @@ def steps(count: int) -> tuple[Step, ...]:
 def searches(settings: ParetoSettings) -> int:
     """Return local searches a front takes at most, from the settings alone."""
     count = len(Front.of(settings).bounds)
-    # One more start is the optimum itself, one more from the second bound on the result before.
-    return count * (settings.starts + 1) + max(0, 3 * (count - 1))
+    placed = max((settings.points or count) - count, 0)
+    # One more start is the optimum itself, one more from the second bound on the result before.  A placed bound begins
+    # with both neighbours besides, and is lent to them.
+    return count * (settings.starts + 1) + max(0, 3 * (count - 1)) + placed * (settings.starts + 5)
 
 
 def bounded(problem: Problem, settings: ParetoSettings, bound: float) -> Problem:
@@ -102,6 +118,7 @@ def pareto(
     """Return the least objective with the second output at most (at least) each of the bounds,
     the loosest bound first.
 
+    With ``settings.points`` further bounds are placed, one after the other in the middle of the largest gap.
     Every bound is searched from its starts and from the result of the next looser one.  Then the results go back from
     the tighter to the looser bounds, for which they are good designs too, and forth again, so a bound never has a worse
     design than a tighter one.  A bound that makes no difference repeats the design.
@@ -151,7 +168,7 @@ def advance(
     def asked() -> bool:
         return time.monotonic() >= end or (stop is not None and stop())
 
-    plan = steps(len(front.bounds))
+    plan = steps(front.given)
     for number in range(front.taken, len(plan)):
         step = plan[number]
         begin = _begin(front, step, number, own[step.target])
@@ -163,6 +180,70 @@ def advance(
                 return
         front = replace(front, taken=number + 1)
         yield front
+    while not front.complete:
+        front, cut = _placed(problem, settings, front, own, asked, jobs)
+        yield front
+        if cut:
+            return
+
+
+def _placed(
+    problem: Problem,
+    settings: ParetoSettings,
+    front: Front,
+    starts: Sequence[Array],
+    asked: Callable[[], bool],
+    jobs: int,
+) -> tuple[Front, bool]:
+    """The front with one more bound, in the middle of its largest gap, and whether it was cut short.
+
+    It is searched from the results of both neighbours and from the starts of the next tighter bound that was given.
+    Its tighter neighbour is searched from what it finds, and so are looser bounds as far as that is better there.
+    """
+    found = gaps(np.array(front.bounds), *places(problem, settings, front))
+    if not found:
+        return replace(front, filled=True), False
+    at, bound, number = found[0].number + 1, found[0].middle, front.taken
+    given = Front.of(settings).bounds
+    tighter = next(k for k, b in enumerate(given) if (b >= bound if settings.at_least else b <= bound))
+    beside = [r.design[None, :] for r in (front.results[at - 1], front.results[at]) if r is not None]
+    designs = np.concatenate([*beside, starts[tighter]])
+    _, first = np.unique(designs, axis=0, return_index=True)
+    front = replace(
+        front,
+        bounds=(*front.bounds[:at], bound, *front.bounds[at:]),
+        results=(*front.results[:at], None, *front.results[at:]),
+        found=(*front.found[:at], -1, *front.found[at:]),
+    )
+    front = _with(
+        front,
+        Step(at, at - 1, first=True),
+        number,
+        _search(problem, settings, bound, designs[np.sort(first)], asked, jobs),
+    )
+    for step in (Step(at + 1, at, first=False), *(Step(k, k + 1, first=False) for k in range(at, -1, -1))):
+        near, held = front.results[step.neighbour], front.results[step.target]
+        if near is None or held is None or near.status == st.LIMIT_EXCEEDED or asked():
+            continue
+        if step.target < step.neighbour and not _order(near) < _order(held):
+            continue
+        better = _search(problem, settings, front.bounds[step.target], near.design[None, :], asked, jobs)
+        front = _with(front, step, number, better)
+    cut = asked()
+    return replace(front, taken=number + (not cut)), cut
+
+
+def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Array, Array]:
+    """What the results reach of the second output, and their objective; the bound and nan where there is none."""
+    reached, values = np.array(front.bounds, np.float64), np.full(len(front.bounds), np.nan)
+    good = [k for k, r in enumerate(front.results) if r is not None and r.status != st.LIMIT_EXCEEDED]
+    if good:
+        designs = np.array([r.design for k in good if (r := front.results[k]) is not None])
+        outputs = design_outputs(problem.family, designs, [settings.output], problem.accuracy, problem.window)
+        size = compared(settings.output, np.asarray(outputs[settings.output], np.float64))
+        reached[good] = np.where(np.isfinite(size), size, reached[good])
+        values[good] = [r.objective for k in good if (r := front.results[k]) is not None]
+    return reached, values
 
 
 def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None:
@@ -175,7 +256,7 @@ def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None
     held = front.results[step.target]
     if near is None or held is None:
         return None
-    seen = step.neighbour < step.target and front.found[step.neighbour] < len(front.bounds)
+    seen = step.neighbour < step.target and front.found[step.neighbour] < front.given
     worse = near.status == st.LIMIT_EXCEEDED and held.status != st.LIMIT_EXCEEDED
     offers = not (seen or worse or np.array_equal(near.design, held.design))
     # A search that did not settle goes on from where it ended.

@@ -11,6 +11,7 @@ import numpy as np
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.chain import stages_of
+from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.evolution import evolved
 from sweep.optimise.linear import Elimination
 from sweep.optimise.merit import STUCK, merit
@@ -113,6 +114,7 @@ def from_proportions(
     seed: int,
     stop: Callable[[], bool] = lambda: False,
     jobs: int = 1,
+    say: Say = unsaid,
 ) -> Array:
     """Return at most ``count`` diverse designs (k, P), each the end of an evolution strategy, the best first.
 
@@ -124,9 +126,15 @@ def from_proportions(
     seed : of samples and strategies
     stop : true ends the strategies where they are
     jobs : processes; the designs do not depend on it
+    say : called with how many groups of strategies have ended, and how many there are
     """
     groups = max(1, -(-count // (PER_GROUP * len(signs)))) * len(signs)
-    found = spread_over(_Group(linear, tuple(signs), seed), list(range(groups)), stop, jobs)
+    ended = iter(range(1, groups + 1))
+    say("proportions", 0, groups, "groups")
+    found = spread_over(
+        _Group(linear, tuple(signs), seed), list(range(groups)), stop, jobs,
+        lambda: say("proportions", next(ended), groups, "groups"),
+    )  # fmt: skip
     designs = np.concatenate([x for x, _ in found]) if found else np.empty((0, len(linear.problem.family.parameters)))
     order = np.argsort(np.concatenate([w for _, w in found]) if found else np.empty(0), kind="stable")
     designs = designs[order]

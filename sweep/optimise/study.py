@@ -147,7 +147,7 @@ def _prescribed(study: Study) -> tuple[Parameter, ...]:
 
 
 def problem_and_starts(
-    study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1
+    study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1, say: Say = unsaid
 ) -> tuple[OptimiseSettings, Problem, Array]:
     """Return settings, problem and starts:
     the diverse best of the dataset, filled up from samples where they are too few.
@@ -156,13 +156,13 @@ def problem_and_starts(
     the study's [task] come before all others.  With ``optimise.global = "proportions"`` five of six starts come from
     the search over proportions instead, in ``jobs`` processes; ``stop`` ends it early.
     """
-    settings, problem, starts = _problem_and_starts(study, folder, stop, jobs)
+    settings, problem, starts = _problem_and_starts(study, folder, stop, jobs, say)
     first = of_task(study, settings.starts, settings.seed)
     return settings, problem, np.concatenate([first, starts])[: max(len(starts), len(first))]
 
 
 def _problem_and_starts(
-    study: Study, folder: Path, stop: Callable[[], bool], jobs: int
+    study: Study, folder: Path, stop: Callable[[], bool], jobs: int, say: Say
 ) -> tuple[OptimiseSettings, Problem, Array]:
     if study.optimise is None or study.objective is None:
         raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
@@ -171,7 +171,7 @@ def _problem_and_starts(
     designs, merit = best_rows(study.family, study.objective.output, folder)
     if settings.globally == "proportions":
         known = designs if len(designs) else drawn(study, count, seed)
-        return settings, *proportion_starts(study, settings, problem_of(study, known), known, merit, stop, jobs)
+        return settings, *proportion_starts(study, settings, problem_of(study, known), known, merit, stop, jobs, say)
     if len(designs):
         problem = problem_of(study, designs)
         return settings, problem, filled(study, problem, diverse(problem, designs, merit, count, ALIKE), count, seed)
@@ -219,7 +219,7 @@ def optimise_study(
     """
     place = Path(folder)
     brake = Brake(None if study.optimise is None else study.optimise.time_budget, stop)
-    settings, problem, starts = problem_and_starts(study, place, brake, jobs)
+    settings, problem, starts = problem_and_starts(study, place, brake, jobs, say)
     settings = replace(settings, time_budget=None)  # one brake for all that follows
     results, found = explore(
         problem, starts, settings, brake, jobs, lambda done, most: say("optimum", done, most, "starts")
@@ -230,8 +230,7 @@ def optimise_study(
         results = with_neighbours(problem, results, catalogue, settings, brake, jobs)
     nominal = results[0]
     if study.tolerance is not None and study.tolerance.robust is not None and found.ended not in CUT:
-        say("robust design", 0, 0, "steps")
-        whole, more = insensitive(study, settings, problem, brake, jobs)
+        whole, more = insensitive(study, settings, problem, brake, jobs, say)
         made = robust(
             whole, results, study.tolerance, settings, brake, jobs, more,
             lambda done, total: say("robust design", done, total, "searches"),

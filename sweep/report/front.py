@@ -10,6 +10,7 @@ import numpy as np
 
 from kernels import status as codes
 from sweep.chunks.cascade import compared
+from sweep.optimise.gaps import SHOWN, gaps
 from sweep.report.figures import LIMIT, OPTIMUM
 from sweep.report.quantities import Quantity, change, number, quantity
 
@@ -83,11 +84,35 @@ def front_note(data: Dataset) -> str:
     """Return how much of the front was searched."""
     if data.study.pareto is None or data.front is None:
         return ""
-    wanted, begun = len(set(data.study.pareto.bounds)), len(data.front)
+    given, begun = len(set(data.study.pareto.bounds)), len(data.front)
+    wanted = (data.study.pareto.points or given) if data.front_steps else given
     late = int(((data.front["ended"] == "time") & ~(data.front["kkt_residual"] <= SETTLED)).sum())
     text = "Every row is a search of its own, a local optimum if its residual is small."
+    text += f" {begun - given} of the bounds were placed where the front bends." if begun > given else ""
     text += f" Time was up before {wanted - begun} more bounds." if begun < wanted else ""
+    text += _gap(data)
     return text + (f" In {late} row{'s' if late > 1 else ''} time was up before the search had ended." if late else "")
+
+
+def _gap(data: Dataset) -> str:
+    """Where the front is least known, if that is worth a word."""
+    objective, second = _quantities(data)
+    points = _points(data)
+    if objective is None or second is None or data.study.pareto is None:
+        return ""
+    missed = [int(point["status"]) == codes.LIMIT_EXCEEDED for point in points]
+    reached = [
+        float(p["bound"]) if m else compared(second.name, float(p[second.name]))
+        for p, m in zip(points, missed, strict=True)
+    ]
+    values = [math.nan if m else float(p[objective.name]) for p, m in zip(points, missed, strict=True)]
+    bounds = np.array([float(point["bound"]) for point in points])
+    found = gaps(bounds, np.array(reached), np.array(values))
+    if not found or found[0].area < SHOWN:
+        return ""
+    ends = f"{second.show(reached[found[0].number], 4)} and {second.show(float(bounds[found[0].number + 1]), 4)}"
+    count = data.study.pareto.points or len(points)
+    return f" It is least known between {ends}: pareto.points, now {count}, places further bounds there."
 
 
 def draw_front(axes: Axes, data: Dataset) -> None:

@@ -54,8 +54,10 @@ def mechanism_figure(
             axes.set_title("\n".join(filter(None, [name, f"{words}, {WORDS[view]}" if several else words])))
     for column in panels.T:
         _same_scale(column)
-        if column[0].get_legend_handles_labels()[0]:
-            column[0].legend(fontsize="small")
+        handles, labels = column[0].get_legend_handles_labels()
+        if handles:  # members of a machine have links of the same name
+            once = dict(zip(labels, handles, strict=True))
+            column[0].legend(once.values(), once.keys(), fontsize="small")
     return figure
 
 
@@ -108,7 +110,9 @@ def mechanism_caption(designs: Mapping[str, Sequence[Part]]) -> str:
     text = f"{POSITIONS} positions at equal steps, the first one in full; grey: paths of the joints."
     if any(part.kinds for part in every):
         text += " Triangles: fixed joints; dash-dotted: their axes, with the positive sense."
-    if len({part.frame for part in every}) > 1:
+    if any(part.member for part in every):
+        text += " Members stand in the machine's frame, earlier stages of a chain in frames of their own."
+    elif len({part.frame for part in every}) > 1:
         text += (
             " Every stage is drawn in a frame of its own. The chain fixes the angle by which the shaft between two"
             " stages drives the next one (phi2 = kappa2 psi1 + offset2), but not where along the shaft that stage"

@@ -123,7 +123,7 @@ def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
     fast = shown.order and speed is not None
     return {
         "name": name,
-        "title": shown.words + (f" {shown.symbol}" if shown.symbolic else ""),
+        "title": shown.heading,
         "unit": shown.unit,
         "range": [low * shown.factor, high * shown.factor],
         "limits": [value * shown.factor for value in lines],

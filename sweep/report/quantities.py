@@ -53,10 +53,15 @@ class Quantity:
         return f"{self.symbol} [{self.unit}]" if self.unit else self.symbol
 
     @property
+    def heading(self) -> str:
+        """Words, and the symbol where there is a real one; the words have the member of a machine already."""
+        member = parts(self.name).member
+        return f"{self.words} {self.symbol.removesuffix(f' {member}')}" if self.symbolic else self.words
+
+    @property
     def title(self) -> str:
-        """Words, symbol where there is a real one, unit."""
-        name = f"{self.words} {self.symbol}" if self.symbolic else self.words
-        return f"{name} [{self.unit}]" if self.unit else name
+        """Heading and unit."""
+        return f"{self.heading} [{self.unit}]" if self.unit else self.heading
 
     def show(self, stored: float, digits: int = 5) -> str:
         """Return the value with its unit."""

@@ -169,6 +169,7 @@ class ParetoSection(Section):
     output: str | None = Field(None, description="the name of a design output, not the objective")
     at_most: Any = None
     at_least: Any = None
+    points: Annotated[int, Field(ge=2, le=64)] | None = Field(None, description="a whole number, 2 to 64")
     starts: Annotated[int, Field(ge=0, le=1000)] = Field(2, description="a whole number, 0 to 1000")
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
 

@@ -55,7 +55,11 @@ def read_pareto(
     bounds = _bounds(output, raw[given[0]], key, faults)
     if bounds is None or not _searchable(family, output, bounds, given[0], faults):
         return None
-    return ParetoSettings(output.name, bounds, given[0] == "at_least", section.starts, time_budget)
+    if section.points is not None and not 2 <= len(set(bounds)) < section.points:
+        some = f"more than the {len(set(bounds))} bounds given, of which there must be two or more"
+        faults.value(("pareto", "points"), section.points, some)
+        return None
+    return ParetoSettings(output.name, bounds, given[0] == "at_least", section.starts, time_budget, section.points)
 
 
 def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[float, ...] | None:

@@ -92,7 +92,7 @@ class ParetoSettings:
 
     ``bounds`` are upper ones, or with ``at_least`` lower ones; ``starts`` designs of the sweep within each bound are
     searched besides the optimum and the result of the next looser bound; ``time_budget`` [s] for the whole front is an
-    emergency brake.
+    emergency brake.  With ``points`` further bounds are placed where the front bends, until there are so many.
     """
 
     output: str
@@ -100,6 +100,7 @@ class ParetoSettings:
     at_least: bool = False
     starts: int = 2
     time_budget: float | None = None
+    points: int | None = None
 
 
 @dataclass(frozen=True)

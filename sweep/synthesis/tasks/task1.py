@@ -17,7 +17,7 @@ from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 @dataclass(frozen=True)
 class Task1:
-    """The unknowns are phi1 and f.  The first position gives f, in which it is linear; a second is an equation for phi1.
+    """The unknowns are phi1 and f.  The first position gives f, in which it is linear, a second an equation for phi1.
 
     Parameters
     ----------

@@ -18,7 +18,11 @@ function svg(name, attributes, parent) {
 function short(value, digits = 4) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(digits - 2).replace("-", "−");
+  if (size !== 0 && (size < 1e-3 || size >= 1e6)) {
+    const [mantissa, power] = value.toExponential(digits - 2).split("e");
+    const raised = [...String(Number(power))].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");
+    return `${Number(mantissa)}·10${raised}`.replace("-", "−");
+  }
   return String(Number(value.toPrecision(digits))).replace("-", "−");
 }
 

@@ -1,0 +1,110 @@
+"""The price list of the effects: error of what each stands for, and its time, at every accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels import status as st
+from studies.accuracy.effect_witness import Effected, known_of
+from studies.accuracy.timing import per_design
+from studies.accuracy.witness import Known
+from sweep.effects import NAMES, effect, extended
+from sweep.effects.costs import designs as ordinary
+from sweep.effects.wanted import expanded
+from sweep.evaluation.summaries import design_outputs
+from sweep.families import family
+from sweep.families.base import Accuracy, Family
+from sweep.quantities.names import error_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SAMPLES, TARGETS = (90, 360, 3600), (1e-3, 1e-6, 1e-9)
+SMOKE_SAMPLES, SMOKE_TARGETS, SMOKE_EVERY = (360,), (1e-6,), 8
+GRID, REFINED = "grid", "accuracy="
+DEAR = 5e6  # ns per design
+MANY, FEW = 8, 2
+ROUNDING = 1e-14  # what two ways to one number may differ by beyond what they say of themselves
+
+
+def effect_prices(smoke: bool) -> pd.DataFrame:
+    """One row per effect of the register and accuracy, each on the first family that it serves."""
+    import pandas as pd
+
+    rows: list[dict[str, object]] = []
+    for name in NAMES[:: SMOKE_EVERY if smoke else 1]:
+        bare = family(effect(name).families[0])
+        full = extended(bare, outputs_of(name, bare))
+        rows += prices_of(name, Effected(bare, full, ordinary(full, count(name, smoke))), smoke)
+    return pd.DataFrame(rows)
+
+
+def count(name: str, smoke: bool) -> int:
+    """On how many designs an effect is measured."""
+    return FEW if smoke or effect(name).ns_per_design > DEAR else MANY
+
+
+def outputs_of(name: str, bare: Family) -> tuple[str, ...]:
+    """What the name of the effect stands for in ``want``; where an output bears it, the effect's numbers of a turn."""
+    found = tuple(expanded(bare, [name]))
+    whole = effect(name).design_result
+    if found != (name,) or whole is None:
+        return found
+    return tuple(o.name for o in whole.outputs if not o.jumps and not o.name.startswith(f"{bare.domain.name}_"))
+
+
+def prices_of(name: str, given: Effected, smoke: bool = False) -> list[dict[str, object]]:
+    """Rows of one effect."""
+    wanted = outputs_of(name, given.bare)
+    known, words = known_of(name, given, wanted)
+    head: dict[str, object] = {
+        "effect": name,
+        "family": given.bare.name,
+        "outputs": len(wanted),
+        "judged": sum(output in known for output in wanted),
+        "designs": len(given.designs),
+        "reference": words,
+    }
+    return [
+        head | {"method": method, "setting": setting} | _priced(given, wanted, accuracy, known)
+        for method, setting, accuracy in _methods(name, smoke)
+    ]
+
+
+def _methods(name: str, smoke: bool) -> Sequence[tuple[str, float, Accuracy]]:
+    samples, targets = (SMOKE_SAMPLES, SMOKE_TARGETS) if smoke else (SAMPLES, TARGETS)
+    if effect(name).whole_turn:
+        samples = samples[:1]  # it chooses its own
+    return [
+        *((GRID, float(n), Accuracy(samples=n)) for n in samples),
+        *((REFINED, target, Accuracy(target=target)) for target in targets),
+    ]
+
+
+def _priced(given: Effected, wanted: tuple[str, ...], accuracy: Accuracy, known: dict[str, Known]) -> dict[str, object]:
+    run = partial(design_outputs, given.full, wanted=wanted, accuracy=accuracy)
+    columns = run(given.designs)
+    errors, own, exceeded = {}, {}, 0
+    for output in (output for output in wanted if output in known):
+        value, sure = known[output]
+        size, found = np.where(value != 0.0, np.abs(value), 1.0), np.asarray(columns[output], np.float64)
+        off = np.abs(found - value)
+        if np.isfinite(off).any():
+            errors[output], own[output] = (float(np.nanmax(part / size)) for part in (off, sure))
+        if accuracy.target is not None:
+            said = np.asarray(columns[error_of(output)], np.float64)
+            exceeded += int((off > said + sure + ROUNDING * size).sum())
+    worst = max(errors, key=lambda output: errors[output], default="")
+    return {
+        "largest_error": errors.get(worst, float("nan")),
+        "median_error": float(np.median(list(errors.values()))) if errors else float("nan"),
+        "reference_error": own.get(worst, float("nan")),
+        "worst_output": worst,
+        "exceeded": exceeded,
+        "unsure": int((columns["status"] != st.OK).sum()),
+        **per_design(run, given.designs),
+    }

@@ -1,0 +1,229 @@
+"""References of the effects: by another method for what couples a whole turn, by finer sampling for everything else.
+
+A witness gets the family with the effect's poses and a design matrix, and returns what it knows by the name of the
+output.  What no witness knows and what is an extremum of a pose output is judged by ever narrower grids.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from studies.accuracy.witness import Known, extreme
+from sweep.effects import effect, extended
+from sweep.families.base import Array, Family
+from sweep.reductions.sampling import TWO_PI, pose_columns
+
+SAMPLES, MANY = 8192, 131_072
+# The same with a half and a third of the poses; a reference may be off by twice what these differ from it.
+COARSER, DOUBT = (2, 3), 2.0
+PASSES, HALVINGS = 12, 200
+EXTREMA = {"max_abs_": 0, "max_": 1, "min_": -1}
+
+
+class Effected(NamedTuple):
+    """A family, the one with the effect's inputs, and designs of the latter."""
+
+    bare: Family
+    full: Family
+    designs: Array
+
+    def given(self, name: str) -> Array:
+        """An input or parameter of the designs."""
+        return self.designs[:, self.full.parameter_names.index(name)]
+
+    def poses(self, names: tuple[str, ...], samples: int, changed: Mapping[str, Array] | None = None) -> list[Array]:
+        """Pose outputs over an even grid, (n, samples), also of other effects; inputs ``changed`` pose by pose."""
+        wider = extended(self.bare, names)
+        rows = np.column_stack([self._input(wider, name) for name in wider.parameter_names])
+        phi = np.arange(samples) * (TWO_PI / samples)
+        n = len(rows)
+        if changed is None:
+            columns, _ = pose_columns(wider, rows, np.tile(phi, (n, 1)), names)
+            return [columns[name] for name in names]
+        rows = np.repeat(rows, samples, axis=0)
+        for name, values in changed.items():
+            rows[:, wider.parameter_names.index(name)] = values.ravel()
+        columns, _ = pose_columns(wider, rows, np.tile(phi, n)[:, None], names)
+        return [columns[name].reshape(n, samples) for name in names]
+
+    def _input(self, wider: Family, name: str) -> Array:
+        if name in self.full.parameter_names:
+            return self.given(name)
+        default = wider.parameters[wider.parameter_names.index(name)].default
+        return np.full(len(self.designs), np.nan if default is None else default)
+
+
+Witness: TypeAlias = Callable[[Effected, int], dict[str, Array]]
+"""Outputs by name, from so many poses; a method that chooses its own poses ignores the number."""
+
+
+def known_of(name: str, given: Effected, wanted: tuple[str, ...]) -> tuple[dict[str, Known], str]:
+    """What is known of an effect's outputs by other means, and in words by which."""
+    entry = WITNESSES.get(name.removeprefix("slider_"))
+    found, words = {}, ""
+    if entry is not None:
+        witness, samples, words = entry
+        fine, *coarse = (witness(given, samples // share) for share in (1, *COARSER))
+        # Of curves with jumps two may agree by accident: a reference is no surer of one design than of the worst.
+        found = {
+            output: Known(value, DOUBT * np.abs(value) * max(np.abs(one[output] / value - 1.0).max() for one in coarse))
+            for output, value in fine.items()
+        }
+    if effect(name).whole_turn:
+        return found, words
+    sampled = of_samples(given, tuple(output for output in wanted if output not in found))
+    return found | sampled, "; ".join(filter(None, (words, FINER if sampled else "")))
+
+
+def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
+    """Largest values and magnitudes and least values of pose outputs, by ever narrower grids."""
+    found = {}
+    for name in wanted:
+        for prefix, sign in EXTREMA.items():
+            pose = name.removeprefix(prefix)
+            if name.startswith(prefix) and pose in given.full.pose_names:
+                found[name] = extreme(given.full.precise(), given.designs, pose, sign)
+                break
+    return found
+
+
+def pressure(given: Effected, samples: int) -> dict[str, Array]:
+    """Largest and least pressure angle, from the angle itself."""
+    largest, least = (extreme(given.full.precise(), given.designs, "pressure_angle", sign).value for sign in (1, -1))
+    return {"pressure_max": largest, "pressure_min": least}
+
+
+def bearing_life(given: Effected, samples: int) -> dict[str, Array]:
+    """Mean loads and lives by even sums over very many poses, whatever kinks there are."""
+    velocity = given.bare.derivative_of[given.bare.position]
+    first, second, way = given.poses(("equivalent_load_d1", "equivalent_load_d2", velocity), samples)
+    exponent, way = given.given("life_exponent"), np.abs(way)
+    travel = TWO_PI * way.mean(axis=1)
+    found: dict[str, Array] = {}
+    for k, load in (("1", first), ("2", second)):
+        size = load.max(axis=1)
+        power = ((load / size[:, None]) ** exponent[:, None] * way).mean(axis=1) * TWO_PI / travel
+        mean = size * power ** (1.0 / exponent)
+        turns = 1e6 * (given.given("dynamic_capacity") / mean) ** exponent
+        found |= {f"mean_load_d{k}": mean, f"life_d{k}": turns * TWO_PI**2 / (travel * given.given("speed"))}
+    return found
+
+
+def speed(given: Effected, samples: int) -> dict[str, Array]:
+    """The energy of the drive summed pose by pose, its mean level by halving."""
+    return _numbers(*_steady(*_energies(given, samples), given.given("speed")), given.given("speed"), _height)
+
+
+def speed_with_friction(given: Effected, samples: int) -> dict[str, Array]:
+    """The same, friction taken anew at every pose with the speed that it makes until that no longer changes."""
+    inertia, slope, excess = _energies(given, samples)
+    mean = given.given("speed")
+    crank, change = np.tile(mean[:, None], (1, samples)), np.zeros(inertia.shape)
+    for _ in range(PASSES):
+        names = ("drive_torque_friction", "drive_torque")
+        rubbing, smooth = given.poses(names, samples, {"speed": crank, "speed_change": change})
+        crank, change = _steady(inertia, slope, excess - (rubbing - smooth), mean)
+    found = _numbers(crank, change, mean, lambda curve: np.abs(curve).max(axis=1))  # no parabola across a jump
+    return {f"{name}_friction": values for name, values in found.items()}
+
+
+def _energies(given: Effected, samples: int) -> tuple[Array, Array, Array]:
+    """Inertia about the crank, its derivative, and the torque that is left over at even speed."""
+    inertia, slope, drive = given.poses(("reduced_inertia", "dreduced_inertia", "drive_torque"), samples)
+    mean = given.given("speed")[:, None]
+    return inertia + given.given("flywheel")[:, None], slope, 0.5 * slope * mean**2 - drive
+
+
+def _steady(inertia: Array, slope: Array, excess: Array, mean: Array) -> tuple[Array, Array]:
+    """Speed and acceleration of d(J w^2/2)/d phi = excess - its mean, given the mean speed; constant motor torque."""
+    torque = excess - excess.mean(axis=1, keepdims=True)
+    step = TWO_PI / inertia.shape[1]
+    work = np.concatenate([np.zeros((len(torque), 1)), np.cumsum(_panels(torque), axis=1)[:, :-1]], axis=1) * step
+    low, high = -work.min(axis=1), 2.0 * inertia.max(axis=1) * mean**2 - work.min(axis=1)
+    for _ in range(HALVINGS):
+        level = 0.5 * (low + high)
+        pace = np.sqrt(inertia / np.maximum(2.0 * (level[:, None] + work), np.finfo(float).tiny)).mean(axis=1)
+        slow = pace > 1.0 / mean  # a turn takes longer than it should
+        low, high = np.where(slow, level, low), np.where(slow, high, level)
+    crank = np.sqrt(2.0 * (0.5 * (low + high)[:, None] + work) / inertia)
+    return crank, (torque - 0.5 * slope * crank**2) / inertia
+
+
+def _numbers(crank: Array, change: Array, mean: Array, height: Callable[[Array], Array]) -> dict[str, Array]:
+    top = crank.max(axis=1, keepdims=True)
+    fastest, slowest = height(crank), top[:, 0] - height(top - crank)
+    found = {"unevenness": (fastest - slowest) / mean, "fastest": fastest, "slowest": slowest}
+    return found | {"max_abs_crank_speed": fastest, "max_abs_crank_acceleration": height(change)}
+
+
+def _panels(y: Array) -> Array:
+    """Integral of every panel of a periodic curve over its width, by the cubic through four samples."""
+    left, right, after = np.roll(y, 1, axis=1), np.roll(y, -1, axis=1), np.roll(y, -2, axis=1)
+    panels: Array = (13.0 * (y + right) - left - after) / 24.0
+    return panels
+
+
+def elastic(given: Effected, samples: int) -> dict[str, Array]:
+    """The periodic vibration by differences of eighth order, its damping by Liouville's formula."""
+    from scipy.sparse import diags
+    from scipy.sparse.linalg import spsolve
+
+    rocking = "driven_inertia" in given.full.parameter_names
+    arm = given.given("c") if rocking else np.ones(len(given.designs))
+    second = given.bare.derivative_of[given.bare.derivative_of[given.bare.position]]
+    lever, bend = given.poses(("t_tau", second), samples)
+    lever = lever * arm[:, None]
+    inertia, load = (given.given(name) for name in (
+        ("driven_inertia", "load_torque") if rocking else ("driven_mass", "load_force")))  # fmt: skip
+    stiffness, damping, omega = (given.given(name) for name in ("stiffness", "damping", "speed"))
+    first, twice = (_stencil(order, samples) for order in (1, 2))
+    lag = np.empty(lever.shape)
+    for k, p in enumerate(lever):
+        rate = first @ p
+        moved = diags(damping[k] * omega[k] * p**2) @ first
+        held = diags(stiffness[k] * p**2 + damping[k] * omega[k] * p * rate)
+        matrix = inertia[k] * omega[k] ** 2 * twice + moved + held
+        lag[k] = spsolve(matrix.tocsc(), load[k] - inertia[k] * omega[k] ** 2 * bend[k])
+    decay = (damping[:, None] * lever**2).mean(axis=1) * TWO_PI / (inertia * omega)
+    found = {"floquet": np.exp(-0.5 * decay), "max_abs_lag_dynamic": _height(lag)}
+    return found | {"max_abs_elongation_dynamic": _height(lag * lever)}
+
+
+def _stencil(order: int, samples: int) -> Any:
+    """Matrix of the first or second derivative of a periodic curve by differences of eighth order."""
+    from scipy.sparse import diags
+
+    half = {1: (4 / 5, -1 / 5, 4 / 105, -1 / 280), 2: (8 / 5, -1 / 5, 8 / 315, -1 / 560)}[order]
+    step, sign = TWO_PI / samples, -1.0 if order == 1 else 1.0
+    places = {0: 0.0 if order == 1 else -205 / 72}
+    for k, weight in enumerate(half, 1):
+        places |= {k: weight, -k: sign * weight, k - samples: weight, samples - k: sign * weight}
+    return diags(list(places.values()), list(places), shape=(samples, samples)).tocsr() / step**order
+
+
+def _height(curve: Array) -> Array:
+    """Largest magnitude of close samples of a smooth periodic curve, with the parabola through the highest three."""
+    size, rows = np.abs(curve), np.arange(len(curve))
+    top = size.argmax(axis=1)
+    left, middle, right = (size[rows, (top + k) % size.shape[1]] for k in (-1, 0, 1))
+    bow = 2.0 * middle - left - right
+    height: Array = middle + np.divide((right - left) ** 2, 8.0 * bow, out=np.zeros(rows.size), where=bow > 0.0)
+    return height
+
+
+FINER = "poses on ever narrower grids"
+WITNESSES: Mapping[str, tuple[Witness, int, str]] = {
+    "pressure_extrema": (pressure, 0, "the angle on ever narrower grids"),
+    "bearing_life": (bearing_life, MANY, f"even sums over {MANY} poses"),
+    "speed_fluctuation": (speed, SAMPLES, f"energy summed over {SAMPLES} poses, level by halving"),
+    "speed_fluctuation_friction": (
+        speed_with_friction, SAMPLES, f"energy summed over {SAMPLES} poses, friction at the speed it makes",
+    ),
+    "dynamic_elasticity": (
+        elastic, SAMPLES, f"differences of eighth order over {SAMPLES} poses; Liouville's formula",
+    ),
+}  # fmt: skip
+"""By the name of the effect without the kind of its follower: the witness, its poses, and in words what it does."""

@@ -1,0 +1,91 @@
+"""The price list of the families: error and time of their measure by every way that they offer, region by region."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.accuracy.regions import Region
+from studies.accuracy.subjects import MOVES, measure, regions_of, subjects
+from studies.accuracy.timing import per_design
+from studies.accuracy.witness import Known, reference
+from sweep.costs import nanoseconds
+from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
+from sweep.families import chain_names, family
+from sweep.families.base import Accuracy, Array, Family
+from sweep.families.domain import March
+from sweep.reductions.catalogue import check_certifiable
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SAMPLES, TARGETS, PROVEN = (90, 360, 3600), (1e-3, 1e-6, 1e-9, 1e-12), 1e-8
+SMOKE_SAMPLES, SMOKE_TARGETS = (360,), (1e-3, 1e-9)
+GRID, REFINED, CERTIFIED = "grid", "accuracy=", "certified, accuracy="
+JUDGED = 1e-2  # a reference that is less sure than that says nothing
+# Designs per region by what a pose takes [ns]: what is dear is measured on few.
+COUNTS = ((100.0, (48, 48, 16)), (2000.0, (16, 16, 8)), (float("inf"), (3, 3, 2)))
+SMOKE_COUNTS, SMOKE_EVERY = (2, 0, 0), 4
+
+
+def family_prices(smoke: bool) -> pd.DataFrame:
+    """One row per family or chain, region and method; in smoke every fourth of them, two designs each."""
+    import pandas as pd
+
+    rows: list[dict[str, object]] = []
+    for name in subjects()[:: SMOKE_EVERY if smoke else 1]:
+        rows += prices_of(family(name), regions_of(name, SMOKE_COUNTS if smoke else counts(name)), smoke)
+    return pd.DataFrame(rows)
+
+
+def counts(name: str) -> tuple[int, int, int]:
+    """How many designs of each region a family is measured on."""
+    ns = sum(nanoseconds("poses", part) for part in chain_names(name))
+    return next(found for limit, found in COUNTS if ns < limit)
+
+
+def prices_of(mechanism: Family, regions: Iterable[Region], smoke: bool = False) -> list[dict[str, object]]:
+    """Rows of one family."""
+    rows = []
+    for region in regions:
+        known = reference(mechanism, region.designs)
+        head = {"family": mechanism.name, "domain": mechanism.domain.kind, "measure": measure(mechanism)}
+        for method, setting, accuracy in methods(mechanism, smoke):
+            row = {"region": region.name, "method": method, "setting": setting, "designs": len(region.designs)}
+            rows.append(head | row | _priced(mechanism, region.designs, accuracy, known))
+    return rows
+
+
+def methods(mechanism: Family, smoke: bool) -> Sequence[tuple[str, float, Accuracy]]:
+    """Name, setting and accuracy of every way to the measure that the family's domain allows."""
+    samples, targets = (SMOKE_SAMPLES, SMOKE_TARGETS) if smoke else (SAMPLES, TARGETS)
+    found = [(GRID, float(n), Accuracy(samples=n)) for n in samples]
+    if isinstance(mechanism.domain, March):
+        return found
+    found += [(REFINED, target, Accuracy(target=target)) for target in targets]
+    proof = Accuracy(target=PROVEN, certify=True)
+    try:
+        check_certifiable(mechanism, [measure(mechanism)], proof)
+    except InputError:  # this family proves no maxima
+        return found
+    return [*found, (CERTIFIED, PROVEN, proof)]
+
+
+def _priced(mechanism: Family, designs: Array, accuracy: Accuracy, known: Known) -> dict[str, object]:
+    columns = design_outputs(mechanism, designs, [measure(mechanism)], accuracy)
+    value = np.asarray(columns[measure(mechanism)], np.float64)
+    answered = np.isfinite(value) & np.isin(columns["status"], MOVES)
+    size = np.where(known.value != 0.0, np.abs(known.value), 1.0)
+    error, sure = np.abs(value - known.value) / size, known.error / size
+    judged = answered & (sure <= JUDGED)
+    return {
+        "largest_error": float(error[judged].max()) if judged.any() else float("nan"),
+        "median_error": float(np.median(error[judged])) if judged.any() else float("nan"),
+        "reference_error": float(sure[judged].max()) if judged.any() else float("nan"),
+        "unanswered": int((~answered).sum()),
+        "unjudged": int((answered & ~judged).sum()),
+        **per_design(lambda some: design_outputs(mechanism, some, [measure(mechanism)], accuracy), designs),
+    }

@@ -1,0 +1,93 @@
+"""What the price list covers: every registered family and two chains, each with designs by region."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kernels import status as st
+from studies.accuracy.regions import Region
+from sweep.evaluation.summaries import design_outputs
+from sweep.families import NAMES, family
+from sweep.families.base import Accuracy, Array, Family
+from sweep.families.chain import Chain
+from sweep.families.domain import Turn
+from sweep.reductions.sampling import Mask
+
+CHAINS = ("rssr+guide", "rssr+rssr")
+NEAR, WIDE, FAR = 0.02, 0.3, 0.9  # largest share by which a parameter differs from the ordinary design's
+ORDINARY, VARIED, EDGE = "ordinary", "wide", "near a change point"
+TEXTS = {
+    ORDINARY: "every parameter within 2 % of the family's ordinary design",
+    VARIED: "every parameter within 30 % of it, as far as they move all the way",
+    EDGE: "1e-6 to 1e-2 of the way back from a design that does not move all the way, to one that does",
+}
+MOVES = (st.OK, st.NOT_OSCILLATING)  # a follower that turns fully moves all the way
+COARSE, CLOSE = Accuracy(samples=90), Accuracy(samples=3600)
+HALVINGS = 26
+
+
+def subjects() -> tuple[str, ...]:
+    """Names of all families of the register, and of the chains."""
+    return (*NAMES, *CHAINS)
+
+
+def measure(mechanism: Family) -> str:
+    """The design output that the price list is about.
+
+    The largest second derivative of the position over the turn, where the register says which output that is; of an
+    interval, a march, or a position without derivatives, how far the position ranges.
+    """
+    first = mechanism.derivative_of.get(mechanism.position, "")
+    second = mechanism.derivative_of.get(first, "")
+    return f"max_abs_{second}" if second and isinstance(mechanism.domain, Turn) else f"range_{mechanism.position}"
+
+
+def example(mechanism: Family) -> Array:
+    """The ordinary design of a family, or those of a chain's stages together, as one row of the design matrix."""
+    given = dict(mechanism.example)
+    if isinstance(mechanism, Chain):
+        given = {f"{name}{s.number}": value for s in mechanism.stages for name, value in s.family.example.items()}
+    return np.array([given.get(p.name, p.default or 0.0) for p in mechanism.parameters], dtype=np.float64)
+
+
+def around(mechanism: Family, count: int, share: float, generator: np.random.Generator) -> Array:
+    """Designs that differ from the ordinary one by at most ``share`` in every parameter that has no choices."""
+    fixed = np.array([p.choices is not None for p in mechanism.parameters])
+    change = generator.uniform(-share, share, (count, fixed.size))
+    return np.ascontiguousarray(example(mechanism) * (1.0 + np.where(fixed, 0.0, change)))
+
+
+def moves(mechanism: Family, designs: Array, grid: Accuracy = COARSE) -> Mask:
+    """Whether each design moves all the way, as far as a grid shows."""
+    return np.isin(design_outputs(mechanism, designs, [measure(mechanism)], grid)["status"], MOVES)
+
+
+def regions_of(name: str, counts: tuple[int, int, int], seed: int = 1) -> Iterator[Region]:
+    """The regions that a family has, with at most so many designs each; a cam has no change points."""
+    mechanism, generator = family(name), np.random.default_rng(seed)
+    for region, share, count in zip((ORDINARY, VARIED), (NEAR, WIDE), counts, strict=False):
+        designs = around(mechanism, max(3 * count, 1), share, generator)
+        moving = designs[moves(mechanism, designs)][:count]
+        if len(moving):
+            yield Region(region, TEXTS[region], np.ascontiguousarray(moving))
+    edge = _edge(mechanism, counts[2], generator) if counts[2] else np.empty((0, 0))
+    if len(edge):
+        yield Region(EDGE, TEXTS[EDGE], edge)
+
+
+def _edge(mechanism: Family, count: int, generator: np.random.Generator) -> Array:
+    """Designs just inside the range of motion, on lines from ordinary ones to such as do not move all the way."""
+    far = around(mechanism, 12 * count, FAR, generator)
+    stuck = far[~moves(mechanism, far)][:count]
+    inside = around(mechanism, len(stuck), NEAR, generator)
+    pairs = moves(mechanism, inside) if len(stuck) else np.zeros(0, np.bool_)
+    start, way = inside[pairs], stuck[pairs] - inside[pairs]
+    low, high = np.zeros((len(start), 1)), np.ones((len(start), 1))
+    for _ in range(HALVINGS if len(start) else 0):
+        middle = 0.5 * (low + high)
+        free = moves(mechanism, start + middle * way)[:, None]
+        low, high = np.where(free, middle, low), np.where(free, high, middle)
+    designs = start + low * (1.0 - 10.0 ** generator.uniform(-6.0, -2.0, low.shape)) * way
+    return np.ascontiguousarray(designs[moves(mechanism, designs, CLOSE)] if len(designs) else designs)

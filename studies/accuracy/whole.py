@@ -1,0 +1,115 @@
+"""One small study from its file to its optimum: how long it takes at every accuracy, and how many digits it gives."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import sweep
+from studies.accuracy.timing import REPEATS, Spread
+from studies.accuracy.witness import reference
+from sweep.dataset.layout import OPTIMUM
+from sweep.families import family
+from sweep.families.base import Array
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SETTINGS = ("samples = 360", "target = 1e-3", "target = 1e-6", "target = 1e-9")  # of the table [accuracy]
+JUDGED = 200  # of the designs that the study keeps
+FAMILY, OBJECTIVE = "rssr", "max_abs_d2psi"
+STUDY = """
+[study]
+name = "whole"
+question = "The least acceleration of a rocker that swings by 40 to 50 degrees"
+[mechanism]
+family = "rssr"
+[scene]
+want = ["max_abs_d2psi", "swing", "max_pressure_angle"]
+[design]
+sample = {{ kind = "sobol", n = {designs}, seed = 17 }}
+a = {{ from = 5, to = 20, unit = "mm" }}
+b = {{ from = 20, to = 80, unit = "mm" }}
+c = {{ from = 15, to = 50, unit = "mm" }}
+e = {{ from = 10, to = 70, unit = "mm" }}
+f = {{ from = -20, to = 20, unit = "mm" }}
+g = {{ from = -20, to = 20, unit = "mm" }}
+alpha = {{ from = 0, to = 90, unit = "deg" }}
+[limits]
+rotatable = true
+swing = {{ min = 40, max = 50, unit = "deg" }}
+max_pressure_angle = {{ max = 60, unit = "deg" }}
+[objective]
+minimise = "max_abs_d2psi"
+[accuracy]
+{setting}
+[optimise]
+starts = 4
+seed = 1
+global = "none"
+[output]
+keep = "feasible"
+dtype = "float64"
+"""
+
+
+def whole_study(designs: int, repeats: int = REPEATS, smoke: bool = False) -> pd.DataFrame:
+    """One row per setting: time of the whole run, error of what is kept, the optimum and how far it is from the finest.
+
+    Wall time and processor time of one worker, as median and quartiles; the first run, which may compile, is not
+    counted.
+    """
+    import pandas as pd
+
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        for setting in SETTINGS[::2] if smoke else SETTINGS:
+            if not smoke:
+                _run(Path(name) / f"{setting}, warm", setting, designs)
+            times = [_run(Path(name) / f"{setting}, {k}", setting, designs) for k in range(repeats)]
+            wall, work = (Spread.of([pair[k] for pair in times]) for k in (0, 1))
+            rows.append(
+                {"setting": setting, "designs": designs}
+                | _judged(Path(name) / f"{setting}, 0")
+                | {"seconds": wall.median, "seconds_lower": wall.lower, "seconds_upper": wall.upper}
+                | {"processor_seconds": work.median}
+            )
+    finest = float(str(rows[-1]["optimum"]))
+    for row in rows:
+        row["optimum_difference"] = abs(float(str(row["optimum"])) / finest - 1.0)
+    return pd.DataFrame(rows)
+
+
+def _run(folder: Path, setting: str, designs: int) -> tuple[float, float]:
+    folder.mkdir()
+    (folder / "study.toml").write_text(STUDY.format(designs=designs, setting=setting))
+    start = time.perf_counter(), time.process_time()
+    sweep.run(folder, out=folder / "designs", jobs=1)
+    return time.perf_counter() - start[0], time.process_time() - start[1]
+
+
+def _judged(folder: Path) -> dict[str, object]:
+    """Rows kept, largest relative error of the objective among some of them, and the optimum with its error."""
+    import pandas as pd
+
+    kept, best = sweep.load(folder / "designs"), pd.read_parquet(folder / OPTIMUM).iloc[:1]
+    few = kept.iloc[:: max(1, len(kept) // JUDGED)]
+    error, of_optimum = _error(few), _error(best)
+    return {
+        "kept": len(kept),
+        "largest_error": float(error.max()),
+        "optimum": float(best[OBJECTIVE].iloc[0]),
+        "optimum_error": float(of_optimum.max()),
+    }
+
+
+def _error(rows: pd.DataFrame) -> Array:
+    mechanism = family(FAMILY)
+    parameters = [p.name for p in mechanism.parameters]
+    matrix = rows.reindex(columns=parameters).fillna({p.name: p.default for p in mechanism.parameters if p.default})
+    known = reference(mechanism, np.ascontiguousarray(matrix.to_numpy(np.float64)))
+    return np.abs(rows[OBJECTIVE].to_numpy(np.float64) / known.value - 1.0)

@@ -1,0 +1,92 @@
+"""What an elastic coupler drives besides its own follower: the stages behind it, and a tool at the rocker's tip."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from sweep.effects import loads
+from sweep.effects.base import Scene
+from sweep.effects.handed import INERTIAS, LOADS, behind, computed
+from sweep.effects.places import ON_TIP, tool_place
+from sweep.families.base import Array
+
+STEP = 2e-3  # of the follower's angle, for the slope of the load: error of fourth order against rounding
+_DRIVE = frozenset({"drive_torque"})
+
+
+class DrivenSide(NamedTuple):
+    """Along the rigid motion, (n, m): the torque that it needs, its slopes, and its inertia.
+
+    ``torque`` T(psi, psi', psi'') about the follower's axis; ``slope`` dT/dpsi at the same rates; ``inertia`` J and
+    ``bend`` dJ/dpsi.
+    """
+
+    torque: Array
+    slope: Array
+    inertia: Array
+    bend: Array
+
+
+def driven_side(scene: Scene, slopes: bool) -> DrivenSide | None:
+    """What the follower drives besides itself; None where that is nothing.  Slopes are zero unless asked for."""
+    found = _stages(scene, slopes)
+    tip = _tip(scene)
+    if found is None or tip is None:
+        return found if tip is None else tip
+    return DrivenSide(*(one + other for one, other in zip(found, tip, strict=True)))
+
+
+def _stages(scene: Scene, slopes: bool) -> DrivenSide | None:
+    """The stages behind: phi of the next one is kappa psi + offset."""
+    handed_back = behind(scene, LOADS, _DRIVE | frozenset(INERTIAS))
+    if handed_back is None:
+        return None
+    kappa = scene.after[0].kappa[:, None]
+    good = np.where(np.asarray(handed_back["status"]) == 0, 1.0, np.nan)
+    torque, inertia, bend = (np.asarray(handed_back[n], np.float64) * good for n in ("drive_torque", *INERTIAS))
+    slope = np.zeros_like(torque)
+    if slopes:
+        near, far = (_moved(scene, k * STEP) - _moved(scene, -k * STEP) for k in (1.0, 2.0))
+        slope = (8.0 * near - far) / (12.0 * STEP)
+    # kappa is +1 or -1: its square is 1
+    return DrivenSide(kappa * torque, slope, inertia, kappa * bend)
+
+
+def _moved(scene: Scene, angle: float) -> Array:
+    """Torque that the next stage needs of the rocker where that stands further by an angle, at the same rates.
+
+    A force that jumps where a tool pierces has no slope: it is left out of the difference.
+    """
+    first, *rest = (
+        driven._replace(inputs=driven.inputs | {"pierce_force": 0.0 * driven.inputs["pierce_force"]})
+        if "pierce_force" in driven.inputs
+        else driven
+        for driven in scene.after
+    )
+    first = first._replace(offset=first.offset + first.kappa * angle)
+    there = replace(scene, after=(first, *rest), memo={}).driven
+    assert there is not None
+    return first.kappa[:, None] * np.asarray(computed(there, LOADS, _DRIVE)["drive_torque"], np.float64)
+
+
+def _tip(scene: Scene) -> DrivenSide | None:
+    """A tool at the tip of the rocker."""
+    if tool_place(scene.family) != ON_TIP or "m_tool" not in scene.inputs:
+        return None
+    names = tuple(p.name for p in loads.FREE_TOOL[1:])
+    force = np.stack(np.broadcast_arrays(*(scene.load(name) for name in names)), axis=2)
+    mass, tip = scene.inputs["m_tool"][:, None], scene.table(tuple(p.name for p in loads.TIP))
+    if not (mass.any() or force.any()):
+        return None
+    poses = scene.records[0]
+    rho, tau = poses[:, :, 15:18], poses[:, :, 18:21]
+    along, aside = tip[:, 0, None, None], tip[:, 1, None, None]
+    moved, turned = along * tau - aside * rho, -along * rho - aside * tau  # dP/dpsi and its own slope
+    weight = force + mass[:, :, None] * scene.table(tuple(p.name for p in loads.GRAVITY))[:, None, :]
+    inertia = np.broadcast_to(mass * (tip[:, :1] ** 2 + tip[:, 1:2] ** 2), scene.shape)
+    speed = scene.inputs["speed"][:, None]
+    torque = inertia * speed * speed * poses[:, :, 23] - (weight * moved).sum(axis=2)
+    return DrivenSide(torque, -(weight * turned).sum(axis=2), inertia, np.zeros(scene.shape))

@@ -1,0 +1,267 @@
+"""Loads of the loopers: each body's momentum, virtual power over the turn, friction, chains, negative controls.
+
+The momenta come from public poses alone (tests/reference/linked.py), differentiated by the Fourier transform: exact to
+rounding of the highest harmonic, N/2 * 2^-53 of the largest value and the square of that for accelerations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sweep
+from kernels import status as st
+from sweep.families import family
+from sweep.families.capabilities import LinkTree
+from tests.reference.linked import POSES, READERS, Z
+from tests.reference.momentum import body_momentum, derivative
+
+N = 256
+PHI = 2.0 * np.pi * np.arange(N) / N
+OMEGA = 30.0
+GRAVITY = np.array([900.0, -9810.0, 400.0])
+FORCE = np.array([3000.0, -5000.0, 2000.0])
+NEAR = 1e-9  # of the largest force; seen 4e-12
+DESIGNS = {
+    "five_link": {"tip_x": 3.0, "tip_y": 0.7, "tip_z": -0.4},
+    "slotted fork": {"g": 0.3, "tip_x": 3.0, "tip_y": 0.7, "tip_z": -0.4},
+    "slotted bar": {"k": 1.8, "tau": -1.0, "tip_x": 3.0, "tip_y": 0.7, "tip_z": -0.4},
+    "swivel": {},
+    "spherical_looper": {},
+    "cylindrical_looper sliding": {},
+    "cylindrical_looper held": {"slides": 0.0},
+    "cylindrical_looper beside": {"d2": 0.4, "beta2": 0.3, "gamma2": 0.7},
+}
+TIPS = {
+    "swivel": lambda d: [d["Lw"], 0.0, 0.0],
+    "spherical_looper": lambda d: [d["p0x"], d["p0y"], d["p0z"]],
+    "cylindrical_looper": lambda d: [d["p0x"], d["p0y"], d["p0z"]],
+}
+
+
+def design(case):
+    name = case.split()[0]
+    own = {p.name: p.default for p in family(name).parameters if p.default is not None}
+    return name, own | dict(family(name).example) | DESIGNS[case]
+
+
+def masses(name, seed=3):
+    """Bodies without any symmetry, their inputs and (mass, centre, tensor) by name; all of the size of the links."""
+    rng = np.random.default_rng(seed)
+    table, found = {}, {}
+    for body in family(name).find(LinkTree).bodies:
+        m, centre = rng.uniform(0.5, 2.0), rng.uniform(-0.5, 0.5, 3)
+        if body.slender:
+            j = rng.uniform(0.2, 0.6)
+            centre = np.array([centre[0], 0.0, 0.0])
+            table |= {f"m_{body.name}": m, f"com_{body.name}_x": centre[0], f"j_{body.name}": j}
+            found[body.name] = (m, centre, np.diag([0.0, j, j]))
+            continue
+        half = rng.uniform(-0.5, 0.5, (3, 3))
+        tensor = half @ half.T + 0.2 * np.eye(3)
+        table[f"m_{body.name}"] = m
+        table |= {f"com_{body.name}_{x}": centre[k] for k, x in enumerate("xyz")}
+        pairs = ("xx", "xy", "xz", "yy", "yz", "zz")
+        table |= {f"j_{body.name}_{p}": tensor["xyz".index(p[0]), "xyz".index(p[1])] for p in pairs}
+        found[body.name] = (m, centre, tensor)
+    return table, found
+
+
+TOOL = {"m_tool": 0.8} | {f"tool_force_{x}": FORCE[k] for k, x in enumerate("xyz")}
+WEIGHT = {f"gravity_{x}": GRAVITY[k] for k, x in enumerate("xyz")}
+
+
+def vectors(name, suffix=""):
+    tree = family(name).find(LinkTree)
+    found = [f"force_{j.name}{suffix}_{x}" for j in tree.joints for x in "xyz"]
+    return found + [f"moment_{j.name}{suffix}_{x}" for j in tree.joints if j.kind in ("shaft", "guide") for x in "xyz"]
+
+
+def vector(poses, name):
+    if f"{name}_x" not in poses:
+        return np.zeros((len(poses), 3))
+    return poses[[f"{name}_{x}" for x in "xyz"]].to_numpy()
+
+
+def needed(case, poses, d, load=0.0):
+    """What each body needs of its joints: force, moment about the origin; and the power that all need together."""
+    name = case.split()[0]
+    bodies, joints, carrier, axes = READERS[name](d, poses)
+    _, given = masses(name)
+    tip = np.array(TIPS[name](d) if name in TIPS else [d[f"tip_{x}"] for x in "xyz"])
+    found, power = {}, 0.0
+    for body, (origin, triad) in bodies.items():
+        origin = np.broadcast_to(origin, (N, 3))
+        parts = [(body_momentum(origin, triad, *given[body], OMEGA), given[body][0], 0.0)]
+        if body == carrier:
+            parts.append((body_momentum(origin, triad, 0.8, tip, np.zeros((3, 3)), OMEGA), 0.8, FORCE))
+        force, moment = np.zeros((N, 3)), np.zeros((N, 3))
+        for (linear, angular, energy, place), mass, applied in parts:
+            outside = mass * GRAVITY + applied
+            force += OMEGA * derivative(linear) - outside
+            moment += OMEGA * derivative(angular) - np.cross(place, outside)
+            power = power + OMEGA * derivative(energy) - OMEGA * derivative(place) @ outside
+        if body == carrier and load:
+            moment = moment - load * Z
+            power = power - load * OMEGA * poses["dpsi"].to_numpy()
+        found[body] = (force, moment)
+    return found, joints, axes, power
+
+
+def of_joints(poses, body, joints, suffix=""):
+    """Force and moment about the origin that all joints of a body put on it."""
+    force, moment = np.zeros((N, 3)), np.zeros((N, 3))
+    for joint, (place, on, by) in joints.items():
+        sign = 1.0 if body == on else -1.0 if body == by else 0.0
+        force += sign * vector(poses, f"force_{joint}{suffix}")
+        moment += sign * vector(poses, f"moment_{joint}{suffix}")
+        moment += sign * np.cross(np.broadcast_to(place, (N, 3)), vector(poses, f"force_{joint}{suffix}"))
+    return force, moment
+
+
+def turn(case, extra=None, wanted=(), drop=()):
+    name, d = design(case)
+    table = {k: v for k, v in d.items() if k not in drop} | masses(name)[0] | TOOL | WEIGHT | {"speed": OMEGA}
+    poses = sweep.evaluate(name, table | (extra or {}), [*POSES[name], *wanted], phi=PHI)
+    assert (poses["status"] == st.OK).all()
+    return name, d, poses
+
+
+@pytest.mark.parametrize("case", DESIGNS)
+def test_joints_of_every_body_balance_its_momentum(case):
+    load = -4000.0 if family(case.split()[0]).find(LinkTree).output >= 0 and "looper" not in case else 0.0
+    wanted = [*vectors(case.split()[0]), "drive_torque", *(["dpsi"] if load else [])]
+    _, d, poses = turn(case, {"load_torque": load} if load else {}, wanted)
+    found, joints, axes, power = needed(case, poses, d, load)
+    scale = max(np.abs(force).max() for force, _ in found.values())
+    for body, (force, moment) in found.items():
+        on_force, on_moment = of_joints(poses, body, joints)
+        assert np.abs(on_force - force).max() < NEAR * scale, body
+        # about the axis of a slender rod nothing is said, nor anything put on it
+        assert np.abs(on_moment - moment).max() < NEAR * 5.0 * scale, body
+    for joint, axis in axes.items():  # a joint bears nothing about the axis that it turns about
+        about = (vector(poses, f"moment_{joint}") * axis).sum(axis=1)
+        assert np.abs(about).max() < NEAR * 5.0 * scale, joint
+    assert np.abs(OMEGA * poses["drive_torque"] - power).max() < NEAR * np.abs(power).max()
+
+
+@pytest.mark.parametrize("case", DESIGNS)
+def test_reduced_inertia_is_the_kinetic_energy_and_the_tool_does_its_work(case):
+    wanted = ["reduced_inertia", "dreduced_inertia", "tool_torque", "tool_load_x", "tool_load_y", "tool_load_z"]
+    name, d, poses = turn(case, None, wanted)
+    bodies, _, carrier, _ = READERS[name](d, poses)
+    given = masses(name)[1]
+    tip = np.array(TIPS[name](d) if name in TIPS else [d[f"tip_{x}"] for x in "xyz"])
+    energy = 0.0
+    for body, (origin, triad) in bodies.items():
+        origin = np.broadcast_to(origin, (N, 3))
+        energy = energy + body_momentum(origin, triad, *given[body], OMEGA)[2]
+        if body == carrier:
+            linear, _, more, place = body_momentum(origin, triad, 0.8, tip, np.zeros((3, 3)), OMEGA)
+            energy = energy + more
+            on_tool = OMEGA * derivative(linear) - 0.8 * GRAVITY - FORCE
+            if name in TIPS:
+                np.testing.assert_allclose(place, poses[["x_p", "y_p", "z_p"]], atol=1e-13)
+    inertia = poses["reduced_inertia"].to_numpy()
+    np.testing.assert_allclose(0.5 * OMEGA**2 * inertia, energy, rtol=1e-10)
+    slope = derivative(inertia)
+    assert np.abs(poses["dreduced_inertia"] - slope).max() < NEAR * np.abs(slope).max()
+    assert np.abs(vector(poses, "tool_load") - on_tool).max() < NEAR * np.abs(on_tool).max()
+    work = (on_tool * derivative(place)).sum(axis=1)
+    assert np.abs(poses["tool_torque"] - work).max() < NEAR * np.abs(work).max()
+
+
+def rubbing(name, mu=0.1):
+    table = {}
+    for joint in family(name).find(LinkTree).joints:
+        table |= {f"mu_{joint.name}": mu, f"radius_{joint.name}": 0.1}
+        if joint.kind in ("shaft", "guide"):
+            table |= {f"support_{joint.name}1": -0.4, f"support_{joint.name}2": 0.5}
+        if joint.kind == "shaft":
+            table[f"thrust_radius_{joint.name}"] = 0.15
+    return table
+
+
+@pytest.mark.parametrize("case", DESIGNS)
+def test_what_the_drive_gives_more_with_friction_is_what_the_joints_lose(case):
+    name = case.split()[0]
+    lost = [f"lost_torque_{j.name}" for j in family(name).find(LinkTree).joints]
+    mu = 0.02 if "bar" in case else 0.1
+    wanted = ["drive_torque", "drive_torque_friction", *lost, *vectors(name, "_friction")]
+    name, d, poses = turn(case, rubbing(name, mu), wanted)
+    extra = poses["drive_torque_friction"] - poses["drive_torque"]
+    whole = poses[lost].sum(axis=1)
+    np.testing.assert_allclose(extra, whole, atol=1e-12 * np.abs(poses["drive_torque"]).max())
+    assert (poses[lost] >= -1e-12 * np.abs(whole).max()).all().all()
+    assert (poses[lost].max() > 0.0).sum() >= len(lost) - 2  # key and hold of a sliding rocker rub nowhere
+    # every body but a rod about its own axis is in balance with what rubs
+    found, joints, _, _ = needed(case, poses, d)
+    scale = max(np.abs(force).max() for force, _ in found.values())
+    for body, (force, _) in found.items():
+        assert np.abs(of_joints(poses, body, joints, "_friction")[0] - force).max() < NEAR * scale, body
+
+
+@pytest.mark.parametrize("case", DESIGNS)
+def test_without_coefficients_friction_changes_nothing_and_steep_ones_jam(case):
+    name = case.split()[0]
+    wanted = ["drive_torque", "drive_torque_friction", "friction_passes"]
+    _, _, poses = turn(case, rubbing(name, 0.0), wanted)
+    size = np.abs(poses["drive_torque"]).max()
+    np.testing.assert_allclose(poses["drive_torque_friction"], poses["drive_torque"], atol=1e-13 * size)
+    assert (poses["friction_passes"] == 1.0).all()
+    table = design(case)[1] | masses(name)[0] | TOOL | {"speed": OMEGA} | rubbing(name, 9.0)
+    steep = sweep.evaluate(name, table, wanted, phi=PHI[::8])
+    assert st.JAMMED in set(steep["status"])
+    assert steep["drive_torque_friction"].isna().equals(steep["status"] != st.OK)
+
+
+def test_a_tenth_of_a_percent_of_the_tool_is_seen():
+    _, d, poses = turn("spherical_looper", {"m_tool": 0.8008}, vectors("spherical_looper"))
+    found, joints, _, _ = needed("spherical_looper", poses, d)
+    scale = max(np.abs(force).max() for force, _ in found.values())
+    assert np.abs(of_joints(poses, "looper", joints)[0] - found["looper"][0]).max() > 1e-5 * scale
+
+
+def test_what_the_frame_bears_is_what_it_gives_its_links():
+    _, d, poses = turn("cylindrical_looper held", rubbing("cylindrical_looper"), [
+        *vectors("cylindrical_looper"), *(f"shaking_force_{x}" for x in "xyz"), *(f"shaking_moment_{x}" for x in "xyz"),
+    ])  # fmt: skip
+    _, joints, _, _ = needed("cylindrical_looper held", poses, d)
+    force, moment = np.zeros((N, 3)), np.zeros((N, 3))
+    for joint, (place, _, by) in joints.items():
+        if by is None:
+            on = vector(poses, f"force_{joint}")
+            force -= on
+            moment -= vector(poses, f"moment_{joint}") + np.cross(np.broadcast_to(place, (N, 3)), on)
+    scale = np.abs(force).max()
+    np.testing.assert_allclose(vector(poses, "shaking_force"), force, atol=1e-12 * scale)
+    np.testing.assert_allclose(vector(poses, "shaking_moment"), moment, atol=1e-11 * scale)
+
+
+@pytest.mark.parametrize(("first", "second"), [("rssr", "swivel"), ("five_link", "swivel"), ("five_link", "guide")])
+def test_the_drive_of_a_chain_does_the_work_of_the_tool_behind_it(first, second):
+    table = {f"{name}1": x for name, x in family(first).example.items()}
+    table |= {f"{name}2": x for name, x in family(second).example.items()} | {"speed1": OMEGA}
+    bodies = {p.name: 0.0 for p in sweep.effects.extended(family([first, second]), ["drive_torque1"]).parameters
+              if p.name.startswith("m_") and not p.name.startswith("m_tool")}  # fmt: skip
+    free = second == "swivel"
+    table |= bodies | {"m_tool2": 0.7} | ({"tool_force_x2": -40.0} if free else {"tool_force2": -40.0})
+    point = ["x_p", "y_p", "z_p"] if free else ["s"]
+    names = ["drive_torque1", "reduced_inertia1", "tool_torque2", "dpsi1", *point]
+    poses = sweep.evaluate([first, second], table, names, phi=PHI)
+    assert (poses["status"] == st.OK).all()
+    speed = np.stack([derivative(poses[name].to_numpy()) for name in point], axis=1)
+    inertia = 0.7 * (speed * speed).sum(axis=1)
+    work = 0.5 * OMEGA**2 * derivative(inertia) + 40.0 * speed[:, 0]
+    np.testing.assert_allclose(poses["reduced_inertia1"], inertia, atol=1e-10 * inertia.max())
+    np.testing.assert_allclose(poses["drive_torque1"], work, atol=NEAR * np.abs(work).max())
+    np.testing.assert_allclose(poses["tool_torque2"] * poses["dpsi1"], work, atol=NEAR * np.abs(work).max())
+
+
+def test_a_force_over_the_turn_adds_to_the_constant_one():
+    name, d = design("swivel")
+    table = d | {"speed": OMEGA, "tool_force_x": 5.0}
+    curve = {"tool_force_x": {"mean": 2.0, "cos": [3.0], "sin": [-1.0]}}
+    poses = sweep.evaluate(name, table, ["drive_torque", "dx_p"], phi=PHI, loads=curve)
+    force = 7.0 + 3.0 * np.cos(PHI) - np.sin(PHI)
+    np.testing.assert_allclose(poses["drive_torque"], -force * poses["dx_p"], atol=1e-12)
