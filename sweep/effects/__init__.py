@@ -94,7 +94,11 @@ def applicable(family: Family) -> tuple[Placed, ...]:
         for entry in map(effect, NAMES)
         if entry.serves(stage) and not (k > 0 and entry.even_crank)
     ]
-    return tuple(p for p in found if not p.entry.takes_load or len(_carriers(family, p)) == len(stages) - 1 - p.stage)
+    return tuple(
+        p
+        for p in found
+        if not p.entry.takes_load or p.entry.may_drive_nothing or len(_carriers(family, p)) == len(stages) - 1 - p.stage
+    )
 
 
 def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
@@ -112,6 +116,12 @@ def _carriers(family: Family, placed: Placed) -> list[Placed]:
         for entry in map(effect, NAMES)
         if key and k > placed.stage and entry.key == key and entry.serves(stage)
     ]
+
+
+def _handing(family: Family, placed: Placed) -> list[Placed]:
+    """Return the effects of all later stages that hand back the load of this one; none if a stage cannot."""
+    found = _carriers(family, placed)
+    return found if len(found) == len(stages_of(family)) - 1 - placed.stage else []
 
 
 def input_names(family: Family) -> frozenset[str]:
@@ -247,11 +257,12 @@ def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:
     users: dict[str, list[str]] = {}
     first = stages_of(family)[0][1]
     for placed in effects:
-        for source in (placed, *_carriers(family, placed)):
+        for source in (placed, *_handing(family, placed)):
             for p in source.entry.inputs_of(stages_of(family)[source.stage][0]):
                 name = f"{p.name}{first if p.name in _FIRST_ONLY else source.number}"
-                kept = merged.get(name, p)
-                merged[name] = kept if p.default is not None else replace(kept, default=None)
+                optional = placed.entry.may_drive_nothing and source is not placed and p.default is None
+                if name not in merged or (p.default is None and not optional):
+                    merged[name] = replace(p, default=0.0) if optional and name not in merged else p
                 users.setdefault(name, []).append(placed.name)
     return tuple(
         replace(p, name=name, text=f"{p.text}; for {', '.join(dict.fromkeys(users[name]))}")

@@ -256,13 +256,15 @@ class Effect:
     ``whole_turn`` effects couple different crank angles: they sample the turn themselves, whatever is asked for.
     ``even_crank`` effects presume a crank that turns evenly, so they are no effects of a chain's later stages.
     ``takes_load`` is the key of the effect that hands back the load of a chain's later stages; without it their load
-    does not enter.  ``requires`` is the capability that a family must have, ``followers`` are the kinds of
-    follower that the effect is made for, ``tool_inputs`` are further inputs where a tool can hang on the coupler and
-    moves along a line, where it moves freely, and where it hangs on the tip of a rocker.  ``least`` are pose outputs of
-    which the least value over the turn counts, as a life, not the largest (:func:`sweep.effects.wanted.expanded`).
-    ``tree`` is the tree of links of the one family that it is for, if it is for one; ``carried_at`` the place of a tool
-    that a family must have, if it must have one.  ``advise(scene)`` applies the effect's rule of negligibility to some
-    designs over a turn; None where none turns.
+    does not enter. ``may_drive_nothing`` says that those stages are massless unless their bodies are given, so that
+    none of their inputs is required, and stages without known loads may follow. ``requires`` is the capability that
+    a family must have, ``followers`` are the kinds of follower that the effect is made for, ``tool_inputs`` are
+    further inputs where a tool can hang on the coupler and moves along a line, where it moves freely, and where it
+    hangs on the tip of a rocker. ``least`` are pose outputs of which the least value over the turn counts, as a
+    life, not the largest (:func:`sweep.effects.wanted.expanded`). ``tree`` is the tree of links of the one family
+    that it is for, if it is for one; ``carried_at`` the place of a tool that a family must have, if it must have
+    one. ``advise(scene)`` applies the effect's rule of negligibility to some designs over a turn; None where none
+    turns.
     """
 
     key: str
@@ -279,6 +281,7 @@ class Effect:
     whole_turn: bool = False
     even_crank: bool = False
     takes_load: str = ""
+    may_drive_nothing: bool = False
     design_result: DesignResult | None = None
     advise: AdviceFunction | None = None
     requires: type = JointRecords

@@ -9,7 +9,7 @@ from kernels.effects.elastic_drive import driven_steady_state
 from kernels.effects.elasticity import quasi_static, steady_state
 from sweep.effects import loads
 from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status, take_over
-from sweep.effects.driven import DrivenSide, driven_side
+from sweep.effects.driven import DrivenSide, driven_side, drives_something
 from sweep.effects.handed import INERTIAS, LOADS, behind
 from sweep.effects.loads import SPEED
 from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
@@ -130,6 +130,21 @@ def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
+    """Solve the designs that drive something apart from those that do not, so that no design depends on the others."""
+    loaded = drives_something(grid)
+    if loaded.all() or not loaded.any():
+        return _solved(grid, phi, last)
+    found: dict[str, Array] = {}
+    status = np.empty(len(grid.designs), np.uint8)
+    for rows in (np.flatnonzero(loaded), np.flatnonzero(~loaded)):
+        part, codes = _solved(grid.only(rows), np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi), last)
+        for name, values in part.items():
+            found.setdefault(name, np.empty((len(grid.designs), *values.shape[1:])))[rows] = values
+        status[rows] = codes
+    return found, status
+
+
+def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
     n = len(grid.designs)
     status, floquet = np.empty(n, np.uint8), np.empty(n)
     lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
@@ -218,6 +233,7 @@ def _static(kind: loads.Follower) -> Effect:
         inputs=INPUTS[kind.name],
         tool_inputs=_AT_TIP,
         takes_load=LOADS,
+        may_drive_nothing=True,
         outputs=_static_outputs(kind),
         least=("frequency_ratio",),
         compute=compute_static,
@@ -241,6 +257,7 @@ def _dynamic(kind: loads.Follower) -> Effect:
         inputs=INPUTS[kind.name],
         tool_inputs=_AT_TIP,
         takes_load=LOADS,
+        may_drive_nothing=True,
         outputs=outputs,
         compute=compute_dynamic,
         called_for="max|lag''/nu^2|/max|lag| above a third of the tolerance",

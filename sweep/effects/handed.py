@@ -7,7 +7,7 @@ from importlib import import_module
 import numpy as np
 
 from sweep.effects.base import Scene
-from sweep.families.base import Array, Columns
+from sweep.families.base import Array, Columns, Family, Parameter
 from sweep.families.capabilities import LinkTree
 
 LOADS, FRICTION = "D1, D3", "D2"  # keys of the effects that hand something back
@@ -22,6 +22,13 @@ def computed(scene: Scene, key: str, wanted: frozenset[str]) -> Columns:
     route = by_records if scene.family.find(LinkTree) is None else by_links
     found: Columns = import_module(f"sweep.effects.{route}").compute(scene, wanted)
     return found
+
+
+def inputs_of_loads(family: Family) -> tuple[Parameter, ...]:
+    """Return the inputs of the effect that hands back a family's load; none where there is no such effect."""
+    register = import_module("sweep.effects")  # it imports the users of this module when they are asked for
+    entries = [register.effect(name) for name in register.NAMES]
+    return tuple(p for e in entries if e.key == LOADS and e.serves(family) for p in e.inputs_of(family))
 
 
 def behind(scene: Scene, key: str, wanted: frozenset[str]) -> Columns | None:
