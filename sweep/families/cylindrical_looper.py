@@ -87,7 +87,7 @@ _BLOCKS = (
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     # what is no number counts even where the place of the ball does not
     beside = (designs[:, _D2] != 0.0) | ~np.isfinite(designs[:, _D2:]).all(axis=1)
     if not beside.any():
@@ -98,7 +98,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.ndarray) -> Columns:
-    """Poses of designs some of which have the second ball beside the axis."""
+    """Return poses of designs some of which have the second ball beside the axis."""
     found: Columns = {}
     for rows in (beside, ~beside):
         own = angles if len(angles.cos) == 1 else Angles(*(np.ascontiguousarray(x[rows]) for x in angles))
@@ -110,24 +110,24 @@ def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.
 
 
 def first_coupler_square(designs: Array) -> Array:
-    """b1^2 of every design."""
+    """Return b1^2 of every design."""
     square: Array = designs[:, 1] * designs[:, 1]
     return square
 
 
 def second_coupler_square(designs: Array) -> Array:
-    """b2^2 of every design."""
+    """Return b2^2 of every design."""
     square: Array = designs[:, 9] * designs[:, 9]
     return square
 
 
 def rocker_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """The point of the shaft at the height of the rocker's ball, (n, m, 3)."""
+    """Return the point of the shaft at the height of the rocker's ball, (n, m, 3)."""
     return _on_shaft(designs, np.asarray(motion["z_c1"], np.float64))
 
 
 def looper_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """The point of the shaft at the height of the working point, (n, m, 3)."""
+    """Return the point of the shaft at the height of the working point, (n, m, 3)."""
     return _on_shaft(designs, np.asarray(motion["z_p"], np.float64))
 
 

@@ -61,7 +61,7 @@ _PLACES = tuple(o.name for o in PLACE_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_with_places(five_link.poses, designs, angles, _VALUES, _PLACES, wanted)
 
 

@@ -69,7 +69,7 @@ _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_with_places(_with_slide, designs, angles, _VALUES, _JOINTS, wanted)
 
 
@@ -80,12 +80,12 @@ def _with_slide(*given: Any) -> None:
 
 
 def unit(designs: Array) -> Array:
-    """1 for every design: the discriminant is the squared cosine of the pressure angle itself."""
+    """Return 1 for every design: the discriminant is the squared cosine of the pressure angle itself."""
     return np.ones(len(designs))
 
 
 def pivot(designs: Array) -> Array:
-    """The point (e, 0, g) of the driven axis, (n, 3)."""
+    """Return the point (e, 0, g) of the driven axis, (n, 3)."""
     return np.stack([designs[:, 1], np.zeros(len(designs)), designs[:, 3]], axis=1)
 
 

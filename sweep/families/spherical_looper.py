@@ -89,24 +89,24 @@ _BLOCKS = (
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_blocks(spherical_looper.poses, designs, angles, _BLOCKS, wanted)
 
 
 def first_coupler_square(designs: Array) -> Array:
-    """b1^2 of every design."""
+    """Return b1^2 of every design."""
     square: Array = designs[:, 1] * designs[:, 1]
     return square
 
 
 def second_coupler_square(designs: Array) -> Array:
-    """b2^2 of every design."""
+    """Return b2^2 of every design."""
     square: Array = designs[:, 18] * designs[:, 18]
     return square
 
 
 def second_shaft(designs: Array) -> Array:
-    """Direction of the shaft of crank 2, (n, 3)."""
+    """Return the direction of the shaft of crank 2, (n, 3)."""
     theta, beta = parameter(PARAMETERS, "theta2", designs), parameter(PARAMETERS, "beta2", designs)
     return np.stack([np.sin(theta) * np.cos(beta), np.sin(theta) * np.sin(beta), np.cos(theta)], axis=1)
 

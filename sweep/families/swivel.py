@@ -38,7 +38,7 @@ _BLOCKS = (ROD_OUTPUTS, *POINT_OUTPUTS, JOINT_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_blocks(swivel.poses, designs, angles, _BLOCKS, wanted)
 
 
