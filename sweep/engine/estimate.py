@@ -93,11 +93,18 @@ def estimate(study: Study, jobs: int, tell: Callable[[int, int], None] = lambda 
     )
 
 
-def other_accuracies(study: Study, jobs: int) -> tuple[tuple[str, float], ...]:
-    """Return what the same sweep would take at the accuracies of :func:`neighbours`:
-    in words, and the estimated seconds.
+def other_accuracies(
+    study: Study, jobs: int, tell: Callable[[int, int], None] = lambda _, __: None
+) -> tuple[tuple[str, float], ...]:
+    """Return what the same sweep would take at other accuracies: in words, and the estimated seconds.
+
+    ``tell`` is called with how many of them are done, and how many there are.
     """
-    return tuple((words, estimate(other, jobs).seconds) for words, other in neighbours(study))
+    found, others = [], neighbours(study)
+    for k, (words, other) in enumerate(others):
+        tell(k, len(others))
+        found.append((words, estimate(other, jobs).seconds))
+    return tuple(found)
 
 
 def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
