@@ -12,7 +12,7 @@ import pytest
 import sweep
 from kernels import status as st
 from sweep.families import family
-from sweep.families.capabilities import LinkTree
+from sweep.families.link_tree import LinkTree
 from tests.reference.linked import POSES, READERS, Z
 from tests.reference.momentum import body_momentum, derivative
 

@@ -59,12 +59,12 @@ def capability_words(family: Family) -> list[str]:
         GuidedPoint,
         JointRecords,
         LimitLocus,
-        LinkTree,
         OutputLink,
         Points,
         PressureEllipse,
         ProvableLocus,
     )
+    from sweep.families.link_tree import LinkTree
 
     words = [
         (Assembly, "rotatability"),

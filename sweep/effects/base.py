@@ -18,8 +18,9 @@ from sweep.effects.places import tool_place
 from sweep.families import NAMES as FAMILY_NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import JointRecords, LinkTree
+from sweep.families.capabilities import JointRecords
 from sweep.families.chain import drive, driving_names
+from sweep.families.link_tree import LinkTree
 from sweep.numerics.curves import Curve
 
 # Loads that a curve over the turn of the crank can add to.

@@ -15,7 +15,8 @@ from sweep.effects import NAMES, effect, with_effects
 from sweep.effects.placing import Placed, first_scene
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Family, Parameter
-from sweep.families.capabilities import JointRecords, LinkTree
+from sweep.families.capabilities import JointRecords
+from sweep.families.link_tree import LinkTree
 
 POSES = 360
 MOTION = "motion"

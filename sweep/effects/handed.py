@@ -8,7 +8,7 @@ import numpy as np
 
 from sweep.effects.base import Scene
 from sweep.families.base import Array, Columns
-from sweep.families.capabilities import LinkTree
+from sweep.families.link_tree import LinkTree
 
 LOADS, FRICTION = "D1, D3", "D2"  # keys of the effects that hand something back
 INERTIAS = ("reduced_inertia", "dreduced_inertia")

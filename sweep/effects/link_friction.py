@@ -14,7 +14,7 @@ from sweep.effects.bearings import together
 from sweep.effects.handed import FRICTION, behind
 from sweep.families import family
 from sweep.families.base import Array, Columns, Output, Parameter
-from sweep.families.capabilities import LinkJoint, LinkTree
+from sweep.families.link_tree import LinkJoint, LinkTree
 
 EQUATION = "docs/links.md (7)-(9)"
 FORMULAS = (
@@ -26,13 +26,13 @@ FORMULAS = (
 )
 SUFFIX, TEXT = "_friction", ", friction included"
 PASSES = "friction_passes"
-SUPPORTED = ("shaft", "guide")
+SUPPORTED = ("shaft", "sleeve")
 
 
 def _of_joint(joint: LinkJoint) -> tuple[Parameter, ...]:
     """Return inputs of a joint in the order of the kernel's columns: those that it has."""
     j, text = joint.name, joint.text
-    bare = 0.0 if joint.kind in ("contact", "guide") else None
+    bare = 0.0 if joint.kind in ("contact", "sleeve") else None
     found = [
         Parameter(f"mu_{j}", "ratio", f"coefficient of friction: {text}", not_negative=True),
         Parameter(f"radius_{j}", "length", f"friction radius: {text}", default=bare, not_negative=True),

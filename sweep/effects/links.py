@@ -12,7 +12,7 @@ from sweep.effects.base import Advice, Effect, Index, Scene, take_over
 from sweep.effects.handed import INERTIAS, LOADS, behind, carried, on_output
 from sweep.families import family
 from sweep.families.base import Array, Columns, Output, Parameter
-from sweep.families.capabilities import LinkJoint, LinkTree
+from sweep.families.link_tree import LinkJoint, LinkTree
 
 EQUATION = "docs/links.md (1)-(6)"
 FORMULAS = (
@@ -24,7 +24,7 @@ FORMULAS = (
 KINDS = {
     "shaft": kernel.SHAFT,
     "hinge": kernel.HINGED_BALL,
-    "guide": kernel.GUIDE,
+    "sleeve": kernel.GUIDE,
     "ball": kernel.BALL,
     "contact": kernel.CONTACT,
 }
@@ -72,7 +72,7 @@ def vectors(joints: tuple[LinkJoint, ...], suffix: str = "", text: str = "") -> 
     found = {}
     for joint in joints:
         found[f"force_{joint.name}{suffix}"] = ("force", f"{joint.text}: force of the {joint.acts}{text}")
-        if joint.kind in ("shaft", "guide"):
+        if joint.kind in ("shaft", "sleeve"):
             found[f"moment_{joint.name}{suffix}"] = (
                 "torque", f"{joint.text}: moment of the {joint.acts}{text}",
             )  # fmt: skip

@@ -6,9 +6,10 @@ import re
 
 from kernels.links import DRIVEN
 from sweep.families.base import Family
-from sweep.families.capabilities import Assembly, Dimensions, JointRecords, LinkTree, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, JointRecords, OutputLink, Points, Skeleton
 from sweep.families.check_outputs import output_faults
 from sweep.families.domain import Turn
+from sweep.families.link_tree import LinkTree
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _LETTERS = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

@@ -10,17 +10,8 @@ from kernels.families import cylindrical_looper
 from kernels.families.cylindrical_looper.links import links as fill_links
 from kernels.links import DRIVEN, FRAME, SLIDE, TURN
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import (
-    Assembly,
-    Dimensions,
-    Link,
-    LinkBody,
-    LinkJoint,
-    LinkTree,
-    Made,
-    Points,
-    Skeleton,
-)
+from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Points, Skeleton
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.linked import filled_by, point_of
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.skeletons import crank_axis, links, parameter, standing
@@ -151,10 +142,10 @@ LINKS = LinkTree(
         LinkJoint("a1", "bearing of crank 1", "shaft", "frame on crank 1", body=0, freedom=0),
         LinkJoint("b1", "ball of crank 1", "hinge", "crank 1 on coupler 1", body=4),
         LinkJoint("c1", "rocker's ball", "ball", "coupler 1 on the rocker", lines=(0, 3)),
-        LinkJoint("key", "key of the rocker on the shaft", "guide", "shaft on the rocker", body=3, freedom=4),
+        LinkJoint("key", "key of the rocker on the shaft", "sleeve", "shaft on the rocker", body=3, freedom=4),
         LinkJoint("hold", "hold of the rocker along the shaft", "contact", "frame, or shaft, on the rocker",
                   lines=(6, 1)),
-        LinkJoint("d", "guide of the shaft", "guide", "frame on the shaft", body=2, freedom=2),
+        LinkJoint("d", "guide of the shaft", "sleeve", "frame on the shaft", body=2, freedom=2),
         LinkJoint("a2", "bearing of crank 2", "shaft", "frame on crank 2", body=1, freedom=1),
         LinkJoint("b2", "ball of crank 2", "hinge", "crank 2 on coupler 2", body=5),
         LinkJoint("c2", "ball of the sliding drive", "ball", "coupler 2 on the shaft", lines=(3, 3)),

@@ -8,7 +8,8 @@ import numpy as np
 
 from kernels.links import Links
 from sweep.families.base import Angles, Array, Columns, Parameter
-from sweep.families.capabilities import DesignMap, LinkFill
+from sweep.families.capabilities import DesignMap
+from sweep.families.link_tree import LinkFill
 from sweep.families.skeletons import parameter
 
 

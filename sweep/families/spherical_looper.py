@@ -10,18 +10,8 @@ from kernels.families import spherical_looper
 from kernels.families.spherical_looper.links import links as fill_links
 from kernels.links import DRIVEN, FRAME, TURN
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import (
-    Arm,
-    Assembly,
-    Dimensions,
-    Fixed,
-    Link,
-    LinkBody,
-    LinkJoint,
-    LinkTree,
-    Points,
-    Skeleton,
-)
+from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Points, Skeleton
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.linked import filled_by, point_of
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.skeletons import crank_axis, links, parameter, standing
