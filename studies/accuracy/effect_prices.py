@@ -32,7 +32,7 @@ ROUNDING = 1e-14  # what two ways to one number may differ by beyond what they s
 
 
 def effect_prices(smoke: bool) -> pd.DataFrame:
-    """One row per effect of the register and accuracy, each on the first family that it serves."""
+    """Return one row per effect of the register and accuracy, each on the first family that it serves."""
     import pandas as pd
 
     rows: list[dict[str, object]] = []
@@ -44,12 +44,14 @@ def effect_prices(smoke: bool) -> pd.DataFrame:
 
 
 def count(name: str, smoke: bool) -> int:
-    """On how many designs an effect is measured."""
+    """Return on how many designs an effect is measured."""
     return FEW if smoke or effect(name).ns_per_design > DEAR else MANY
 
 
 def outputs_of(name: str, bare: Family) -> tuple[str, ...]:
-    """What the name of the effect stands for in ``want``; where an output bears it, the effect's numbers of a turn."""
+    """Return what the name of the effect stands for in ``want``;
+    where an output bears it, the effect's numbers of a turn.
+    """
     found = tuple(expanded(bare, [name]))
     whole = effect(name).design_result
     if found != (name,) or whole is None:
@@ -58,7 +60,7 @@ def outputs_of(name: str, bare: Family) -> tuple[str, ...]:
 
 
 def prices_of(name: str, given: Effected, smoke: bool = False) -> list[dict[str, object]]:
-    """Rows of one effect."""
+    """Return rows of one effect."""
     wanted = outputs_of(name, given.bare)
     known, words = known_of(name, given, wanted)
     head: dict[str, object] = {

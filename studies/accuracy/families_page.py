@@ -20,7 +20,7 @@ HEAD = ("family", "number", "designs", *(f"grid {n}" for n in SAMPLES), *(f"`{po
 
 
 def families_page(m: Measured) -> list[str]:
-    """The page, line by line."""
+    """Return the page, line by line."""
     lines = [
         "# What accuracy costs: every family",
         "",
@@ -85,7 +85,7 @@ def _cell(row: pd.Series) -> str:
 
 
 def _spread(table: pd.DataFrame) -> list[str]:
-    """How far the timings of one call differ, over all rows of the table."""
+    """Return how far the timings of one call differ, over all rows of the table."""
     width = (table["ns_per_design_upper"] - table["ns_per_design_lower"]) / table["ns_per_design"]
     return [
         *prose(

@@ -51,7 +51,7 @@ class Measured:
     loads: pd.DataFrame | None = None
 
     def tables(self) -> Iterator[tuple[str, pd.DataFrame]]:
-        """The tables that this study measures, by name."""
+        """Yield the tables that this study measures, by name."""
         return ((name, getattr(self, name)) for name in _own_tables())
 
     def write(self, folder: Path) -> None:
@@ -64,7 +64,7 @@ class Measured:
 
     @classmethod
     def read(cls, folder: Path) -> Measured:
-        """What :meth:`write` kept, with the tables of other programs where they lie beside it."""
+        """Return what :meth:`write` kept, with the tables of other programs where they lie beside it."""
         import pandas as pd
 
         about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
@@ -74,7 +74,7 @@ class Measured:
 
 
 def others(folder: Path) -> dict[str, pd.DataFrame]:
-    """Tables of other programs that lie in the folder, by name."""
+    """Return tables of other programs that lie in the folder, by name."""
     import pandas as pd
 
     files = {name: folder / f"{name}.parquet" for name in PEERS}

@@ -18,8 +18,9 @@ from sweep.effects.places import tool_place
 from sweep.families import NAMES as FAMILY_NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import JointRecords, LinkTree
+from sweep.families.capabilities import JointRecords
 from sweep.families.chain import drive, driving_names
+from sweep.families.link_tree import LinkTree
 from sweep.numerics.curves import Curve
 
 # Loads that a curve over the turn of the crank can add to.
@@ -45,7 +46,7 @@ class Driven(NamedTuple):
     curves: Mapping[str, Curve] = {}
 
     def only(self, rows: Rows) -> Driven:
-        """Some of the designs."""
+        """Return some of the designs."""
         given = {name: x[rows] for name, x in self.inputs.items()}
         return Driven(self.family, self.designs[rows], self.kappa[rows], self.offset[rows], given, self.curves)
 
@@ -121,7 +122,7 @@ class Scene:
         return Scene(following.family, following.designs, angles, following.inputs, tuple(rest), self, following.curves)
 
     def stage(self, index: int) -> Scene:
-        """The scene of the stage ``index`` places behind this one."""
+        """Return the scene of the stage ``index`` places behind this one."""
         scene = self
         for _ in range(index):
             assert scene.driven is not None
@@ -150,7 +151,7 @@ class Scene:
         return first, second
 
     def crank(self) -> tuple[Array, Array]:
-        """Speed and angular acceleration of this stage's crank, (n, m), or (n, 1) where it turns evenly."""
+        """Return the speed and angular acceleration of this stage's crank, (n, m), or (n, 1) where it turns evenly."""
         even = self.inputs["speed"][:, None], self.inputs["speed_change"][:, None]
         speed, change = self._first.uneven or even
         if self.rates is None:
@@ -167,11 +168,11 @@ class Scene:
         return status
 
     def table(self, names: tuple[str, ...]) -> Array:
-        """Inputs side by side, (n, len(names))."""
+        """Return inputs side by side, (n, len(names))."""
         return np.column_stack([self.inputs[name] for name in names])
 
     def load(self, name: str) -> Array:
-        """A load at the poses: (n, 1) where it is constant, (n, m) where a curve adds to it."""
+        """Return a load at the poses: (n, 1) where it is constant, (n, m) where a curve adds to it."""
         constant, curve = self.inputs[name][:, None], self.curves.get(name)
         return constant if curve is None else constant + curve(self._first.angles.phi)
 
@@ -186,7 +187,7 @@ class Scene:
         return self if self.before is None else self.before._first
 
     def only(self, rows: Rows) -> Scene:
-        """Some of the designs; the scene itself where these are all."""
+        """Return some of the designs; the scene itself where these are all."""
         if rows.size == len(self.designs):
             return self
         angles = Angles(*(x[rows] for x in self.angles)) if self.angles.cos.shape[0] > 1 else self.angles
@@ -194,17 +195,19 @@ class Scene:
         return Scene(self.family, self.designs[rows], angles, given, after, curves=self.curves)
 
     def posed(self, rows: Rows, phi: Array) -> Scene:
-        """Some of the designs, each as often as wanted, at crank angles (k, m) of their own."""
+        """Return some of the designs, each as often as wanted, at crank angles (k, m) of their own."""
         given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
         return Scene(self.family, self.designs[rows], Angles.of(phi), given, after, curves=self.curves)
 
     def precise(self) -> Scene:
-        """The same scene with the most accurate poses that its families have."""
+        """Return the same scene with the most accurate poses that its families have."""
         after = tuple(d._replace(family=d.family.precise()) for d in self.after)
         return Scene(self.family.precise(), self.designs, self.angles, self.inputs, after, curves=self.curves)
 
     def on_grid(self, size: int) -> Scene:
-        """The same designs at ``size`` equidistant crank angles of one turn: what a whole-turn effect samples."""
+        """Return the same designs at ``size`` equidistant crank angles of one turn:
+        what a whole-turn effect samples.
+        """
         angles = Angles.of(2.0 * np.pi * np.arange(size)[None] / size)
         return Scene(self.family, self.designs, angles, self.inputs, self.after, curves=self.curves)
 
@@ -292,12 +295,12 @@ class Effect:
     carried_at: int | None = None
 
     def inputs_of(self, family: Family) -> tuple[Parameter, ...]:
-        """The inputs, with those of a tool where the family has a place that one can hang on."""
+        """Return the inputs, with those of a tool where the family has a place that one can hang on."""
         place = tool_place(family)
         return self.inputs if place is None else (*self.inputs, *self.tool_inputs[place])
 
     def serves(self, family: Family) -> bool:
-        """Whether the family has what the effect requires, with a kind of follower that it is made for."""
+        """Return whether the family has what the effect requires, with a kind of follower that it is made for."""
         joints = family.find(JointRecords)
         follows = joints is None or joints.follower in self.followers
         own = self.tree is None or family.find(LinkTree) is self.tree
@@ -331,12 +334,14 @@ def refuse(status: Status, designs: NDArray[np.bool_]) -> None:
 
 
 def no_poses(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """What an effect computes per pose that has no outputs per pose: the motion's status."""
+    """Return what an effect computes per pose that has no outputs per pose: the motion's status."""
     return {"status": scene.status()}
 
 
 def largest(scene: Scene, compute: ComputeFunction, name: str, quantity: str, threshold: float) -> Advice | None:
-    """Advice from the largest magnitude of one output over the turn, of the designs where it is known all the way."""
+    """Return the advice from the largest magnitude of one output over the turn,
+    of the designs where it is known all the way.
+    """
     found = np.abs(np.asarray(compute(scene, frozenset({name}))[name], np.float64))
     turning = np.isfinite(found).all(axis=1)
     return Advice(quantity, found[turning].max(axis=1), threshold) if turning.any() else None

@@ -60,7 +60,7 @@ def _weighs(stage: Scene | Driven, given: dict[str, Array], inputs: Sequence[Par
 
 
 def driven_side(scene: Scene, slopes: bool) -> DrivenSide | None:
-    """What the follower drives besides itself; None where that is nothing.  Slopes are zero unless asked for."""
+    """Return what the follower drives besides itself; None where that is nothing. Slopes are zero unless asked for."""
     found = _stages(scene, slopes) if _behind_weighs(scene).any() else None
     tip = _tip(scene)
     if found is None or tip is None:
@@ -69,7 +69,7 @@ def driven_side(scene: Scene, slopes: bool) -> DrivenSide | None:
 
 
 def _stages(scene: Scene, slopes: bool) -> DrivenSide | None:
-    """The stages behind: phi of the next one is kappa psi + offset."""
+    """Return the stages behind: phi of the next one is kappa psi + offset."""
     handed_back = behind(scene, LOADS, _DRIVE | frozenset(INERTIAS))
     if handed_back is None:
         return None
@@ -88,7 +88,8 @@ def _stages(scene: Scene, slopes: bool) -> DrivenSide | None:
 
 
 def _moved(scene: Scene, angle: float) -> Array:
-    """Torque that the next stage needs of the rocker where that stands further by an angle, at the same rates.
+    """Return the torque that the next stage needs of the rocker where that stands further by an angle,
+    at the same rates.
 
     A force that jumps where a tool pierces has no slope: it is left out of the difference.
     """
@@ -105,7 +106,7 @@ def _moved(scene: Scene, angle: float) -> Array:
 
 
 def _tip(scene: Scene) -> DrivenSide | None:
-    """A tool at the tip of the rocker."""
+    """Return a tool at the tip of the rocker."""
     if tool_place(scene.family) != ON_TIP or "m_tool" not in scene.inputs:
         return None
     names = tuple(p.name for p in loads.FREE_TOOL[1:])

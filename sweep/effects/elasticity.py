@@ -94,7 +94,7 @@ def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
-    """What a curve and the driven side add to the constant load, (n, m); None where the load is constant."""
+    """Return what a curve and the driven side add to the constant load, (n, m); None where the load is constant."""
     load = loads.follower(scene).load.name
     if load not in scene.curves and driven is None:
         return None
@@ -103,7 +103,7 @@ def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
 
 
 def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted pointwise quantities; status NOT_LINEAR where the deflection is no longer small."""
+    """Return the wanted pointwise quantities; status NOT_LINEAR where the deflection is no longer small."""
     outputs = optional_outputs(_KERNEL_NAMES, wanted, scene.shape)
     lag, displacement, ratio = outputs
     status = scene.status()
@@ -125,7 +125,7 @@ def _status_behind(scene: Scene) -> Status:
 
 
 def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Steady state on its own grid, carried to the wanted angles."""
+    """Return the steady state on its own grid, carried to the wanted angles."""
     return at_poses(scene, *on_finer_grids(scene, scene.angles.phi, GRIDS + FINER, _solve), wanted)
 
 
@@ -159,7 +159,7 @@ def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Stat
 
 
 def _equation(scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenSide) -> tuple[Array, Array, Array]:
-    """Factors of eta' and of eta, and the right side, over that of eta''; (3) with (5), (n, N)."""
+    """Return factors of eta' and of eta, and the right side, over that of eta''; (3) with (5), (n, N)."""
     inertia, stiffness, damping, speed, _ = (data[:, k, None] for k in range(5))
     square = p * p
     orders = np.arange(p.shape[1] // 2 + 1)
@@ -174,7 +174,9 @@ def _equation(scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenS
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Floquet multiplier and the reductions of lag and elongation; finer grids for the designs that need them."""
+    """Return the Floquet multiplier and the reductions of lag and elongation;
+    finer grids for the designs that need them.
+    """
     columns = _turn(scene, wanted, GRIDS)
     late = np.flatnonzero(columns["status"] == st.NOT_CONVERGED)
     if late.size:
@@ -195,7 +197,7 @@ def _turn(scene: Scene, wanted: frozenset[str], grids: tuple[int, ...]) -> Colum
 
 
 def advise_static(scene: Scene) -> Advice | None:
-    """Largest quasi-static lag over the turn: an angle, or the share of the coupler's length."""
+    """Return the largest quasi-static lag over the turn: an angle, or the share of the coupler's length."""
     found = compute_static(scene, frozenset({"lag"}))
     lag = np.abs(np.asarray(found["lag"], np.float64))
     turning = np.isfinite(lag).all(axis=1)
@@ -207,7 +209,7 @@ def advise_static(scene: Scene) -> Advice | None:
 
 
 def advise_dynamic(scene: Scene) -> Advice | None:
-    """Sheet 5, criterion (ii): max|eta_qs''/nu^2|/max|eta_qs|, 0.7 to 2.8 times of which dynamics adds to the lag."""
+    """Return max|eta_qs''/nu^2|/max|eta_qs|; dynamics adds 0.7 to 2.8 times this share to the lag."""
     found = compute_static(scene.on_grid(GRIDS[-1]), frozenset({"lag", "frequency_ratio"}))
     lag, ratio = (np.asarray(found[name], np.float64) for name in ("lag", "frequency_ratio"))
     turning = np.isfinite(lag).all(axis=1)

@@ -195,7 +195,7 @@ def _placed(
     asked: Callable[[], bool],
     jobs: int,
 ) -> tuple[Front, bool]:
-    """The front with one more bound, in the middle of its largest gap, and whether it was cut short.
+    """Return the front with one more bound, in the middle of its largest gap, and whether it was cut short.
 
     It is searched from the results of both neighbours and from the starts of the next tighter bound that was given.
     Its tighter neighbour is searched from what it finds, and so are looser bounds as far as that is better there.
@@ -234,7 +234,9 @@ def _placed(
 
 
 def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Array, Array]:
-    """What the results reach of the second output, and their objective; the bound and nan where there is none."""
+    """Return what the results reach of the second output, and their objective;
+    the bound and nan where there is none.
+    """
     reached, values = np.array(front.bounds, np.float64), np.full(len(front.bounds), np.nan)
     good = [k for k, r in enumerate(front.results) if r is not None and r.status != st.LIMIT_EXCEEDED]
     if good:

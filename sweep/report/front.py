@@ -95,7 +95,7 @@ def front_note(data: Dataset) -> str:
 
 
 def _gap(data: Dataset) -> str:
-    """Where the front is least known, if that is worth a word."""
+    """Say where the front is least known, if that is worth a word."""
     objective, second = _quantities(data)
     points = _points(data)
     if objective is None or second is None or data.study.pareto is None:
