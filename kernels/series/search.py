@@ -2,7 +2,7 @@
 
 Per design: samples that resolve the curve (`kernels.series.look`); every local maximum of at least 60 % of the best is
 refined, vectorised over the maxima of a block of designs (`kernels.series.peaks`).  What is not trusted, or what
-rounding may have changed by more than a thousandth of the target, is left to precise poses.
+rounding may have changed by more than 2^-14 of the target, is left to precise poses.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ Array: TypeAlias = NDArray[np.float64]
 Status: TypeAlias = NDArray[np.uint8]
 
 SHARE = 0.6  # a peak below this share of the best sample is not refined
-PLAIN = 1.0 / 1024.0  # of the target: larger rounding errors are left to precise poses
+PLAIN = 2.0**-14  # of the target: larger rounding errors are left to precise poses
 RIVALS = 1e-3  # of the scale: peaks lower by no more may turn out the highest where rounding has moved them
 SETTLING = 8  # more steps for a maximum that is not trusted after the usual ones
 MORE = 4  # times as many samples for a design of which a maximum is not trusted even so

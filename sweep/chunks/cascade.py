@@ -119,7 +119,7 @@ class Cascade:
         self._levels = levels(self.study)
         self._waiting: list[list[Batch]] = [[] for _ in self._levels]
         self._left: list[Batch] = []
-        self._go_on = (codes.OK, *PARTIAL) if self.study.output.keep == "all" else (codes.OK,)
+        self._go_on = np.isin(np.arange(256), (codes.OK, *PARTIAL) if self.study.output.keep == "all" else (codes.OK,))
         self.reached = [0] * len(self._levels)
         self.counts = np.zeros(256, np.int64)
         self.missed = Counter()
@@ -184,7 +184,7 @@ class Cascade:
             if limit.output in found:
                 self._leave(limit, status, (status == codes.OK) & ~meets(limit, found[limit.output]))
         more = {name: np.asarray(values, np.float64) for name, values in found.items() if name != "status"}
-        return Batch(batch.index, batch.designs, batch.outputs | more, status), np.isin(status, self._go_on)
+        return Batch(batch.index, batch.designs, batch.outputs | more, status), self._go_on[status]
 
     def _found(self, route: Route, batch: Batch) -> Mapping[str, NDArray[Any]]:
         """Return outputs of a route with their error estimates, and ``status``."""

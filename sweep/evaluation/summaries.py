@@ -49,6 +49,7 @@ PARTIAL = (
     st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
     st.NO_EVENT,
 )  # fmt: skip
+GOES_ON = np.isin(np.arange(256), PARTIAL)
 
 
 def summarise(
@@ -180,7 +181,7 @@ def design_outputs(
     for route in ways:
         assert route.run is not None
         # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
-        alive = np.flatnonzero(np.isin(status, PARTIAL))
+        alive = np.flatnonzero(GOES_ON[status])
         with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
             found = route.run(designs[alive], accuracy, window)
         for name in route.outputs:

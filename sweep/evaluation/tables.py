@@ -143,7 +143,7 @@ def _parameter_column(family: Parametrised, p: Parameter, table: Table, keys: di
     if p.sign:
         _refuse(values <= 0.0 if p.positive else values < 0.0, values, p.name, f"a {p.sign} {p.unit}")
     if p.choices is not None:
-        _refuse(~np.isin(values, p.choices), values, p.name, p.choice)
+        _refuse(np.logical_and.reduce([values != x for x in p.choices]), values, p.name, p.choice)
     return values
 
 

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.series.form import Form
-
 if TYPE_CHECKING:
+    from kernels.series.form import Form
     from sweep.families.base import Angles, Columns
 
 Array: TypeAlias = NDArray[np.float64]

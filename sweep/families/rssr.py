@@ -188,9 +188,11 @@ def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
         columns["err_margin"] = error
         if angle is not None:
             # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
+            turning, far = status == st.OK, np.full(n, np.nan)
             with np.errstate(divide="ignore"):
-                linear = error / np.abs(np.sin(2.0 * angle))
-            columns["err_max_pressure_angle"] = np.minimum(linear, np.sqrt(error)) + 8.0 * ROUNDING
+                linear = error[turning] / np.abs(np.sin(2.0 * angle[turning]))
+            far[turning] = np.minimum(linear, np.sqrt(error[turning])) + 8.0 * ROUNDING
+            columns["err_max_pressure_angle"] = far
     return columns
 
 

@@ -90,12 +90,21 @@ class Sobol:
         """Return points start to stop - 1, one row per dimension."""
         index = np.arange(start, stop, dtype=np.int64)
         gray = index ^ (index >> 1)
+        digits: list[int | NDArray[np.int64]] = []
+        for part in range(self._tables.shape[1]):
+            low = part * _TABLE_BITS
+            group = (gray >> low) & (2**_TABLE_BITS - 1)
+            # Of a short slice the upper digits are all the same: one number instead of a column.
+            same = start >> low == (stop - 1) >> low and stop > start
+            digits.append(int(group[0]) if same else group)
         out = np.empty((len(self._shift), index.size))
         for k, tables in enumerate(self._tables):
             x = np.full(index.size, self._shift[k])
-            for part, table in enumerate(tables):
-                x ^= table[(gray >> (part * _TABLE_BITS)) & (2**_TABLE_BITS - 1)]
-            out[k] = (x.astype(np.float64) + self._centre) * 2.0**-BITS
+            for table, group in zip(tables, digits, strict=True):
+                x ^= table[group]
+            out[k] = x
+            out[k] += self._centre
+            out[k] *= 2.0**-BITS
         return out
 
 

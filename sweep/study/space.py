@@ -154,7 +154,9 @@ def _between(ends: tuple[float, float], k: Array, steps: int, scale: Scale) -> A
         # The C library's power, one value at a time: vectorised ones may round by position in the array.
         values = np.array([low ** (1.0 - t) * high**t for t in (k / steps).tolist()])
     else:
-        values = (low * (steps - k) + high * k) / steps
+        values = (low * (steps - k) + high * k) / steps if steps != 1 else low * (1.0 - k) + high * k
+        if steps == 1:  # then both ends are exact
+            return np.clip(values, low, high, out=values)
     inside: Array = np.clip(values, low, high)
     return np.where(k == 0, low, np.where(k == steps, high, inside))
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from kernels import status as codes
 from kernels.line_fit import line_fit
-from kernels.sincos import tabulate
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
@@ -83,10 +82,7 @@ def fit_line(
         return fitted, status
     own = fitted[np.ix_(alive, np.array([column[f"{name}{suffix}"] for name in guide.parameter_names]))]
     wanted = frozenset({"x_b", "y_b", "x_c", "y_c"})
-    turned = angles[alive]
-    cos, sin = np.empty_like(turned), np.empty_like(turned)
-    tabulate(turned, cos, sin)
-    pins = guide.poses(np.ascontiguousarray(own), Angles(turned, cos, sin), wanted)
+    pins = guide.poses(np.ascontiguousarray(own), Angles.of(angles[alive]), wanted)
     missing = pins["status"] != codes.OK
     parts = [np.where(missing, np.nan, pins[name].astype(np.float64)) for name in ("x_b", "y_b", "x_c", "y_c")]
     values = {name: np.ascontiguousarray(own[:, guide.parameter_names.index(name)]) for name in guided.fitted}
