@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.effects import NAMES, effect, with_effects
+from sweep.effects.places import ON_TIP, tool_place
 from sweep.effects.placing import Placed, first_scene
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Family, Parameter
@@ -40,8 +41,8 @@ INPUTS = {
 }  # fmt: skip
 
 # Of linkages of a few units of length, by the beginning of an input's name.
-SMALL = {"speed": 520.0, "m_tool": 2.5e-5}
-KINDS = {"mu_": 0.05, "radius_": 0.1}
+SMALL = {"k": 1.8, "tau": -1.0, "speed": 520.0, "m_tool": 2.5e-5, "tip_x": 2.0, "tool_force_y": -5.0}
+KINDS = {"mu_": 0.05, "radius_": 0.1, "m_": 1e-5}
 
 
 class Cost(NamedTuple):
@@ -67,17 +68,20 @@ def designs(full: Family, n: int, seed: int = 0) -> Array:
 
 
 def _value(full: Family, p: Parameter) -> float | None:
-    """Return the value of a parameter or an input:
-    of the small machine, or of the family's example and by the kind of input.
-    """
-    for known in (CENTRE, INPUTS) if full.find(LinkTree) is None else (full.example, SMALL):
+    """Return a parameter or an input of the small machine, or of the family's example and by the kind of input."""
+    linked = full.find(LinkTree) is not None
+    if tool_place(full) == ON_TIP:
+        # a tool at the tip loads whatever else is measured: it is there for its own effect alone
+        at_tip = "tip_load" in full.pose_names
+        if p.name in ("m_tool", "tip_x"):
+            return (INPUTS | {"tip_x": 75.0})[p.name] if at_tip else 0.0
+    for known in (full.example, SMALL) if linked else (CENTRE, INPUTS):
         if p.name in known:
             return known[p.name]
-    if p.default is not None:
-        return p.default
-    if p.name.startswith("support_"):
-        return -0.5 if p.name.endswith("1") else 0.6
-    return next((value for start, value in KINDS.items() if p.name.startswith(start)), None)
+    kind = next((value for start, value in KINDS.items() if p.name.startswith(start)), None) if linked else None
+    if kind is not None or p.default is not None:
+        return p.default if kind is None else kind
+    return -0.5 if p.name.endswith("1") else 0.6  # places of supports
 
 
 def least_time(run: Callable[[], object], repeats: int = 5) -> float:
