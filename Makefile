@@ -25,7 +25,8 @@ setup: $(VENV)/ready  ## create the environment in .venv
 test: $(VENV)/ready  ## run the tests, in two processes
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-test-long: $(VENV)/ready  ## the tests that take minutes: thousands of hostile tables
+test-long: $(VENV)/ready  ## the tests that take minutes, thousands of hostile tables; loads against Pinocchio, which it installs
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,peers]'
 	$(BIN)/python -m pytest -m long
 
 test-faults: $(VENV)/ready  ## kills, signals, full disks, damage: 150 kills and 170 other faults, a table; about 15 minutes
@@ -71,10 +72,11 @@ study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accur
 smoke-accuracy: $(VENV)/ready  ## the same on few designs, writes no page
 	$(BIN)/python -m studies.accuracy --smoke --out results/smoke/accuracy
 
-bench-peers: $(VENV)/ready  ## next to pylinkage, which gets an environment of its own, and loads next to MuJoCo
+bench-peers: $(VENV)/ready  ## next to pylinkage and Pinocchio, which get an environment of their own, and loads next to MuJoCo
 	$(PYTHON) -m venv .venv-peers
-	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable . 'pylinkage[numba]'
+	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable '.[peers]' 'pylinkage[numba]'
 	.venv-peers/bin/python -m studies.accuracy.peers --out results/accuracy
+	.venv-peers/bin/python -m studies.accuracy.peer_loads --out results/accuracy
 	$(BIN)/python -m tests.bench.loads --out results/accuracy
 
 bench-scale: $(VENV)/ready  ## 10^5 to 10^9 samples, to 10^8 designs, and reading them: writes docs/scale.md, about 10 minutes
@@ -94,6 +96,7 @@ search-worse: $(VENV)/ready  ## look for poses with larger errors than any known
 
 bench: $(VENV)/ready  ## ns per sample against numpy and C; what everything takes, into sweep/costs.toml and docs
 	$(BIN)/python -m tests.bench.kernels
+	$(BIN)/python -m tests.bench.chains
 	$(BIN)/python -m tests.bench.costs
 	$(SWEEP) effects --markdown > docs/effects.md
 

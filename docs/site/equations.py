@@ -13,8 +13,19 @@ from typing import NamedTuple
 
 LABEL = re.compile(r"^(.*?\S)\s{2,}\((\d+\s?[a-z]?\*?|[A-Z]\*)\)$|^(.*?\S)\s\((\d+\s?[a-z]?\*?)\)$")
 TOKEN = re.compile(
-    r"\s*(?:(?P<code>`[^`]*`|docs/[\w-]+\.md)|(?P<index>_\w+)|(?P<number>\d+(?:\.\d+)?(?:e-?\d+)?)|(?P<name>[A-Za-z](?:\w|(?<=\d),(?=\d)|(?<=[a-z]{3})'(?=s\b)|(?<=[a-z]{3})-(?=[a-z]{3}))*)"
-    r"|(?P<prime>'+)|(?P<op>\.\.\.|<=|>=|:=|\+-|[-+=<>.,;:|/^(){}\[\]*]))"
+    r"""\s*(?:
+      (?P<code>`[^`]*`|docs/[\w-]+\.md)
+    | (?P<index>_\w+)                            # of brackets: (rocker pin)_x
+    | (?P<number>\d+(?:\.\d+)?(?:e-?\d+)?)
+    | (?P<name>[A-Za-z](?:\w
+          | (?<=\d),(?=\d)                       # xi_1,2
+          | (?<=[a-z]{3})'(?=s\b)                # rack's
+          | (?<=[a-z]{3})-(?=[a-z]{3})           # mid-stroke
+      )*)
+    | (?P<prime>'+)
+    | (?P<op>\.\.\.|<=|>=|:=|\+-|[-+=<>.,;:|/^(){}\[\]*])
+    )""",
+    re.VERBOSE,
 )
 GREEK = {
     "alpha": "α", "beta": "β", "bet": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "eps": "ε", "theta": "θ",

@@ -65,7 +65,7 @@ def summarise(
     angles: AngleUnit | None = None,
     loads: Loads | None = None,
 ) -> pd.DataFrame:
-    """Design outputs of mechanisms, one row per design, in the order of the input.
+    """Return design outputs of mechanisms, one row per design, in the order of the input.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def design_outputs(
     accuracy: Accuracy,
     window: Part = None,
 ) -> Columns:
-    """Design outputs of a design matrix, cheapest first; what does not turn is left out of the dear ones.
+    """Return design outputs of a design matrix, cheapest first; what does not turn is left out of the dear ones.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def design_outputs(
 
 
 def _spread(values: NDArray[np.generic], rows: Index, n: int) -> NDArray[np.generic]:
-    """Values of some rows as a whole column: False or nan in the others."""
+    """Return values of some rows as a whole column: False or nan in the others."""
     if rows.size == n:
         return values
     whole: NDArray[np.generic] = np.zeros(n, np.bool_) if values.dtype == np.bool_ else np.full(n, np.nan)

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.series.form import Form
+
 if TYPE_CHECKING:
     from kernels.links import Links
     from sweep.families.base import Angles, Columns
@@ -37,6 +39,11 @@ class Assembly:
     pressure_angle: str
     scale: DesignMap
     stage: str = ""
+
+
+def constant(*numbers: float) -> DesignMap:
+    """The same numbers for every design, (n, k)."""
+    return lambda designs: np.tile(np.array(numbers), (len(designs), 1))
 
 
 @dataclass(frozen=True)
@@ -121,6 +128,37 @@ class PressureEllipse:
     """The curve of the coupler direction across the follower's motion, (n, 7), for its extrema in closed form."""
 
     curve: DesignMap
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A pose output as a fused chain has it: a derivative of a x + b y + c of what its last stage moves.
+
+    ``order`` is that of the derivative by the crank angle, 0, 1 or 2; ``made_of(designs)``, (n, 3), gives a, b, c of
+    the stage's own designs.
+    """
+
+    order: int
+    made_of: DesignMap
+
+
+@dataclass(frozen=True)
+class InSeries:
+    """A stage whose motion can be fused with that of the stages before and behind it (:mod:`kernels.series`).
+
+    Parameters
+    ----------
+    form : its inline closures
+    curves : the pose outputs whose extrema a fused search finds where it is the last stage
+    components : of those pose outputs that a grid has at once, the component: "x1", "x2", "x3", "y0", "y1", "y2"
+    opening : of a family that can be the first stage, ``opening(designs, status, distance)``: does it turn, and how
+        far is its nearest singularity
+    """
+
+    form: Form
+    curves: Mapping[str, Curve]
+    components: Mapping[str, str]
+    opening: Callable[[Array, NDArray[np.uint8], Array], None] | None = None
 
 
 @dataclass(frozen=True)

@@ -26,12 +26,15 @@ from sweep.families.base import (
 from sweep.families.capabilities import (
     Assembly,
     CrankRockerLoop,
+    Curve,
+    InSeries,
     JointRecords,
     LimitLocus,
     OutputLink,
     Points,
     PressureEllipse,
     Skeleton,
+    constant,
 )
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
@@ -305,6 +308,8 @@ def _sampled(accuracy: Accuracy) -> bool:
     return accuracy.samples is not None
 
 
+CURVES = {"dpsi": Curve(1, constant(1.0, 0.0, 0.0)), "d2psi": Curve(2, constant(1.0, 0.0, 0.0))}
+
 FAMILY = Family(
     name="rssr",
     title="spatial crank-rocker",
@@ -325,6 +330,7 @@ FAMILY = Family(
     capabilities=(
         CRANK_ROCKER_SIZES,
         Assembly("discriminant", "pressure_angle", discriminant_scale),
+        InSeries(rssr.FORM, CURVES, {"dpsi": "x1", "d2psi": "x2", "d3psi": "x3"}, rssr.opening),
         JointRecords(joint_records, JOINT_NEEDS, "rocker"),
         PressureEllipse(ellipse),
         CrankRockerLoop(np.ascontiguousarray),

@@ -23,7 +23,7 @@ POSES_PEAK = 30.0
 
 
 def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy) -> float:
-    """Estimated time of a general route [ns per design], made of measured times of poses and of searches."""
+    """Return the estimated time of a general route [ns per design], made of measured times of poses and of searches."""
     stages, pose = _stages(family), pose_ns(family)
     if group == "margin":
         return sum(_margin_ns(family, suffix, accuracy) for suffix in margin_suffixes(family))
@@ -43,7 +43,7 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
 
 
 def _margin_ns(family: Family, suffix: str, accuracy: Accuracy) -> float:
-    """Estimated time of the margin of a stage, which all stages before it drive."""
+    """Return the estimated time of the margin of a stage, which all stages before it drive."""
     if isinstance(family, Machine):
         name, own = suffix.split(".")
         return _margin_ns(family.member(name).family, own, accuracy)
@@ -62,7 +62,7 @@ def _stages(family: Family) -> int:
 
 
 def pose_ns(family: Family) -> float:
-    """Estimated time of the motion of a pose: of a chain or a machine that of all its stages and members."""
+    """Return the estimated time of the motion of a pose: of a chain or a machine that of all its stages and members."""
     if isinstance(family, Machine):
         return sum(pose_ns(member.family) for member in family.members)
     if isinstance(family, Chain):

@@ -87,7 +87,7 @@ class Sobol:
         self._tables = np.array(tables, np.uint64).reshape(dimensions, INDEX_BITS // _TABLE_BITS, 2**_TABLE_BITS)
 
     def points(self, start: int, stop: int) -> Array:
-        """Points start to stop - 1, one row per dimension."""
+        """Return points start to stop - 1, one row per dimension."""
         index = np.arange(start, stop, dtype=np.int64)
         gray = index ^ (index >> 1)
         out = np.empty((len(self._shift), index.size))
@@ -100,7 +100,7 @@ class Sobol:
 
 
 def _direction_numbers(polynomial: int, first: tuple[int, ...]) -> list[int]:
-    """V_1 ... V_INDEX_BITS as integers of BITS digits, by the recurrence of the primitive polynomial."""
+    """Return V_1 ... V_INDEX_BITS as integers of BITS digits, by the recurrence of the primitive polynomial."""
     degree = polynomial.bit_length() - 1
     if degree == 0:  # the first dimension is the van der Corput sequence
         return [1 << (BITS - 1 - j) for j in range(INDEX_BITS)]
@@ -115,7 +115,7 @@ def _direction_numbers(polynomial: int, first: tuple[int, ...]) -> list[int]:
 
 
 def _mix(direction: int, raw: list[int]) -> int:
-    """Each digit plus (mod 2) a random choice of the digits above it."""
+    """Return each digit plus (mod 2) a random choice of the digits above it."""
     mixed = 0
     for digit in range(BITS):
         place = BITS - 1 - digit
@@ -125,7 +125,7 @@ def _mix(direction: int, raw: list[int]) -> int:
 
 
 def _xor_tables(directions: list[int]) -> NDArray[np.uint64]:
-    """For every group of index digits the exclusive or of the direction numbers of each combination."""
+    """Return for every group of index digits the exclusive or of the direction numbers of each combination."""
     tables = np.zeros((INDEX_BITS // _TABLE_BITS, 2**_TABLE_BITS), np.uint64)
     for j, direction in enumerate(directions):
         part, bit = divmod(j, _TABLE_BITS)

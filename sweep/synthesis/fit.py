@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from kernels import status as codes
 from kernels.line_fit import line_fit
+from kernels.sincos import tabulate
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
@@ -38,13 +39,13 @@ class LineFit:
     free_direction: bool
 
     def parameters(self, family: Family) -> tuple[str, ...]:
-        """Names of the parameters the fit sets, xi2, eta2 ... in a chain; lam only if its direction is free."""
+        """Return names of the parameters the fit sets, xi2, eta2 ... in a chain; lam only if its direction is free."""
         guided, suffix = _guided(family)
         free = (name for name in guided.fitted if self.free_direction or name != guided.direction)
         return tuple(f"{name}{suffix}" for name in free)
 
     def rescaled(self, family: Family) -> tuple[str, ...]:
-        """Names of the parameters whose given values are proportions only."""
+        """Return names of the parameters whose given values are proportions only."""
         guided, suffix = _guided(family)
         return () if self.stroke is None else tuple(f"{name}{suffix}" for name in guided.scaled)
 
@@ -82,7 +83,10 @@ def fit_line(
         return fitted, status
     own = fitted[np.ix_(alive, np.array([column[f"{name}{suffix}"] for name in guide.parameter_names]))]
     wanted = frozenset({"x_b", "y_b", "x_c", "y_c"})
-    pins = guide.poses(np.ascontiguousarray(own), Angles.of(angles[alive]), wanted)
+    turned = angles[alive]
+    cos, sin = np.empty_like(turned), np.empty_like(turned)
+    tabulate(turned, cos, sin)
+    pins = guide.poses(np.ascontiguousarray(own), Angles(turned, cos, sin), wanted)
     missing = pins["status"] != codes.OK
     parts = [np.where(missing, np.nan, pins[name].astype(np.float64)) for name in ("x_b", "y_b", "x_c", "y_c")]
     values = {name: np.ascontiguousarray(own[:, guide.parameter_names.index(name)]) for name in guided.fitted}
@@ -104,7 +108,7 @@ def fit_line(
 
 
 def _guided(family: Family) -> tuple[GuidedPoint, str]:
-    """The guided point, and what follows the names of its stage's parameters: the stage's number in a chain."""
+    """Return the guided point, and what follows the names of its stage's parameters: the stage's number in a chain."""
     last = stages_of(family)[-1]
     guided = last.family.find(GuidedPoint)
     if guided is not None:
@@ -113,7 +117,9 @@ def _guided(family: Family) -> tuple[GuidedPoint, str]:
 
 
 def _input_angles(family: Family, designs: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """Input angles of the guide over its swing or turn, Chebyshev points, (n, m), and the status of what drives it."""
+    """Return input angles of the guide over its swing or turn, Chebyshev points, (n, m),
+    and the status of what drives it.
+    """
     samples = SWING_SAMPLES if isinstance(family, Chain) else TURN_SAMPLES
     share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))
     if not isinstance(family, Chain):
