@@ -47,15 +47,16 @@ def effect_prices(smoke: bool) -> pd.DataFrame:
 def loaded(bare: Family, full: Family, designs: int) -> Array:
     """Ordinary designs with the inputs of an effect; bodies that all have no mass are given some, or all loads vanish.
 
-    A tip lies off the axis of its link for the same reason.
+    Where a tool at a tip is all there is, the tip lies off the axis of its link for the same reason.
     """
     matrix = ordinary(full, designs)
     own = len(bare.parameters)
     still = {p.name: k for k, p in enumerate(full.parameters) if k >= own and not matrix[:, k].any()}
-    bodies = [p.name for p in full.parameters[own:] if p.name.startswith("m_") and p.name != "m_tool"]
+    inert = [p.name for p in full.parameters[own:] if p.unit in ("mass", "inertia") and p.name != "m_tool"]
+    bodies = [name for name in inert if name.startswith("m_")]
     length = float(np.median([abs(x) for x, p in zip(matrix[0], bare.parameters, strict=False) if p.unit == "length"]))
     for name, k in still.items():
-        if name == "tip_x":
+        if name == "tip_x" and not inert:
             matrix[:, k] = ARM * length
         elif all(body in still for body in bodies):
             if name.startswith("m_"):
