@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 ABOUT = "about.json"
 # Written by `make bench-peers`, in an environment of its own, if ever.
-PEERS = ("peers", "loads")
+PEERS = ("peers", "loads", "peer_loads")
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Measured:
     marks : what was to be reached, and what was
     positions, exact, work, outputs, storage, digits, targets : the crank-rocker in depth
     oracle, worst : errors against the 25-digit tables, and the largest that a search has found
-    peers, loads : other programs, None where `make bench-peers` has not been run
+    peers, loads, peer_loads : other programs, None where `make bench-peers` has not been run
     """
 
     machine: str
@@ -49,6 +49,7 @@ class Measured:
     worst: pd.DataFrame
     peers: pd.DataFrame | None = None
     loads: pd.DataFrame | None = None
+    peer_loads: pd.DataFrame | None = None
 
     def tables(self) -> Iterator[tuple[str, pd.DataFrame]]:
         """Yield the tables that this study measures, by name."""
