@@ -96,6 +96,7 @@ search-worse: $(VENV)/ready  ## look for poses with larger errors than any known
 
 bench: $(VENV)/ready  ## ns per sample against numpy and C; what everything takes, into sweep/costs.toml and docs
 	$(BIN)/python -m tests.bench.kernels
+	$(BIN)/python -m tests.bench.chains
 	$(BIN)/python -m tests.bench.costs
 	$(SWEEP) effects --markdown > docs/effects.md
 

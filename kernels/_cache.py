@@ -251,6 +251,15 @@ class KernelCache(FunctionCache):
         base, stamp = self._impl.filename_base, self._impl.locator.get_source_stamp()
         self._cache_file = _Checked(self._cache_path, base, stamp)  # type: ignore[no-untyped-call]
 
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        """What tells compiled code apart: signature, processor and byte code.
+
+        numba adds a hash of what a function closes over.  Other kernels in there carry a random number, so no process
+        would find the code of another.  A generated kernel says by its name what it closes over (`kernels._jit`).
+        """
+        code: bytes = self._py_func.__code__.co_code
+        return sig, codegen.magic_tuple(), hashlib.sha256(code).hexdigest()
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled code of one signature, or None; of files that are damaged nothing is kept."""
         try:

@@ -62,3 +62,22 @@ def inline_fused(helper: F) -> F:
     copy = FunctionType(source.__code__, source.__globals__, name, source.__defaults__, source.__closure__)
     copy.__qualname__, copy.__module__ = name, source.__module__
     return cast(F, _compiled(copy, forceinline=True, no_cfunc_wrapper=True, fastmath={"contract"}))
+
+
+def generated(name: str, function: F) -> F:
+    """As :func:`kernel`, for a function that a generator made.
+
+    ``name`` stands for everything that the function closes over, stages, numbers and other generated functions: its
+    machine code is kept under that name, so no two may have the same.
+    """
+    return _compiled(_named(name, function))
+
+
+def generated_inline(name: str, function: F) -> F:
+    """As :func:`inline`, for a function that a generator made; ``name`` as of :func:`generated`."""
+    return _compiled(_named(name, function), forceinline=True, no_cfunc_wrapper=True)
+
+
+def _named(name: str, function: F) -> F:
+    function.__name__ = function.__qualname__ = name
+    return function

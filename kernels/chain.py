@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @kernel
 def input_angle(kappa: Array, offset: Array, cos_psi: Array, sin_psi: Array, cos_phi: Array, sin_phi: Array) -> None:
-    """Cosine and sine of the next stage's input angle kappa psi + offset, by angle addition; (1).
+    """Compute the cosine and sine of the next stage's input angle kappa psi + offset, by angle addition; (1).
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def chain_rule(
     outer2: Array | None,
     outer3: Array | None,
 ) -> None:
-    """Derivatives of the driven stage with respect to the crank angle of the chain, (22) to the third order.
+    """Compute derivatives of the driven stage with respect to the crank angle of the chain, (22) to the third order.
 
     Parameters
     ----------

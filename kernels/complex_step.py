@@ -19,12 +19,14 @@ from kernels._jit import inline
 
 @inline
 def divisor(x: Any) -> Any:
-    """x, or nan for 0: a compiled division by a complex zero raises an exception where a real one gives inf."""
+    """Return x, or nan for 0: a compiled division by a complex zero raises an exception where a real one gives inf."""
     return x if x.real != 0.0 else math.nan + x
 
 
 def arctan2(y: Any, x: Any) -> Any:
-    """Angle of the vector (x, y); for complex arguments continued to first order in their imaginary parts."""
+    """Return the angle of the vector (x, y);
+    for complex arguments continued to first order in their imaginary parts.
+    """
     if isinstance(y, complex) or isinstance(x, complex):
         return _arctan2_complex(y, x)
     return _arctan2_real(y, x)
@@ -41,7 +43,7 @@ def _arctan2_complex(y: Any, x: Any) -> Any:
 
 
 def magnitude(x: Any) -> Any:
-    """|x|; for a complex argument x or -x, whichever has the positive real part."""
+    """Return |x|; for a complex argument x or -x, whichever has the positive real part."""
     if isinstance(x, complex):
         return _magnitude_complex(x)
     return _magnitude_real(x)
@@ -71,7 +73,9 @@ def _magnitude_typed(x: Any) -> Any:
 
 
 def hypotenuse(x: Any, y: Any) -> Any:
-    """Length of the vector (x, y); for complex arguments continued to first order in their imaginary parts."""
+    """Return the length of the vector (x, y);
+    for complex arguments continued to first order in their imaginary parts.
+    """
     if isinstance(x, complex) or isinstance(y, complex):
         return _hypotenuse_complex(x, y)
     return _hypotenuse_real(x, y)

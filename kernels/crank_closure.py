@@ -43,7 +43,7 @@ class Reduced(NamedTuple):
 
 @inline
 def axial_terms(f: Any, g: Any, alpha: Any, ca: Any) -> tuple[Any, Any, Any]:
-    """f^2 + g^2 - 2 f g cos(alpha), the magnitude of its terms, and f cos(alpha) - g; (K*).
+    """Return f^2 + g^2 - 2 f g cos(alpha), the magnitude of its terms, and f cos(alpha) - g; (K*).
 
     Without cancellation where the axes are nearly parallel, alpha near 0 or pi, and both offsets long.
     """
@@ -58,13 +58,13 @@ def axial_terms(f: Any, g: Any, alpha: Any, ca: Any) -> tuple[Any, Any, Any]:
 
 @inline
 def within_unit_range(c: float) -> bool:
-    """Whether a rocker of length c needs no scaling: no square can leave float64."""
+    """Return whether a rocker of length c needs no scaling: no square can leave float64."""
     return (c > 1e-6) & (c < 1e6)
 
 
 @inline
 def unit_scale(c: float) -> float:
-    """Power of two that brings a rocker of length c to the unit range; 1 where it is near enough."""
+    """Return the power of two that brings a rocker of length c to the unit range; 1 where it is near enough."""
     if within_unit_range(c):
         return 1.0
     _, exponent = math.frexp(c)
@@ -73,7 +73,9 @@ def unit_scale(c: float) -> float:
 
 @inline
 def reduce_scaled(a: Any, b: Any, c: Any, e: Any, f: Any, g: Any, alpha: Any, branch: float) -> Reduced:
-    """Constants of one design, for lengths whose squares stay in float64; without a branch, so that it vectorises."""
+    """Return constants of one design, for lengths whose squares stay in float64;
+    without a branch, so that it vectorises.
+    """
     sa, ca = sincos(alpha)
     q, q_size, rise = axial_terms(f, g, alpha, ca)
     square = (c - b) * (c + b) + (a * a + e * e) + q
@@ -91,7 +93,7 @@ def reduce_scaled(a: Any, b: Any, c: Any, e: Any, f: Any, g: Any, alpha: Any, br
 
 @inline
 def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
-    """Rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64."""
+    """Return the rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64."""
     mx, my, mw = abs(r.e.real) + 1.0, abs(r.y0.real) + 1.0, r.w_size
     t = 8.0 * EPS
     return t * (abs(x.real) * mx + abs(y.real) * my + abs(w.real) * mw) + t * t * (mx * mx + my * my + mw * mw)

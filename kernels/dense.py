@@ -23,7 +23,7 @@ SMALLEST = 1e-300  # a column or a rotation below is zero
 
 @kernel
 def product(a: Array, b: Array, out: Array) -> None:
-    """Matrix product ``out = a b`` of (m, k) and (k, n), summed in the order of k.
+    """Compute the matrix product ``out = a b`` of (m, k) and (k, n), summed in the order of k.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def _reflected(a: Array, first: int, column: int, left: float, b: Array, other: 
 
 @kernel
 def triangle(a: Array, order: Index, q: Array, tolerance: float) -> int:
-    """Householder triangle of a matrix, its largest remaining column first: ``a[:, order] = q r``.
+    """Return the Householder triangle of a matrix, its largest remaining column first: ``a[:, order] = q r``.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def triangle(a: Array, order: Index, q: Array, tolerance: float) -> int:
 
 @kernel
 def least_squares(a: Array, b: Array, tolerance: float, x: Array) -> int:
-    """Shortest x with the least ``|a x - b|`` by a complete orthogonal decomposition.
+    """Return the shortest x with the least ``|a x - b|`` by a complete orthogonal decomposition.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def least_squares(a: Array, b: Array, tolerance: float, x: Array) -> int:
 
 @kernel
 def symmetric_axes(a: Array, values: Array, axes: Array) -> None:
-    """Eigenvalues and eigenvectors of symmetric matrices by Jacobi's rotations.
+    """Compute eigenvalues and eigenvectors of symmetric matrices by Jacobi's rotations.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ class Swung(NamedTuple):
 
 @inline
 def swing(path: Path, size: float, b: Any, c: Any, branch: float) -> Swung:
-    """Angle of the rocker for one place of the driving ball.
+    """Return the angle of the rocker for one place of the driving ball.
 
     Parameters
     ----------
@@ -61,6 +61,7 @@ def swing(path: Path, size: float, b: Any, c: Any, branch: float) -> Swung:
     tolerance = t * ((abs(x.real) + abs(y.real)) * size + abs(w.real) * w_size) + t * t * (
         2.0 * size * size + w_size * w_size
     )
+    # a rocker without length has no direction
     code = st.SINGULAR if c.real == 0.0 else pose_status(True, delta.real, tolerance, rr.real)
     moving = code == st.OK
     has_angle = moving or code == st.DEAD_POINT
@@ -84,7 +85,7 @@ def swing(path: Path, size: float, b: Any, c: Any, branch: float) -> Swung:
 
 @inline
 def rotated(cos: Any, sin: Any, p: Any, q: Any, j: Any, path: Path) -> Path:
-    """A moving point turned about z by an angle that moves too: the product rule, to the third derivative.
+    """Return a moving point turned about z by an angle that moves too: the product rule, to the third derivative.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ EXCHANGES = 60
 
 @inline
 def _least_squares(bx: Array, by: Array, dx: Array, dy: Array, inside: NDArray[np.bool_]) -> tuple[float, ...]:
-    """Moments of the masked points: means, and the coefficients of centred Bx and By on centred (dx, dy)."""
+    """Return moments of the masked points: means, and the coefficients of centred Bx and By on centred (dx, dy)."""
     count, mbx, mby, mdx, mdy = 0, 0.0, 0.0, 0.0, 0.0
     for j in range(bx.size):
         if inside[j]:
@@ -64,7 +64,9 @@ def _least_squares(bx: Array, by: Array, dx: Array, dy: Array, inside: NDArray[n
 def _direction(
     bx: Array, by: Array, dx: Array, dy: Array, inside: NDArray[np.bool_], moments: tuple[float, ...]
 ) -> float:
-    """Direction in [0, pi) of the smallest least-squares deviation: an eigenvector of the residuals' Gram matrix."""
+    """Return the direction in [0, pi) of the smallest least-squares deviation:
+    an eigenvector of the residuals' Gram matrix.
+    """
     mbx, mby, mdx, mdy, cx_bx, cy_bx, cx_by, cy_by = moments
     gxx, gxy, gyy = 0.0, 0.0, 0.0
     for j in range(bx.size):
@@ -82,13 +84,15 @@ def _direction(
 
 @inline
 def _point(cx_bx: float, cy_bx: float, cx_by: float, cy_by: float, c: float, s: float) -> tuple[float, float]:
-    """Coupler point turned into the line's frame: Im(w d) cancels the part of Im(B e^{-i lam}) along (dx, dy)."""
+    """Return the coupler point turned into the line's frame:
+    Im(w d) cancels the part of Im(B e^{-i lam}) along (dx, dy).
+    """
     return -(c * cy_by - s * cy_bx), -(c * cx_by - s * cx_bx)
 
 
 @inline
 def _solve3(a: Array, y: Array) -> bool:
-    """Gauss elimination with row exchange, in place; false where the matrix is singular."""
+    """Solve by Gauss elimination with row exchange, in place; false where the matrix is singular."""
     for k in range(3):
         pivot = k
         for i in range(k + 1, 3):
@@ -127,7 +131,9 @@ def _exchange(
     y: Array,
     points: NDArray[np.int64],
 ) -> bool:
-    """Minimax x = (w_x, w_y, h) of |target + w_x dy + w_y dx - h| over the masked points; x starts at least squares."""
+    """Return the minimax x = (w_x, w_y, h) of |target + w_x dy + w_y dx - h| over the masked points;
+    x starts at least squares.
+    """
     m = dx.size
     # First reference: the four points of alternating largest residuals along the path.
     count = 0
@@ -197,7 +203,7 @@ def _exchange(
 
 @inline
 def _couplers(b_x: Array, b_y: Array, c_x: Array, c_y: Array, bx: Array, by: Array, dx: Array, dy: Array) -> bool:
-    """Pin B and direction d of the coupler at every position; false if one of them is not assembled."""
+    """Return the pin B and direction d of the coupler at every position; false if one of them is not assembled."""
     good = True
     for j in range(b_x.size):
         bx[j], by[j] = b_x[j], b_y[j]
@@ -223,7 +229,7 @@ def line_fit(
     travel: Array,
     status: Status,
 ) -> None:
-    """Coupler point and line with the smallest largest deviation over the working part of the travel.
+    """Compute the coupler point and line with the smallest largest deviation over the working part of the travel.
 
     Parameters
     ----------

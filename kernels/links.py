@@ -58,7 +58,7 @@ class Moving(NamedTuple):
 
 @inline
 def vector(a: Array) -> Vector:
-    """The first three numbers."""
+    """Return the first three numbers."""
     return a[0], a[1], a[2]
 
 
@@ -70,7 +70,7 @@ def put(out: Array, a: Vector) -> None:
 
 @inline
 def moving(body: Array) -> Moving:
-    """Rates of a body from its record, (PER_BODY,)."""
+    """Return rates of a body from its record, (PER_BODY,)."""
     return Moving(
         vector(body), vector(body[3:]), vector(body[6:]), vector(body[9:]), vector(body[12:]),
     )  # fmt: skip
@@ -78,13 +78,13 @@ def moving(body: Array) -> Moving:
 
 @inline
 def velocity_at(body: Moving, point: Vector) -> Vector:
-    """Velocity of the point of a body that is at ``point``."""
+    """Return the velocity of the point of a body that is at ``point``."""
     return add(body.v, cross(body.omega, sub(point, body.at)))
 
 
 @inline
 def acceleration_at(body: Moving, point: Vector) -> Vector:
-    """Acceleration of the point of a body that is at ``point``."""
+    """Return the acceleration of the point of a body that is at ``point``."""
     return add(body.a, spun(body.omega, body.eps, sub(point, body.at)))
 
 
@@ -104,7 +104,7 @@ def put_body(out: Array, body: Moving, x: Vector, y: Vector, z: Vector, joint: V
 
 @inline
 def turning(at: Vector, axis: Vector, first: float, second: float) -> Moving:
-    """A body that turns about a fixed axis through its origin."""
+    """Return a body that turns about a fixed axis through its origin."""
     none = (0.0, 0.0, 0.0)
     return Moving(at, none, none, scale(first, axis), scale(second, axis))
 
@@ -140,7 +140,7 @@ def put_rod(out: Array, axes: Array, on: Moving, at: Vector, to: Moving, end: Ve
 
 @inline
 def across(s: Vector) -> Vector:
-    """A unit vector across a unit vector."""
+    """Return a unit vector across a unit vector."""
     x, y, z = abs(s[0]), abs(s[1]), abs(s[2])
     found = (0.0, -s[2], s[1])
     if y <= x and y <= z:
@@ -167,7 +167,7 @@ def put_ball(out: Array, point: Vector) -> None:
 
 @inline
 def shaft(alpha: float) -> tuple[Vector, Vector]:
-    """Axis (0, sin alpha, cos alpha) of a crank, and the direction of its crank angle 90 degrees."""
+    """Return the axis (0, sin alpha, cos alpha) of a crank, and the direction of its crank angle 90 degrees."""
     sa, ca = math.sin(alpha), math.cos(alpha)
     return (0.0, sa, ca), (0.0, ca, -sa)
 
@@ -183,5 +183,5 @@ def put_crank(
 
 @inline
 def turned_about(axis: Vector, cos: float, sin: float, a: Vector) -> Vector:
-    """A vector turned about a unit axis."""
+    """Return a vector turned about a unit axis."""
     return add(mix(cos, a, sin, cross(axis, a)), scale((1.0 - cos) * dot(axis, a), axis))

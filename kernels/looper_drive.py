@@ -33,7 +33,9 @@ class Crank(NamedTuple):
 
 @inline
 def reduce_crank(d: Any, per: float) -> Crank:
-    """Constants from the first eight columns of a design, a b c e f g alpha branch; ``per`` scales its lengths."""
+    """Return constants from the first eight columns of a design, a b c e f g alpha branch;
+    ``per`` scales its lengths.
+    """
     a, b, c, e, f, g = d[0] * per, d[1] * per, d[2] * per, d[3] * per, d[4] * per, d[5] * per
     sa, ca, branch = np.sin(d[6]), np.cos(d[6]), d[7].real
     size = a.real + abs(e.real) + abs(f.real) + abs(g.real)
@@ -44,7 +46,9 @@ def reduce_crank(d: Any, per: float) -> Crank:
 
 @inline
 def pin_path(r: Crank, u: Any, v: Any) -> Path:
-    """The crank pin from the foot of the rocker, (e, 0, g), with its derivatives, at (cos phi, sin phi) = (u, v)."""
+    """Return the crank pin from the foot of the rocker, (e, 0, g), with its derivatives, at (cos phi,
+    sin phi) = (u, v).
+    """
     hu, hv, tu, tv = r.a * (r.ca * u), r.a * (r.ca * v), r.a * (r.sa * u), r.a * (r.sa * v)
     pin = (r.a * u - r.e, r.y0 + hv, r.lift - r.g - tv)
     return pin, (-r.a * v, hu, -tu), (-r.a * u, -hv, tv), (r.a * v, -hu, tu)

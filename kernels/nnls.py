@@ -19,7 +19,7 @@ DEPENDENT = 1e-14  # a column of which less than this part is left depends on th
 
 @inline
 def _solved(a: Array, b: Array, held: Index, count: int, z: Array) -> None:
-    """Back substitution in the triangle of the held columns."""
+    """Substitute back in the triangle of the held columns."""
     for k in range(count - 1, -1, -1):
         value = b[k]
         for j in range(k + 1, count):
@@ -69,7 +69,9 @@ def _dropped(a: Array, b: Array, held: Index, count: int, place: int) -> None:
 
 @inline
 def _next(a: Array, b: Array, inside: Index, count: int, refused: Index) -> tuple[int, float]:
-    """The column whose growth lessens the distance most, and what a reflection leaves of it; -1 where none does."""
+    """Return the column whose growth lessens the distance most, and what a reflection leaves of it;
+    -1 where none does.
+    """
     m, n = a.shape
     best, largest, first = -1, 0.0, 0.0
     for j in range(n):
@@ -93,7 +95,7 @@ def _next(a: Array, b: Array, inside: Index, count: int, refused: Index) -> tupl
 
 @kernel
 def nnls(matrix: Array, target: Array, x: Array) -> int:
-    """Smallest ``|matrix x - target|`` with x >= 0.
+    """Return the smallest ``|matrix x - target|`` with x >= 0.
 
     Parameters
     ----------

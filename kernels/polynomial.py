@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @inline
 def value_and_slope(p: Array, degree: int, x: float) -> tuple[float, float]:
-    """p[0] + p[1] x + ... and its derivative."""
+    """Return p[0] + p[1] x + ... and its derivative."""
     value, slope = p[degree], 0.0
     for j in range(degree - 1, -1, -1):
         slope = slope * x + value
@@ -29,7 +29,7 @@ def value_and_slope(p: Array, degree: int, x: float) -> tuple[float, float]:
 
 @inline
 def middle(low: float, high: float) -> float:
-    """A point that halves the bracket, in the logarithm where it spans more than a factor of four."""
+    """Return a point that halves the bracket, in the logarithm where it spans more than a factor of four."""
     if low == 0.0:
         return high * 2.0**-8
     if high > 4.0 * low:
@@ -39,7 +39,9 @@ def middle(low: float, high: float) -> float:
 
 @inline
 def bracketed_root(p: Array, degree: int, low: float, high: float, at_low: float) -> float:
-    """Where p changes its sign between low and high: Newton's method kept in the bracket; nan if it does not settle."""
+    """Find where p changes its sign between low and high, by Newton's method kept in the bracket;
+    nan if it does not settle.
+    """
     x, before = middle(low, high), math.inf
     for _ in range(200):
         value, slope = value_and_slope(p, degree, x)
@@ -60,7 +62,8 @@ def bracketed_root(p: Array, degree: int, low: float, high: float, at_low: float
 
 @inline
 def roots_up_to(end: float, p: Array, degree: int, derivatives: Array, found: Array) -> int:
-    """Roots of p in (0, end) in ascending order; the roots of each derivative part those of the one before it.
+    """Return roots of p in (0, end) in ascending order;
+    the roots of each derivative part those of the one before it.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ _ROUND = 1.5 * 2.0**52
 
 
 def sincos(x: Any) -> tuple[Any, Any]:
-    """(sin x, cos x) for |x| <= 1e5; nan for nan and infinity.  A complex x goes to the library."""
+    """Return (sin x, cos x) for |x| <= 1e5; nan for nan and infinity. A complex x goes to the library."""
     return _sincos_complex(x) if isinstance(x, complex) else _sincos_real(x)
 
 

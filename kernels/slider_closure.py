@@ -34,7 +34,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_scaled(a: Any, b: Any, e: Any, f: Any, alpha: Any, branch: Any, unit: float) -> Reduced:
-    """Constants of one design whose lengths are given in ``unit``; crank a, coupler b, offsets e and f."""
+    """Return constants of one design whose lengths are given in ``unit``; crank a, coupler b, offsets e and f."""
     sa, ca = np.sin(alpha), np.cos(alpha)
     m_size, n_size = abs(e.real) + a.real, abs(f.real) + a.real
     valid = a.real > 0.0 and 0.0 < b.real < 1e140 and m_size < 1e140 and n_size < 1e140
@@ -60,7 +60,7 @@ def place(r: Reduced, u: Any, v: Any) -> Place:
 
 @inline
 def tolerance(r: Reduced, at: Place) -> float:
-    """Rounding error of Q: below it, whether the links reach cannot be decided in float64."""
+    """Return the rounding error of Q: below it, whether the links reach cannot be decided in float64."""
     error = 8.0 * EPS
     first = error * (abs(at.m.real) * r.m_size + abs(at.n.real) * r.n_size)
     # The squares of the errors of m and n count where m and n themselves vanish.
@@ -69,7 +69,8 @@ def tolerance(r: Reduced, at: Place) -> float:
 
 @inline
 def derivatives(r: Reduced, u: Any, v: Any, y: Any, per_w: Any) -> tuple[Any, Any, Any]:
-    """First to third derivative of s by phi; y is y_B, ``per_w`` is branch/sqrt(Q), nan where that does not exist; (3).
+    """Return the first to third derivative of s by phi;
+    y is y_B, ``per_w`` is branch/sqrt(Q), nan where that does not exist; (3).
 
     What the caller does not use leaves no instruction.
     """

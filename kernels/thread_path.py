@@ -19,21 +19,21 @@ from kernels.vectors import Vector, cross, dot, sub
 
 @inline
 def length(e: Vector, n1: Vector, n2: Vector) -> float:
-    """Length of the thread N1, E, N2; (2)."""
+    """Return the length of the thread N1, E, N2; (2)."""
     d1, d2 = sub(e, n1), sub(e, n2)
     return np.sqrt(dot(d1, d1)) + np.sqrt(dot(d2, d2))  # type: ignore[no-any-return]
 
 
 @inline
 def slope(e: Vector, n1: Vector, n2: Vector, de: Vector) -> float:
-    """First derivative of the length where E has the derivative ``de``; (3)."""
+    """Return the first derivative of the length where E has the derivative ``de``; (3)."""
     d1, d2 = sub(e, n1), sub(e, n2)
     return dot(d1, de) / np.sqrt(dot(d1, d1)) + dot(d2, de) / np.sqrt(dot(d2, d2))  # type: ignore[no-any-return]
 
 
 @inline
 def bend(e: Vector, n1: Vector, n2: Vector, de: Vector, d2e: Vector) -> float:
-    """Second derivative of the length; (4)."""
+    """Return the second derivative of the length; (4)."""
     return _bend(sub(e, n1), de, d2e) + _bend(sub(e, n2), de, d2e)
 
 
@@ -45,7 +45,9 @@ def _bend(d: Vector, de: Vector, d2e: Vector) -> float:
 
 @inline
 def wrap_angle(e: Vector, n1: Vector, n2: Vector) -> float:
-    """Angle [rad] by which the thread turns at E: atan2(|d1 x d2|, -d1 . d2), exact near 0 and near pi; (1)."""
+    """Return the angle [rad] by which the thread turns at E: atan2(|d1 x d2|, -d1 .
+    d2), exact near 0 and near pi; (1).
+    """
     d1, d2 = sub(e, n1), sub(n2, e)
     across = cross(d1, d2)
     square = dot(across, across)

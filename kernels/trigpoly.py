@@ -54,7 +54,7 @@ def rotate(u: float, v: float, angle: float) -> tuple[float, float]:
 
 @inline
 def _step(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> float:
-    """Halley step to p' = 0, or downhill where the polynomial is not convex."""
+    """Return the Halley step to p' = 0, or downhill where the polynomial is not convex."""
     cos2, sin2 = (u - v) * (u + v), 2.0 * u * v
     first, second = s1 * u - c1 * v, s2 * cos2 - c2 * sin2
     d1 = first + 2.0 * second
@@ -80,7 +80,7 @@ def _lower(value: float, odd: float, c: float, s: float, best: float, u: float, 
 
 @inline
 def lowest_of_16(c1: float, s1: float, c2: float, s2: float) -> tuple[float, float]:
-    """Cosine and sine of the lowest of 16 equally spaced points; without a branch, so that it vectorises."""
+    """Return the cosine and sine of the lowest of 16 equally spaced points; without a branch, so that it vectorises."""
     best, u, v = _lower(c2, c1, 1.0, 0.0, math.inf, 1.0, 0.0)
     best, u, v = _lower(-c2, s1, 0.0, 1.0, best, u, v)
     best, u, v = _lower(s2, _R * (c1 + s1), _R, _R, best, u, v)
@@ -95,7 +95,8 @@ def lowest_of_16(c1: float, s1: float, c2: float, s2: float) -> tuple[float, flo
 
 @inline
 def approach(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> tuple[float, float, float]:
-    """Two cubically converging steps downhill and the size of the last; without a branch, so that it vectorises.
+    """Return two cubically converging steps downhill and the size of the last;
+    without a branch, so that it vectorises.
 
     From the lowest of 16 points the second is 2e-4 rad long on average, what is left after it 1e-12.
     """
@@ -108,14 +109,16 @@ def approach(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> 
 
 @inline
 def shortfall(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> float:
-    """Positive if and only if the stationary point (u, v) is not the global minimum."""
+    """Return a number that is positive if and only if the stationary point (u, v) is not the global minimum."""
     even = c2 * ((u - v) * (u + v)) + s2 * (2.0 * u * v)
     return 2.0 * math.sqrt(c2 * c2 + s2 * s2) + (c1 * u + s1 * v) + 2.0 * even
 
 
 @inline
 def far_minimum(c2: float, s2: float, u: float, v: float) -> tuple[float, float]:
-    """From the minimum (u, v): the direction that leads to the other one if there are two; c2, s2 not both zero."""
+    """Return the direction that leads from the minimum (u, v) to the other one if there are two;
+    c2, s2 not both zero.
+    """
     cos2, sin2 = (u - v) * (u + v), 2.0 * u * v
     even, cross = c2 * cos2 + s2 * sin2, s2 * cos2 - c2 * sin2
     per = 1.0 / math.sqrt(c2 * c2 + s2 * s2)
@@ -124,7 +127,7 @@ def far_minimum(c2: float, s2: float, u: float, v: float) -> tuple[float, float]
 
 @inline
 def point(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> Minimum:
-    """Value and second derivative at (u, v)."""
+    """Return the value and second derivative at (u, v)."""
     first, even = c1 * u + s1 * v, c2 * ((u - v) * (u + v)) + s2 * (2.0 * u * v)
     return Minimum(u, v, first + even, -first - 4.0 * even)
 
@@ -140,7 +143,7 @@ def _descend(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> 
 
 @inline
 def minimum(c1: float, s1: float, c2: float, s2: float) -> Minimum:
-    """Global minimum of c1 cos t + s1 sin t + c2 cos 2t + s2 sin 2t.
+    """Return the global minimum of c1 cos t + s1 sin t + c2 cos 2t + s2 sin 2t.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ BISECTIONS = 54
 def turn_extremes(
     values: Array, largest: Array, phi_largest: Array, least: Array, phi_least: Array, rms: Array, missed: Array
 ) -> None:
-    """Extremes and root mean square of curves over one turn.
+    """Compute extremes and root mean square of curves over one turn.
 
     Parameters
     ----------

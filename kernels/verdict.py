@@ -1,4 +1,4 @@
-"""One scheme of statuses for every family: of a pose from its discriminant, of a turn from the least of them."""
+"""The scheme of statuses of every family: of a pose it follows from its discriminant, of a turn from the least."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from kernels._jit import inline
 
 @inline
 def pose_status(valid: bool, discriminant: float, tolerance: float, square: float | None) -> int:
-    """Whether the links reach at a pose: OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT.
+    """Return whether the links reach at a pose: OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT.
 
     Parameters
     ----------
@@ -32,8 +32,19 @@ def pose_status(valid: bool, discriminant: float, tolerance: float, square: floa
 
 
 @inline
+def follower_status(valid: bool, undefined: bool, discriminant: float, tolerance: float) -> int:
+    """Decide as :func:`pose_status` does, for a follower that may have no direction whatever the discriminant is.
+
+    ``undefined`` says so: a pin stands on the axis of the slotted link that it drives, or a side of the triangle of
+    links has no length.  Such a pose is SINGULAR.
+    """
+    code = pose_status(valid, discriminant, tolerance, None)
+    return st.SINGULAR if valid and undefined else code
+
+
+@inline
 def turning_status(least: float, tolerance: float, valid: bool) -> int:
-    """Whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT.
+    """Return whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT.
 
     ``least`` is the smallest discriminant of the turn and ``tolerance`` the bound of its rounding error.
     """

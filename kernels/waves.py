@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 @kernel
 def trigonometric_sum(coefficients: Array, phi: Array, derivative: bool, out: Array) -> None:
-    """Sums ``c_0 + sum over k of (c_(2k-1) cos k phi + c_2k sin k phi)``, or their derivatives by phi.
+    """Compute sums ``c_0 + sum over k of (c_(2k-1) cos k phi + c_2k sin k phi)``, or their derivatives by phi.
 
     Parameters
     ----------

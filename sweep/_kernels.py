@@ -1,4 +1,4 @@
-"""That the package ``kernels`` is ours: another distribution on the package index has the same name.
+"""Checks that the package ``kernels`` is ours: another distribution on the package index has the same name.
 
 Whichever is installed last overwrites the other's files, and an import would answer from the wrong ones.
 """

@@ -41,11 +41,11 @@ UNMEASURED: Mapping[Kind, float] = {
 
 
 def nanoseconds(kind: Kind, name: str) -> float:
-    """Measured time of something in a section of the table; what is assumed where it has no row there."""
+    """Return the measured time of something in a section of the table; what is assumed where it has no row there."""
     return table().get(kind, {}).get(name, UNMEASURED[kind])
 
 
 @lru_cache
 def table() -> Mapping[str, Mapping[str, float]]:
-    """The table as it stands in the file, by section."""
+    """Return the table as it stands in the file, by section."""
     return tomllib.loads(TABLE.read_text(encoding="utf-8"))

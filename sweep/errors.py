@@ -35,7 +35,7 @@ class InputError(LinksweepError, ValueError):
 
 
 def shown(value: object) -> str:
-    """A value as it stands in a message: its repr, cut short where it is long."""
+    """Return a value as it stands in a message: its repr, cut short where it is long."""
     try:
         text = repr(value)
     except ValueError:  # an int of thousands of digits, an object that cannot show itself
@@ -171,7 +171,7 @@ SYNONYMS = {
 
 
 def closest(word: str, known: Iterable[str]) -> str | None:
-    """The known word nearest to ``word``, or None if none is near."""
+    """Return the known word nearest to ``word``, or None if none is near."""
     choices = list(known)
     # Case first: among e1, f1, g1 the letters of E1 say nothing.
     matches = [k for k in choices if k.casefold() == word.casefold()]
@@ -185,12 +185,14 @@ def closest(word: str, known: Iterable[str]) -> str | None:
 
 
 def _begins(word: str, name: str) -> bool:
-    """Whether one is the beginning of the other, and not only a letter or two of it."""
+    """Return whether one is the beginning of the other, and not only a letter or two of it."""
     return min(len(word), len(name)) > 3 and (name.startswith(word) or word.startswith(name))
 
 
 def edits(one: str, other: str) -> int:
-    """How many letters to change, leave out, put in or exchange with their neighbour to make one word the other."""
+    """Return how many letters to change, leave out,
+    put in or exchange with their neighbour to make one word the other.
+    """
     before: list[int] = []
     row = list(range(len(other) + 1))
     for i, a in enumerate(one, 1):
@@ -204,6 +206,6 @@ def edits(one: str, other: str) -> int:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string."""
+    """Return ``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string."""
     guess = closest(word, known)
     return f", did you mean '{guess}'?" if guess else ""

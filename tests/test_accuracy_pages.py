@@ -98,6 +98,9 @@ def test_other_programs_have_their_rows_where_they_were_measured():
     lines = families_page._loads(loads)
     assert any(line == "| MuJoCo 4 | `rssr` | 25 | 2.0e-14 | 300 us | 200 ns | 1500 |" for line in lines)
     assert "make bench-peers" in "".join(families_page._loads(None))
+    one = pd.DataFrame([{"what": "Pinocchio 4", "ns_per_pose": 5e5, "ratio": 1.0, "largest_difference": 3e-14}])
+    lines = families_page._loads(None, one)
+    assert "| Pinocchio 4 | 500 us | 1 |" in lines and "differ by at most 3.0e-14" in " ".join(lines)
 
 
 def test_digits_of_a_study_are_free_or_have_a_price():

@@ -14,7 +14,6 @@ from studies.accuracy.effect_witness import Effected, known_of
 from studies.accuracy.regions import Region, margins
 from sweep.effects import NAMES as EFFECTS
 from sweep.effects import effect, extended
-from sweep.effects.costs import designs as ordinary
 from sweep.families import NAMES, family
 from sweep.families.domain import March
 from tests.rssr_designs import random_designs
@@ -148,7 +147,20 @@ def test_a_wrong_step_shows_up_as_an_error():
 def effected(name, count=1):
     bare = family(effect(name).families[0])
     full = extended(bare, effect_prices.outputs_of(name, bare))
-    return Effected(bare, full, ordinary(full, count))
+    return Effected(bare, full, effect_prices.loaded(bare, full, count))
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_no_effect_is_priced_where_it_has_nothing_to_do(name):
+    """Bodies without mass would have loads of zero, which are right to any digit."""
+    given = effected(name)
+    own = len(given.bare.parameters)
+    given_inputs = given.full.parameters[own:]
+    bodies = [k for k, p in enumerate(given_inputs) if p.unit == "mass" and p.name != "m_tool"]
+    assert np.isfinite(given.designs).all()
+    assert not bodies or given.designs[:, own:][:, bodies].any()
+    if not any(p.unit in ("mass", "inertia") and p.name != "m_tool" for p in given_inputs):
+        assert all(given.given(p.name).all() for p in given_inputs if p.name == "tip_x")
 
 
 @pytest.mark.parametrize("name", ["speed_fluctuation", "dynamic_elasticity", "bearing_life", "slider_elasticity"])

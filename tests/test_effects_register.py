@@ -16,7 +16,8 @@ from sweep.effects.costs import designs
 from sweep.effects.placing import Placed
 from sweep.families import NAMES as FAMILIES
 from sweep.families import family
-from sweep.families.capabilities import JointRecords, LinkTree, ThreadPath
+from sweep.families.capabilities import JointRecords, ThreadPath
+from sweep.families.link_tree import LinkTree
 from sweep.study.units import factor, internal_unit
 
 ROOT = Path(__file__).resolve().parents[1]

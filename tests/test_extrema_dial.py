@@ -15,6 +15,7 @@ from kernels import status as st
 from studies.accuracy.regions import regions
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
+from sweep.families.chain import Chain
 from sweep.reductions.extrema import Request, true_extrema
 from tests.climbing import climbed, turning_points, values
 from tests.turn_designs import GUIDE, NEEDLE, RSSP, RSSR, crank_rockers, guided_four_bars, needle_drives, slider_cranks
@@ -56,7 +57,10 @@ def test_errors_fall_with_the_target_and_stay_below_it(case):
         relative = np.abs(found[requests[0]].value / exact[requests[0]] - 1.0)
         assert relative.max() <= target
         worst.append(np.quantile(relative, 0.99))
-    assert worst[0] > 10.0 * worst[1] > 100.0 * worst[2]  # at 1e-6 most are exact already
+    if isinstance(family, Chain):
+        assert max(worst) < 1e-12  # a fused chain's Newton steps reach its rounding at any target
+    else:
+        assert worst[0] > 10.0 * worst[1] > 100.0 * worst[2]  # at 1e-6 most are exact already
 
 
 @pytest.mark.parametrize("target", TARGETS)

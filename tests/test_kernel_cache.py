@@ -271,3 +271,30 @@ def test_where_there_are_no_locks_it_is_said_once_and_nothing_is_kept(tree: Path
     assert running.returncode == 0 and found.split()[0] == "2.0"
     assert len(said.splitlines()) == 1 and "has no locks" in said
     assert report(tree)[1] == "0"
+
+
+MADE = """
+from kernels._jit import generated, generated_inline
+
+
+def adder(step):
+    def shift(x):
+        return x + step
+
+    shifted = generated_inline(f"shift_{step}", shift)
+
+    def run(x):
+        return shifted(x)
+
+    return generated(f"run_{step}", run)
+"""
+
+
+def test_generated_kernels_are_kept_under_their_names_with_what_they_close_over(tree: Path) -> None:
+    (tree / "made.py").write_text(MADE)
+    program = (
+        "from kernels.made import adder; a, b = adder(1), adder(2); "
+        "print(a(1.0), b(1.0), len(a.stats.cache_hits), len(b.stats.cache_hits))"
+    )
+    assert report(tree, program) == ["2.0", "3.0", "0", "0"]
+    assert report(tree, program) == ["2.0", "3.0", "1", "1"]

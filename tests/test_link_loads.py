@@ -12,7 +12,7 @@ import pytest
 import sweep
 from kernels import status as st
 from sweep.families import family
-from sweep.families.capabilities import LinkTree
+from sweep.families.link_tree import LinkTree
 from tests.reference.linked import POSES, READERS, Z
 from tests.reference.momentum import body_momentum, derivative
 
@@ -74,7 +74,7 @@ WEIGHT = {f"gravity_{x}": GRAVITY[k] for k, x in enumerate("xyz")}
 def vectors(name, suffix=""):
     tree = family(name).find(LinkTree)
     found = [f"force_{j.name}{suffix}_{x}" for j in tree.joints for x in "xyz"]
-    return found + [f"moment_{j.name}{suffix}_{x}" for j in tree.joints if j.kind in ("shaft", "guide") for x in "xyz"]
+    return found + [f"moment_{j.name}{suffix}_{x}" for j in tree.joints if j.kind in ("shaft", "sleeve") for x in "xyz"]
 
 
 def vector(poses, name):
@@ -175,7 +175,7 @@ def rubbing(name, mu=0.1):
     table = {}
     for joint in family(name).find(LinkTree).joints:
         table |= {f"mu_{joint.name}": mu, f"radius_{joint.name}": 0.1}
-        if joint.kind in ("shaft", "guide"):
+        if joint.kind in ("shaft", "sleeve"):
             table |= {f"support_{joint.name}1": -0.4, f"support_{joint.name}2": 0.5}
         if joint.kind == "shaft":
             table[f"thrust_radius_{joint.name}"] = 0.15

@@ -13,8 +13,19 @@ from typing import NamedTuple
 
 LABEL = re.compile(r"^(.*?\S)\s{2,}\((\d+\s?[a-z]?\*?|[A-Z]\*)\)$|^(.*?\S)\s\((\d+\s?[a-z]?\*?)\)$")
 TOKEN = re.compile(
-    r"\s*(?:(?P<code>`[^`]*`|docs/[\w-]+\.md)|(?P<index>_\w+)|(?P<number>\d+(?:\.\d+)?(?:e-?\d+)?)|(?P<name>[A-Za-z](?:\w|(?<=\d),(?=\d)|(?<=[a-z]{3})'(?=s\b)|(?<=[a-z]{3})-(?=[a-z]{3}))*)"
-    r"|(?P<prime>'+)|(?P<op>\.\.\.|<=|>=|:=|\+-|[-+=<>.,;:|/^(){}\[\]*]))"
+    r"""\s*(?:
+      (?P<code>`[^`]*`|docs/[\w-]+\.md)
+    | (?P<index>_\w+)                            # of brackets: (rocker pin)_x
+    | (?P<number>\d+(?:\.\d+)?(?:e-?\d+)?)
+    | (?P<name>[A-Za-z](?:\w
+          | (?<=\d),(?=\d)                       # xi_1,2
+          | (?<=[a-z]{3})'(?=s\b)                # rack's
+          | (?<=[a-z]{3})-(?=[a-z]{3})           # mid-stroke
+      )*)
+    | (?P<prime>'+)
+    | (?P<op>\.\.\.|<=|>=|:=|\+-|[-+=<>.,;:|/^(){}\[\]*])
+    )""",
+    re.VERBOSE,
 )
 GREEK = {
     "alpha": "α", "beta": "β", "bet": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "eps": "ε", "theta": "θ",
@@ -44,7 +55,7 @@ class Token(NamedTuple):
 
 
 def typeset(markdown: str) -> str:
-    """A page with its indented blocks of equations set; all other blocks as they were."""
+    """Return a page with its indented blocks of equations set; all other blocks as they were."""
     lines, done, block, fenced = markdown.split("\n"), [], [], False
     for line in [*lines, ""]:
         fenced ^= line.startswith("```")
@@ -59,7 +70,7 @@ def typeset(markdown: str) -> str:
 
 
 def _block(block: list[str]) -> list[str]:
-    """The lines that stand for a block."""
+    """Return the lines that stand for a block."""
     as_it_was = [f"    {line}" for line in block]
     text = "\n".join(block)
     labelled = any(LABEL.match(line) for line in block)
@@ -75,7 +86,7 @@ def _block(block: list[str]) -> list[str]:
 
 
 def _row(line: str) -> str:
-    """A line: what it says, and its number."""
+    """Return a line: what it says, and its number."""
     found = LABEL.match(line)
     said, label = (line, "") if found is None else (found[1] or found[3], found[2] or found[4])
     indent = (len(said) - len(said.lstrip())) * 0.45
@@ -86,12 +97,12 @@ def _row(line: str) -> str:
 
 
 def _hyphened(text: str) -> bool:
-    """Whether a name with a hyphen is one word, not a difference."""
+    """Return whether a name with a hyphen is one word, not a difference."""
     return all(part not in GREEK and part not in FUNCTIONS and part.isalpha() for part in text.split("-"))
 
 
 def _pieces(text: str) -> list[str]:
-    """What stands apart by more than one blank, outside of brackets."""
+    """Return what stands apart by more than one blank, outside of brackets."""
     pieces = [""]
     for part in re.split(r"(\s{2,})", text):
         inside = sum(map(pieces[-1].count, "([{")) > sum(map(pieces[-1].count, ")]}"))
@@ -111,7 +122,7 @@ def _pieces(text: str) -> list[str]:
 
 
 def expression(text: str) -> str:
-    """MathML of a piece of a line."""
+    """Return the MathML of a piece of a line."""
     tokens, at = [], 0
     while at < len(text.rstrip()):
         found = TOKEN.match(text, at)
@@ -142,7 +153,7 @@ class _Reader:
         return self.tokens[k] if 0 <= k < len(self.tokens) else Token("end", "", False)
 
     def terms(self, end: str) -> str:
-        """All up to ``end``, which is taken too; up to the end of the line where it is empty."""
+        """Return all up to ``end``, which is taken too; up to the end of the line where it is empty."""
         made: list[str] = []
         product = False  # the last thing was a factor
         while True:
@@ -169,7 +180,7 @@ class _Reader:
                 product = True
 
     def sign(self, binary: bool) -> str:
-        """An operator; between words a comma, colon or full stop is punctuation."""
+        """Return an operator; between words a comma, colon or full stop is punctuation."""
         text = self.peek().text
         self.at += 1
         if text in ",;:":
@@ -178,12 +189,12 @@ class _Reader:
         return f"<mo{form}>{escape(SIGNS.get(text, text))}</mo>"
 
     def crosses(self) -> bool:
-        """Whether x stands between two factors: a vector product."""
+        """Return whether x stands between two factors: a vector product."""
         after = self.peek(1)
         return after.spaced and (after.text in ("(", "[", "|") or (after.kind == "name" and not self.word(1)))
 
     def factor(self) -> str:
-        """An atom with what stands after it; a fraction where it is divided by another."""
+        """Return an atom with what stands after it; a fraction where it is divided by another."""
         made, bare = self.powered()
         while self.peek().text == "/":
             self.at += 1
@@ -195,7 +206,7 @@ class _Reader:
         return made
 
     def powered(self) -> tuple[str, str]:
-        """An atom with primes and powers; without its brackets, where they alone enclose it."""
+        """Return an atom with primes and powers; without its brackets, where they alone enclose it."""
         made, bare = self.atom()
         if self.peek().kind == "index":
             made = f'<msub><mrow>{made}</mrow><mi mathvariant="normal">{self.peek().text[1:]}</mi></msub>'
@@ -217,7 +228,7 @@ class _Reader:
         return bare or made
 
     def atom(self) -> tuple[str, str]:
-        """A number, name, word, function with its argument, or brackets; second the inside of brackets."""
+        """Return a number, name, word, function with its argument, or brackets; second the inside of brackets."""
         token = self.peek()
         self.at += 1
         if token.kind == "number":
@@ -245,7 +256,7 @@ class _Reader:
         return self.applied(token.text) if token.text in FUNCTIONS else (name(token.text), "")
 
     def applied(self, function: str) -> tuple[str, str]:
-        """A function with its power and its argument: in brackets, or the next factor."""
+        """Return a function with its power and its argument: in brackets, or the next factor."""
         if function == "sqrt" and self.peek().text in ("(", "["):
             return f"<msqrt><mrow>{self.atom()[1]}</mrow></msqrt>", ""
         if function == "sum":  # of all that follows, its divisor too
@@ -262,7 +273,7 @@ class _Reader:
         return head, ""
 
     def word(self, ahead: int) -> bool:
-        """Whether a name is a word of a sentence."""
+        """Return whether a name is a word of a sentence."""
         token = self.peek(ahead)
         if token.kind != "name":
             return False
@@ -278,7 +289,7 @@ class _Reader:
         return token.kind == "name" and text.isalpha() and len(text) > 1 and text not in GREEK and text not in FUNCTIONS
 
     def words(self) -> str:
-        """Words that follow each other."""
+        """Return words that follow each other."""
         found = []
         while self.word(0) and (not found or (self.peek().spaced and self.peek(1).text not in ("/", "^"))):
             found.append(self.peek().text)
@@ -287,7 +298,7 @@ class _Reader:
 
 
 def name(text: str) -> str:
-    """A symbol with its index: psi_ext, phi0, G_phipsi, X1."""
+    """Return a symbol with its index: psi_ext, phi0, G_phipsi, X1."""
     head, _, index = text.partition("_")
     digits = re.fullmatch(r"([A-Za-z]+?)([\d,]+)", head)
     if digits:
@@ -302,7 +313,7 @@ def name(text: str) -> str:
 
 
 def _greeks(text: str) -> list[str]:
-    """Greek letters one after the other, as phipsi; none where it is something else."""
+    """Return greek letters one after the other, as phipsi; none where it is something else."""
     found = []
     while text:
         first = next((key for key in sorted(GREEK, key=len, reverse=True) if text.startswith(key)), None)

@@ -40,7 +40,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
-    """Pages named in the text, docs/x.md, become links, equations are set; what stands in code stays as it is."""
+    """Turn pages named in the text, docs/x.md, into links and set equations; what stands in code stays as it is."""
     up = "../" * page.file.src_uri.count("/")
     own = page.file.src_uri
 
@@ -53,7 +53,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
 
 
 def titles(files: Any) -> dict[str, str]:
-    """The first heading of every page by its name."""
+    """Return the first heading of every page by its name."""
     if not _TITLES:
         for path in (ROOT / "docs").glob("*.md"):
             line = path.read_text(encoding="utf-8").split("\n", 1)[0]
@@ -65,7 +65,7 @@ _TITLES: dict[str, str] = {}
 
 
 def python_page() -> str:
-    """Every public name, from its docstring."""
+    """Return every public name, from its docstring."""
     import sweep
 
     groups = (
@@ -101,7 +101,7 @@ def python_page() -> str:
 
 
 def families_page() -> str:
-    """Parameters and outputs of every family, from the register."""
+    """Return parameters and outputs of every family, from the register."""
     from sweep.cli.listing import capability_words, main_outputs, over
     from sweep.evaluation.summaries import output
     from sweep.families import NAMES, family
@@ -136,12 +136,12 @@ def families_page() -> str:
 
 
 def cell(text: str) -> str:
-    """Text that may stand in a table."""
+    """Return the text that may stand in a table."""
     return text.replace("|", "\\|").replace("\n", " ")
 
 
 def notebook_page(path: Path) -> tuple[str, dict[str, bytes]]:
-    """A notebook as Markdown: text, code, what the code printed, pictures as files of their own."""
+    """Return a notebook as Markdown: text, code, what the code printed, pictures as files of their own."""
     pictures: dict[str, bytes] = {}
     parts: list[str] = []
     for number, found in enumerate(json.loads(path.read_text(encoding="utf-8"))["cells"]):

@@ -20,12 +20,12 @@ SECONDS = 120  # for one cell; kernels may have to be compiled first
 
 
 def notebooks() -> list[Path]:
-    """All of them."""
+    """Return all of them."""
     return sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 
 
 def executed(path: Path) -> Any:
-    """The notebook with fresh outputs, run in an empty folder against the sources of this project."""
+    """Return the notebook with fresh outputs, run in an empty folder against the sources of this project."""
     book = nbformat.read(path, as_version=4)
     os.environ["PYTHONPATH"] = str(ROOT)
     with tempfile.TemporaryDirectory() as place:

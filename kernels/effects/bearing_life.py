@@ -28,7 +28,7 @@ def bearing_loads(
     equivalent1: Array | None,
     equivalent2: Array | None,
 ) -> None:
-    """Loads of two bearings that carry a force and a moment of the frame on the rocker.
+    """Compute loads of two bearings that carry a force and a moment of the frame on the rocker.
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ class Criteria(NamedTuple):
 
 @inline
 def sliding_data(data: Array, i: int) -> Sliding:
-    """Row of the sliding-bearing matrix."""
+    """Return the row of the sliding-bearing matrix."""
     return Sliding(
         data[i, 0], data[i, 1], data[i, 2], data[i, 3], data[i, 4], data[i, 5], data[i, 6], data[i, 7], data[i, 8],
         data[i, 9],
@@ -77,20 +77,22 @@ def sliding_data(data: Array, i: int) -> Sliding:
 
 @inline
 def in_plane(t_tau: float, t_rho: float, t_k: float) -> tuple[float, float, float]:
-    """cos(theta1), sin(theta1) and sin(theta1) tan(theta2) of a coupler direction."""
+    """Return cos(theta1), sin(theta1) and sin(theta1) tan(theta2) of a coupler direction."""
     size = math.hypot(t_tau, t_rho)
     return abs(t_tau) / size, t_rho / size, t_k / size
 
 
 @inline
 def support_arms(c: float, z1: float, z2: float, cos1: float, sin1: float, axial: float) -> tuple[float, float]:
-    """Pi_1, Pi_2: support force times the distance of the supports, per unit of P; the axial force turns about c."""
+    """Return Pi_1, Pi_2: support force times the distance of the supports, per unit of P;
+    the axial force turns about c.
+    """
     return math.hypot(z2 * cos1, z2 * sin1 + c * axial), math.hypot(z1 * cos1, z1 * sin1 + c * axial)
 
 
 @inline
 def sliding_criteria(s: Sliding, moment: float, cos1: float, sin1: float, axial: float) -> Criteria:
-    """Equations (15)-(17): support forces and mean pressures while the rocker overcomes ``moment``; arm <= 0 locks."""
+    """Evaluate (15)-(17): support forces and mean pressures while the rocker overcomes ``moment``; arm <= 0 locks."""
     pi1, pi2 = support_arms(s.c, s.z1, s.z2, cos1, sin1, axial)
     span = abs(s.z2 - s.z1)
     arm = s.c * cos1 - s.mu * (0.5 * s.kj * s.d * (pi1 + pi2) / span + s.rt * abs(axial))
@@ -115,7 +117,7 @@ def sliding_bearings(
     pressure2: Array | None,
     pressure3: Array | None,
 ) -> None:
-    """Support forces and mean pressures of two journals and a collar, massless estimate.
+    """Compute support forces and mean pressures of two journals and a collar, massless estimate.
 
     Parameters
     ----------
@@ -161,7 +163,7 @@ def rolling_bearings(
     life1: Array | None,
     life2: Array | None,
 ) -> None:
-    """Equivalent loads and L10 lives [10^6 turns] of two rolling bearings, frictionless support forces.
+    """Compute equivalent loads and L10 lives [10^6 turns] of two rolling bearings, frictionless support forces.
 
     Parameters
     ----------
@@ -196,7 +198,9 @@ def rolling_bearings(
 
 @inline
 def equivalent_load(bearings: Array, i: int, radial: float, thrust: float) -> float:
-    """Dynamic equivalent load K_b (V R) or K_b (X V R + Y F_a) of a rolling bearing, columns of :class:`Rolling`."""
+    """Return the dynamic equivalent load K_b (V R) or K_b (X V R + Y F_a) of a rolling bearing,
+    columns of :class:`Rolling`.
+    """
     v, x, y, e_limit, shock = bearings[i, 3], bearings[i, 4], bearings[i, 5], bearings[i, 6], bearings[i, 9]
     load: float = v * radial if thrust <= e_limit * v * radial else x * v * radial + y * thrust
     return float(shock * load)

@@ -21,7 +21,7 @@ Status = NDArray[np.uint8]
 def capstan(
     before: Array, wrap: Array, friction: Array, status: Status, tension: Array | None, force: Array | None
 ) -> None:
-    """Tension behind the eyelet and magnitude of the force on it.
+    """Compute the tension behind the eyelet and magnitude of the force on it.
 
     Parameters
     ----------

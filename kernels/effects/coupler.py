@@ -46,7 +46,9 @@ class Coupler(NamedTuple):
 
 @inline
 def orientation(j: Joints, construction: float) -> Coupler:
-    """Orientation and rates of the coupler for one pose; primes are derivatives with respect to the crank angle."""
+    """Return the orientation and rates of the coupler for one pose;
+    primes are derivatives with respect to the crank angle.
+    """
     v_b, a_b = scale(j.a, j.tau_b), scale(-j.a, j.rho_b)
     v_c = scale(j.c * j.dpsi, j.tau)
     a_c = mix(j.c * j.d2psi, j.tau, -j.turns * j.c * j.dpsi * j.dpsi, j.rho)
@@ -77,7 +79,7 @@ def orientation(j: Joints, construction: float) -> Coupler:
 
 @inline
 def euler_angles(j: Joints, body: Coupler, construction: float) -> tuple[float, float]:
-    """Euler angles of the coupler but for its precession, in all quadrants.
+    """Return Euler angles of the coupler but for its precession, in all quadrants.
 
     Finger on C: Rz(psi) Rx(Theta) Rz(Phi) turns x to s and z to n.  Finger on B: the precession is 90 deg - alpha about
     x, which brings z to u; Theta turns about u, Phi about the new x, and y becomes s.
@@ -105,7 +107,7 @@ def coupler_point(
     eps: Array | None,
     euler: Array | None,
 ) -> None:
-    """Motion of a point of the coupler and the coupler's orientation and rates.
+    """Compute the motion of a point of the coupler and the coupler's orientation and rates.
 
     Parameters
     ----------

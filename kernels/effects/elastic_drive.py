@@ -38,7 +38,7 @@ def _kept(cosines: Array, sines: Array) -> int:
 
 @inline
 def _harmonic(cosines: Array, sines: Array, step: int) -> complex:
-    """Complex coefficient of a series; harmonics that it does not have are zero."""
+    """Return the complex coefficient of a series; harmonics that it does not have are zero."""
     k = abs(step)
     if k >= cosines.size:
         return complex(0.0, 0.0)
@@ -97,7 +97,7 @@ def driven_solution(bc: Array, bs: Array, cc: Array, cs: Array, c: Array, s: Arr
 
 @kernel
 def driven_multiplier(bc: Array, bs: Array, cc: Array, cs: Array) -> float:
-    """Largest modulus of the multipliers of eta'' + b eta' + c eta = 0 by Magnus steps of fourth order."""
+    """Return the largest modulus of the multipliers of eta'' + b eta' + c eta = 0 by Magnus steps of fourth order."""
     largest = 0.0
     for k in range(cc.size):
         largest += math.hypot(cc[k], cs[k])
@@ -143,7 +143,8 @@ def driven_steady_state(
     p: Array, b: Array, c: Array, r: Array, radius: Array, reach: Array, phi: Array, last: bool, status: Status,
     eta: Array, elongation: Array, floquet: Array,
 ) -> None:  # fmt: skip
-    """Periodic steady state of the lag and the largest Floquet multiplier, from the coefficients on a grid.
+    """Compute the periodic steady state of the lag and the largest Floquet multiplier,
+    from the coefficients on a grid.
 
     Parameters
     ----------

@@ -46,7 +46,8 @@ def quasi_static(
     frequency_ratio: Array | None,
     varying: Array | None = None,
 ) -> None:
-    """Lag of the follower under inertia and load, its displacement at the joint, and the frequency ratio.
+    """Compute the lag of the follower under inertia and load, its displacement at the joint,
+    and the frequency ratio.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ def steady_state(
     p: Array, d2psi: Array, c: Array, reach: Array, data: Array, phi: Array, last: bool, status: Status, eta: Array,
     elongation: Array, floquet: Array, varying: Array | None = None,
 ) -> None:  # fmt: skip
-    """Periodic steady state of the lag and the largest Floquet multiplier.
+    """Compute the periodic steady state of the lag and the largest Floquet multiplier.
 
     Parameters
     ----------
@@ -188,7 +189,8 @@ def periodic_solution(qc: Array, qs: Array, stiffness: float, damping: float, c:
 
 @kernel
 def largest_multiplier(qc: Array, qs: Array, stiffness: float, damping: float) -> float:
-    """Largest modulus of the multipliers of eta'' + damping q eta' + (stiffness q + damping q'/2) eta = 0.
+    """Return the largest modulus of the multipliers
+    of eta'' + damping q eta' + (stiffness q + damping q'/2) eta = 0.
 
     Fourth-order Magnus steps: exact for constant q, so stiff couplers need no smaller step than the phase asks for.
     """

@@ -53,7 +53,9 @@ class State(NamedTuple):
 
 @inline
 def _between(p0: float, p1: float, m0: float, m1: float, c0: float, c1: float, s: float) -> tuple[float, float, float]:
-    """Quintic with given ends, slopes and curvatures (by s) at the share s, and its first two derivatives; (4)."""
+    """Return the quintic with given ends, slopes and curvatures (by s) at the share s,
+    and its first two derivatives; (4).
+    """
     d, e, f = p1 - p0 - m0 - 0.5 * c0, m1 - m0 - c0, c1 - c0
     a3, a4, a5 = 10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f
     value = p0 + s * (m0 + s * (0.5 * c0 + s * (a3 + s * (a4 + s * a5))))
@@ -63,7 +65,7 @@ def _between(p0: float, p1: float, m0: float, m1: float, c0: float, c1: float, s
 
 @inline
 def rack_height(path: Array, j: int, s: float) -> tuple[float, float, float]:
-    """Height of the rack above the plate in cell j at the share s, with derivatives by phi."""
+    """Return the height of the rack above the plate in cell j at the share s, with derivatives by phi."""
     n = path.shape[1]
     h, j, k = TWO_PI / n, j % n, (j + 1) % n
     y, y1, y2 = _between(
@@ -85,7 +87,7 @@ def _along(path: Array, j: int, s: float) -> float:
 
 @inline
 def flown(foot: Foot, state: State, phi: float) -> tuple[float, float]:
-    """Height and speed of the flying foot at a crank angle; (6)."""
+    """Return the height and speed of the flying foot at a crank angle; (6)."""
     t = phi - state.since
     half = 0.5 * foot.kappa * t
     sinc = math.sin(half) / half if half != 0.0 else 1.0
@@ -98,13 +100,15 @@ def flown(foot: Foot, state: State, phi: float) -> tuple[float, float]:
 
 @inline
 def _force(foot: Foot, y: float, bend: float) -> float:
-    """Contact force of a foot that follows the rack, divided by m omega^2; (5)."""
+    """Return the contact force of a foot that follows the rack, divided by m omega^2; (5)."""
     return foot.g0 + foot.kappa * foot.kappa * y + bend
 
 
 @inline
 def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int) -> float:
-    """What changes sign at an event: height of the rack (0), contact force (1), gap below the flying foot (2)."""
+    """Return what changes sign at an event:
+    height of the rack (0), contact force (1), gap below the flying foot (2).
+    """
     y, _, bend = rack_height(path, j, s)
     if which == 0:
         return y
@@ -115,7 +119,9 @@ def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int
 
 @kernel
 def _root(path: Array, foot: Foot, state: State, j: int, low: float, high: float, which: int) -> float:
-    """Share of the cell at which a measure passes zero: false position, the end that stays halved (Illinois)."""
+    """Return the share of the cell at which a measure passes zero:
+    false position, the end that stays halved (Illinois).
+    """
     f_low, f_high = _measure(path, foot, state, j, low, which), _measure(path, foot, state, j, high, which)
     for _ in range(_MOST_STEPS):
         if f_low == f_high:
@@ -139,7 +145,7 @@ def _root(path: Array, foot: Foot, state: State, j: int, low: float, high: float
 
 @kernel
 def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[State, float]:
-    """State after the foot meets rack or plate with a speed, and the relative speed; (7)-(9)."""
+    """Return the state after the foot meets rack or plate with a speed, and the relative speed; (7)-(9)."""
     y, y1, bend = rack_height(path, j, s)
     phi = (j + s) * (TWO_PI / path.shape[1])
     on_rack = y > 0.0 or (y >= -1e-14 * abs(y1) and y1 > 0.0)
@@ -159,7 +165,9 @@ def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[St
 
 @kernel
 def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tuple[float, int]:
-    """Share of the cell at which the state ends, and by which measure; 2 and -1 if it lasts beyond the cell."""
+    """Return the share of the cell at which the state ends, and by which measure;
+    2 and -1 if it lasts beyond the cell.
+    """
     if state.mode == PLATE:
         if _measure(path, foot, state, j, 1.0, 0) > 0.0:
             return _root(path, foot, state, j, s, 1.0, 0), 0
@@ -197,7 +205,7 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
 
 @inline
 def _above(path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> tuple[float, float]:
-    """Crank angle and way along the feed between two shares of a cell while the rack is above the plate."""
+    """Return the crank angle and way along the feed between two shares of a cell while the rack is above the plate."""
     one, two = rack_height(path, j, low)[0], rack_height(path, j, high)[0]
     if one <= 0.0 and two <= 0.0:
         return 0.0, 0.0

@@ -44,7 +44,7 @@ class Piece(NamedTuple):
 
 @inline
 def _quintic(path: Array, row: int, j: int, at: float, size: float, out: Array) -> None:
-    """Coefficients (6,) of the path in cell j by x, with the cell's share = at + size x; (4)."""
+    """Compute coefficients (6,) of the path in cell j by x, with the cell's share = at + size x; (4)."""
     n = path.shape[1]
     h, j, k = TWO_PI / n, j % n, (j + 1) % n
     p0, m0, c0 = path[row, j], path[row + 1, j] * h, path[row + 2, j] * h * h
@@ -64,7 +64,7 @@ def _quintic(path: Array, row: int, j: int, at: float, size: float, out: Array) 
 
 @inline
 def _value(series: Array, count: int, x: float) -> tuple[float, float]:
-    """A power series and its derivative at x."""
+    """Return a power series and its derivative at x."""
     y, slope = series[count - 1], 0.0
     for i in range(count - 2, -1, -1):
         slope = slope * x + y
@@ -74,7 +74,7 @@ def _value(series: Array, count: int, x: float) -> tuple[float, float]:
 
 @inline
 def _motion(foot: Foot, fabric: Fabric, y: float, v: float, angle: float, ground: Array, series: Array) -> None:
-    """Power series (TERMS,) of a foot that presses on the fabric, by the share of the piece; (13)."""
+    """Compute power series (TERMS,) of a foot that presses on the fabric, by the share of the piece; (13)."""
     drag, pull = fabric.damping * angle, (foot.kappa * foot.kappa + fabric.stiffness) * angle * angle
     series[0], series[1] = y, v * angle
     for i in range(TERMS - 2):
@@ -88,7 +88,7 @@ def _motion(foot: Foot, fabric: Fabric, y: float, v: float, angle: float, ground
 
 @inline
 def _press(fabric: Fabric, ground: Array, y: float, v: float, x: float, angle: float) -> tuple[float, float]:
-    """Force of the fabric, and how deep the foot stands in it, for a foot at height y with speed v; (14)."""
+    """Return the force of the fabric, and how deep the foot stands in it, for a foot at height y with speed v; (14)."""
     g, slope = _value(ground, 6, x)
     return fabric.stiffness * (g - y) + fabric.damping * (slope / angle - v), g - y
 
@@ -97,7 +97,7 @@ def _press(fabric: Fabric, ground: Array, y: float, v: float, x: float, angle: f
 def _look(
     foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array, x: float
 ) -> tuple[float, float, float]:
-    """What is negative after an event, at the share x of the piece; height and speed of the foot there."""
+    """Return what is negative after an event, at the share x of the piece; height and speed of the foot there."""
     if state.mode == FLIGHT:
         y, v = flown(foot, state, piece.begin + x * piece.angle)
         force, depth = _press(fabric, ground, y, v, x, piece.angle)
@@ -109,7 +109,7 @@ def _look(
 
 @kernel
 def _event(foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array) -> float:
-    """Share of the piece at which the state ends; 2 if it lasts beyond."""
+    """Return the share of the piece at which the state ends; 2 if it lasts beyond."""
     low = 0.0
     for k in range(1, 5):
         high = 0.25 * k

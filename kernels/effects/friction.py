@@ -94,7 +94,9 @@ def _of_moving(f: Friction, load: Loads) -> Friction:
 
 @inline
 def supports(force: Vector, moment: Vector, axis: Vector, z1: float, z2: float) -> tuple[float, float, float]:
-    """Radial loads of the two supports of a shaft and the axial force, from force and moment about the origin of z."""
+    """Return radial loads of the two supports of a shaft and the axial force,
+    from force and moment about the origin of z.
+    """
     axial = dot(force, axis)
     radial = mix(1.0, force, -axial, axis)
     second = scale(1.0 / (z2 - z1), mix(1.0, cross(moment, axis), -z1, radial))
@@ -129,7 +131,7 @@ def friction_loads(
     wrench: Array | None = None,
     on_follower: Array | None = None,
 ) -> None:
-    """Joint reactions and driving torque with friction.
+    """Compute joint reactions and driving torque with friction.
 
     Parameters
     ----------
@@ -274,7 +276,7 @@ def _total(answers: Array, x: float, y: float, z: float, total: Array) -> None:
 
 @inline
 def _guidance(total: Array, axis: Vector, f: Friction) -> tuple[float, float, float]:
-    """Loads of the two supports of the follower and the force along its axis."""
+    """Return loads of the two supports of the follower and the force along its axis."""
     return supports((total[9], total[10], total[11]), (total[15], total[16], total[17]), axis, f.z_d1, f.z_d2)
 
 
@@ -320,7 +322,7 @@ def _leap(along: float, square: float) -> float:
 
 @inline
 def _largest_change(x: float, dx: float, y: float, dy: float, z: float, dz: float) -> float:
-    """Largest change of a couple in proportion to that couple."""
+    """Return the largest change of a couple in proportion to that couple."""
     worst = 0.0
     for old, change in ((x, dx), (y, dy), (z, dz)):
         size = max(abs(old), abs(old + change))

@@ -87,7 +87,7 @@ def _body(data: Array, x: Vector, y: Vector, z: Vector) -> Body:
 
 @inline
 def _inertia_times(body: Body, a: Vector) -> Vector:
-    """Inertia tensor times a vector given in fixed axes."""
+    """Return the inertia tensor times a vector given in fixed axes."""
     p, q, r = dot(body.first, a), dot(body.second, a), dot(body.third, a)
     xx, xy, xz, yy, yz, zz = body.inertia
     local = (xx * p + xy * q + xz * r, xy * p + yy * q + yz * r, xz * p + yz * q + zz * r)
@@ -96,13 +96,13 @@ def _inertia_times(body: Body, a: Vector) -> Vector:
 
 @inline
 def _torque(body: Body, omega: Vector, eps: Vector) -> Vector:
-    """Rate of the moment of momentum about the centre of mass."""
+    """Return the rate of the moment of momentum about the centre of mass."""
     return add(_inertia_times(body, eps), cross(omega, _inertia_times(body, omega)))
 
 
 @inline
 def inertia_loads(j: Joints, coupler: Coupler, bodies: Array, drive: Array) -> Loads:
-    """Inertia forces and torques of the three bodies, reduced inertia and its derivative, for one pose."""
+    """Return the inertia forces and torques of the three bodies, reduced inertia and its derivative, for one pose."""
     gravity = (bodies[3 * BODY], bodies[3 * BODY + 1], bodies[3 * BODY + 2])
     torque, speed, change = drive[LOAD], drive[SPEED], drive[CHANGE]
     crank = _body(bodies[:BODY], j.rho_b, j.tau_b, j.u)
@@ -137,7 +137,7 @@ def inertia_loads(j: Joints, coupler: Coupler, bodies: Array, drive: Array) -> L
 
 @inline
 def loaded(on: Loads, wrench: Array) -> Loads:
-    """The loads with a force and a moment about B, (6,), that act on the coupler from outside.
+    """Return the loads with a force and a moment about B, (6,), that act on the coupler from outside.
 
     F2 - F takes the place of F2 everywhere; T2 is moved by what that changes in the moment about B.
     """
@@ -152,7 +152,7 @@ def loaded(on: Loads, wrench: Array) -> Loads:
 
 @inline
 def loaded_follower(on: Loads, wrench: Array) -> Loads:
-    """The loads with a force and a moment about D, (6,), that act on the follower from outside."""
+    """Return the loads with a force and a moment about D, (6,), that act on the follower from outside."""
     force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
     return Loads(
         on.f1, on.t1, on.d1, on.f2, on.t2, on.d2,
@@ -163,7 +163,7 @@ def loaded_follower(on: Loads, wrench: Array) -> Loads:
 
 @inline
 def _about_axis(body: Body, axis: Vector) -> float:
-    """Moment of inertia about an axis through the frame origin."""
+    """Return the moment of inertia about an axis through the frame origin."""
     across = cross(axis, body.centre)
     return dot(axis, _inertia_times(body, axis)) + body.mass * dot(across, across)
 
@@ -172,7 +172,8 @@ def _about_axis(body: Body, axis: Vector) -> float:
 def solve(
     j: Joints, coupler: Coupler, on: Loads, construction: float, e_b: Vector, e_c: Vector, t_d: float, t_a: float
 ) -> Reactions:
-    """Reactions of one pose; e_b, e_c friction couples on the coupler, t_d, t_a friction torques on the shafts.
+    """Return reactions of one pose; e_b, e_c friction couples on the coupler, t_d,
+    t_a friction torques on the shafts.
 
     On a slider t_d is the friction force of its way along tau.
     """
@@ -213,7 +214,7 @@ def kinetostatics(
     wrench: Array | None = None,
     on_follower: Array | None = None,
 ) -> None:
-    """Frictionless joint reactions, driving torque and reduced inertia.
+    """Compute the frictionless joint reactions, driving torque and reduced inertia.
 
     Parameters
     ----------
@@ -259,7 +260,7 @@ def kinetostatics(
 
 @inline
 def pose_status(code: int, j: Joints, coupler: Coupler) -> int:
-    """Status of a pose for forces: its own, or the reason why its reactions have no digits."""
+    """Return the status of a pose for forces: its own, or the reason why its reactions have no digits."""
     if code != st.OK:
         return code
     if not abs(j.t_tau) >= LEAST_COSINE:

@@ -46,7 +46,7 @@ MU, RADIUS, THRUST, FIRST, SECOND, PER_FRICTION = 0, 1, 2, 3, 4, 5
 
 @inline
 def _rates(links: Links, i: int, k: int, body: int) -> Moving:
-    """Rates of a body; the frame stands still."""
+    """Return rates of a body; the frame stands still."""
     none = (0.0, 0.0, 0.0)
     if body < 0:
         return Moving(none, none, none, none, none)
@@ -55,7 +55,9 @@ def _rates(links: Links, i: int, k: int, body: int) -> Moving:
 
 @inline
 def _moved(a: Vector, b: Vector) -> Vector:
-    """Difference of two rates, zero where it is rounding: then nothing moves, and friction has no direction."""
+    """Return the difference of two rates, zero where it is rounding:
+    then nothing moves, and friction has no direction.
+    """
     found = sub(a, b)
     return found if norm(found) > STILL * (norm(a) + norm(b)) else (0.0, 0.0, 0.0)
 
@@ -70,7 +72,9 @@ def _unit(a: Vector) -> Vector:
 def direction(
     links: Links, i: int, k: int, joint: Index, place: Vector, data: Array, speed: float
 ) -> tuple[Vector, Vector, float]:
-    """Friction force and couple of a joint per unit of its load, (7), (8), and their power per unit crank speed."""
+    """Return the friction force and couple of a joint per unit of its load, (7), (8),
+    and their power per unit crank speed.
+    """
     on, by = joint_ends(links, i, joint)
     one, two = _rates(links, i, k, on), _rates(links, i, k, by)
     sense = math.copysign(1.0, speed) if speed != 0.0 else 0.0
@@ -127,7 +131,7 @@ def link_friction(
     lost: Array | None,
     on_supports: Array | None,
 ) -> None:
-    """Joint reactions and driving torque with friction; what is not named here as in :mod:`.link_loads`.
+    """Compute joint reactions and driving torque with friction; what is not named here as in :mod:`.link_loads`.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ SHAFT, HINGED_BALL, GUIDE, BALL, CONTACT = 0, 1, 2, 3, 4
 
 @inline
 def inertia_times(body: Array, tensor: Tensor, a: Vector) -> Vector:
-    """Inertia tensor, given in the body's axes, times a vector in fixed axes."""
+    """Return the inertia tensor, given in the body's axes, times a vector in fixed axes."""
     x, y, z = vector(body[15:]), vector(body[18:]), vector(body[21:])
     p, q, r = dot(x, a), dot(y, a), dot(z, a)
     xx, xy, xz, yy, yz, zz = tensor
@@ -107,7 +107,9 @@ def spread(links: Links, i: int, k: int, room: Array) -> None:
 
 @inline
 def on_freedom(kind: int, axis: Vector, joint: Vector, wrench: Array) -> float:
-    """Moment of a wrench about an axis through the joint, or its force along it where the freedom is a slide."""
+    """Return the moment of a wrench about an axis through the joint,
+    or its force along it where the freedom is a slide.
+    """
     force = vector(wrench)
     if kind == SLIDE:
         return dot(axis, force)
@@ -204,7 +206,9 @@ def reactions(links: Links, i: int, k: int, wrenches: Array, room: Array, x: Arr
 
 @inline
 def at_joint(links: Links, i: int, k: int, joint: Index, found: Array, x: Array) -> tuple[Vector, Vector, Vector]:
-    """Force and moment of a joint, and its place: of a body's joint with its parent, or of lines that close a loop."""
+    """Return the force and moment of a joint, and its place:
+    of a body's joint with its parent, or of lines that close a loop.
+    """
     if joint[KIND] <= GUIDE:
         body = joint[BODY_OF]
         return vector(found[body]), vector(found[body, 3:]), vector(links.bodies[i, k, body, 24:])
@@ -216,7 +220,7 @@ def at_joint(links: Links, i: int, k: int, joint: Index, found: Array, x: Array)
 
 @inline
 def joint_ends(links: Links, i: int, joint: Index) -> tuple[int, int]:
-    """Numbers of the body that a joint's force acts on and of the one that it acts on reversed."""
+    """Return numbers of the body that a joint's force acts on and of the one that it acts on reversed."""
     if joint[KIND] <= GUIDE:
         return joint[BODY_OF], links.parents[joint[BODY_OF]]
     return links.ends[i, joint[LINE], 0], links.ends[i, joint[LINE], 1]
@@ -238,7 +242,7 @@ def link_loads(
     inertia: Array | None,
     on_tool: Array | None,
 ) -> None:
-    """Frictionless joint reactions, driving torque and reduced inertia of a tree of bodies with loops.
+    """Compute the frictionless joint reactions, driving torque and reduced inertia of a tree of bodies with loops.
 
     Parameters
     ----------

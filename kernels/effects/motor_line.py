@@ -41,7 +41,8 @@ def steady_energy(
     still: float,
     energy: Array,
 ) -> bool:
-    """Kinetic energy in the steady state; False where the machine stalls or the motor is too stiff for the steps.
+    """Return the kinetic energy in the steady state;
+    False where the machine stalls or the motor is too stiff for the steps.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def _shoot(
     between: int,
     energy: Array,
 ) -> tuple[float, float]:
-    """T(0) and M of the periodic solution with this mean speed; nan where Newton finds none."""
+    """Return T(0) and M of the periodic solution with this mean speed; nan where Newton's method finds none."""
     wanted = 2.0 * math.pi / mean_speed
     for _ in range(NEWTON):
         end, by_start, by_torque, time, time_start, time_torque = _march(
@@ -115,7 +116,9 @@ def _march(
     between: int,
     energy: Array,
 ) -> tuple[float, float, float, float, float, float]:
-    """One turn: T at its end, the time it takes, and the derivatives of both by T(0) and M; writes T on the grid."""
+    """Return one turn: T at its end, the time it takes, and the derivatives of both by T(0) and M;
+    writes T on the grid.
+    """
     points = inertia.size
     step = 4.0 * math.pi / points
     t, by_start, by_torque, time, time_start, time_torque = start, 1.0, 0.0, 0.0, 0.0, 0.0
@@ -156,7 +159,9 @@ def _rates(
     by_start: float,
     by_torque: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """Derivatives by phi of T, of its derivatives by T(0) and M, of the time, and of the time's two derivatives."""
+    """Return derivatives by phi of T, of its derivatives by T(0) and M, of the time,
+    and of the time's two derivatives.
+    """
     if not t > 0.0:
         return math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
     omega = math.sqrt(2.0 * t / inertia)

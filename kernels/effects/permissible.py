@@ -31,7 +31,7 @@ STEPS = 100
 def sliding_utilisation(
     bearings: Array, limits: Array, i: int, moment: float, cos1: float, sin1: float, axial: float
 ) -> float:
-    """Largest mean pressure of journals and collar over its permissible value; inf where friction locks."""
+    """Return the largest mean pressure of journals and collar over its permissible value; inf where friction locks."""
     r = sliding_criteria(sliding_data(bearings, i), moment, cos1, sin1, axial)
     worst = max(r.p1 / limits[i, 0], max(r.p2 / limits[i, 1], r.p3 / limits[i, 2]))
     return worst if r.arm > 0.0 else math.inf
@@ -41,7 +41,7 @@ def sliding_utilisation(
 def rolling_utilisation(
     bearings: Array, limits: Array, i: int, moment: float, cos1: float, sin1: float, axial: float
 ) -> float:
-    """Larger equivalent load of the two bearings over the permissible one; inf where no torque passes."""
+    """Return the larger equivalent load of the two bearings over the permissible one; inf where no torque passes."""
     pi1, pi2 = support_arms(bearings[i, 0], bearings[i, 1], bearings[i, 2], cos1, sin1, axial)
     force = moment / (bearings[i, 0] * cos1)
     per_span = force / abs(bearings[i, 2] - bearings[i, 1])
@@ -53,7 +53,7 @@ def rolling_utilisation(
 
 @inline
 def _spare(utilisation: Any, bearings: Array, limits: Array, i: int, moment: float, half: float, tan2: float) -> float:
-    """1/utilisation - 1 at theta1 = 2 arctan(half): near to linear, finite where friction locks."""
+    """Return 1/utilisation - 1 at theta1 = 2 arctan(half): near to linear, finite where friction locks."""
     per = 1.0 / (1.0 + half * half)
     sin1 = 2.0 * half * per
     used: float = utilisation(bearings, limits, i, moment, (1.0 - half) * (1.0 + half) * per, sin1, sin1 * tan2)
@@ -64,7 +64,7 @@ def _spare(utilisation: Any, bearings: Array, limits: Array, i: int, moment: flo
 def _first_crossing(
     utilisation: Any, looks: int, bearings: Array, limits: Array, i: int, moment: float, tan2: float
 ) -> float:
-    """Largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none."""
+    """Return the largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none."""
     # In half = tan(theta1/2) there is no sine to call; what is spare falls through zero at the crossing.
     low, high, at_high = 0.0, 1.0, -1.0
     at_low = _spare(utilisation, bearings, limits, i, moment, 0.0, tan2)
@@ -137,7 +137,7 @@ def sliding_limits(
     permissible: Array | None,
     reserve: Array | None,
 ) -> None:
-    """Utilisation of sliding bearings and the radial pressure angle they permit.
+    """Compute the utilisation of sliding bearings and the radial pressure angle they permit.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def rolling_limits(
     permissible: Array | None,
     reserve: Array | None,
 ) -> None:
-    """Utilisation of rolling bearings and the radial pressure angle they permit.
+    """Compute the utilisation of rolling bearings and the radial pressure angle they permit.
 
     As :func:`sliding_limits`, with the (n, 11) columns of :class:`kernels.effects.bearings.Rolling` and the permissible
     equivalent load as the one column of ``limits``.

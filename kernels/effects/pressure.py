@@ -32,7 +32,7 @@ def directions(
     theta2: Array | None,
     theta3: Array | None,
 ) -> None:
-    """Components of the coupler direction and the radial, axial and crank-side pressure angles.
+    """Compute components of the coupler direction and the radial, axial and crank-side pressure angles.
 
     Parameters
     ----------

@@ -58,7 +58,9 @@ def extrema_expected(a1: float, b1: float, a2: float, b2: float) -> float:
 def zeros(
     a1: float, b1: float, a2: float, b2: float, cut: float, quartic: Array, scratch: Array, found: Array, phi: Array
 ) -> int:
-    """Zeros of a1 cos + b1 sin + a2 cos 2 + b2 sin 2 in one turn from ``cut``, ascending; their number, or -1."""
+    """Return zeros of a1 cos + b1 sin + a2 cos 2 + b2 sin 2 in one turn from ``cut``, ascending;
+    their number, or -1.
+    """
     count = 0
     for quarter in range(4):
         start = cut + 0.5 * math.pi * quarter
@@ -89,7 +91,7 @@ def zeros(
 def pressure_extrema(
     ellipse: Array, status: Status, count: Array, phi: Array, theta: Array, highest: Array, lowest: Array
 ) -> None:
-    """All extrema of the pressure angle over a turn.
+    """Compute all extrema of the pressure angle over a turn.
 
     Parameters
     ----------

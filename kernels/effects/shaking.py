@@ -37,7 +37,7 @@ def centre_acceleration(
     y: Array | None,
     z: Array | None,
 ) -> None:
-    """Acceleration analogue S'' of the common centre of mass, and its magnitude.
+    """Compute the acceleration analogue S'' of the common centre of mass, and its magnitude.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ def speed_fluctuation(
     missed: Array | None = None,
     slope: Array | None = None,
 ) -> None:
-    """Steady-state speed, its extremes and the degree of unevenness.
+    """Compute the steady-state speed, its extremes and the degree of unevenness.
 
     Parameters
     ----------

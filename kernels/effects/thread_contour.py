@@ -29,13 +29,13 @@ COLUMNS = ("R", "alpha", "beta", "B", "N", "gamma")
 
 @inline
 def thread_radius(count: float, density: float) -> float:
-    """Radius of a round thread of metric count N [m/g] and density gamma [g/cm^3], in mm; (2)."""
+    """Return the radius of a round thread of metric count N [m/g] and density gamma [g/cm^3], in mm; (2)."""
     return 1.0 / math.sqrt(math.pi * density * count)
 
 
 @inline
 def growth(x: float) -> float:
-    """(e^x - 1)/x, 1 at x = 0; relative error of some roundings for every x."""
+    """Return (e^x - 1)/x, 1 at x = 0; relative error of some roundings for every x."""
     # expm1: e^x - 1 as it stands has no correct digit left where x is a rounding error of 1
     return math.expm1(x) / x if x != 0.0 else 1.0
 
@@ -52,7 +52,7 @@ def thread_contour(
     adhesion: Array | None,
     radius: Array | None,
 ) -> None:
-    """Tension behind a contour and its three parts; equations (1) to (3) of docs/thread.md.
+    """Compute the tension behind a contour and its three parts; equations (1) to (3) of docs/thread.md.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def thread_contour(
 
 @inline
 def least_radius(alpha: float, beta: float, stiff: float, thick: float) -> float:
-    """Radius of least tension, (2 B beta/alpha)^(1/3) - r, not below 0; inf without adhesion; (4)."""
+    """Return the radius of least tension, (2 B beta/alpha)^(1/3) - r, not below 0; inf without adhesion; (4)."""
     # no adhesion: the tension falls with R without end, or does not depend on it
     if alpha == 0.0:
         return math.inf if stiff * beta > 0.0 else math.nan
@@ -109,7 +109,7 @@ def least_radius(alpha: float, beta: float, stiff: float, thick: float) -> float
 
 @kernel
 def contour_of_least_tension(data: Array, radius: Array) -> None:
-    """Radius of the contour behind which the tension is least, for every wrap angle and tension; (4).
+    """Compute the radius of the contour behind which the tension is least, for every wrap angle and tension; (4).
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ COLUMNS = ("v_ref", "K", "n")
 
 @kernel
 def thread_speed(speed: Array, data: Array, status: Status, ratio: Array) -> None:
-    """Tension at a thread speed over the tension at the reference speed: 1 + K ((v/v_ref)^n - 1); (7).
+    """Compute the tension at a thread speed over the tension at the reference speed: 1 + K ((v/v_ref)^n - 1); (7).
 
     Parameters
     ----------

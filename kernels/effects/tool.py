@@ -36,13 +36,15 @@ COLUMNS = 13
 
 @inline
 def arm(j: Joints, data: Array) -> Vector:
-    """The point from B in fixed axes; ``across`` is k x s, so the finger of the ball joints does not matter."""
+    """Return the point from B in fixed axes; ``across`` is k x s, so the finger of the ball joints does not matter."""
     return add(mix(data[1], j.s, data[2], cross(j.k, j.s)), scale(data[3], j.k))
 
 
 @inline
 def piercing(force: float, fabric: float, sense: float, s: float, ds: float) -> float:
-    """Force on the tool along lam while it goes into the fabric: from entry to the turning point, not back."""
+    """Return the force on the tool along lam while it goes into the fabric:
+    from entry to the turning point, not back.
+    """
     return -sense * force if sense * (s - fabric) > 0.0 and sense * ds > 0.0 else 0.0
 
 
@@ -59,7 +61,8 @@ def tool_load(
     inertia: Array | None,
     along: Array | None,
 ) -> None:
-    """Force of the tool on the coupler, its moment about B, and the inertia that the tool adds to the crank's.
+    """Compute the force of the tool on the coupler, its moment about B,
+    and the inertia that the tool adds to the crank's.
 
     Parameters
     ----------
@@ -116,7 +119,8 @@ def free_tool(
     inertia: Array | None,
     along: Array | None,
 ) -> None:
-    """Force of a tool that moves freely with a point of the coupler or of the rocker, and its moment; (6), (7).
+    """Compute the force of a tool that moves freely with a point of the coupler or of the rocker,
+    and its moment; (6), (7).
 
     Parameters
     ----------

@@ -31,7 +31,8 @@ def thread_over_point(
     second: Array | None,
     wrap: Array | None,
 ) -> None:
-    """Length of the thread N1, E, N2, its derivatives with respect to the crank angle, and the wrap angle at E.
+    """Compute the length of the thread N1, E, N2, its derivatives with respect to the crank angle,
+    and the wrap angle at E.
 
     Parameters
     ----------
@@ -67,7 +68,8 @@ def thread_over_point(
 
 @kernel
 def guide_line(guides: Array, position: Array, off: Array, along: Array, half: Array) -> None:
-    """Coordinates of (26): distance of E from the line of the guides, place along it from its middle, half its length.
+    """Compute coordinates of (26): distance of E from the line of the guides, place along it from its middle,
+    half its length.
 
     Parameters
     ----------

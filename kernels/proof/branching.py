@@ -28,7 +28,7 @@ COMBINED = 5  # rows that a proof combines at most: one more than a box may have
 
 @inline
 def halves(low: Array, high: Array, centre: Array, half: Array) -> None:
-    """Centre of a box, rounded, and half widths that reach both ends from it."""
+    """Compute the centre of a box, rounded, and half widths that reach both ends from it."""
     for k in range(centre.shape[0]):
         centre[k] = 0.5 * (low[k] + high[k])
         half[k] = max(up(high[k] - centre[k]), up(centre[k] - low[k]))
@@ -36,7 +36,7 @@ def halves(low: Array, high: Array, centre: Array, half: Array) -> None:
 
 @kernel
 def combined(rows: Array, factors: Array, count: int, half: Array) -> float:
-    """A number below  sum factors_j row_j  over the whole box, rounding included."""
+    """Return a number below sum factors_j row_j over the whole box, rounding included."""
     bound = 0.0
     for j in range(count):
         if factors[j] != 0.0:
@@ -55,7 +55,9 @@ def combined(rows: Array, factors: Array, count: int, half: Array) -> float:
 
 @inline
 def _linear(rows: Array, count: int, objective: Flags, half: Array, out: Array, sizes: Array) -> None:
-    """Rows as a linear program sees them: the value and the middle of the slopes, less what the slopes leave open."""
+    """Compute rows as a linear program sees them:
+    the value and the middle of the slopes, less what the slopes leave open.
+    """
     for j in range(count):
         low, high, open_ = rows[j, CENTRE], rows[j, CENTRE + 1], 0.0
         size = abs(low)
@@ -75,7 +77,8 @@ def best_bound(
     rows: Array, count: int, objective: Flags, half: Array, work: Array, basis: Indices, linear: Array, sizes: Array,
     factors: Array,
 ) -> tuple[float, bool]:  # fmt: skip
-    """The best bound (1) of a box, and whether it is one of limits alone: then a positive one empties the box.
+    """Return the best bound (1) of a box, and whether it is one of limits alone:
+    then a positive one empties the box.
 
     Parameters
     ----------
@@ -116,7 +119,7 @@ def best_bound(
 
 @kernel
 def looseness(rows: Array, factors: Array, count: int, half: Array, out: Array) -> None:
-    """What each variable's width costs the bound, to decide which one to halve."""
+    """Compute what each variable's width costs the bound, to decide which one to halve."""
     for k in range(half.shape[0]):
         total, low, high = 0.0, 0.0, 0.0
         for j in range(count):
@@ -128,13 +131,13 @@ def looseness(rows: Array, factors: Array, count: int, half: Array, out: Array) 
 
 @inline
 def surely_negative(rows: Array, j: int) -> bool:
-    """Whether no design of the box has a value of the row that is not negative."""
+    """Return whether no design of the box has a value of the row that is not negative."""
     return bool(rows[j, RANGE + 1] < 0.0)
 
 
 @inline
 def _before(bounds: Array, depths: Indices, one: int, other: int) -> bool:
-    """Whether a box comes before another: the one of lower bound, among equals the larger one."""
+    """Return whether a box comes before another: the one of lower bound, among equals the larger one."""
     if bounds[one] != bounds[other]:
         return bool(bounds[one] < bounds[other])
     return bool(depths[one] < depths[other])

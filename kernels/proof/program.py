@@ -28,7 +28,9 @@ SOLVED, IMPOSSIBLE, STALLED = 0, 1, 2
 
 @inline
 def _row(number: int, rows: Array, count: int, objective: NDArray[np.uint8], half: Array, out: Array) -> float:
-    """Coefficients of a constraint  out . (d, t) >= b, and b: the rows, then d_k >= -half, -d_k >= -half, t >= 0."""
+    """Return coefficients of a constraint out .
+    (d, t) >= b, and b: the rows, then d_k >= -half, -d_k >= -half, t >= 0.
+    """
     n = half.shape[0]
     out[:] = 0.0
     if number < count:
@@ -48,7 +50,9 @@ def _row(number: int, rows: Array, count: int, objective: NDArray[np.uint8], hal
 def _most_violated(
     rows: Array, count: int, objective: NDArray[np.uint8], half: Array, scale: float, z: Array, row: Array
 ) -> int:
-    """Number of the constraint that z misses most, each in the unit of what it may cost; -1 where all are kept."""
+    """Return the number of the constraint that z misses most, each in the unit of what it may cost;
+    -1 where all are kept.
+    """
     n = half.shape[0]
     entering, worst = -1, ROUNDING * scale
     for number in range(count + 2 * n + 1):
@@ -72,7 +76,7 @@ def multipliers(
     basis: NDArray[np.int64],
     out: Array,
 ) -> int:
-    """Multipliers of the rows of (1).
+    """Return multipliers of the rows of (1).
 
     Parameters
     ----------

@@ -35,26 +35,26 @@ CENTRE, RANGE, SLOPES = 0, 2, 4  # columns of a form
 
 @inline
 def down(x: float) -> float:
-    """A number that a sum or product rounded to x cannot lie below."""
+    """Return a number that a sum or product rounded to x cannot lie below."""
     return x - (abs(x) * ULP + TINY)
 
 
 @inline
 def up(x: float) -> float:
-    """A number that a sum or product rounded to x cannot lie above."""
+    """Return a number that a sum or product rounded to x cannot lie above."""
     return x + (abs(x) * ULP + TINY)
 
 
 @inline
 def times(a: float, b: float, c: float, d: float) -> tuple[float, float]:
-    """The interval [a, b] [c, d]."""
+    """Return the interval [a, b] [c, d]."""
     p, q, r, s = a * c, a * d, b * c, b * d
     return down(min(min(p, q), min(r, s))), up(max(max(p, q), max(r, s)))
 
 
 @inline
 def width(variables: int) -> int:
-    """Columns of a form."""
+    """Return columns of a form."""
     return SLOPES + 2 * variables
 
 
@@ -73,14 +73,14 @@ def settle(at: Array, out: int, half: Array) -> None:
 
 @kernel
 def constant(at: Array, out: int, low: float, high: float) -> None:
-    """A number that does not depend on the design and lies between the two ends."""
+    """Make a number that does not depend on the design and lies between the two ends."""
     at[out, :] = 0.0
     at[out, CENTRE], at[out, CENTRE + 1], at[out, RANGE], at[out, RANGE + 1] = low, high, low, high
 
 
 @kernel
 def variable(at: Array, out: int, centre: float, half: Array, k: int) -> None:
-    """The k-th variable itself."""
+    """Make the k-th variable itself."""
     constant(at, out, centre, centre)
     at[out, RANGE], at[out, RANGE + 1] = down(centre - half[k]), up(centre + half[k])
     at[out, SLOPES + 2 * k], at[out, SLOPES + 2 * k + 1] = 1.0, 1.0
@@ -88,7 +88,7 @@ def variable(at: Array, out: int, centre: float, half: Array, k: int) -> None:
 
 @kernel
 def combine(at: Array, out: int, p: float, a: int, q: float, b: int, half: Array) -> None:
-    """P a + q b for two numbers p, q."""
+    """Compute P a + q b for two numbers p, q."""
     for j in range(0, at.shape[1], 2):
         first, second = times(p, p, at[a, j], at[a, j + 1])
         third, fourth = times(q, q, at[b, j], at[b, j + 1])
@@ -98,7 +98,7 @@ def combine(at: Array, out: int, p: float, a: int, q: float, b: int, half: Array
 
 @kernel
 def multiply(at: Array, out: int, a: int, b: int, half: Array) -> None:
-    """The product a b, with slopes  s_a b(box) + a(c) s_b;  ``out`` must be neither."""
+    """Compute the product a b, with slopes s_a b(box) + a(c) s_b; ``out`` must be neither."""
     at[out, 0], at[out, 1] = times(at[a, 0], at[a, 1], at[b, 0], at[b, 1])
     at[out, 2], at[out, 3] = times(at[a, 2], at[a, 3], at[b, 2], at[b, 3])
     for j in range(SLOPES, at.shape[1], 2):
@@ -110,7 +110,7 @@ def multiply(at: Array, out: int, a: int, b: int, half: Array) -> None:
 
 @kernel
 def square(at: Array, out: int, a: int, half: Array) -> None:
-    """a^2, with slopes  s_a (a(box) + a(c));  never negative.  ``out`` must not be a."""
+    """Compute a^2, with slopes s_a (a(box) + a(c)); never negative. ``out`` must not be a."""
     for j in (CENTRE, RANGE):
         low, high = abs(at[a, j]), abs(at[a, j + 1])
         least = 0.0 if at[a, j] <= 0.0 <= at[a, j + 1] else min(low, high)
@@ -124,7 +124,7 @@ def square(at: Array, out: int, a: int, half: Array) -> None:
 
 @kernel
 def inverse(at: Array, out: int, a: int, half: Array) -> bool:
-    """1/a, with slopes  -s_a/(a(box) a(c));  false where a may be zero.  ``out`` must not be a."""
+    """Return 1/a, with slopes -s_a/(a(box) a(c)); false where a may be zero. ``out`` must not be a."""
     if not (at[a, RANGE] > SMALL or at[a, RANGE + 1] < -SMALL):
         return False
     for j in (CENTRE, RANGE):
@@ -138,7 +138,7 @@ def inverse(at: Array, out: int, a: int, half: Array) -> bool:
 
 @kernel
 def root(at: Array, out: int, a: int, half: Array) -> bool:
-    """The positive square root, with slopes  s_a/(root(box) + root(c));  false where a may be negative or zero."""
+    """Return the positive square root, with slopes s_a/(root(box) + root(c)); false where a may be negative or zero."""
     if not at[a, RANGE] > SMALL:
         return False
     for j in (CENTRE, RANGE):
@@ -152,14 +152,14 @@ def root(at: Array, out: int, a: int, half: Array) -> bool:
 
 @inline
 def _clipped(at: Array, out: int) -> None:
-    """No sine or cosine is above 1."""
+    """Cut an enclosure off at -1 and 1, beyond which no sine or cosine lies."""
     for j in (CENTRE, RANGE):
         at[out, j], at[out, j + 1] = max(at[out, j], -1.0), min(at[out, j + 1], 1.0)
 
 
 @inline
 def _turned(at: Array, out: int, value: float, quarter: float, reach: float) -> None:
-    """Centre and range of  value cos(d) + quarter sin(d), |d| <= reach, from  1 - d^2/2 <= cos(d) <= 1."""
+    """Compute the centre and range of value cos(d) + quarter sin(d), |d| <= reach, from 1 - d^2/2 <= cos(d) <= 1."""
     # sincos errs by less than 0.8 units in the last place
     at[out, 0], at[out, 1] = value - 2.0 * ULP, value + 2.0 * ULP
     sag = up(0.5 * up(reach * reach)) * max(abs(at[out, 0]), abs(at[out, 1]))
@@ -174,7 +174,7 @@ def _turned(at: Array, out: int, value: float, quarter: float, reach: float) -> 
 
 @kernel
 def sine_cosine(at: Array, sine: int, cosine: int, a: int, factor: float, half: Array) -> None:
-    """Sine and cosine of factor a, for a factor of 1 or 0.5 and a form whose centre is one number.
+    """Compute the sine and cosine of factor a, for a factor of 1 or 0.5 and a form whose centre is one number.
 
     The slopes are those of the curves over the range.
     """

@@ -40,23 +40,23 @@ class Number:
         return self.square() if other is self else self.tape.put(MULTIPLY, self, other)
 
     def times(self, factor: float) -> Number:
-        """The product with a number that is exact, as 0.5 or 2."""
+        """Return the product with a number that is exact, as 0.5 or 2."""
         return self.tape.put(COMBINE, self, self, factor, 0.0)
 
     def square(self) -> Number:
-        """The square, never negative."""
+        """Return the square, never negative."""
         return self.tape.put(SQUARE, self, self)
 
     def inverse(self) -> Number:
-        """1/x; the run ends without result where x may vanish."""
+        """Return 1/x; the run ends without result where x may vanish."""
         return self.tape.put(INVERSE, self, self)
 
     def root(self) -> Number:
-        """The positive square root; the run ends without result where x may be negative or vanish."""
+        """Return the positive square root; the run ends without result where x may be negative or vanish."""
         return self.tape.put(ROOT, self, self)
 
     def sine_cosine(self, of_half: bool = False) -> tuple[Number, Number]:
-        """Sine and cosine of a coordinate, or of half of it."""
+        """Return the sine and cosine of a coordinate, or of half of it."""
         sine = self.tape.put(SINE, self, self, 0.5 if of_half else 1.0)
         return sine, self.tape.new()
 
@@ -75,16 +75,16 @@ class Tape:
         self.forms = self.inputs
 
     def input(self, number: int) -> Number:
-        """An input of the formula."""
+        """Return an input of the formula."""
         return Number(self, number)
 
     def new(self) -> Number:
-        """The next free form."""
+        """Return the next free form."""
         self.forms += 1
         return Number(self, self.forms - 1)
 
     def one(self) -> Number:
-        """The number 1."""
+        """Return the number 1."""
         zero = self.input(0)
         return self.put(CONSTANT, zero, zero, 1.0)
 
@@ -96,12 +96,12 @@ class Tape:
         return out
 
     def end(self) -> int:
-        """End a part of the formula; the number to run it by."""
+        """End a part of the formula; return the number to run it by."""
         self.ends.append(len(self.operations))
         return len(self.ends) - 1
 
     def recorded(self) -> tuple[Operations, Array, Operations]:
-        """Operations, their factors and the ends of the parts, for :func:`run`."""
+        """Return operations, their factors and the ends of the parts, for :func:`run`."""
         return np.array(self.operations, np.int64), np.array(self.factors), np.array([0, *self.ends], np.int64)
 
 

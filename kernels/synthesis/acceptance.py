@@ -40,7 +40,7 @@ MEANING: dict[int, str] = {
 
 @inline
 def first_failure(point: bool, ahead: float, back: float, a: float, t_ext: float, t_fold: float, branch: float) -> int:
-    """Number of the first of the tests (i)-(iii) that is failed, or PASSED.
+    """Return the number of the first of the tests (i)-(iii) that is failed, or PASSED.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def first_failure(point: bool, ahead: float, back: float, a: float, t_ext: float
 
 @inline
 def design_status(valid: bool, failed: int) -> int:
-    """Status of a design after the tests (i)-(iii)."""
+    """Return the status of a design after the tests (i)-(iii)."""
     if not valid:
         return st.INVALID_INPUT
     return st.OK if failed == PASSED else st.NOT_ADMISSIBLE

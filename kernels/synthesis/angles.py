@@ -10,5 +10,7 @@ PI = 3.141592653589793
 
 @inline
 def sine_cosine(angle: float) -> tuple[float, float]:
-    """(sin, cos) of an angle; one call site, as numba warns when ``sincos`` is expanded twice in one function."""
+    """Return (sin, cos) of an angle; one call site,
+    as numba warns when ``sincos`` is expanded twice in one function.
+    """
     return sincos(angle)

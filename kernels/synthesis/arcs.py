@@ -11,7 +11,7 @@ from kernels.synthesis.angles import PI, sine_cosine
 
 @kernel
 def rssr_arc_ends(requirements: Array, ends: Array) -> None:
-    """Crank angles phi1 at which the rocker ball would lie on the crank axis or at infinity.
+    """Compute crank angles phi1 at which the rocker ball would lie on the crank axis or at infinity.
 
     Equation (4) of docs/synthesis.md: the zeros of rho1, rho2 and of the determinant.
 
@@ -49,7 +49,8 @@ def rssr_arc_ends(requirements: Array, ends: Array) -> None:
 
 @kernel
 def rssp_arc_ends(requirements: Array, ends: Array) -> None:
-    """Crank angles phi1 at which the slider ball would lie on the crank axis; equation (10) of docs/synthesis.md.
+    """Compute crank angles phi1 at which the slider ball would lie on the crank axis;
+    equation (10) of docs/synthesis.md.
 
     Parameters
     ----------

@@ -19,7 +19,9 @@ _MOST_STEPS = 200
 
 @inline
 def half_angle(stroke: float, arm: float, exact: bool) -> float:
-    """Half of the swing of the shaft lever: by the chord of its end (exact), or by the printed arc tangent; (1)."""
+    """Return half of the swing of the shaft lever:
+    by the chord of its end (exact), or by the printed arc tangent; (1).
+    """
     if exact:
         return math.atan2(stroke, math.sqrt((2.0 * arm - stroke) * (2.0 * arm + stroke)))
     return math.atan2(stroke, 2.0 * arm)
@@ -27,14 +29,14 @@ def half_angle(stroke: float, arm: float, exact: bool) -> float:
 
 @inline
 def distance_to_c(frame: float, arm: float, xi: float) -> float:
-    """O2C from the sides O2O3, O3C and the angle between them; (2)."""
+    """Return O2C from the sides O2O3, O3C and the angle between them; (2)."""
     half = math.sin(0.5 * xi)
     return math.sqrt((frame - arm) * (frame - arm) + 4.0 * frame * arm * (half * half))
 
 
 @kernel
 def heddle_extremes(requirements: Array, extremes: Array, status: Status) -> None:
-    """Both extreme positions of the bell crank for a wanted stroke of the shaft; (1), (2) of docs/heddle.md.
+    """Compute both extreme positions of the bell crank for a wanted stroke of the shaft; (1), (2) of docs/heddle.md.
 
     Parameters
     ----------
@@ -67,7 +69,7 @@ def heddle_extremes(requirements: Array, extremes: Array, status: Status) -> Non
 
 @kernel
 def heddle_lever_angles(positions: Array, angles: Array, status: Status) -> None:
-    """Angles of the cam lever O2B in both extreme positions for a given rod BC; (10) of docs/heddle.md.
+    """Compute angles of the cam lever O2B in both extreme positions for a given rod BC; (10) of docs/heddle.md.
 
     Parameters
     ----------
@@ -99,7 +101,7 @@ def heddle_lever_angles(positions: Array, angles: Array, status: Status) -> None
 
 @inline
 def _kept_rod(x: float, y: float, one: tuple[float, float], two: tuple[float, float], side: float) -> float:
-    """Length of the rod from B = (x, y) to the first C, or nan if B stands on the wrong side of a ray."""
+    """Return the length of the rod from B = (x, y) to the first C, or nan if B stands on the wrong side of a ray."""
     if side * (one[0] * y - one[1] * x) > 0.0 and side * (two[0] * y - two[1] * x) > 0.0:
         return math.hypot(x - one[0], y - one[1])
     return math.nan
@@ -107,7 +109,8 @@ def _kept_rod(x: float, y: float, one: tuple[float, float], two: tuple[float, fl
 
 @kernel
 def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) -> None:
-    """All rods BC that give the cam lever a wanted swing between the extreme positions; (11) of docs/heddle.md.
+    """Compute all rods BC that give the cam lever a wanted swing between the extreme positions;
+    (11) of docs/heddle.md.
 
     Turn the second position about O2 by the swing: B coincides in both, so it stands on the circle of radius O2B and on
     the perpendicular bisector of the two places of C.  That gives two points for each sense of the swing; those on the
@@ -162,7 +165,7 @@ def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) ->
 
 @inline
 def _travel(arm: float, lever: float, frame: float, end: float, half: float) -> tuple[float, float, int]:
-    """Height of E above mid-stroke when the bell crank stands at +half and at -half; (12)."""
+    """Return the height of E above mid-stroke when the bell crank stands at +half and at -half; (12)."""
     bar = four_bar(arm, math.hypot(frame, arm - lever), lever, frame, 1.0)
     cos, _, _, _, up = driven(bar, -math.sin(half), math.cos(half))
     other, _, _, _, down = driven(bar, math.sin(half), math.cos(half))
@@ -172,7 +175,8 @@ def _travel(arm: float, lever: float, frame: float, end: float, half: float) -> 
 
 @kernel
 def heddle_shaft_arms(shafts: Array, arms: Array, status: Status) -> None:
-    """Arm O3D that gives a shaft its stroke, all other lengths of the link being common to the shafts; (12), (13).
+    """Compute the arm O3D that gives a shaft its stroke, all other lengths of the link being common to the shafts;
+    (12), (13).
 
     Parameters
     ----------

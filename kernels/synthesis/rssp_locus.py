@@ -43,7 +43,7 @@ class Limits(NamedTuple):
 
 @inline
 def _finish(g: Given, at: Limits, i: int, status: Status, failed: Status, designs: Array) -> None:
-    """Crank and coupler of (11), (12), the tests (i)-(iii), and the row of the design."""
+    """Compute the crank and coupler of (11), (12), the tests (i)-(iii), and the row of the design."""
     stroke, e, f, alpha, sa, ca, valid = g
     s1, s2, middle, ahead, back, v1, v2, point = at
     branch = -1.0 if stroke.real > 0.0 else 1.0
@@ -70,7 +70,7 @@ def _valid(stroke: float, place: float, f: float, alpha: float) -> bool:
 
 @kernel
 def rssp_on_locus(requirements: Array, status: Status, failed: Status, designs: Array, s1: Array | None) -> None:
-    """Slider-cranks at given crank angles of the extended position.
+    """Compute slider-cranks at given crank angles of the extended position.
 
     Equations (9)-(12) of docs/synthesis.md.  A central mechanism, phi0 = pi, has its own: :func:`rssp_at_place`.
 
@@ -124,7 +124,7 @@ def rssp_at_offset(
     requirements: Array, root: Array, status: Status, failed: Status, designs: Array, s1: Array | None,
     phi1: Array | None,
 ) -> None:  # fmt: skip
-    """Slider-cranks at given offsets e of the slide line: a quadratic equation for the slider's place.
+    """Compute slider-cranks at given offsets e of the slide line: a quadratic equation for the slider's place.
 
     Equations (11)-(13) of docs/synthesis.md.
 
@@ -167,7 +167,7 @@ def rssp_at_offset(
 def rssp_at_place(
     requirements: Array, status: Status, failed: Status, designs: Array, phi0: Array | None, phi1: Array | None
 ) -> None:
-    """Slider-cranks whose stroke begins at a given place; phi0 comes out.  The way to central ones: e = 0.
+    """Compute slider-cranks whose stroke begins at a given place; phi0 comes out. The way to central ones: e = 0.
 
     Equations (11), (12) and (14) of docs/synthesis.md.
 

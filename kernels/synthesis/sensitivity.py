@@ -47,7 +47,7 @@ def _at_limit(designs: Array, i: int, psi: float, phi: float, rates: Array, plac
 def limit_sensitivities(
     designs: Array, psi_ext: Array, phi_ext: Array, psi_fold: Array, phi_fold: Array, rates: Array
 ) -> None:
-    """Derivatives of both limit positions with respect to every dimension.
+    """Compute derivatives of both limit positions with respect to every dimension.
 
     At a limit dpsi/dphi = 0, so the limit angle of the rocker moves as the rocker does at that crank angle held fixed.
 

@@ -47,7 +47,7 @@ def main() -> None:
 
 
 def measured(smoke: bool, out: Path) -> Measured:
-    """All tables, measured now."""
+    """Return all tables, measured now."""
     start = time.perf_counter()
 
     def done(what: str) -> None:

@@ -39,7 +39,9 @@ PURPOSES = (
 
 
 def in_short(work: pd.DataFrame) -> str:
-    """The page in a sentence: the largest acceleration of ordinary designs by a grid and by the package's own way."""
+    """Return the page in a sentence: the largest acceleration of ordinary designs by a grid
+    and by the package's own way.
+    """
     part = work[(work["quantity"] == "max_abs_d2psi") & (work["region"] == EASY)]
     told = []
     for method, words in (("grid, float64", "a plain grid"), (HOUSE["max_abs_d2psi"], "`accuracy=`")):
@@ -50,7 +52,7 @@ def in_short(work: pd.DataFrame) -> str:
 
 
 def answer(work: pd.DataFrame) -> list[str]:
-    """The table of times by error, and what it says in words."""
+    """Return the table of times by error, and what it says in words."""
     rows, named = [], ""
     for quantity, text in QUANTITIES.items():
         part = work[work["quantity"] == quantity]
@@ -95,7 +97,7 @@ def _cell(at: pd.Series | None) -> str:
 
 
 def _per_digit(cells: list[pd.Series | None]) -> str:
-    """Factor per digit between the coarsest and the finest of the bounds that are reached."""
+    """Return the factor per digit between the coarsest and the finest of the bounds that are reached."""
     reached = [(bound, at["ns_per_design"]) for bound, at in zip(BOUNDS, cells, strict=True) if at is not None]
     if len(reached) < 2:
         return "-"
@@ -104,7 +106,9 @@ def _per_digit(cells: list[pd.Series | None]) -> str:
 
 
 def advice(work: pd.DataFrame, storage: pd.DataFrame) -> list[str]:
-    """What to use for what: the cheapest method that keeps the bound in every region, at its coarsest setting."""
+    """Return what to use for what: the cheapest method that keeps the bound in every region,
+    at its coarsest setting.
+    """
     offered = work[~work["method"].isin((*COMPARED, CERTIFIED))]
     lines = [
         f"* **{purpose}** ({QUANTITIES[quantity]} to {power(bound)}): {_choice(offered, quantity, bound)}"
@@ -119,7 +123,9 @@ def advice(work: pd.DataFrame, storage: pd.DataFrame) -> list[str]:
 
 
 def _choice(work: pd.DataFrame, quantity: str, bound: float) -> str:
-    """The cheapest method that keeps the bound everywhere but at change points, and how much dearer the next is."""
+    """Return the cheapest method that keeps the bound everywhere but at change points,
+    and how much dearer the next is.
+    """
     part = work[(work["quantity"] == quantity) & (work["region"] != EDGE)]
     without = ""
     ranked = _ranked(part, bound)
@@ -148,7 +154,9 @@ def _setting(at: pd.Series) -> str:
 
 
 def _ranked(part: pd.DataFrame, bound: float) -> list[tuple[float, pd.DataFrame]]:
-    """Per method its coarsest setting that keeps the bound in every region: mean time and rows, the cheapest first."""
+    """Return for every method its coarsest setting that keeps the bound in every region:
+    mean time and rows, the cheapest first.
+    """
     found = []
     for method, curve in part.groupby("method", sort=False):
         good = [
@@ -163,7 +171,7 @@ def _ranked(part: pd.DataFrame, bound: float) -> list[tuple[float, pd.DataFrame]
 
 
 def _proof(work: pd.DataFrame) -> str:
-    """What the certificate costs beside the search that it checks, at the coarsest setting below 1e-8."""
+    """Return what the certificate costs beside the search that it checks, at the coarsest setting below 1e-8."""
     part = work[(work["quantity"] == "max_abs_d2psi") & (work["region"] != EDGE) & (work["setting"] <= PROVEN)]
     searched, proven = (part[part["method"] == name] for name in (HOUSE["max_abs_d2psi"], CERTIFIED))
     setting = proven["setting"].max()

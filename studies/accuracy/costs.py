@@ -50,7 +50,8 @@ FINE, MANY = Accuracy(target=1e-8), 4000
 
 
 def output_costs(designs: Array, smoke: bool) -> pd.DataFrame:
-    """Time of every output of the crank-rocker and of every effect of the register, each alone, in one run.
+    """Return the time of every output of the crank-rocker and of every effect of the register, each alone,
+    in one run.
 
     Columns: what is computed, of which families, ns per pose or per design, and how many times the angle psi at one
     pose, or at the poses of a turn, that is.  Effects are measured on the first of their families, without the motion
@@ -134,7 +135,7 @@ dtype = "{dtype}"
 
 
 def storage_costs(designs: int) -> pd.DataFrame:
-    """Bytes, time and error of the same sweep stored in float64 and in float32."""
+    """Return bytes, time and error of the same sweep stored in float64 and in float32."""
     import pandas as pd
 
     dtypes = ("float64", "float32")

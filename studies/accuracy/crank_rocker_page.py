@@ -9,7 +9,7 @@ from studies.accuracy.tables import significant as sig
 
 
 def crank_rocker_page(m: Measured) -> list[str]:
-    """The page, line by line."""
+    """Return the page, line by line."""
     return [
         "# What accuracy costs: the crank-rocker in depth",
         "",

@@ -24,7 +24,8 @@ SMOKE_SAMPLES, SMOKE_TARGETS = (32, 256, 2048), (1e-3, 1e-6, 1e-10)
 
 
 def work_table(regions: Iterable[Region], smoke: bool) -> pd.DataFrame:
-    """One row per quantity, region and method: largest and median error, time, how many designs without an answer.
+    """Return one row per quantity, region and method:
+    largest and median error, time, how many designs without an answer.
 
     Errors of extrema are relative, those of positions in rad; a time is that of one design, of positions for
     :data:`ANGLES` of its crank angles.
@@ -43,7 +44,7 @@ def work_table(regions: Iterable[Region], smoke: bool) -> pd.DataFrame:
 
 
 def _position_rows(region: Region, samples: tuple[int, ...], count: int) -> list[dict[str, object]]:
-    """Errors at few angles, a third of them crowded about the sharpest place; times at many."""
+    """Return errors at few angles, a third of them crowded about the sharpest place; times at many."""
     generator = np.random.default_rng(len(region.name))
     designs = np.ascontiguousarray(region.designs[:count])
     many = generator.uniform(0.0, 2.0 * np.pi, (len(designs), ANGLES))
@@ -103,7 +104,9 @@ def _call(run: Callable[[Array], Array], designs: Array) -> Callable[[], Array]:
 
 
 def position_table(regions: Iterable[Region], poses: int) -> pd.DataFrame:
-    """Errors of the poses against 60 digits per region and output: largest, and in units of 2^-53 max(cond, |y|)."""
+    """Return errors of the poses against 60 digits per region and output:
+    largest, and in units of 2^-53 max(cond, |y|).
+    """
     rows = []
     for region in regions:
         designs = region.designs[:poses]

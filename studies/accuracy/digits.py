@@ -25,7 +25,8 @@ FEASIBLE = 1e-9
 
 
 def optimiser_digits(starts: int, every: int = 1) -> pd.DataFrame:
-    """Looks and time until the objective stays within 10^-digits of its end: medians over the starts that converge.
+    """Return looks and time until the objective stays within 10^-digits of its end:
+    medians over the starts that converge.
 
     Least acceleration for a swing of 45 degrees and a pressure angle of at most 45 degrees, four variables.  Each
     search is run again and again, ended ``every`` looks later each time; what it then has as its best design counts.
@@ -41,7 +42,9 @@ def optimiser_digits(starts: int, every: int = 1) -> pd.DataFrame:
 
 
 def optimiser_targets(starts: int) -> pd.DataFrame:
-    """The same searches with ``accuracy`` coarse and fine: time per start and relative difference of the optimum."""
+    """Return the same searches with ``accuracy`` coarse and fine:
+    time per start and relative difference of the optimum.
+    """
     import pandas as pd
 
     from sweep.optimise import minimise
@@ -76,7 +79,7 @@ def _starts(problem: Problem, count: int) -> Array:
 
 
 def _history(first: Array, every: int) -> list[tuple[int, float]] | None:
-    """(looks, seconds) per number of digits, or None where the search finds no feasible optimum."""
+    """Return (looks, seconds) per number of digits, or None where the search finds no feasible optimum."""
     from sweep.optimise import minimise
     from sweep.study import OptimiseSettings
 

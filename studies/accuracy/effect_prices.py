@@ -17,7 +17,7 @@ from sweep.effects.costs import designs as ordinary
 from sweep.effects.wanted import expanded
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
-from sweep.families.base import Accuracy, Family
+from sweep.families.base import Accuracy, Array, Family
 from sweep.quantities.names import error_of
 
 if TYPE_CHECKING:
@@ -26,30 +26,58 @@ if TYPE_CHECKING:
 SAMPLES, TARGETS = (90, 360, 3600), (1e-3, 1e-6, 1e-9)
 SMOKE_SAMPLES, SMOKE_TARGETS, SMOKE_EVERY = (360,), (1e-6,), 8
 GRID, REFINED = "grid", "accuracy="
-DEAR = 5e6  # ns per design
+DEAR, DEAR_POSE = 5e6, 1e3  # ns per design and per pose
+MASS, ARM, MIXED = 1e-4, 0.4, ("xy", "xz", "yz")  # of bodies without inputs [t]; share of an ordinary length
 MANY, FEW = 8, 2
 ROUNDING = 1e-14  # what two ways to one number may differ by beyond what they say of themselves
 
 
 def effect_prices(smoke: bool) -> pd.DataFrame:
-    """One row per effect of the register and accuracy, each on the first family that it serves."""
+    """Return one row per effect of the register and accuracy, each on the first family that it serves."""
     import pandas as pd
 
     rows: list[dict[str, object]] = []
     for name in NAMES[:: SMOKE_EVERY if smoke else 1]:
         bare = family(effect(name).families[0])
         full = extended(bare, outputs_of(name, bare))
-        rows += prices_of(name, Effected(bare, full, ordinary(full, count(name, smoke))), smoke)
+        rows += prices_of(name, Effected(bare, full, loaded(bare, full, count(name, smoke))), smoke)
     return pd.DataFrame(rows)
 
 
+def loaded(bare: Family, full: Family, designs: int) -> Array:
+    """Ordinary designs with the inputs of an effect; bodies that all have no mass are given some, or all loads vanish.
+
+    Where a tool at a tip is all there is, the tip lies off the axis of its link for the same reason.
+    """
+    matrix = ordinary(full, designs)
+    own = len(bare.parameters)
+    still = {p.name: k for k, p in enumerate(full.parameters) if k >= own and not matrix[:, k].any()}
+    inert = [p.name for p in full.parameters[own:] if p.unit in ("mass", "inertia") and p.name != "m_tool"]
+    bodies = [name for name in inert if name.startswith("m_")]
+    length = float(np.median([abs(x) for x, p in zip(matrix[0], bare.parameters, strict=False) if p.unit == "length"]))
+    for name, k in still.items():
+        if name == "tip_x" and not inert:
+            matrix[:, k] = ARM * length
+        elif all(body in still for body in bodies):
+            if name.startswith("m_"):
+                matrix[:, k] = MASS
+            elif name.startswith("com_") and name.endswith("_x"):
+                matrix[:, k] = ARM * length
+            elif name.startswith("j_") and not name.endswith(MIXED):
+                matrix[:, k] = MASS * (ARM * length) ** 2
+    return matrix
+
+
 def count(name: str, smoke: bool) -> int:
-    """On how many designs an effect is measured."""
-    return FEW if smoke or effect(name).ns_per_design > DEAR else MANY
+    """Return on how many designs an effect is measured."""
+    dear = effect(name).ns_per_design > DEAR or effect(name).ns_per_pose > DEAR_POSE
+    return FEW if smoke or dear else MANY
 
 
 def outputs_of(name: str, bare: Family) -> tuple[str, ...]:
-    """What the name of the effect stands for in ``want``; where an output bears it, the effect's numbers of a turn."""
+    """Return what the name of the effect stands for in ``want``;
+    where an output bears it, the effect's numbers of a turn.
+    """
     found = tuple(expanded(bare, [name]))
     whole = effect(name).design_result
     if found != (name,) or whole is None:
@@ -58,7 +86,7 @@ def outputs_of(name: str, bare: Family) -> tuple[str, ...]:
 
 
 def prices_of(name: str, given: Effected, smoke: bool = False) -> list[dict[str, object]]:
-    """Rows of one effect."""
+    """Return rows of one effect."""
     wanted = outputs_of(name, given.bare)
     known, words = known_of(name, given, wanted)
     head: dict[str, object] = {

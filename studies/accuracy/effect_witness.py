@@ -31,11 +31,13 @@ class Effected(NamedTuple):
     designs: Array
 
     def given(self, name: str) -> Array:
-        """An input or parameter of the designs."""
+        """Return an input or parameter of the designs."""
         return self.designs[:, self.full.parameter_names.index(name)]
 
     def poses(self, names: tuple[str, ...], samples: int, changed: Mapping[str, Array] | None = None) -> list[Array]:
-        """Pose outputs over an even grid, (n, samples), also of other effects; inputs ``changed`` pose by pose."""
+        """Return pose outputs over an even grid, (n, samples), also of other effects;
+        inputs ``changed`` pose by pose.
+        """
         wider = extended(self.bare, names)
         rows = np.column_stack([self._input(wider, name) for name in wider.parameter_names])
         phi = np.arange(samples) * (TWO_PI / samples)
@@ -61,7 +63,7 @@ Witness: TypeAlias = Callable[[Effected, int], dict[str, Array]]
 
 
 def known_of(name: str, given: Effected, wanted: tuple[str, ...]) -> tuple[dict[str, Known], str]:
-    """What is known of an effect's outputs by other means, and in words by which."""
+    """Return what is known of an effect's outputs by other means, and in words by which."""
     entry = WITNESSES.get(name.removeprefix("slider_"))
     found, words = {}, ""
     if entry is not None:
@@ -79,7 +81,7 @@ def known_of(name: str, given: Effected, wanted: tuple[str, ...]) -> tuple[dict[
 
 
 def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
-    """Largest values and magnitudes and least values of pose outputs, by ever narrower grids."""
+    """Return the largest values and magnitudes and least values of pose outputs, by ever narrower grids."""
     found = {}
     for name in wanted:
         for prefix, sign in EXTREMA.items():
@@ -91,13 +93,13 @@ def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
 
 
 def pressure(given: Effected, samples: int) -> dict[str, Array]:
-    """Largest and least pressure angle, from the angle itself."""
+    """Return the largest and least pressure angle, from the angle itself."""
     largest, least = (extreme(given.full.precise(), given.designs, "pressure_angle", sign).value for sign in (1, -1))
     return {"pressure_max": largest, "pressure_min": least}
 
 
 def bearing_life(given: Effected, samples: int) -> dict[str, Array]:
-    """Mean loads and lives by even sums over very many poses, whatever kinks there are."""
+    """Return mean loads and lives by even sums over very many poses, whatever kinks there are."""
     velocity = given.bare.derivative_of[given.bare.position]
     first, second, way = given.poses(("equivalent_load_d1", "equivalent_load_d2", velocity), samples)
     exponent, way = given.given("life_exponent"), np.abs(way)
@@ -113,12 +115,12 @@ def bearing_life(given: Effected, samples: int) -> dict[str, Array]:
 
 
 def speed(given: Effected, samples: int) -> dict[str, Array]:
-    """The energy of the drive summed pose by pose, its mean level by halving."""
+    """Return the energy of the drive summed pose by pose, its mean level by halving."""
     return _numbers(*_steady(*_energies(given, samples), given.given("speed")), given.given("speed"), _height)
 
 
 def speed_with_friction(given: Effected, samples: int) -> dict[str, Array]:
-    """The same, friction taken anew at every pose with the speed that it makes until that no longer changes."""
+    """Return the same, friction taken anew at every pose with the speed that it makes until that no longer changes."""
     inertia, slope, excess = _energies(given, samples)
     mean = given.given("speed")
     crank, change = np.tile(mean[:, None], (1, samples)), np.zeros(inertia.shape)
@@ -131,14 +133,16 @@ def speed_with_friction(given: Effected, samples: int) -> dict[str, Array]:
 
 
 def _energies(given: Effected, samples: int) -> tuple[Array, Array, Array]:
-    """Inertia about the crank, its derivative, and the torque that is left over at even speed."""
+    """Return the inertia about the crank, its derivative, and the torque that is left over at even speed."""
     inertia, slope, drive = given.poses(("reduced_inertia", "dreduced_inertia", "drive_torque"), samples)
     mean = given.given("speed")[:, None]
     return inertia + given.given("flywheel")[:, None], slope, 0.5 * slope * mean**2 - drive
 
 
 def _steady(inertia: Array, slope: Array, excess: Array, mean: Array) -> tuple[Array, Array]:
-    """Speed and acceleration of d(J w^2/2)/d phi = excess - its mean, given the mean speed; constant motor torque."""
+    """Return the speed and acceleration of d(J w^2/2)/d phi = excess - its mean, given the mean speed;
+    constant motor torque.
+    """
     torque = excess - excess.mean(axis=1, keepdims=True)
     step = TWO_PI / inertia.shape[1]
     work = np.concatenate([np.zeros((len(torque), 1)), np.cumsum(_panels(torque), axis=1)[:, :-1]], axis=1) * step
@@ -160,14 +164,14 @@ def _numbers(crank: Array, change: Array, mean: Array, height: Callable[[Array],
 
 
 def _panels(y: Array) -> Array:
-    """Integral of every panel of a periodic curve over its width, by the cubic through four samples."""
+    """Return the integral of every panel of a periodic curve over its width, by the cubic through four samples."""
     left, right, after = np.roll(y, 1, axis=1), np.roll(y, -1, axis=1), np.roll(y, -2, axis=1)
     panels: Array = (13.0 * (y + right) - left - after) / 24.0
     return panels
 
 
 def elastic(given: Effected, samples: int) -> dict[str, Array]:
-    """The periodic vibration by differences of eighth order, its damping by Liouville's formula."""
+    """Return the periodic vibration by differences of eighth order, its damping by Liouville's formula."""
     from scipy.sparse import diags
     from scipy.sparse.linalg import spsolve
 
@@ -193,7 +197,7 @@ def elastic(given: Effected, samples: int) -> dict[str, Array]:
 
 
 def _stencil(order: int, samples: int) -> Any:
-    """Matrix of the first or second derivative of a periodic curve by differences of eighth order."""
+    """Return the matrix of the first or second derivative of a periodic curve by differences of eighth order."""
     from scipy.sparse import diags
 
     half = {1: (4 / 5, -1 / 5, 4 / 105, -1 / 280), 2: (8 / 5, -1 / 5, 8 / 315, -1 / 560)}[order]
@@ -205,7 +209,9 @@ def _stencil(order: int, samples: int) -> Any:
 
 
 def _height(curve: Array) -> Array:
-    """Largest magnitude of close samples of a smooth periodic curve, with the parabola through the highest three."""
+    """Return the largest magnitude of close samples of a smooth periodic curve,
+    with the parabola through the highest three.
+    """
     size, rows = np.abs(curve), np.arange(len(curve))
     top = size.argmax(axis=1)
     left, middle, right = (size[rows, (top + k) % size.shape[1]] for k in (-1, 0, 1))

@@ -19,7 +19,7 @@ HEAD = ("effect", "on", "designs", *(f"grid {n}" for n in SAMPLES), *(f"`{power(
 
 
 def effects_page(m: Measured) -> list[str]:
-    """The page, line by line."""
+    """Return the page, line by line."""
     table = m.effects
     poses = _per_pose(m.outputs)
     rows = [_row(str(name), part, poses) for name, part in table.groupby("effect", sort=False)]
@@ -77,7 +77,7 @@ def _row(name: str, rows: pd.DataFrame, poses: dict[str, str]) -> list[str]:
 
 
 def _honest(table: pd.DataFrame) -> list[str]:
-    """Whether errors stay below what ``err_`` says, and where a status says that a number is not sure."""
+    """Return whether errors stay below what ``err_`` says, and where a status says that a number is not sure."""
     refined = table[table["method"] == REFINED]
     beyond = refined[refined["exceeded"] > 0]
     unsure = refined[refined["unsure"] > 0]

@@ -22,13 +22,15 @@ CLOSURES = {"plain, as in sweeps": PLAIN, "twice the precision, as in evaluate":
 
 
 def motion(mechanism: Family, designs: Array, phi: Array) -> Array:
-    """Motion, psi and three derivatives, (4, n), at one crank angle per design."""
+    """Return the motion, psi and three derivatives, (4, n), at one crank angle per design."""
     columns = mechanism.poses(designs, Angles.of(phi[:, None]), frozenset(reference.ORDERS))
     return np.stack([np.asarray(columns[name], np.float64)[:, 0] for name in reference.ORDERS])
 
 
 def exact_table(regions: Iterable[Region], poses: int) -> pd.DataFrame:
-    """Largest error of psi [rad] and, relatively, of its derivatives: by the poses of sweeps and of evaluate."""
+    """Return the largest error of psi [rad] and, relatively, of its derivatives:
+    by the poses of sweeps and of evaluate.
+    """
     import pandas as pd
 
     rows = []

@@ -20,7 +20,7 @@ HEAD = ("family", "number", "designs", *(f"grid {n}" for n in SAMPLES), *(f"`{po
 
 
 def families_page(m: Measured) -> list[str]:
-    """The page, line by line."""
+    """Return the page, line by line."""
     lines = [
         "# What accuracy costs: every family",
         "",
@@ -55,7 +55,7 @@ def families_page(m: Measured) -> list[str]:
         "",
         *_spread(m.families),
         *_planar(m),
-        *_loads(m.loads),
+        *_loads(m.loads, m.peer_loads),
     ]
     return lines[:-1]
 
@@ -85,7 +85,7 @@ def _cell(row: pd.Series) -> str:
 
 
 def _spread(table: pd.DataFrame) -> list[str]:
-    """How far the timings of one call differ, over all rows of the table."""
+    """Return how far the timings of one call differ, over all rows of the table."""
     width = (table["ns_per_design_upper"] - table["ns_per_design_lower"]) / table["ns_per_design"]
     return [
         *prose(
@@ -118,30 +118,42 @@ def _planar(m: Measured) -> list[str]:
     ]
 
 
-def _loads(loads: pd.DataFrame | None) -> list[str]:
+def _loads(loads: pd.DataFrame | None, one: pd.DataFrame | None = None) -> list[str]:
+    """Joint loads: ``loads`` by family, ``one`` of one crank-rocker by the ways of a program."""
     lines = ["## Joint loads next to general programs", ""]
-    if loads is None:
+    if loads is None and one is None:
         return [*lines, "Not measured in this results folder: `make bench-peers` first.", ""]
-    rows = [
-        [
-            row["program"],
-            f"`{row['family']}`",
-            str(row["poses"]),
-            sig(row["largest_difference"]),
-            duration(row["ns_per_pose"]),
-            duration(row["ns_per_pose_own"]),
-            sig(row["ns_per_pose"] / row["ns_per_pose_own"]),
+    if loads is not None:
+        lines += [
+            *prose(
+                "Inverse dynamics of the same bodies at the same poses (`make bench-peers`): largest difference of a",
+                "joint force or drive torque, relative to the largest of the turn, and the time per pose; theirs from",
+                "Python, with the loop closed by Newton's method in the exported model, ours in a sweep.",
+            ),
+            "",
+            *pipe_table(
+                ["program", "family", "poses", "difference", "its time", "ours", "times as fast"],
+                [_load_row(row) for _, row in loads.iterrows()],
+            ),
+            "",
         ]
-        for _, row in loads.iterrows()
-    ]
-    return [
-        *lines,
-        *prose(
-            "Inverse dynamics of the same bodies at the same poses (`make bench-peers`): largest difference of a joint",
-            "force or drive torque, relative to the largest of the turn, and the time per pose; theirs from Python,",
-            "with the loop closed by Newton's method in the exported model, ours in a sweep.",
-        ),
-        "",
-        *pipe_table(["program", "family", "poses", "difference", "its time", "ours", "times as fast"], rows),
-        "",
-    ]
+    if one is not None:
+        lines += [
+            *prose(
+                "One crank-rocker with heavy links, time per pose and how many times as fast as the first; the loads",
+                f"differ by at most {sig(one['largest_difference'].max())} of the largest.",
+            ),
+            "",
+            *pipe_table(
+                ["what", "per pose", "times as fast"],
+                [[str(row["what"]), duration(row["ns_per_pose"]), sig(row["ratio"])] for _, row in one.iterrows()],
+            ),
+            "",
+        ]
+    return lines
+
+
+def _load_row(row: pd.Series) -> list[str]:
+    ratio = row["ns_per_pose"] / row["ns_per_pose_own"]
+    times = [duration(row["ns_per_pose"]), duration(row["ns_per_pose_own"]), sig(ratio)]
+    return [row["program"], f"`{row['family']}`", str(row["poses"]), sig(row["largest_difference"]), *times]

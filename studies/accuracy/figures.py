@@ -45,7 +45,9 @@ KINDS = {
 
 
 def draw(work: pd.DataFrame, costs: pd.DataFrame, regions: tuple[tuple[str, str], ...], folder: Path) -> list[Saved]:
-    """All methods on ordinary designs, a figure per quantity with a panel per region, and the prices of outputs."""
+    """Return all methods on ordinary designs, a figure per quantity with a panel per region,
+    and the prices of outputs.
+    """
     with house_style():
         figures = {"accuracy-methods": _methods(work, regions[0][0])}
         figures |= {f"accuracy-{name}": _by_region(work, name, regions) for name in TITLES}
@@ -65,7 +67,7 @@ def _curves(axes: Axes, points: pd.DataFrame) -> None:
 
 
 def _decades(axes: Axes, times: pd.Series) -> None:
-    """Whole decades on the axis of time, so that every figure can be read and compared."""
+    """Set whole decades on the axis of time, so that every figure can be read and compared."""
     low, high = (round_(np.log10(value)) for round_, value in ((np.floor, times.min()), (np.ceil, times.max())))
     axes.set_ylim(10.0**low, 10.0**high)
     ticks = 10.0 ** np.arange(low, high + 1.0)
@@ -74,7 +76,7 @@ def _decades(axes: Axes, times: pd.Series) -> None:
 
 
 def _plain_figure(width: float, height: float, **margins: float) -> Figure:
-    """A figure with given margins: to let the layout be solved for eight panels takes seconds."""
+    """Return a figure with given margins: to let the layout be solved for eight panels takes seconds."""
     figure = new_figure(width, height)
     figure.set_layout_engine(None)
     figure.subplots_adjust(**margins)
@@ -118,7 +120,7 @@ def _by_region(work: pd.DataFrame, quantity: str, regions: tuple[tuple[str, str]
 
 
 def _prices(costs: pd.DataFrame) -> Figure:
-    """Bars on a logarithmic axis: per pose on the left, per design on the right."""
+    """Return bars on a logarithmic axis: per pose on the left, per design on the right."""
     parts = [costs[costs["per"] == per] for per in ("pose", "design")]
     longest = max(len(part) for part in parts)
     figure = new_figure(WIDTH * 1.25, 0.6 + 0.21 * longest)

@@ -28,7 +28,7 @@ PAGES = (
 
 
 def front(m: Measured) -> list[str]:
-    """docs/accuracy.md, line by line."""
+    """Return docs/accuracy.md, line by line."""
     return [
         "# What the next digit costs",
         "",
@@ -57,7 +57,7 @@ def front(m: Measured) -> list[str]:
 
 
 def five(m: Measured) -> list[str]:
-    """What a designer should know, a sentence or two each."""
+    """Return what a designer should know, a sentence or two each."""
     return [
         _refined(m.families),
         _grid(m.families),
@@ -68,7 +68,7 @@ def five(m: Measured) -> list[str]:
 
 
 def at(table: pd.DataFrame, region: str, method: str, setting: float) -> pd.DataFrame:
-    """Rows of one region and method at one setting, a row per family."""
+    """Return rows of one region and method at one setting, a row per family."""
     found = table[(table["region"] == region) & (table["method"] == method)]
     return found[np.isclose(found["setting"], setting, rtol=1e-9, atol=0.0)].set_index("family")
 

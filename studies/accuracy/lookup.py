@@ -20,7 +20,7 @@ Singles: TypeAlias = NDArray[np.float32]
 
 
 def position_methods(samples: tuple[int, ...], phi: Array) -> list[Method]:
-    """Ways to psi of every design at its own crank angles phi (n, m), in [0, 2 pi)."""
+    """Return ways to psi of every design at its own crank angles phi (n, m), in [0, 2 pi)."""
     found = [Method("table, straight lines", n, _table(n, phi, False)) for n in samples]
     found += [Method("table, cubics", n, _table(n, phi, True)) for n in samples]
     found.append(Method("direct, float32", 1, _direct_single(phi)))
@@ -65,7 +65,7 @@ def _table(samples: int, phi: Array, cubic: bool) -> Way:
 
 @kernel_fused
 def position_single(designs: Array, cos_phi: Singles, sin_phi: Singles, psi: Singles) -> None:
-    """Rocker angle in float32; the constants of a design in float64, rounded once."""
+    """Compute the rocker angle in float32; the constants of a design in float64, rounded once."""
     least = np.float32(0.0)
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
@@ -80,7 +80,8 @@ def position_single(designs: Array, cos_phi: Singles, sin_phi: Singles, psi: Sin
 
 @kernel
 def between(psi: Array, dpsi: Array | None, phi: Array, out: Array) -> None:
-    """Angle between the samples (n, m) of a turn that begins at 0: by straight lines, or by cubics where dpsi is given.
+    """Compute the angle between the samples (n, m) of a turn that begins at 0:
+    by straight lines, or by cubics where dpsi is given.
 
     ``phi`` (n, k) in [0, 2 pi); the table's angles may jump by full turns.
     """

@@ -42,14 +42,16 @@ class Mark:
 
 
 def marks(designs: int, decisions: int) -> list[Mark]:
-    """All marks; ``decisions`` designs are decided in rational arithmetic as well."""
+    """Return all marks; ``decisions`` designs are decided in rational arithmetic as well."""
     turning = rotatable(designs, 2024)
     mixed = drawn(designs, np.random.default_rng(7))
     return [*_maxima(turning), *_margin(mixed), _verdicts(decisions), *_two_threads(mixed, turning)]
 
 
 def tables_mark(oracle: pd.DataFrame) -> Mark:
-    """Rows of the oracle tables whose error is above the factor of their sheet; ``oracle`` as of :mod:`.oracle`."""
+    """Return rows of the oracle tables whose error is above the factor of their sheet;
+    ``oracle`` as of :mod:`.oracle`.
+    """
     beyond = int((~(oracle["factor"] <= oracle["allowed"])).sum())
     rows = int(oracle.groupby(["table", "kind"])["rows"].max().sum())
     text = f"{beyond} of {len(oracle)}, over {rows} rows; {int(oracle['undecidable'].sum())} declared undecidable"
@@ -59,7 +61,7 @@ def tables_mark(oracle: pd.DataFrame) -> Mark:
 
 
 def smoke_mark() -> Mark:
-    """The smoke version of this study, run as a user would, with warm kernels."""
+    """Return the smoke version of this study, run as a user would, with warm kernels."""
     with tempfile.TemporaryDirectory() as folder:
         start, before = time.perf_counter(), os.times()
         command = [sys.executable, "-m", "studies.accuracy", "--smoke", "--out", folder]
@@ -70,7 +72,7 @@ def smoke_mark() -> Mark:
 
 
 def study_mark(took: float) -> Mark:
-    """The study that measures all this, up to its figures."""
+    """Return the study that measures all this, up to its figures."""
     used = sum(os.times()[:4])
     text = f"{took / 60.0:.1f}; {used / 60.0:.1f} of processor time"
     return Mark("`make study-accuracy` [min]", "10", text, took <= 600.0)
@@ -121,7 +123,9 @@ def _maxima(designs: Array) -> list[Mark]:
 
 
 def even_reference(designs: Array) -> Array:
-    """Largest |psi''| from 65 536 even samples by the fused loop, and halving between the neighbours of the top."""
+    """Return the largest |psi''| from 65 536 even samples by the fused loop,
+    and halving between the neighbours of the top.
+    """
     angles = turn(reference.SAMPLES)
     step = 2.0 * np.pi / reference.SAMPLES
     exact, halves = np.empty(len(designs)), np.array_split(np.arange(len(designs)), 2)
@@ -138,7 +142,7 @@ def even_reference(designs: Array) -> Array:
 
 
 def _together(work: Callable[[Any, Any], None], parts: Sequence[tuple[Any, Any]]) -> None:
-    """Two threads, one call each."""
+    """Run two threads, one call each."""
     threads = [threading.Thread(target=work, args=part) for part in parts]
     for thread in threads:
         thread.start()
@@ -156,7 +160,7 @@ def _margin(designs: Array) -> list[Mark]:
 
 
 def _verdicts(designs: int) -> Mark:
-    """Verdicts near change points against the sign of a fine minimum in 50 digits."""
+    """Return verdicts near change points against the sign of a fine minimum in 50 digits."""
     wrong, undecided = 0, 0
     generator = np.random.default_rng(5)
     plain = rotatable(designs, 77)
@@ -174,7 +178,9 @@ def _verdicts(designs: int) -> Mark:
 
 
 def _to_the_edge(designs: Array) -> Array:
-    """Factor on the coupler that brings each design to its change point, as near as halving in float64 comes."""
+    """Return the factor on the coupler that brings each design to its change point,
+    as near as halving in float64 comes.
+    """
     low, high, trial = np.zeros(len(designs)), np.ones(len(designs)), designs.copy()
     status, turns = np.empty(len(designs), np.uint8), np.empty(len(designs))
     for _ in range(54):
@@ -187,7 +193,9 @@ def _to_the_edge(designs: Array) -> Array:
 
 
 def least_discriminant(design: Array) -> float:
-    """Sign-exact least value of Delta over the turn in 50 digits: 64 samples and Newton from the lowest ones."""
+    """Return the sign-exact least value of Delta over the turn in 50 digits:
+    64 samples and Newton from the lowest ones.
+    """
     from mpmath import mp, mpf
 
     with mp.workdps(50):
@@ -220,7 +228,9 @@ def least_discriminant(design: Array) -> float:
 
 
 def _two_threads(mixed: Array, turning: Array) -> list[Mark]:
-    """Verdict and true maximum of every design, wall time on two threads: of any designs, and of those that turn."""
+    """Return the verdict and true maximum of every design, wall time on two threads:
+    of any designs, and of those that turn.
+    """
     assert set(np.unique(mixed[:, BRANCH])) <= {-1.0, 1.0}
     return [_in_two_threads(mixed, "every random design"), _in_two_threads(turning, "every design that turns")]
 

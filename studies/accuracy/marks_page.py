@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def marks_page(m: Measured) -> list[str]:
-    """The page, line by line."""
+    """Return the page, line by line."""
     return [
         "# Marks and largest known errors",
         "",
@@ -27,7 +27,7 @@ def marks_page(m: Measured) -> list[str]:
 
 
 def marks_table(marks: pd.DataFrame) -> list[str]:
-    """The marks: what was asked, what was measured, whether it was met."""
+    """Return the marks: what was asked, what was measured, whether it was met."""
     rows = [[mark, asked, measured, "yes" if met else "**no**"] for mark, asked, measured, met in marks.to_numpy()]
     return pipe_table(["mark", "asked", "measured", "met"], rows)
 
@@ -44,7 +44,7 @@ def _marks(m: Measured) -> list[str]:
 
 
 def _known(m: Measured) -> list[str]:
-    """Largest factors: one line per table, then by quantity and kind of row, then what the search found."""
+    """Return the largest factors: one line per table, then by quantity and kind of row, then what the search found."""
     lines = [
         "",
         "## Largest known factors",

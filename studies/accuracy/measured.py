@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 ABOUT = "about.json"
 # Written by `make bench-peers`, in an environment of its own, if ever.
-PEERS = ("peers", "loads")
+PEERS = ("peers", "loads", "peer_loads")
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Measured:
     marks : what was to be reached, and what was
     positions, exact, work, outputs, storage, digits, targets : the crank-rocker in depth
     oracle, worst : errors against the 25-digit tables, and the largest that a search has found
-    peers, loads : other programs, None where `make bench-peers` has not been run
+    peers, loads, peer_loads : other programs, None where `make bench-peers` has not been run
     """
 
     machine: str
@@ -49,9 +49,10 @@ class Measured:
     worst: pd.DataFrame
     peers: pd.DataFrame | None = None
     loads: pd.DataFrame | None = None
+    peer_loads: pd.DataFrame | None = None
 
     def tables(self) -> Iterator[tuple[str, pd.DataFrame]]:
-        """The tables that this study measures, by name."""
+        """Yield the tables that this study measures, by name."""
         return ((name, getattr(self, name)) for name in _own_tables())
 
     def write(self, folder: Path) -> None:
@@ -64,7 +65,7 @@ class Measured:
 
     @classmethod
     def read(cls, folder: Path) -> Measured:
-        """What :meth:`write` kept, with the tables of other programs where they lie beside it."""
+        """Return what :meth:`write` kept, with the tables of other programs where they lie beside it."""
         import pandas as pd
 
         about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
@@ -74,7 +75,7 @@ class Measured:
 
 
 def others(folder: Path) -> dict[str, pd.DataFrame]:
-    """Tables of other programs that lie in the folder, by name."""
+    """Return tables of other programs that lie in the folder, by name."""
     import pandas as pd
 
     files = {name: folder / f"{name}.parquet" for name in PEERS}

@@ -32,7 +32,7 @@ class Method:
 
 
 def acceleration_methods(samples: tuple[int, ...], targets: tuple[float, ...]) -> list[Method]:
-    """Ways to the largest |psi''| over the turn."""
+    """Return ways to the largest |psi''| over the turn."""
     found = [Method("grid, float64", n, _grid(n)) for n in samples]
     found += [Method("grid, float32", n, _grid_single(n)) for n in samples]
     found += [Method("grid + parabola", n, _grid_parabola(n)) for n in samples if n <= 4096]
@@ -43,7 +43,7 @@ def acceleration_methods(samples: tuple[int, ...], targets: tuple[float, ...]) -
 
 
 def swing_methods(samples: tuple[int, ...], targets: tuple[float, ...]) -> list[Method]:
-    """Ways to the magnitude of the swing."""
+    """Return ways to the magnitude of the swing."""
     found = [Method("grid, float64", n, _swing_grid(n, False)) for n in samples]
     found += [Method("grid + parabola", n, _swing_grid(n, True)) for n in samples if n <= 4096]
     found += [Method("accuracy=", target, _swing_adaptive(target)) for target in targets]
@@ -110,7 +110,7 @@ def _grid_refined(samples: int) -> Way:
     top, step = _grid_top(samples), 2.0 * np.pi / samples
 
     def run(designs: Array) -> Array:
-        """Regula falsi (Illinois) on psi''' between the neighbours of the top sample."""
+        """Find the root of psi''' between the neighbours of the top sample by regula falsi (Illinois)."""
         found, phi = top(designs)
         ends, _ = pose_columns(RSSR, designs, phi[:, None] + np.array([[-step, step]]), ("d3psi",))
         low, high = phi - step, phi + step

@@ -40,13 +40,15 @@ class Worst:
 
 
 def read(folder: Path, name: str) -> list[dict[str, Any]]:
-    """Rows of one table."""
+    """Return rows of one table."""
     rows: list[dict[str, Any]] = json.loads((folder / f"{name}_open.json").read_text())["rows"]
     return rows
 
 
 def factors(folder: Path, few: bool = False) -> list[Worst]:
-    """Every table whose sheet states a tolerance; with ``few`` the crank-rocker's poses and limit positions alone."""
+    """Return every table whose sheet states a tolerance;
+    with ``few`` the crank-rocker's poses and limit positions alone.
+    """
     if few:
         return [*_rssr(folder), *_limits(folder)]
     from studies.accuracy.effect_oracle import effect_factors
@@ -57,7 +59,7 @@ def factors(folder: Path, few: bool = False) -> list[Worst]:
 
 
 def frame(found: Sequence[Worst]) -> pd.DataFrame:
-    """As a table."""
+    """Return the rows as a table."""
     import pandas as pd
 
     return pd.DataFrame([worst.__dict__ for worst in found])
@@ -100,7 +102,9 @@ def judge(
 
 
 def _size(row: Row, key: str) -> float | None:
-    """The larger of condition number and value; None where they leave float64 (discriminants at scales of 1e+-100)."""
+    """Return the larger of condition number and value;
+    None where they leave float64 (discriminants at scales of 1e+-100).
+    """
     from mpmath import mpf
 
     cond, value = row["cond"].get(key), abs(float(row[key]))
@@ -112,7 +116,7 @@ def _column(rows: Sequence[Row], name: str) -> list[float]:
 
 
 def _orders(position: str, name: str) -> dict[str, tuple[str, list[str]]]:
-    """Outputs of a follower named ``name`` against the keys d1, d2, d3 of the tables."""
+    """Return outputs of a follower named ``name`` against the keys d1, d2, d3 of the tables."""
     ladder = ["d1", "d2", "d3"]
     derivatives = {f"{'d' if k == 0 else f'd{k + 1}'}{name}": (ladder[k], ladder[: k + 1]) for k in range(3)}
     return {name: (position, [position])} | derivatives
@@ -127,7 +131,7 @@ def _rssr(folder: Path) -> list[Worst]:
 
 
 def _unit_size(row: Row, key: str) -> float | None:
-    """An angle is known to a rounding of one radian at best, however small it happens to be."""
+    """Return the size by which errors are measured; an angle is known to a rounding of one radian at best."""
     size = _size(row, key)
     return max(size, 1.0) if size is not None and key == "psi" else size
 
@@ -186,7 +190,7 @@ def _limits(folder: Path) -> list[Worst]:
 
 
 def _pressure(folder: Path) -> list[Worst]:
-    """Pressure angles of crank-rockers."""
+    """Return pressure angles of crank-rockers."""
     rows = [row | row["expected"] for row in read(folder, "pressure") if row["kind"] == "rssr"]
     names = ("a", "b", "c", "e", "f", "g", "alpha")
     table = {name: _column([row["inputs"] for row in rows], name) for name in (*names, "phi")}
@@ -202,7 +206,9 @@ def _pressure(folder: Path) -> list[Worst]:
 
 
 def _largest_pressure(folder: Path) -> list[Worst]:
-    """Largest pressure angle over the turn; the rows carry no sensitivity, the unit is a rounding of one radian."""
+    """Return the largest pressure angle over the turn;
+    the rows carry no sensitivity, the unit is a rounding of one radian.
+    """
     found = []
     for family, names in (("rssr", ("a", "b", "c", "e", "f", "g", "alpha")), ("rssp", ("a", "b", "e", "f", "alpha"))):
         rows = [row | row["expected"] for row in read(folder, "pressure") if row["kind"] == f"extrema_{family}"]
@@ -217,7 +223,7 @@ def _largest_pressure(folder: Path) -> list[Worst]:
 
 
 def _synthesis(folder: Path) -> list[Worst]:
-    """Links from a requirement: of the two solutions of every row, the one nearer to the table's crank."""
+    """Return links from a requirement: of the two solutions of every row, the one nearer to the table's crank."""
     found = []
     for family, mechanism, inputs, outputs in (
         ("rssr", "RSSR", {"swing": "psi0", "psi1": "psi1", "g": "g"}, {"a": "a", "b": "b", "c": "c"}),
@@ -235,7 +241,9 @@ def _synthesis(folder: Path) -> list[Worst]:
 
 
 def _geared_dwell(folder: Path) -> list[Worst]:
-    """Poses, dwell measures and maxima; the table has no condition numbers (its sheet: 16 roundings of the size)."""
+    """Return poses, dwell measures and maxima;
+    the table has no condition numbers (its sheet: 16 roundings of the size).
+    """
     everything = [row | row["out"] | row["in"] for row in read(folder, "geared_dwell")]
     points = [row for row in everything if row["kind"] == "point"]
     ladder = ["phi", "dphi", "d2phi", "d3phi"]

@@ -45,7 +45,7 @@ def html(written: dict[str, str], figures: list[Saved]) -> str:
     style = "body{font:15px/1.45 system-ui,sans-serif;max-width:1350px;margin:2em auto;padding:0 1em;color:#222}" \
         "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.15em .5em;border-bottom:1px solid #e4e7eb;" \
         "text-align:left;font-variant-numeric:tabular-nums}td:nth-child(n+3){white-space:nowrap}" \
-        "img{width:100%}code{background:#f3f4f6}"  # fmt: skip
+        "img{max-width:100%}code{background:#f3f4f6}"  # fmt: skip
     head = (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Accuracy and time</title><style>{style}</style>'
     )

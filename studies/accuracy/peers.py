@@ -90,7 +90,7 @@ def _own(design: Array, samples: int) -> Callable[[], float]:
 
 
 def _pylinkage(design: Array, samples: int) -> Callable[[], float]:
-    """The rocker's angular acceleration from its pin's, as the program gives no angles."""
+    """Return the rocker's angular acceleration from its pin's, as the program gives no angles."""
     from pylinkage.actuators import Crank
     from pylinkage.components import Ground
     from pylinkage.dyads import RRRDyad

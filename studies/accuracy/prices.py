@@ -32,7 +32,7 @@ SMOKE_COUNTS, SMOKE_EVERY = (2, 0, 0), 4
 
 
 def family_prices(smoke: bool) -> pd.DataFrame:
-    """One row per family or chain, region and method; in smoke every fourth of them, two designs each."""
+    """Return one row per family or chain, region and method; in smoke every fourth of them, two designs each."""
     import pandas as pd
 
     rows: list[dict[str, object]] = []
@@ -42,13 +42,13 @@ def family_prices(smoke: bool) -> pd.DataFrame:
 
 
 def counts(name: str) -> tuple[int, int, int]:
-    """How many designs of each region a family is measured on."""
+    """Return how many designs of each region a family is measured on."""
     ns = sum(nanoseconds("poses", part) for part in chain_names(name))
     return next(found for limit, found in COUNTS if ns < limit)
 
 
 def prices_of(mechanism: Family, regions: Iterable[Region], smoke: bool = False) -> list[dict[str, object]]:
-    """Rows of one family."""
+    """Return rows of one family."""
     rows = []
     for region in regions:
         known = reference(mechanism, region.designs)
@@ -60,7 +60,7 @@ def prices_of(mechanism: Family, regions: Iterable[Region], smoke: bool = False)
 
 
 def methods(mechanism: Family, smoke: bool) -> Sequence[tuple[str, float, Accuracy]]:
-    """Name, setting and accuracy of every way to the measure that the family's domain allows."""
+    """Return the name, setting and accuracy of every way to the measure that the family's domain allows."""
     samples, targets = (SMOKE_SAMPLES, SMOKE_TARGETS) if smoke else (SAMPLES, TARGETS)
     found = [(GRID, float(n), Accuracy(samples=n)) for n in samples]
     if isinstance(mechanism.domain, March):

@@ -22,7 +22,7 @@ _TURN = 2.0 * np.pi
 
 
 def transfer_functions(design: Array, phi: float) -> tuple[Any, ...]:
-    """psi, psi', psi'', psi''' as mpmath numbers, for exactly the given doubles."""
+    """Return the psi, psi', psi'', psi''' as mpmath numbers, for exactly the given doubles."""
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -30,7 +30,7 @@ def transfer_functions(design: Array, phi: float) -> tuple[Any, ...]:
 
 
 def position(design: Array, phi: float) -> Any:
-    """The angle psi alone, up to full turns, as an mpmath number."""
+    """Return the angle psi alone, up to full turns, as an mpmath number."""
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -38,7 +38,9 @@ def position(design: Array, phi: float) -> Any:
 
 
 def _angle(inputs: list[Any], branch: int) -> tuple[Any, ...]:
-    """Arctangent plus arccosine from the implicit equation in the plain letters of the sources; no kernel's algebra."""
+    """Solve the implicit equation in the plain letters of the sources by arctangent plus arccosine;
+    no kernel's algebra.
+    """
     import mpmath
 
     a, b, c, e, f, g, alpha, phi = inputs
@@ -50,7 +52,7 @@ def _angle(inputs: list[Any], branch: int) -> tuple[Any, ...]:
 
 
 def _motion(inputs: list[Any], branch: int) -> tuple[Any, ...]:
-    """The angle, and its derivatives from the partials of ``F = |BC|^2 - b^2``."""
+    """Return the angle, and its derivatives from the partials of ``F = |BC|^2 - b^2``."""
     import mpmath
 
     a, _, c, e, _, g, _, _ = inputs
@@ -70,7 +72,9 @@ def _motion(inputs: list[Any], branch: int) -> tuple[Any, ...]:
 
 
 def turning_point(design: Array, phi: float) -> tuple[Any, Any]:
-    """Crank angle and rocker angle where the rocker turns back next to phi, by Newton's method in 60 digits."""
+    """Return the crank angle and rocker angle where the rocker turns back next to phi,
+    by Newton's method in 60 digits.
+    """
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -84,7 +88,9 @@ def turning_point(design: Array, phi: float) -> tuple[Any, Any]:
 
 
 def condition(design: Array, phi: float) -> tuple[float, ...]:
-    """Absolute condition numbers sum |x dy/dx| of psi and its derivatives over all inputs, by 60-digit differences."""
+    """Return the absolute condition numbers sum |x dy/dx| of psi and its derivatives over all inputs,
+    by 60-digit differences.
+    """
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -104,7 +110,7 @@ def condition(design: Array, phi: float) -> tuple[float, ...]:
 
 
 def angle_error(got: float, exact: Any) -> float:
-    """Distance of an angle from the exact one, whatever full turns lie between."""
+    """Return the distance of an angle from the exact one, whatever full turns lie between."""
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -112,7 +118,8 @@ def angle_error(got: float, exact: Any) -> float:
 
 
 def extremum(designs: Array, pose: str, sign: int = 0) -> Array:
-    """True maximum (sign 1), minimum (-1) or largest magnitude (0) over the turn of a pose output with a derivative.
+    """Return the true maximum (sign 1),
+    minimum (-1) or largest magnitude (0) over the turn of a pose output with a derivative.
 
     Every local extremum within a tenth of the best sample is refined by halving on the sign of the derivative.  Of the
     samples 49 152 are evenly spaced; the others crowd about the least discriminant, down to 1e-9 rad, because near a
@@ -122,13 +129,17 @@ def extremum(designs: Array, pose: str, sign: int = 0) -> Array:
 
 
 def largest_acceleration(designs: Array) -> Array:
-    """Largest |psi''| over the turn: the place as :func:`extremum` finds it, the height sharpened in 60 digits."""
+    """Return the largest |psi''| over the turn:
+    the place as :func:`extremum` finds it, the height sharpened in 60 digits.
+    """
     _, places = _extremum(designs, "d2psi", 0)
     return np.array([peak_acceleration(*pair) for pair in zip(designs, places, strict=True)])
 
 
 def peak_acceleration(design: Array, phi: float) -> float:
-    """Height of the peak of the acceleration next to phi, in 60 digits: secant steps to the zero of the jerk."""
+    """Return the height of the peak of the acceleration next to phi, in 60 digits:
+    secant steps to the zero of the jerk.
+    """
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -174,19 +185,19 @@ def _extremum(designs: Array, pose: str, sign: int) -> tuple[Array, Array]:
 
 
 def hardest_angle(designs: Array) -> Array:
-    """Crank angle of the least discriminant, next to which a motion is sharpest."""
+    """Return the crank angle of the least discriminant, next to which a motion is sharpest."""
     status, place = np.empty(len(designs), np.uint8), np.empty(len(designs))
     rssr.margin(designs, status, None, None, None, place, None)
     return place
 
 
 def swing(designs: Array) -> Array:
-    """Magnitude of the swing from the two extrema of the angle, nan for a follower that turns fully."""
+    """Return the magnitude of the swing from the two extrema of the angle, nan for a follower that turns fully."""
     return extremum(designs, "psi", 1) - extremum(designs, "psi", -1)
 
 
 def refined(designs: Array, pose: str, sign: int, centre: Array, before: Array, after: Array) -> tuple[Array, Array]:
-    """Height, times the sign that makes it a maximum, and place of the extremum around each centre."""
+    """Return the height, times the sign that makes it a maximum, and place of the extremum around each centre."""
     slope = RSSR.derivative_of[pose]
     low, high = centre - before, centre + after
     for _ in range(_HALVINGS):

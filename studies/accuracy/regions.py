@@ -23,7 +23,9 @@ class Region:
 
 
 def drawn(n: int, generator: np.random.Generator) -> Array:
-    """Designs of general proportions, crank up to 1, other lengths up to 5, any angle between the axes; n rows."""
+    """Return designs of general proportions, crank up to 1, other lengths up to 5,
+    any angle between the axes; n rows.
+    """
     r = generator
     lengths = [r.uniform(0.1, 1.0, n), r.uniform(0.5, 5.0, n), r.uniform(0.5, 4.0, n)]
     offsets = [r.uniform(-3.0, 3.0, n), r.uniform(-2.0, 2.0, n), r.uniform(-2.0, 2.0, n)]
@@ -31,14 +33,14 @@ def drawn(n: int, generator: np.random.Generator) -> Array:
 
 
 def margins(designs: Array) -> Array:
-    """Least cos^2 of the pressure angle over the turn; nan for what does not turn fully."""
+    """Return the least cos^2 of the pressure angle over the turn; nan for what does not turn fully."""
     status, margin = np.empty(len(designs), np.uint8), np.empty(len(designs))
     rssr.margin(designs, status, margin, None, None, None, None)
     return np.where(status == st.OK, margin, np.nan)
 
 
 def rotatable(n: int, seed: int) -> Array:
-    """The first n of :func:`drawn` whose crank turns fully."""
+    """Return the first n of :func:`drawn` whose crank turns fully."""
     generator = np.random.default_rng(seed)
     found: list[Array] = []
     while sum(map(len, found)) < n:
@@ -48,7 +50,7 @@ def rotatable(n: int, seed: int) -> Array:
 
 
 def regions(n: int, seed: int) -> tuple[Region, ...]:
-    """Seven regions of n rotatable designs each."""
+    """Return seven regions of n rotatable designs each."""
     plain = rotatable(40 * n, seed)
     angle = np.degrees(np.arccos(np.sqrt(margins(plain))))
     found = [
@@ -105,7 +107,7 @@ def _parallel(n: int, seed: int) -> Array:
 
 
 def _long(n: int, seed: int) -> Array:
-    """One offset is made long and the coupler is measured between joints that are placed first."""
+    """Make one offset long and measure the coupler between joints that are placed first."""
     generator = np.random.default_rng(seed + 3)
     designs = drawn(60 * n, generator)
     rows, which = np.arange(len(designs)), generator.integers(3, 6, len(designs))

@@ -16,7 +16,7 @@ HOUSE = {"psi": "direct, float64", "max_abs_d2psi": "accuracy=", "swing": "accur
 
 
 def significant(value: Any) -> str:
-    """Two significant digits, short."""
+    """Return two significant digits, short."""
     x = float(value)
     if not math.isfinite(x):
         return "-"
@@ -24,24 +24,24 @@ def significant(value: Any) -> str:
 
 
 def power(x: float) -> str:
-    """A power of ten as 1e-3; anything else as it comes."""
+    """Return a power of ten as 1e-3; anything else as it comes."""
     exponent = round(math.log10(x))
     return f"1e{exponent}" if math.isclose(x, 10.0**exponent) and x != 1.0 else f"{x:g}"
 
 
 def prose(*sentences: str) -> list[str]:
-    """A paragraph, wrapped as the pages of the house are."""
+    """Return a paragraph, wrapped as the pages of the house are."""
     return textwrap.wrap(" ".join(sentences), 118, break_long_words=False, break_on_hyphens=False)
 
 
 def pipe_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:
-    """A Markdown table, line by line."""
+    """Return a Markdown table, line by line."""
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     return lines + ["| " + " | ".join(str(cell).replace("|", "\\|") for cell in row) + " |" for row in rows]
 
 
 def duration(nanoseconds: Any) -> str:
-    """A time per design in the unit in which it is read."""
+    """Return a time per design in the unit in which it is read."""
     ns = float(nanoseconds)
     for unit, size in (("ns", 1.0), ("us", 1e3), ("ms", 1e6), ("s", 1e9)):
         if ns < 1e3 * size or unit == "s":
@@ -50,14 +50,16 @@ def duration(nanoseconds: Any) -> str:
 
 
 def setting_of(at: pd.Series) -> str:
-    """The setting of a point of a curve in words; empty where the method has none."""
+    """Return the setting of a point of a curve in words; empty where the method has none."""
     if str(at["method"]).startswith("direct"):
         return ""
     return power(at["setting"]) if str(at["method"]).endswith("=") else f"N {at['setting']:.0f}"
 
 
 def coarsest(curve: pd.DataFrame, bound: float) -> pd.Series | None:
-    """The coarsest setting of one method in one region with every design answered and no error above the bound."""
+    """Return the coarsest setting of one method in one region with every design answered
+    and no error above the bound.
+    """
     good = curve[(curve["largest_error"] <= bound) & (curve["unanswered"] == 0) & allowed(curve, bound)]
     if good.empty:
         return None
@@ -65,12 +67,12 @@ def coarsest(curve: pd.DataFrame, bound: float) -> pd.Series | None:
 
 
 def allowed(curve: pd.DataFrame, bound: float) -> pd.Series:
-    """Settings that may be recommended: an ``accuracy=`` is a promise, so one coarser than the bound is not."""
+    """Return settings that may be recommended: an ``accuracy=`` is a promise, so one coarser than the bound is not."""
     return ~curve["method"].str.endswith("=") | (curve["setting"] <= bound * (1.0 + 1e-9))
 
 
 def reached_table(table: pd.DataFrame, bound: float) -> list[str]:
-    """Region by method: the coarsest setting within the bound, its time, and how many times that of ours."""
+    """Return the region by method: the coarsest setting within the bound, its time, and how many times that of ours."""
     methods = list(dict.fromkeys(table["method"]))
     own = HOUSE[str(table["quantity"].iloc[0])]
     rows = []
@@ -93,7 +95,7 @@ def reached_table(table: pd.DataFrame, bound: float) -> list[str]:
 
 
 def html_body(page: str, images: Mapping[str, str]) -> str:
-    """Headings, paragraphs, lists, tables and images of the page as HTML; ``images``: data URIs by file name."""
+    """Return headings, paragraphs, lists, tables and images of the page as HTML; ``images``: data URIs by file name."""
     blocks = []
     for block in page.split("\n\n"):
         lines = block.strip().split("\n")

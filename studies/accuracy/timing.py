@@ -23,12 +23,12 @@ class Spread(NamedTuple):
 
     @classmethod
     def of(cls, times: Sequence[float]) -> Spread:
-        """Of given times."""
+        """Make the spread of given times."""
         lower, median, upper = np.percentile(times, [25.0, 50.0, 75.0])
         return cls(float(median), float(lower), float(upper))
 
     def columns(self, units: int, per: str) -> dict[str, float]:
-        """As columns of a table, ns per unit: the median, and both quartiles."""
+        """Return the columns of a table, ns per unit: the median, and both quartiles."""
         names = (f"ns_per_{per}", f"ns_per_{per}_lower", f"ns_per_{per}_upper")
         return {name: 1e9 * took / units for name, took in zip(names, self, strict=True)}
 
@@ -39,17 +39,19 @@ def seconds(
     least: float = 2e-3,
     clock: Callable[[], float] = time.process_time,
 ) -> float:
-    """Shortest of several timings of one call [s], see :func:`timings`."""
+    """Return the shortest of several timings of one call [s], see :func:`timings`."""
     return min(timings(call, repeats, least, clock))
 
 
 def spread(call: Callable[[], object], repeats: int = REPEATS, least: float = 2e-3) -> Spread:
-    """Median and quartiles of several timings of one call, see :func:`timings`."""
+    """Return the median and quartiles of several timings of one call, see :func:`timings`."""
     return Spread.of(timings(call, repeats, least))
 
 
 def per_design(run: Callable[[Array], object], designs: Array) -> dict[str, float]:
-    """Columns of the time per design, of the same designs over and over: what a call itself takes must not show."""
+    """Return columns of the time per design, of the same designs over and over:
+    what a call itself takes must not show.
+    """
     start = time.process_time()
     run(designs)
     again = max(1, min(MANY // len(designs), round(ENOUGH / max(time.process_time() - start, 1e-6))))
@@ -63,7 +65,7 @@ def timings(
     least: float,
     clock: Callable[[], float] = time.process_time,
 ) -> list[float]:
-    """Times of one call [s]; the first call, which may compile, is not counted.
+    """Return times of one call [s]; the first call, which may compile, is not counted.
 
     Calls shorter than ``least`` are timed in groups, so that the clock does not show.  Processor time, which other work
     on the machine disturbs least; what runs in several threads needs ``time.perf_counter``.

@@ -58,7 +58,8 @@ dtype = "float64"
 
 
 def whole_study(designs: int, repeats: int = REPEATS, smoke: bool = False) -> pd.DataFrame:
-    """One row per setting: time of the whole run, error of what is kept, the optimum and how far it is from the finest.
+    """Return one row per setting: time of the whole run, error of what is kept,
+    the optimum and how far it is from the finest.
 
     Wall time and processor time of one worker, as median and quartiles; the first run, which may compile, is not
     counted.
@@ -93,7 +94,7 @@ def _run(folder: Path, setting: str, designs: int) -> tuple[float, float]:
 
 
 def _judged(folder: Path) -> dict[str, object]:
-    """Rows kept, largest relative error of the objective among some of them, and the optimum with its error."""
+    """Return rows kept, largest relative error of the objective among some of them, and the optimum with its error."""
     import pandas as pd
 
     kept, best = sweep.load(folder / "designs"), pd.read_parquet(folder / OPTIMUM).iloc[:1]

@@ -24,16 +24,18 @@ from sweep.families.domain import March
 from sweep.reductions.closing import on_closed_turn
 from sweep.reductions.sampling import TWO_PI, Index, pose_columns
 
-GRID, FINER, ROUNDS = 2048, 33, 3
-RANGE_ROUNDS = 7  # the height of a kink is sharpened by 16 a round
+GRID, FINER = 2048, 33  # angles of the first grid over a turn, and of each narrower one round a place
+ROUNDS = 3  # of narrower grids that sharpen the place of a peak
+RANGE_ROUNDS = 7  # of those that sharpen a height, which comes nearer by 16 a round at a corner
 ROUGH = 8  # of the last samples, the highest of which show how rough the curve is
 PEAKS = 8  # of the second differences of one design, the highest
-NODES, WIDEST, NARROWER, WIDTHS = 33, 1.2, 0.75, 40
+NODES = 33  # of an interval
+WIDEST, NARROWER, WIDTHS = 1.2, 0.75, 40  # half-widths of the intervals [rad], each by that factor from the one before
 INNER = 0.3  # share of an interval in which the polynomial's second derivative is sharp
-STEPS = 4
+STEPS = 4  # of Newton's method from the best of close samples
 ALIKE = 5  # neighbouring widths whose heights are compared
 KINK = 1e-3  # a peak whose height differs by more from width to width is a corner of the position, not of its slope
-MARCHED = (14_400, 28_800)
+MARCHED = (14_400, 28_800)  # steps of a march; what the two differ by is its error
 NOISE = 1e-3  # share of a second difference that rounding may be, for it still to sharpen a place
 
 Curve: TypeAlias = Callable[[Index, Array, Array | None], Array]

@@ -24,7 +24,7 @@ PRESSURE, ROCKER_TOO_SHORT = 15, 7
 
 
 def reason(leaf: dict[str, object]) -> str:
-    """What excludes a box, one of the keys of COLOURS."""
+    """Return what excludes a box, one of the keys of COLOURS."""
     kinds = leaf["kinds"]
     if leaf["outcome"] == "bound":
         return "acceleration not below the bound"

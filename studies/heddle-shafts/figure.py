@@ -32,7 +32,9 @@ CAM = {"rise": math.radians(120.0), "dwell": math.radians(60.0), "fall": math.ra
 
 
 def table() -> pd.DataFrame:
-    """One row per shaft: stroke of a clear shed, the two dimensions that change, and what the cam makes of it."""
+    """Return one row per shaft: stroke of a clear shed, the two dimensions that change,
+    and what the cam makes of it.
+    """
     number = np.arange(1, SHAFTS + 1)
     strokes = shed({"shaft": number, "d1": FELL, "t": PITCH, "stroke": PAGE["stroke"]})["stroke"].to_numpy()
     ends = extremes(PAGE | LEVER | {"BC": ROD}).iloc[0]
@@ -51,7 +53,9 @@ def table() -> pd.DataFrame:
 
 
 def _drive(ends: pd.Series) -> dict[str, float]:
-    """The chain from the cam to the bell crank, common to all shafts; stage 1 is the cam with its roller lever."""
+    """Return the chain from the cam to the bell crank, common to all shafts;
+    stage 1 is the cam with its roller lever.
+    """
     first, second = float(ends["lever_angle_1"]), float(ends["lever_angle_2"])
     rest = math.pi - math.acos((151.0**2 + ROLLER_LEVER**2 - BASE**2) / (2.0 * 151.0 * ROLLER_LEVER))
     cam = {f"{name}1": value for name, value in CAM.items()}
@@ -65,7 +69,7 @@ def _drive(ends: pd.Series) -> dict[str, float]:
 
 
 def chart(rows: pd.DataFrame) -> Figure:
-    """Acceleration and asymmetry from shaft to shaft."""
+    """Return the acceleration and asymmetry from shaft to shaft."""
     figure = new_figure(WIDTH, 4.6)
     left, right = figure.subplots(1, 2)
     left.bar(rows["shaft"], rows["acceleration"], color=OPTIMUM)

@@ -33,7 +33,9 @@ TORQUES = {3000: 350.0, 5000: 950.0, 7000: 1850.0}
 
 
 def table(designs: pd.DataFrame) -> pd.DataFrame:
-    """One row per effect and speed: quantiles of its measure over the feasible designs, and whether it matters."""
+    """Return one row per effect and speed:
+    quantiles of its measure over the feasible designs, and whether it matters.
+    """
     rows = []
     for speed, torque in TORQUES.items():
         of_speed = np.isclose(designs["speed"], speed * np.pi / 30.0)
@@ -49,7 +51,7 @@ def table(designs: pd.DataFrame) -> pd.DataFrame:
 
 
 def chart(effects: pd.DataFrame, designs: pd.DataFrame) -> Figure:
-    """Measures over their thresholds against speed; utilisation against the largest pressure angle."""
+    """Return measures over their thresholds against speed; utilisation against the largest pressure angle."""
     figure = new_figure(WIDTH, 8.4)
     above, below = figure.subplots(2, 1)
     for k, label in enumerate(RULES):

@@ -57,7 +57,7 @@ OUTPUTS = ["max_abs_d2psi", "max_pressure_angle", "swing", "stroke_ratio"]
 
 
 def crank_rocker(ratio: float, known: list[Array], starts: int) -> Result:
-    """The crank-rocker of least acceleration found for a stroke ratio, from drawn and from known designs."""
+    """Return the crank-rocker of least acceleration found for a stroke ratio, from drawn and from known designs."""
     locus = CRANK_ROCKER["locus"] | {"phi0": f"{360.0 * ratio / (1.0 + ratio)!r} deg"}
     study = study_from_data(CRANK_ROCKER | {"locus": locus}, Path("crank-rocker"))
     designs = np.array([*known, *drawn(study, starts, 56)[:starts]])
@@ -66,7 +66,9 @@ def crank_rocker(ratio: float, known: list[Array], starts: int) -> Result:
 
 
 def crank_rockers(ratios: list[float], starts: int) -> pd.DataFrame:
-    """One row per stroke ratio, searched upwards and then downwards again, each also from its neighbour's answer."""
+    """Return one row per stroke ratio, searched upwards and then downwards again,
+    each also from its neighbour's answer.
+    """
     best: dict[float, Result] = {}
     for ratio in (*ratios, *ratios[-2::-1]):
         known = [best[other].design for other in ratios if other in best]
@@ -81,12 +83,12 @@ def crank_rockers(ratios: list[float], starts: int) -> pd.DataFrame:
 
 
 def merit(result: Result) -> tuple[bool, float]:
-    """Designs that miss a limit after those that keep all, settled or not."""
+    """Rank designs that miss a limit after those that keep all, settled or not."""
     return result.status == LIMIT_EXCEEDED, result.objective
 
 
 def table(front: pd.DataFrame, starts: int) -> pd.DataFrame:
-    """One row per stroke ratio and mechanism; one that misses a limit has status LIMIT_EXCEEDED."""
+    """Return one row per stroke ratio and mechanism; one that misses a limit has status LIMIT_EXCEEDED."""
     slotted = front.sort_values("bound").assign(mechanism="slotted link", ratio=lambda rows: rows["bound"])
     others = crank_rockers(slotted["ratio"].tolist(), starts).assign(mechanism="crank-rocker")
     both = pd.concat([slotted, others], ignore_index=True)
@@ -94,7 +96,7 @@ def table(front: pd.DataFrame, starts: int) -> pd.DataFrame:
 
 
 def chart(drives: pd.DataFrame) -> Figure:
-    """Acceleration against the stroke ratio."""
+    """Return the acceleration against the stroke ratio."""
     figure = new_figure(WIDTH, 4.6)
     axes = figure.subplots()
     for name, colour in (("slotted link", OPTIMUM), ("crank-rocker", REFERENCE)):

@@ -35,7 +35,9 @@ LINKS = ["a2", "b2", "c2", "e2"]
 
 
 def price(study: Study, mechanisms: dict[str, np.ndarray]) -> pd.DataFrame:
-    """Acceleration, deviation as drawn and as made, shortest link, arm and size of mechanisms side by side."""
+    """Return the acceleration, deviation as drawn and as made, shortest link,
+    arm and size of mechanisms side by side.
+    """
     if study.tolerance is None:
         raise ValueError("the study has no tolerances")
     names = study.family.parameter_names
@@ -64,7 +66,9 @@ def price(study: Study, mechanisms: dict[str, np.ndarray]) -> pd.DataFrame:
 
 
 def front(study: Study, optimum: np.ndarray, deviations: tuple[float, ...], looks: int, jobs: int) -> pd.DataFrame:
-    """Least acceleration where 95 % of what is made deviate by at most so much, each from its neighbour's mechanism."""
+    """Return the least acceleration where 95 % of what is made deviate by at most so much,
+    each from its neighbour's mechanism.
+    """
     if study.tolerance is None:
         raise ValueError("the study has no tolerances")
     problem = problem_of(study, np.array([0.7 * optimum, 1.3 * optimum]))
@@ -85,7 +89,7 @@ def front(study: Study, optimum: np.ndarray, deviations: tuple[float, ...], look
 
 
 def chart(table: pd.DataFrame, mechanisms: pd.DataFrame) -> Figure:
-    """The front, with the mechanisms as they are made."""
+    """Return the front, with the mechanisms as they are made."""
     figure = new_figure(WIDTH, 3.8)
     axes = figure.subplots()
     kept = table[table["kept"]]

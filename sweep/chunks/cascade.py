@@ -119,7 +119,7 @@ class Cascade:
         self._levels = levels(self.study)
         self._waiting: list[list[Batch]] = [[] for _ in self._levels]
         self._left: list[Batch] = []
-        self._go_on = (codes.OK, *PARTIAL) if self.study.output.keep == "all" else (codes.OK,)
+        self._go_on = np.isin(np.arange(256), (codes.OK, *PARTIAL) if self.study.output.keep == "all" else (codes.OK,))
         self.reached = [0] * len(self._levels)
         self.counts = np.zeros(256, np.int64)
         self.missed = Counter()
@@ -184,10 +184,10 @@ class Cascade:
             if limit.output in found:
                 self._leave(limit, status, (status == codes.OK) & ~meets(limit, found[limit.output]))
         more = {name: np.asarray(values, np.float64) for name, values in found.items() if name != "status"}
-        return Batch(batch.index, batch.designs, batch.outputs | more, status), np.isin(status, self._go_on)
+        return Batch(batch.index, batch.designs, batch.outputs | more, status), self._go_on[status]
 
     def _found(self, route: Route, batch: Batch) -> Mapping[str, NDArray[Any]]:
-        """Outputs of a route with their error estimates, and ``status``."""
+        """Return outputs of a route with their error estimates, and ``status``."""
         return design_outputs(self.study.family, batch.designs, route.outputs, self.study.accuracy, self.study.window)
 
     def _fitted(self, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
@@ -240,7 +240,9 @@ class Recalled(Cascade):
 
 
 def levels(study: Study) -> tuple[Level, ...]:
-    """The levels of a study: its routes in the order of `Work`; those that need fitted parameters come after [fit]."""
+    """Return the levels of a study: its routes in the order of `Work`;
+    those that need fitted parameters come after [fit].
+    """
     found = [Level(route, route.ns_per_design) for route in ordered_routes(study)]
     if study.fit is not None or study.parameter_limits:
         before = sum(_before_fit(study, route) for route in ordered_routes(study))
@@ -249,13 +251,15 @@ def levels(study: Study) -> tuple[Level, ...]:
 
 
 def ordered_routes(study: Study) -> tuple[Route, ...]:
-    """The routes of a study in the order of `Work`; those that need the fitted parameters come last."""
+    """Return the routes of a study in the order of `Work`; those that need the fitted parameters come last."""
     found = routes(study.family, study.want, study.accuracy)
     return tuple(sorted(found, key=lambda route: not _before_fit(study, route)))
 
 
 def _before_fit(study: Study, route: Route) -> bool:
-    """Whether the route concerns only stages before the one that [fit] finishes, and no load that it hands back."""
+    """Return whether the route concerns only stages before the one that [fit] finishes,
+    and no load that it hands back.
+    """
     if study.fit is None:
         return False
     last = len(stages_of(study.bare))
@@ -272,7 +276,7 @@ def compared(name: str, values: Number) -> Number:
 
 
 def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:
-    """Whether each value keeps the limit; nan does not.  Swing and stroke are compared by magnitude."""
+    """Return whether each value keeps the limit; nan does not. Swing and stroke are compared by magnitude."""
     x = compared(limit.output, np.asarray(values, dtype=np.float64))
     good = np.isfinite(x)
     if limit.minimum is not None:

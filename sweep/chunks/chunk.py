@@ -38,7 +38,8 @@ class ChunkResult:
 
 
 def output_columns(study: Study) -> dict[str, str]:
-    """Names and types of the result columns: what the study wants, each number with its error estimate if there is one.
+    """Return names and types of the result columns:
+    what the study wants, each number with its error estimate if there is one.
 
     An estimate is stored in float32 always, a proven bound is not; whether a crank turns is no number and has none.
     """
@@ -51,7 +52,8 @@ def output_columns(study: Study) -> dict[str, str]:
 
 
 def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
-    """Checked (n, P) design matrix of the designs start, ..., stop - 1 of the study's space, and their status (n,).
+    """Return the checked (n, P) design matrix of the designs start, ..., stop - 1 of the study's space,
+    and their status (n,).
 
     The status is OK unless [locus] found no mechanism for a design; its links are nan then.
     """
@@ -69,7 +71,7 @@ def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArra
 
 
 def parameter_ns(study: Study) -> float:
-    """Estimated cost of the parameters of a design [ns]."""
+    """Return the estimated cost of the parameters of a design [ns]."""
     own = nanoseconds("work", "parameter") * len(study.family.parameters)
     own += nanoseconds("work", "locus") if study.locus is not None else 0.0
     if study.space.kind == "product":

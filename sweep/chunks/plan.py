@@ -92,17 +92,17 @@ class Plan:
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def bounds(self, index: int) -> tuple[int, int]:
-        """First design of a chunk and the one after its last."""
+        """Return the first design of a chunk and the one after its last."""
         start = index * self.chunk_size
         return start, min(start + self.chunk_size, self.designs)
 
     def as_dict(self) -> dict[str, Any]:
-        """What ``_plan.json`` says of the chunks."""
+        """Return what ``_plan.json`` says of the chunks."""
         return {"format": FORMAT, "identity": self.identity, "chunks": self.chunks} | asdict(self)
 
 
 def make_plan(study: Study, chunk_size: int | None = None) -> Plan:
-    """The plan of a study; a pilot of about a thousand designs tells how many get through the cascade.
+    """Return the plan of a study; a pilot of about a thousand designs tells how many get through the cascade.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def designs_fingerprint(study: Study) -> str:
 
 
 def choose_chunk_size(study: Study, known: Pilot | None = None) -> int:
-    """Designs per chunk: a multiple of 512 from the routes' cost, the memory and the number of designs.
+    """Return designs per chunk: a multiple of 512 from the routes' cost, the memory and the number of designs.
 
     Neither the number of workers nor the clock of the machine enters.  ``known`` is a pilot that was already sent.
     """
@@ -184,7 +184,7 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
 
 
 def spread_designs(study: Study, number: int) -> Array:
-    """About that many designs spread over the space, (n, P); fewer where [locus] finds no mechanism for some."""
+    """Return about that many designs spread over the space, (n, P); fewer where [locus] finds no mechanism for some."""
     count = study.space.count
     golden = (math.sqrt(5.0) - 1.0) / 2.0
     starts = sorted({int((k * golden) % 1.0 * count) for k in range(number)})
@@ -193,7 +193,7 @@ def spread_designs(study: Study, number: int) -> Array:
 
 
 def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
-    """About that many designs that keep all limits, spread over those found, and how many were tried.
+    """Return about that many designs that keep all limits, spread over those found, and how many were tried.
 
     512 designs spread over the space go through the limits, then 4096 if none of them keeps all: fitted and on their
     locus, as those of the sweep.
@@ -216,12 +216,12 @@ def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
 
 
 def row_bytes(study: Study) -> int:
-    """Bytes of one row before it is encoded."""
+    """Return bytes of one row before it is encoded."""
     return sum(np.dtype(column.dtype).itemsize for column in describe_columns(study))
 
 
 def describe_columns(study: Study) -> tuple[Column, ...]:
-    """The columns of a chunk in order: design, parameters, outputs, status."""
+    """Return the columns of a chunk in order: design, parameters, outputs, status."""
     columns = [Column("design", "int64", "1", "index of the design in the study's design space", "index")]
     columns += [
         Column(p.name, "float64", PARAMETER_UNITS[p.unit], p.text, "parameter") for p in study.family.parameters
@@ -232,7 +232,7 @@ def describe_columns(study: Study) -> tuple[Column, ...]:
 
 
 def error_words(study: Study, name: str) -> str:
-    """What the error column of an output holds."""
+    """Return what the error column of an output holds."""
     return (
         "proven bound of the absolute error"
         if is_proven(study.family, name, study.accuracy)
@@ -249,7 +249,7 @@ def _output_column(study: Study, name: str, dtype: str) -> Column:
 
 @lru_cache
 def code_hash() -> str:
-    """Hash of the sources and libraries that determine the values in a chunk."""
+    """Return the hash of the sources and libraries that determine the values in a chunk."""
     import scipy
 
     from kernels._cache import source_hash
@@ -260,7 +260,7 @@ def code_hash() -> str:
 
 @lru_cache
 def optimiser_hash() -> str:
-    """Hash of the sources that determine the optimum, beyond those of the chunks."""
+    """Return the hash of the sources that determine the optimum, beyond those of the chunks."""
     return _hash_sources([path for path in DIGESTS if path.startswith("optimise/")], code_hash())
 
 

@@ -74,7 +74,7 @@ def init(name: str, family: str | None, members: tuple[str, ...], into: Path) ->
 
 
 def _machine(members: tuple[str, ...]) -> Machine | None:
-    """The machine of NAME=FAMILY texts; None where there are none."""
+    """Return the machine of NAME=FAMILY texts; None where there are none."""
     from sweep.cli.listing import family_names
     from sweep.errors import InputError
     from sweep.families import family as find_family
@@ -98,7 +98,7 @@ def _machine(members: tuple[str, ...]) -> Machine | None:
 @click.command()
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A file; default: standard output.")
 def schema(out: Path | None) -> None:
-    """The JSON schema of study files, by which editors complete and check them."""
+    """Write the JSON schema of study files, by which editors complete and check them."""
     from sweep.errors import StoreError
 
     if out is None:
@@ -111,7 +111,7 @@ def schema(out: Path | None) -> None:
 
 
 def schema_text(found: dict[str, Any]) -> str:
-    """A schema as it stands in a file: a line for each table, each family and each definition."""
+    """Return a schema as it stands in a file: a line for each table, each family and each definition."""
     parts = []
     for key, value in found.items():
         opening, closing = ("[", "]") if isinstance(value, list) else ("{", "}")
@@ -137,7 +137,7 @@ def _current_schema() -> str:
 
 
 def _shared_schema(into: Path) -> Path | None:
-    """The schema that a project keeps for all its studies, docs/study.schema.json, if ``into`` lies in one."""
+    """Return the schema that a project keeps for all its studies, docs/study.schema.json, if ``into`` lies in one."""
     here = into.resolve()
     return next((file for up in (here, *here.parents) if (file := up / "docs" / SCHEMA).is_file()), None)
 

@@ -6,7 +6,7 @@ import click
 
 
 def families(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Families that begin so; behind a + the next stage of a chain."""
+    """Return families that begin so; behind a + the next stage of a chain."""
     from sweep.families import NAMES
 
     before, plus, last = incomplete.rpartition("+")
@@ -14,14 +14,14 @@ def families(context: click.Context, parameter: click.Parameter, incomplete: str
 
 
 def effects(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Effects that begin so."""
+    """Return effects that begin so."""
     from sweep.effects import NAMES
 
     return [name for name in NAMES if name.startswith(incomplete)]
 
 
 def outputs(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Outputs of the FAMILY given before, behind a comma the next one."""
+    """Return outputs of the FAMILY given before, behind a comma the next one."""
     from sweep.cli.listing import family_names, main_outputs
     from sweep.errors import LinksweepError
     from sweep.families import family

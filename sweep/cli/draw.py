@@ -80,7 +80,7 @@ def draw(
 
 
 def _of_one(source: str, table: Path | None, design: str | None, row: int) -> tuple[Any, dict[str, Any]]:
-    """Mechanism and design out of a folder, or a family's name and a table."""
+    """Return the mechanism and design out of a folder, or a family's name and a table."""
     from sweep.cli.listing import family_names
     from sweep.cli.tables import read_table
     from sweep.errors import InputError

@@ -38,7 +38,7 @@ def effects(name: str | None, markdown: bool) -> None:
 
 
 def cost_words(entry: Effect) -> str:
-    """Measured cost in words."""
+    """Return the measured cost in words."""
     words = [f"{entry.ns_per_pose:.0f} ns per pose"] if entry.ns_per_pose else []
     if entry.design_result:
         words.append(f"{entry.ns_per_design / 1000.0:.3g} us per design")
@@ -46,13 +46,13 @@ def cost_words(entry: Effect) -> str:
 
 
 def chain_words(entry: Effect) -> str:
-    """Which stages of a chain the effect can be asked of."""
+    """Return which stages of a chain the effect can be asked of."""
     stages = "the first stage" if entry.even_crank else "any stage"
     return f"{stages}; the load of the stages behind it enters" if entry.takes_load else stages
 
 
 def explain(entry: Effect) -> list[str]:
-    """One effect in full, line by line."""
+    """Return one effect in full, line by line."""
     from sweep.study.units import internal_unit
 
     lines = [f"{entry.name} ({entry.key}): {entry.title}", ""]
@@ -89,19 +89,19 @@ def _output_rows(outputs: tuple[Output, ...]) -> list[tuple[str, str, str, str]]
 
 
 def input_words(p: Parameter) -> str:
-    """Definition of an input with what it may be."""
+    """Return the definition of an input with what it may be."""
     notes = [p.sign] if p.sign else []
     notes += [f"{p.default:g} if left out" if p.default is not None else "required"]
     return f"{p.text} ({', '.join(notes)})"
 
 
 def every_input(entry: Effect) -> tuple[Parameter, ...]:
-    """Inputs of an effect for whatever family, those of a tool behind its own."""
+    """Return inputs of an effect for whatever family, those of a tool behind its own."""
     return tuple(dict.fromkeys((*entry.inputs, *(p for tool in entry.tool_inputs for p in tool))))
 
 
 def page() -> str:
-    """docs/effects.md, made from the register."""
+    """Return docs/effects.md, made from the register."""
     from sweep.effects import NAMES, effect
     from sweep.study.units import internal_unit
 

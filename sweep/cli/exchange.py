@@ -18,7 +18,7 @@ FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_
 @click.option("--tolerance", type=float, help="Largest residual as a part of the drawing's size; default 1e-4.")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A table for `sweep eval`: one design.")
 def points(family: str, file: Path, part: str, tolerance: float | None, out: Path | None) -> None:
-    """The dimensions of FAMILY from the points of a drawing: FILE.csv with the columns name, x, y, z.
+    """Find the dimensions of FAMILY from the points of a drawing: FILE.csv with the columns name, x, y, z.
 
     FILE may also be a .csv, .dxf or .glb that `sweep export` wrote; of several stages or members --part names one.
 

@@ -17,7 +17,7 @@ OF_EACH = 2  # outputs of a member that are asked for
 
 
 def machine_text(name: str, machine: Machine, schema: str) -> str:
-    """A study.toml that passes `sweep check`; ``schema`` is where its JSON schema lies, seen from the file."""
+    """Return a study.toml that passes `sweep check`; ``schema`` is where its JSON schema lies, seen from the file."""
     members = {m.name: m.family for m in machine.members}
     wanted = {member: wanted_outputs(family)[-OF_EACH:] for member, family in members.items()}
     last = machine.members[-1].name
@@ -72,7 +72,7 @@ def machine_text(name: str, machine: Machine, schema: str) -> str:
 
 
 def machine_smoke_text(machine: Machine) -> str:
-    """The tiny version beside it."""
+    """Return the tiny version beside it."""
     members = {m.name: m.family for m in machine.members}
     lines = ["# The same question with few designs."]
     for member in members:
@@ -82,7 +82,7 @@ def machine_smoke_text(machine: Machine) -> str:
 
 
 def swept_of(members: Mapping[str, Family], member: str) -> list[str]:
-    """What is swept of a member: a dimension each of the first two."""
+    """Return what is swept of a member: a dimension each of the first two."""
     return swept_names(members[member])[:1] if member in list(members)[:2] else []
 
 
@@ -102,7 +102,9 @@ def _members(members: Mapping[str, Family]) -> list[str]:
 
 
 def _relations(machine: Machine) -> tuple[list[str], list[str]]:
-    """Lines of the table and the outputs that they give: a distance where two neighbours have points, their timing."""
+    """Return lines of the table and the outputs that they give:
+    a distance where two neighbours have points, their timing.
+    """
     lines, outputs = [], []
     for one, other in pairwise(machine.members):
         points = [f"{m.name}.{m.points[-1]}" for m in (one, other) if m.points]
@@ -116,7 +118,9 @@ def _relations(machine: Machine) -> tuple[list[str], list[str]]:
 
 
 def _place(family: Family) -> str:
-    """A crank angle that the family has: where its output is largest; of what turns on and on, its acceleration."""
+    """Return a crank angle that the family has: where its output is largest;
+    of what turns on and on, its acceleration.
+    """
     turns = any(name.startswith("dwell_") for name in wanted_outputs(family))
     return f"phi_max_abs_d2{family.position}" if turns else f"phi_max_{family.position}"
 

@@ -25,7 +25,7 @@ WIDTH = 56  # column of the explanations
 
 
 def study_text(name: str, family: Family, schema: str) -> str:
-    """A study.toml that passes `sweep check`; ``schema`` is where its JSON schema lies, seen from the file."""
+    """Return a study.toml that passes `sweep check`; ``schema`` is where its JSON schema lies, seen from the file."""
     from sweep.families.domain import March
 
     wanted = wanted_outputs(family)
@@ -81,7 +81,7 @@ def study_text(name: str, family: Family, schema: str) -> str:
 
 
 def smoke_text(family: Family) -> str:
-    """The tiny version beside it."""
+    """Return the tiny version beside it."""
     return "# The same question with few designs.\n[design]\n" + "".join(
         f"{name} = {{ count = 2 }}\n" for name in swept_names(family)
     )
@@ -94,7 +94,7 @@ def _names(family: Family) -> list[str]:
 
 
 def mechanism_line(family: Family) -> str:
-    """The family, or the families of a chain."""
+    """Return the family, or the families of a chain."""
     names = _names(family)
     if len(names) == 1:
         return f'family = "{names[0]}"'
@@ -102,7 +102,7 @@ def mechanism_line(family: Family) -> str:
 
 
 def _example(family: Family) -> dict[str, float]:
-    """The examples of the stages under the names of the chain."""
+    """Return the examples of the stages under the names of the chain."""
     from sweep.families.chain import Chain, stages_of
 
     stages = stages_of(family)
@@ -112,7 +112,9 @@ def _example(family: Family) -> dict[str, float]:
 
 
 def wanted_outputs(family: Family) -> list[str]:
-    """What a designer asks first: size of the motion, pressure angle, greatest acceleration; else what there is."""
+    """Return what a designer asks first: size of the motion, pressure angle, greatest acceleration;
+    else what there is.
+    """
     from sweep.cli.listing import main_outputs
     from sweep.quantities.names import is_flag, parts
 
@@ -128,7 +130,7 @@ def wanted_outputs(family: Family) -> list[str]:
 
 
 def swept_names(family: Family) -> list[str]:
-    """The first two dimensions: lengths that are not zero, or any numbers where there are none."""
+    """Return the first two dimensions: lengths that are not zero, or any numbers where there are none."""
     example = _example(family)
     usable = [p for p in family.parameters if p.choices is None and example.get(p.name)]
     lengths = [p.name for p in usable if p.unit == "length"]
@@ -136,7 +138,7 @@ def swept_names(family: Family) -> list[str]:
 
 
 def design_lines(family: Family, swept: list[str]) -> Iterator[str]:
-    """Every parameter with its meaning: ``swept`` ones as ranges, those with a default as comments."""
+    """Yield every parameter with its meaning: ``swept`` ones as ranges, those with a default as comments."""
     example = _example(family)
     given = {p.unit for p in family.parameters}
     units = OTHERS | (SI if given & {"mass", "force", "stiffness", "torque"} else LENGTHS)
@@ -163,7 +165,7 @@ def _words(p: Parameter) -> str:
 
 
 def limit_lines(family: Family) -> list[str]:
-    """Full rotation as a limit, pressure angles as comments."""
+    """Return the full rotation as a limit, pressure angles as comments."""
     from sweep.cli.listing import main_outputs
     from sweep.quantities.names import is_flag, stem
 

@@ -22,7 +22,7 @@ ANGLES = click.option(
 
 
 def family_names(text: str) -> str | list[str]:
-    """``rssr`` is a family, ``rssr+guide`` or ``rssr,guide`` a chain of two."""
+    """Read ``rssr`` as a family, ``rssr+guide`` or ``rssr,guide`` as a chain of two."""
     from sweep.families import chain_names
 
     names = chain_names(text)
@@ -46,25 +46,25 @@ def families(name: str | None) -> None:
 
 
 def over(family: Family) -> str:
-    """Over what a family is evaluated, in a word or two."""
+    """Say in a word or two over what a family is evaluated."""
     domain = family.domain
     return domain.kind if domain.kind != "interval" else f"interval of {domain.name}"
 
 
 def capability_words(family: Family) -> list[str]:
-    """What a family can be asked for besides its motion."""
+    """Return what a family can be asked for besides its motion."""
     from sweep.families.capabilities import (
         Assembly,
         CrankRockerLoop,
         GuidedPoint,
         JointRecords,
         LimitLocus,
-        LinkTree,
         OutputLink,
         Points,
         PressureEllipse,
         ProvableLocus,
     )
+    from sweep.families.link_tree import LinkTree
 
     words = [
         (Assembly, "rotatability"),
@@ -82,7 +82,7 @@ def capability_words(family: Family) -> list[str]:
 
 
 def describe(family: Family) -> list[str]:
-    """Parameters, pose outputs and design outputs of a family with their units, one per line."""
+    """Return parameters, pose outputs and design outputs of a family with their units, one per line."""
     from sweep.evaluation.summaries import output
     from sweep.families.capabilities import Points
     from sweep.quantities.reduction import prefixes
@@ -109,7 +109,9 @@ def describe(family: Family) -> list[str]:
 
 
 def main_outputs(family: Family) -> list[str]:
-    """Design outputs but for the reductions of every pose output, of which only those a designer asks for first."""
+    """Return design outputs but for the reductions of every pose output,
+    of which only those a designer asks for first.
+    """
     from sweep.evaluation.summaries import output_names
     from sweep.families.capabilities import Assembly
     from sweep.families.members import Machine
@@ -129,7 +131,7 @@ def main_outputs(family: Family) -> list[str]:
 
 
 def aligned(rows: Iterable[Sequence[str]]) -> list[str]:
-    """Rows of words as indented lines with aligned columns."""
+    """Return rows of words as indented lines with aligned columns."""
     table = [tuple(row) for row in rows]
     if not table:
         return []
@@ -145,7 +147,7 @@ def echo_columns(rows: Iterable[Sequence[str]]) -> None:
 
 @click.group()
 def cache() -> None:
-    """The compiled kernels kept on disk."""
+    """Manage the compiled kernels that are kept on disk."""
 
 
 @cache.command()

@@ -63,7 +63,7 @@ def _said(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Our own warnings are one line; others are for whoever programs."""
+    """Print a warning of our own in one line; others are for whoever programs."""
     if issubclass(category, LinksweepWarning):
         click.echo(f"sweep: {message}", err=True)
     else:

@@ -58,7 +58,7 @@ def merge(study: Path, out: Path | None, smoke: bool) -> None:
 
 
 def _folder(study: Path, out: Path | None, smoke: bool) -> Path:
-    """The folder that `sweep run` would take."""
+    """Return the folder that `sweep run` would take."""
     from sweep.study import load_study
 
     if out is not None:

@@ -21,7 +21,7 @@ ADVISED = 64
 
 
 def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]) -> list[str]:
-    """The plan of a study, line by line.
+    """Return the plan of a study, line by line.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
 
 
 def _computed(study: Study) -> list[str]:
-    """The routes of the sweep in their order, with their cost, outputs and limits."""
+    """Return the routes of the sweep in their order, with their cost, outputs and limits."""
     from sweep.chunks.cascade import ordered_routes
     from sweep.evaluation.summaries import output
     from sweep.report.limits import bound_words
@@ -92,7 +92,9 @@ def _computed(study: Study) -> list[str]:
 
 
 def _before_and_between(study: Study) -> list[str]:
-    """Parameters that follow from others: made before the sweep's routes, or fitted between them; and their limits."""
+    """Return parameters that follow from others: made before the sweep's routes, or fitted between them;
+    and their limits.
+    """
     from sweep.chunks.plan import PARAMETER_UNITS
     from sweep.report.limits import bound_words
     from sweep.report.quantities import quantity
@@ -124,7 +126,7 @@ def _times(ratio: float) -> str:
 
 
 def _front(study: Study) -> list[str]:
-    """The front of [pareto]: what is set against what, from where to where, and how much searching that is."""
+    """Return the front of [pareto]: what is set against what, from where to where, and how much searching that is."""
     from sweep.evaluation.summaries import output
     from sweep.optimise.pareto import searches
     from sweep.report.quantities import number, quantity
@@ -144,7 +146,7 @@ def _front(study: Study) -> list[str]:
 
 
 def _effects(study: Study) -> list[str]:
-    """The effects of the scene: what is computed, what is not, and which rules of negligibility hold."""
+    """Return the effects of the scene: what is computed, what is not, and which rules of negligibility hold."""
     from sweep.chunks.plan import feasible_designs, spread_designs
     from sweep.effects.advice import findings, left_out, tree
 
@@ -188,7 +190,7 @@ def _accuracy(study: Study) -> str:
 
 
 def size(count: float) -> str:
-    """A number of bytes, in words."""
+    """Return a number of bytes, in words."""
     for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if count >= scale:
             return f"{count / scale:.3g} {unit}"
@@ -196,7 +198,7 @@ def size(count: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time, in words."""
+    """Return a time, in words."""
     if seconds < 120.0:
         return f"{seconds:.2g} s"
     return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"

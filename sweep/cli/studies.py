@@ -82,11 +82,16 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
     """
     from sweep.cli.plan import plan_lines
     from sweep.engine.estimate import check_budget, estimate, other_accuracies
+    from sweep.jobs.progress import Phases
     from sweep.study import load_study
 
     model = load_study(study, smoke=smoke)
-    cost = estimate(model, jobs)
-    for line in plan_lines(model, cost, other_accuracies(model, jobs)):
+    with Phases(show=True) as phases:
+        cost = estimate(model, jobs, lambda done, of: phases.say("planning", done, of))
+        others = other_accuracies(model, jobs, lambda done, of: phases.say("other accuracies", done, of))
+        phases.say("what matters")
+        lines = plan_lines(model, cost, others)
+    for line in lines:
         click.echo(line)
     check_budget(model, cost)
 

@@ -58,7 +58,7 @@ def evaluate_table(
     status_text: bool,
     out: Path | None,
 ) -> None:
-    """Pose outputs of the designs in TABLE (.parquet or .csv), one row per pose.
+    """Compute pose outputs of the designs in TABLE (.parquet or .csv), one row per pose.
 
     TABLE has a column for each parameter of FAMILY, in one length unit, ANGLES IN RAD unless --angles or a header such
     as `alpha [deg]` says otherwise, and a column phi (then each row is one pose) unless --poses is given (then each row
@@ -112,7 +112,7 @@ def summarise_table(
     status_text: bool,
     out: Path | None,
 ) -> None:
-    """Design outputs of the designs in TABLE (.parquet or .csv), one row per design.
+    """Compute design outputs of the designs in TABLE (.parquet or .csv), one row per design.
 
     TABLE has a column for each parameter of FAMILY, in one length unit, ANGLES IN RAD unless --angles or a header such
     as `alpha [deg]` says otherwise.  FAMILY is a family or a chain such as rssr+guide.  A value that is nan has a
@@ -138,13 +138,13 @@ def summarise_table(
 
 
 def wanted(texts: tuple[str, ...]) -> list[str]:
-    """Names out of ``--want x,y --want z``, without repetition."""
+    """Return names out of ``--want x,y --want z``, without repetition."""
     names = [name.strip() for text in texts for name in text.split(",")]
     return list(dict.fromkeys(name for name in names if name))
 
 
 def kept(texts: tuple[str, ...]) -> bool | list[str]:
-    """What ``--keep`` asks for, as the argument ``keep`` of the API."""
+    """Return what ``--keep`` asks for, as the argument ``keep`` of the API."""
     names = wanted(texts)
     return True if names == ["all"] else names
 

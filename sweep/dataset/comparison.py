@@ -101,7 +101,7 @@ class Comparison:
         return VALUES_CHANGED if self.values_changed else SLOWER if self.is_slower else 0
 
     def lines(self) -> list[str]:
-        """The findings in words."""
+        """Return the findings in words."""
         found = [*self.notes, f"{self.rows} rows in both"]
         for count, words in ((self.only_old, "only in the old"), (self.only_new, "only in the new")):
             found += [f"{count} rows {words} dataset"] if count else []
@@ -127,7 +127,7 @@ class Comparison:
 
 
 def _first(column: Moved) -> str:
-    """The first rows that moved, where the worst is not the only one."""
+    """Return the first rows that moved, where the worst is not the only one."""
     if column.changed < 2:
         return ""
     return f"; the first: {', '.join(column.places)}{', ...' if column.changed > len(column.places) else ''}"
@@ -199,7 +199,7 @@ class _Rows:
         self._reached = 0
 
     def until(self, stop: int | None) -> pd.DataFrame:
-        """The next rows, up to a design; all that are left without one."""
+        """Return the next rows, up to a design; all that are left without one."""
         import pandas as pd
 
         pieces = [] if self._rows is None else [self._rows]
@@ -264,7 +264,7 @@ def _notes(old: Path, new: Path) -> tuple[str, ...]:
 
 
 def _seconds(old: Path, new: Path) -> tuple[float, float] | None:
-    """Time of all runs into each folder [s], if both came to their end."""
+    """Return the time of all runs into each folder [s], if both came to their end."""
     times = []
     for folder in (old, new):
         ends = [line for line in store.read_runs(folder) if line.get("event") == "end"]

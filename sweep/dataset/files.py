@@ -100,7 +100,7 @@ def remove_temporary(folder: Path) -> None:
 
 
 def read_plan(folder: Path) -> dict[str, Any] | None:
-    """Content of ``_plan.json``; None if there is none or it is damaged."""
+    """Return the content of ``_plan.json``; None if there is none or it is damaged."""
     path = beside(folder) / PLAN
     if not path.is_file():
         return None
@@ -120,7 +120,7 @@ def write_plan(folder: Path, data: Mapping[str, Any]) -> None:
 
 
 def read_table(path: Path) -> pd.DataFrame:
-    """A table beside the chunks, such as ``_optimum.parquet``.
+    """Return a table beside the chunks, such as ``_optimum.parquet``.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def read_table(path: Path) -> pd.DataFrame:
 
 
 def read_runs(folder: Path) -> list[dict[str, Any]]:
-    """Lines of ``_runs.jsonl``; a line torn by a kill is left out."""
+    """Return lines of ``_runs.jsonl``; a line torn by a kill is left out."""
     path = beside(folder) / RUNS
     if not path.is_file():
         return []

@@ -18,14 +18,16 @@ SUFFIX = ".meta"
 
 
 def located(folder: str | Path) -> Path:
-    """The folder of designs that a user means: the given one, or the ``designs`` in it where it holds no chunks."""
+    """Return the folder of designs that a user means:
+    the given one, or the ``designs`` in it where it holds no chunks.
+    """
     place = Path(folder)
     inner = place / DESIGNS
     return inner if inner.is_dir() and not any(place.glob("part-*.parquet")) else place
 
 
 def beside(folder: Path) -> Path:
-    """Where plan, log, lock, optimum and report of a folder of designs lie: see `outside`.
+    """Return the folder of plan, log, lock, optimum and report of a folder of designs: see `outside`.
 
     A dataset of an earlier version keeps these files where it has them, among the chunks.
     """
@@ -33,11 +35,11 @@ def beside(folder: Path) -> Path:
 
 
 def outside(folder: Path) -> Path:
-    """The parent of a folder called ``designs``, and ``<folder>.meta`` next to any other."""
+    """Return the parent of a folder called ``designs``, and ``<folder>.meta`` next to any other."""
     place = folder.resolve() if folder.is_symlink() or folder.name in ("", "..") else folder
     return place.parent if place.name == DESIGNS else place.with_name(place.name + SUFFIX)
 
 
 def is_older(folder: Path) -> bool:
-    """Whether an earlier version wrote this dataset, with its plan among the chunks."""
+    """Return whether an earlier version wrote this dataset, with its plan among the chunks."""
     return (folder / PLAN).is_file()

@@ -78,7 +78,7 @@ def _acquired(folder: Path) -> BaseFileLock:
 
 
 def _hold(folder: Path) -> int | None:
-    """A descriptor that holds a lock on the folder itself; None where the system locks no folders."""
+    """Return a descriptor that holds a lock on the folder itself; None where the system locks no folders."""
     try:
         import fcntl
     except ImportError:  # Windows

@@ -35,7 +35,7 @@ class Part:
     digest: str
 
     def read(self) -> bytes:
-        """Content of the file.
+        """Return the content of the file.
 
         Raises
         ------
@@ -50,14 +50,14 @@ class Part:
         return data
 
     def rows(self, columns: list[str] | None = None) -> pd.DataFrame:
-        """All columns or some, after the checks of `read`."""
+        """Return all columns or some, after the checks of `read`."""
         import pandas as pd
 
         return pd.read_parquet(io.BytesIO(self.read()), columns=columns)
 
 
 def about(part: Part, data: bytes | None = None) -> dict[str, Any]:
-    """What a chunk's metadata say of it: study, code, identity, index, range of designs, counts.
+    """Return what a chunk's metadata say of it: study, code, identity, index, range of designs, counts.
 
     Parameters
     ----------
@@ -88,18 +88,18 @@ def about(part: Part, data: bytes | None = None) -> dict[str, Any]:
 
 
 def content_hash(data: bytes) -> str:
-    """The hash that stands at the end of a chunk's name."""
+    """Return the hash that stands at the end of a chunk's name."""
     return hashlib.sha256(data).hexdigest()[:16]
 
 
 def part_of(path: Path) -> Part | None:
-    """The chunk file by its name; None if the name is no chunk's."""
+    """Return the chunk file by its name; None if the name is no chunk's."""
     match = _PART.fullmatch(path.name)
     return None if match is None else Part(path, int(match[1]), match[2], match[3])
 
 
 def parts(folder: Path) -> list[Part]:
-    """The chunk files by their names, in design order.
+    """Return the chunk files by their names, in design order.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def parts(folder: Path) -> list[Part]:
 
 
 def is_whole(part: Part) -> bool:
-    """Whether the file is what its name says."""
+    """Return whether the file is what its name says."""
     try:
         part.read()
     except StoreError as error:
@@ -127,7 +127,9 @@ def is_whole(part: Part) -> bool:
 
 
 def missing_chunks(folder: Path, chunks: list[Part]) -> list[int]:
-    """Indices of the chunks that the folder's chunks, or its plan, say there should be and that are not there."""
+    """Return indices of the chunks that the folder's chunks, or its plan,
+    say there should be and that are not there.
+    """
     plan = read_plan(folder) or {}
     count = about(chunks[0]).get("chunks") if chunks else None
     return sorted(set(range(plan.get("chunks", 0) if count is None else count)) - {part.index for part in chunks})

@@ -26,7 +26,7 @@ MOST_BINS = 100_000
 
 
 def scan(folder: str | Path) -> ds.Dataset:
-    """A dataset as an Arrow dataset: columns and filters are applied while the files are read.
+    """Return a dataset as an Arrow dataset: columns and filters are applied while the files are read.
 
     ``sweep.scan(folder).to_table(columns=["design", "swing"], filter=(pc.field("status") == 0)).to_pandas()`` reads
     two columns and the rows within all limits; ``.scanner(...).to_batches()`` gives them batch by batch.
@@ -70,7 +70,8 @@ def scan(folder: str | Path) -> ds.Dataset:
 
 
 def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
-    """The designs within all limits whose output is smallest, best first; signs of swing and stroke do not count.
+    """Return the designs within all limits whose output is smallest, best first;
+    signs of swing and stroke do not count.
 
     Parameters
     ----------
@@ -99,7 +100,8 @@ def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
 
 
 def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
-    """The designs within all limits that no other one beats in both outputs, ordered by the first; smaller is better.
+    """Return the designs within all limits that no other one beats in both outputs, ordered by the first;
+    smaller is better.
 
     Parameters
     ----------
@@ -133,7 +135,7 @@ def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
 
 
 def _with_units(rows: pd.DataFrame, source: Any) -> pd.DataFrame:
-    """The rows with the units that stand in the schema."""
+    """Return the rows with the units that stand in the schema."""
     rows.attrs["units"] = {
         field.name: field.metadata[b"unit"].decode() for field in source.schema if b"unit" in (field.metadata or {})
     }
@@ -143,7 +145,7 @@ def _with_units(rows: pd.DataFrame, source: Any) -> pd.DataFrame:
 def histogram(
     folder: str | Path, output: str, bins: int = 100, ends: tuple[float, float] | None = None
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """How many designs within all limits have an output in each of equal bins, and the edges of the bins.
+    """Return how many designs within all limits have an output in each of equal bins, and the edges of the bins.
 
     Parameters
     ----------
@@ -188,7 +190,9 @@ def _ends(source: Any, output: str) -> tuple[float, float]:
 
 
 def _feasible(source: Any, names: Sequence[str]) -> Iterator[pd.DataFrame]:
-    """The rows with status 0, batch by batch; one file after the other, so that memory is that of a few batches."""
+    """Yield the rows with status 0, batch by batch;
+    one file after the other, so that memory is that of a few batches.
+    """
     import pyarrow.compute as pc
 
     scanner = source.scanner(
@@ -201,7 +205,9 @@ def _feasible(source: Any, names: Sequence[str]) -> Iterator[pd.DataFrame]:
 
 
 def _whole(source: Any, designs: NDArray[np.int64]) -> pd.DataFrame:
-    """All columns of some designs, in the order given; of files without any of them only the statistics are read."""
+    """Return all columns of some designs, in the order given;
+    of files without any of them only the statistics are read.
+    """
     import pyarrow.compute as pc
 
     wanted = pc.field("design").isin(designs) & (pc.field("status") == 0)

@@ -21,7 +21,7 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
 def row_faults(rows: pd.DataFrame, own: Mapping[str, Any], about: Mapping[str, Any], study: Study | None) -> list[str]:
-    """What is wrong with the rows of one chunk, in words.
+    """Return what is wrong with the rows of one chunk, in words.
 
     Parameters
     ----------
@@ -70,7 +70,9 @@ def _count_faults(status: np.ndarray[Any, Any], own: Mapping[str, Any]) -> list[
 
 
 def _parameter_faults(rows: pd.DataFrame, own: Mapping[str, Any], study: Study) -> list[str]:
-    """Parameters that are not those of the design space; what [fit] sets or scales is left to the recomputing."""
+    """Return parameters that are not those of the design space;
+    what [fit] sets or scales is left to the recomputing.
+    """
     from sweep.chunks.chunk import parameter_matrix
 
     matrix, _ = parameter_matrix(study, own["start"], own["stop"])
@@ -92,7 +94,7 @@ def _same(one: np.ndarray[Any, Any], other: np.ndarray[Any, Any]) -> np.ndarray[
 
 
 def spread(bounds: Mapping[int, tuple[int, int]], number: int) -> dict[int, list[int]]:
-    """About ``number`` designs spread evenly over chunks of these bounds, by chunk; the same at every call."""
+    """Choose about ``number`` designs spread evenly over chunks of these bounds, by chunk; the same at every call."""
     indices = sorted(bounds)
     ends = np.cumsum([bounds[index][1] - bounds[index][0] for index in indices])
     chosen: dict[int, list[int]] = {}
@@ -104,7 +106,7 @@ def spread(bounds: Mapping[int, tuple[int, int]], number: int) -> dict[int, list
 
 
 def unequal(row: pd.DataFrame, again: Columns) -> str:
-    """How a stored row (one or none) differs from the design computed again; empty if no bit does."""
+    """Return how a stored row (one or none) differs from the design computed again; empty if no bit does."""
     if len(row) != len(again["design"]):
         kept = "has a row" if len(row) else "has no row"
         return f"{kept}, computed again it {'has none' if len(row) else 'has one'}"

@@ -118,7 +118,7 @@ __all__ = [
 
 
 def encode(plan: Plan, index: int, result: ChunkResult) -> bytes:
-    """The Parquet file of a chunk; equal input gives equal bytes.
+    """Return the Parquet file of a chunk; equal input gives equal bytes.
 
     Parameters that repeat (lattice axes, fixed values) are dictionary-encoded, everything else byte-stream-split,
     all under zstd.  The file's metadata say what determined the values, the fields' metadata unit and definition.
@@ -164,12 +164,12 @@ def write_chunk(folder: Path, plan: Plan, index: int, result: ChunkResult) -> Pa
 
 
 def named_counts(counts: Mapping[int, int]) -> dict[str, int]:
-    """Designs by the name of their status."""
+    """Return designs by the name of their status."""
     return {STATUS_NAMES.get(code, str(code)): number for code, number in sorted(counts.items())}
 
 
 def finished_chunks(folder: Path, plan: Plan, tell: Callable[[int, int], None] = lambda _, __: None) -> dict[int, Part]:
-    """Chunks of the plan that need not be computed again; damaged ones are moved to ``_bad/``.
+    """Return chunks of the plan that need not be computed again; damaged ones are moved to ``_bad/``.
 
     ``tell`` is called with how many were read, and how many there are.
 
@@ -199,7 +199,7 @@ def _twice(folder: Path, one: Part, other: Part) -> StoreError:
 
 
 def foreign(folder: Path, found: str, plan: Plan) -> InputError:
-    """The error for data of another study or code; they are never mixed."""
+    """Return the error for data of another study or code; they are never mixed."""
     allowed = (
         f"chunks of study {plan.study[:12]} and code {plan.code[:12]} only (identity {plan.identity}); "
         "choose another folder with --out, or set the old data aside with --force"
@@ -208,7 +208,9 @@ def foreign(folder: Path, found: str, plan: Plan) -> InputError:
 
 
 def totals(folder: Path) -> tuple[dict[str, int], dict[str, int]]:
-    """Designs by the name of their status, and by the limit they miss, over all chunks, from the chunks' metadata."""
+    """Return designs by the name of their status, and by the limit they miss, over all chunks,
+    from the chunks' metadata.
+    """
     counts: Counter[str] = Counter()
     missed: Counter[str] = Counter()
     for part in parts(folder):
@@ -219,7 +221,8 @@ def totals(folder: Path) -> tuple[dict[str, int], dict[str, int]]:
 
 
 def is_complete(folder: str | Path) -> bool:
-    """Whether every chunk of the dataset's plan is there and whole, and the optimum too if the study asks for one.
+    """Return whether every chunk of the dataset's plan is there and whole,
+    and the optimum too if the study asks for one.
 
     Parameters
     ----------
@@ -247,19 +250,21 @@ def is_complete(folder: str | Path) -> bool:
 
 
 def front_is_complete(path: Path) -> bool:
-    """Whether the search of the front in this file has ended."""
+    """Return whether the search of the front in this file has ended."""
     about = metadata(path)
     return about.get(b"complete") == b"true" or about.get(b"ended") == b"time"
 
 
 def front_cut_short(path: Path) -> str | None:
-    """``5 of 28`` steps of a front whose search time has cut short; None for a whole one, or where there is none."""
+    """Return ``5 of 28`` steps of a front whose search time has cut short;
+    None for a whole one, or where there is none.
+    """
     about = metadata(path)
     return None if about.get(b"complete") != b"false" else about.get(b"steps", b"").decode() or None
 
 
 def load(folder: str | Path) -> pd.DataFrame:
-    """The finished part of a dataset, in design order.
+    """Return the finished part of a dataset, in design order.
 
     Parameters
     ----------
@@ -316,7 +321,7 @@ def load(folder: str | Path) -> pd.DataFrame:
 
 
 def units(part: Part) -> dict[str, str]:
-    """The unit of every column of a chunk that has one, as its field metadata say."""
+    """Return the unit of every column of a chunk that has one, as its field metadata say."""
     import pyarrow.parquet as pq
 
     schema = pq.read_schema(part.path)

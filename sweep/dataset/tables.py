@@ -14,13 +14,13 @@ TABLES = "tables"
 
 
 def digests(place: Path, names: Iterable[str]) -> dict[str, str]:
-    """SHA-256 of those of the tables that are there."""
+    """Return SHA-256 of those of the tables that are there."""
     with store_errors(place):
         return {n: hashlib.sha256((place / n).read_bytes()).hexdigest() for n in names if (place / n).is_file()}
 
 
 def altered(place: Path, note: Mapping[str, Any], names: Iterable[str]) -> list[str]:
-    """The tables that are not as their search has written them, or not there; an older plan notes no hashes.
+    """Return the tables that are not as their search has written them, or not there; an older plan notes no hashes.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def altered(place: Path, note: Mapping[str, Any], names: Iterable[str]) -> list[
 
 
 def metadata(path: Path) -> dict[bytes, bytes]:
-    """What a table says of itself; empty where there is none, or it is damaged."""
+    """Return what a table says of itself; empty where there is none, or it is damaged."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -64,7 +64,7 @@ class Verification:
         return INCOMPLETE if self.findings else 0
 
     def lines(self) -> list[str]:
-        """The findings in words, one per line; the last line is the verdict."""
+        """Return the findings in words, one per line; the last line is the verdict."""
         words = [f"{self.chunks} whole chunks, {self.rows} rows, {self.size} bytes read"]
         words += [f"{self.recomputed} designs computed again"] if self.recomputed else []
         damaged = sum(finding.damage for finding in self.findings)
@@ -133,7 +133,7 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
 
 
 def _chunks(found: Verification, place: Path, files: list[Path]) -> list[store.Part]:
-    """The chunks by their names; a Parquet file with another name is a finding."""
+    """Return the chunks by their names; a Parquet file with another name is a finding."""
     try:
         return store.parts(place)
     except InputError:
@@ -149,7 +149,7 @@ def _chunks(found: Verification, place: Path, files: list[Path]) -> list[store.P
 
 
 def _about_without_plan(chunks: Iterable[store.Part]) -> dict[str, Any]:
-    """What the first readable chunk says of the study."""
+    """Return what the first readable chunk says of the study."""
     for part in chunks:
         try:
             about = store.about(part)
@@ -160,7 +160,7 @@ def _about_without_plan(chunks: Iterable[store.Part]) -> dict[str, Any]:
 
 
 def _study(found: Verification, plan: dict[str, Any], place: Path) -> Study | None:
-    """The study the dataset answers; None, with a note, if this version does not understand it."""
+    """Return the study the dataset answers; None, with a note, if this version does not understand it."""
     from sweep.study.load import study_from_data
 
     data = plan.get("data") or plan["chunk_data"]
@@ -175,7 +175,7 @@ def _study(found: Verification, plan: dict[str, Any], place: Path) -> Study | No
 def _whole_chunks(
     found: Verification, chunks: list[store.Part], about: dict[str, Any], study: Study | None
 ) -> dict[int, store.Part]:
-    """The chunks that are what their names say; what is wrong with the others, or with their rows, is noted."""
+    """Return the chunks that are what their names say; what is wrong with the others, or with their rows, is noted."""
     whole: dict[int, store.Part] = {}
     for part in chunks:
         if part.identity != about.get("identity", part.identity):
@@ -212,7 +212,7 @@ def _rows(data: bytes) -> pd.DataFrame:
 def _missing(
     found: Verification, place: Path, plan: dict[str, Any] | None, about: dict[str, Any], whole: dict[int, store.Part]
 ) -> None:
-    """Chunks that should be there, and the optimum or front that the plan asks for."""
+    """Report chunks that are missing, and the optimum or front that the plan asks for and that is missing."""
     named = {finding.path.name for finding in found.findings}
     lost = [k for k in range(about.get("chunks", 0)) if k not in whole]
     lost = [k for k in lost if not any(name.startswith(f"part-{k:06d}-") for name in named)]
@@ -232,7 +232,7 @@ def _missing(
 
 
 def _totals(found: Verification, place: Path, plan: dict[str, Any] | None, whole: dict[int, store.Part]) -> None:
-    """The designs by status that the plan notes, against those of the chunks."""
+    """Compare the designs by status that the plan notes with those of the chunks."""
     if plan is None or not plan.get("complete") or set(whole) != set(range(plan["chunks"])):
         return
     counts: Counter[str] = Counter()
@@ -245,7 +245,7 @@ def _totals(found: Verification, place: Path, plan: dict[str, Any] | None, whole
 
 
 def _side_files(found: Verification, place: Path, plan: dict[str, Any]) -> None:
-    """The tables beside the chunks: the checksums of their pages, and the hashes that the plan notes."""
+    """Check the tables beside the chunks: the checksums of their pages, and the hashes that the plan notes."""
     for name in SIDE_FILES:
         path = store.beside(place) / name
         if not path.is_file():

@@ -76,14 +76,14 @@ _INPUT_NAMES: dict[tuple[tuple[str, str], ...], frozenset[str]] = {}
 
 @lru_cache
 def effect(name: str) -> Effect:
-    """The register's entry of that name."""
+    """Return the register's entry of that name."""
     module, constant = _ENTRIES[name]
     entry: Effect = getattr(import_module(f"sweep.effects.{module}"), constant)
     return entry
 
 
 def applicable(family: Family) -> tuple[Placed, ...]:
-    """Effects that can be asked of a family or of the stages of a chain, in the order of the register.
+    """Return effects that can be asked of a family or of the stages of a chain, in the order of the register.
 
     A later stage of a chain turns unevenly; a stage whose load comes from stages behind it needs them to hand it back.
     """
@@ -94,17 +94,23 @@ def applicable(family: Family) -> tuple[Placed, ...]:
         for entry in map(effect, NAMES)
         if entry.serves(stage) and not (k > 0 and entry.even_crank)
     ]
-    return tuple(p for p in found if not p.entry.takes_load or len(_carriers(family, p)) == len(stages) - 1 - p.stage)
+    return tuple(
+        p
+        for p in found
+        if not p.entry.takes_load or p.entry.may_drive_nothing or len(_carriers(family, p)) == len(stages) - 1 - p.stage
+    )
 
 
 def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
-    """The effects that some wanted pose output, design output or reduction belongs to, in the order of the register."""
+    """Return the effects that some wanted pose output, design output or reduction belongs to,
+    in the order of the register.
+    """
     names = {about for name in wanted for about in reduced(name, family.domain)}  # max_abs_force_d asks for force_d
     return tuple(p for p in applicable(family) if not names.isdisjoint(o.name for o in p.outputs))
 
 
 def _carriers(family: Family, placed: Placed) -> list[Placed]:
-    """The effects of the later stages that hand back the load of this one."""
+    """Return the effects of the later stages that hand back the load of this one."""
     stages, key = stages_of(family), placed.entry.takes_load
     return [
         Placed(entry, k, number, False)
@@ -114,8 +120,14 @@ def _carriers(family: Family, placed: Placed) -> list[Placed]:
     ]
 
 
+def _handing(family: Family, placed: Placed) -> list[Placed]:
+    """Return the effects of all later stages that hand back the load of this one; none if a stage cannot."""
+    found = _carriers(family, placed)
+    return found if len(found) == len(stages_of(family)) - 1 - placed.stage else []
+
+
 def input_names(family: Family) -> frozenset[str]:
-    """Inputs of all effects that can be asked of a family, or of the stages of a chain."""
+    """Return inputs of all effects that can be asked of a family, or of the stages of a chain."""
     if isinstance(family, Machine):
         return frozenset(f"{m.name}.{name}" for m in family.members for name in input_names(m.family))
     # Asked at every call of the reductions; it depends on nothing but the names of the stages.
@@ -126,7 +138,7 @@ def input_names(family: Family) -> frozenset[str]:
 
 
 def curved_inputs(family: Family) -> tuple[str, ...]:
-    """Inputs of effects that a load over the turn can add to, for a family, a chain or a machine."""
+    """Return inputs of effects that a load over the turn can add to, for a family, a chain or a machine."""
     if isinstance(family, Machine):
         return tuple(f"{m.name}.{name}" for m in family.members for name in curved_inputs(m.family))
     numbers = [number for _, number in stages_of(family)]
@@ -136,14 +148,16 @@ def curved_inputs(family: Family) -> tuple[str, ...]:
 
 
 def offered(family: Family) -> tuple[Output, ...]:
-    """Pose and design outputs of all effects that can be asked of a family, or of the stages of a chain."""
+    """Return the pose and design outputs of all effects that can be asked of a family, or of the stages of a chain."""
     if isinstance(family, Machine):
         return tuple(replace(o, name=f"{m.name}.{o.name}") for m in family.members for o in offered(m.family))
     return tuple(o for placed in applicable(family) for o in placed.outputs)
 
 
 def elsewhere(family: Family, name: str) -> str:
-    """Words for an error: which effects have an output that this family, or this stage of a chain, cannot be asked."""
+    """Return words for an error: which effects have an output that this family, or this stage of a chain,
+    cannot be asked.
+    """
     if isinstance(family, Machine):
         found = family.split(name)
         return elsewhere(found[0].family, found[1]) if found else ""
@@ -160,7 +174,7 @@ def elsewhere(family: Family, name: str) -> str:
 
 
 def extended(family: Family, wanted: Iterable[str], curves: Mapping[str, Curve] = NO_CURVES) -> Family:
-    """The family with the effects that ``wanted`` calls for; the family itself where it calls for none.
+    """Return the family with the effects that ``wanted`` calls for; the family itself where it calls for none.
 
     The inputs of the effects become further parameters, after the family's own.  In a chain an effect belongs to a
     stage, and its inputs and outputs carry the stage's number.  ``curves`` are loads over the turn of the crank, by the
@@ -194,7 +208,7 @@ def _check_even(machine: Machine, found: Mapping[str, Family]) -> None:
 
 
 def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
-    """Dotted names that wanted names are about, those behind relations included."""
+    """Return dotted names that wanted names are about, those behind relations included."""
     names = {about for name in wanted for about in reduced(name, machine.domain)}
     asked = [timing for timing in machine.timings if timing.name in names]
     places = [place for timing in asked for place in timing.places]
@@ -207,7 +221,7 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
 
 
 def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[str, Curve] = NO_CURVES) -> Family:
-    """The family with the outputs and inputs of these effects."""
+    """Return the family with the outputs and inputs of these effects."""
     if not effects:
         return family
     added = inputs(family, effects)
@@ -239,7 +253,7 @@ def _design_ns(entry: Effect, accuracy: Accuracy) -> float:
 
 
 def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:
-    """Inputs of these effects and of those that hand back their load, with their stage's number.
+    """Return inputs of these effects and of those that hand back their load, with their stage's number.
 
     One that several share stands once, and is required if any of them requires it.
     """
@@ -247,11 +261,12 @@ def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:
     users: dict[str, list[str]] = {}
     first = stages_of(family)[0][1]
     for placed in effects:
-        for source in (placed, *_carriers(family, placed)):
+        for source in (placed, *_handing(family, placed)):
             for p in source.entry.inputs_of(stages_of(family)[source.stage][0]):
                 name = f"{p.name}{first if p.name in _FIRST_ONLY else source.number}"
-                kept = merged.get(name, p)
-                merged[name] = kept if p.default is not None else replace(kept, default=None)
+                optional = placed.entry.may_drive_nothing and source is not placed and p.default is None
+                if name not in merged or (p.default is None and not optional):
+                    merged[name] = replace(p, default=0.0) if optional and name not in merged else p
                 users.setdefault(name, []).append(placed.name)
     return tuple(
         replace(p, name=name, text=f"{p.text}; for {', '.join(dict.fromkeys(users[name]))}")

@@ -38,7 +38,7 @@ class Finding(NamedTuple):
 
 
 def closure(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """The effects with all they need, each after what it needs."""
+    """Return the effects with all they need, each after what it needs."""
     found: dict[str, Effect] = {}
 
     def visit(entry: Effect) -> None:
@@ -52,7 +52,8 @@ def closure(effects: Iterable[Effect]) -> tuple[Effect, ...]:
 
 
 def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str, str, str, str]]:
-    """Rows of a small tree: effect, key, cost, share; what an effect needs stands below it and is part of its cost.
+    """Return rows of a small tree: effect, key, cost, share;
+    what an effect needs stands below it and is part of its cost.
 
     ``poses`` is the number of poses of one design, for the cost of what is computed per design.
     """
@@ -73,7 +74,7 @@ def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str,
 
 
 def cost(placed: Placed, wanted: frozenset[str], poses: float) -> float:
-    """Nanoseconds per design of what is wanted of an effect."""
+    """Return nanoseconds per design of what is wanted of an effect."""
     per_design = not wanted.isdisjoint(o.name for o in placed.design_outputs)
     reduced = (name for name in wanted if not any(name == o.name for o in placed.design_outputs))
     per_pose = any(name.endswith(o.name) for name in reduced for o in placed.pose_outputs)
@@ -85,7 +86,7 @@ def _needs(entry: Effect, depth: int) -> list[tuple[int, Effect]]:
 
 
 def left_out(family: Family, wanted: Iterable[str]) -> tuple[str, ...]:
-    """Names of the effects that could be asked for and are not needed here."""
+    """Return names of the effects that could be asked for and are not needed here."""
     used = {
         f"{entry.name}{placed.number}" for placed in called_for(family, wanted) for entry in closure([placed.entry])
     }

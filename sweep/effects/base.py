@@ -18,8 +18,9 @@ from sweep.effects.places import tool_place
 from sweep.families import NAMES as FAMILY_NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import JointRecords, LinkTree
+from sweep.families.capabilities import JointRecords
 from sweep.families.chain import drive, driving_names
+from sweep.families.link_tree import LinkTree
 from sweep.numerics.curves import Curve
 
 # Loads that a curve over the turn of the crank can add to.
@@ -45,7 +46,7 @@ class Driven(NamedTuple):
     curves: Mapping[str, Curve] = {}
 
     def only(self, rows: Rows) -> Driven:
-        """Some of the designs."""
+        """Return some of the designs."""
         given = {name: x[rows] for name, x in self.inputs.items()}
         return Driven(self.family, self.designs[rows], self.kappa[rows], self.offset[rows], given, self.curves)
 
@@ -121,7 +122,7 @@ class Scene:
         return Scene(following.family, following.designs, angles, following.inputs, tuple(rest), self, following.curves)
 
     def stage(self, index: int) -> Scene:
-        """The scene of the stage ``index`` places behind this one."""
+        """Return the scene of the stage ``index`` places behind this one."""
         scene = self
         for _ in range(index):
             assert scene.driven is not None
@@ -150,7 +151,7 @@ class Scene:
         return first, second
 
     def crank(self) -> tuple[Array, Array]:
-        """Speed and angular acceleration of this stage's crank, (n, m), or (n, 1) where it turns evenly."""
+        """Return the speed and angular acceleration of this stage's crank, (n, m), or (n, 1) where it turns evenly."""
         even = self.inputs["speed"][:, None], self.inputs["speed_change"][:, None]
         speed, change = self._first.uneven or even
         if self.rates is None:
@@ -167,11 +168,11 @@ class Scene:
         return status
 
     def table(self, names: tuple[str, ...]) -> Array:
-        """Inputs side by side, (n, len(names))."""
+        """Return inputs side by side, (n, len(names))."""
         return np.column_stack([self.inputs[name] for name in names])
 
     def load(self, name: str) -> Array:
-        """A load at the poses: (n, 1) where it is constant, (n, m) where a curve adds to it."""
+        """Return a load at the poses: (n, 1) where it is constant, (n, m) where a curve adds to it."""
         constant, curve = self.inputs[name][:, None], self.curves.get(name)
         return constant if curve is None else constant + curve(self._first.angles.phi)
 
@@ -186,7 +187,7 @@ class Scene:
         return self if self.before is None else self.before._first
 
     def only(self, rows: Rows) -> Scene:
-        """Some of the designs; the scene itself where these are all."""
+        """Return some of the designs; the scene itself where these are all."""
         if rows.size == len(self.designs):
             return self
         angles = Angles(*(x[rows] for x in self.angles)) if self.angles.cos.shape[0] > 1 else self.angles
@@ -194,17 +195,19 @@ class Scene:
         return Scene(self.family, self.designs[rows], angles, given, after, curves=self.curves)
 
     def posed(self, rows: Rows, phi: Array) -> Scene:
-        """Some of the designs, each as often as wanted, at crank angles (k, m) of their own."""
+        """Return some of the designs, each as often as wanted, at crank angles (k, m) of their own."""
         given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
         return Scene(self.family, self.designs[rows], Angles.of(phi), given, after, curves=self.curves)
 
     def precise(self) -> Scene:
-        """The same scene with the most accurate poses that its families have."""
+        """Return the same scene with the most accurate poses that its families have."""
         after = tuple(d._replace(family=d.family.precise()) for d in self.after)
         return Scene(self.family.precise(), self.designs, self.angles, self.inputs, after, curves=self.curves)
 
     def on_grid(self, size: int) -> Scene:
-        """The same designs at ``size`` equidistant crank angles of one turn: what a whole-turn effect samples."""
+        """Return the same designs at ``size`` equidistant crank angles of one turn:
+        what a whole-turn effect samples.
+        """
         angles = Angles.of(2.0 * np.pi * np.arange(size)[None] / size)
         return Scene(self.family, self.designs, angles, self.inputs, self.after, curves=self.curves)
 
@@ -256,13 +259,15 @@ class Effect:
     ``whole_turn`` effects couple different crank angles: they sample the turn themselves, whatever is asked for.
     ``even_crank`` effects presume a crank that turns evenly, so they are no effects of a chain's later stages.
     ``takes_load`` is the key of the effect that hands back the load of a chain's later stages; without it their load
-    does not enter.  ``requires`` is the capability that a family must have, ``followers`` are the kinds of
-    follower that the effect is made for, ``tool_inputs`` are further inputs where a tool can hang on the coupler and
-    moves along a line, where it moves freely, and where it hangs on the tip of a rocker.  ``least`` are pose outputs of
-    which the least value over the turn counts, as a life, not the largest (:func:`sweep.effects.wanted.expanded`).
-    ``tree`` is the tree of links of the one family that it is for, if it is for one; ``carried_at`` the place of a tool
-    that a family must have, if it must have one.  ``advise(scene)`` applies the effect's rule of negligibility to some
-    designs over a turn; None where none turns.
+    does not enter. ``may_drive_nothing`` says that those stages are massless unless their bodies are given, so that
+    none of their inputs is required, and stages without known loads may follow. ``requires`` is the capability that
+    a family must have, ``followers`` are the kinds of follower that the effect is made for, ``tool_inputs`` are
+    further inputs where a tool can hang on the coupler and moves along a line, where it moves freely, and where it
+    hangs on the tip of a rocker. ``least`` are pose outputs of which the least value over the turn counts, as a
+    life, not the largest (:func:`sweep.effects.wanted.expanded`). ``tree`` is the tree of links of the one family
+    that it is for, if it is for one; ``carried_at`` the place of a tool that a family must have, if it must have
+    one. ``advise(scene)`` applies the effect's rule of negligibility to some designs over a turn; None where none
+    turns.
     """
 
     key: str
@@ -279,6 +284,7 @@ class Effect:
     whole_turn: bool = False
     even_crank: bool = False
     takes_load: str = ""
+    may_drive_nothing: bool = False
     design_result: DesignResult | None = None
     advise: AdviceFunction | None = None
     requires: type = JointRecords
@@ -289,12 +295,12 @@ class Effect:
     carried_at: int | None = None
 
     def inputs_of(self, family: Family) -> tuple[Parameter, ...]:
-        """The inputs, with those of a tool where the family has a place that one can hang on."""
+        """Return the inputs, with those of a tool where the family has a place that one can hang on."""
         place = tool_place(family)
         return self.inputs if place is None else (*self.inputs, *self.tool_inputs[place])
 
     def serves(self, family: Family) -> bool:
-        """Whether the family has what the effect requires, with a kind of follower that it is made for."""
+        """Return whether the family has what the effect requires, with a kind of follower that it is made for."""
         joints = family.find(JointRecords)
         follows = joints is None or joints.follower in self.followers
         own = self.tree is None or family.find(LinkTree) is self.tree
@@ -328,12 +334,14 @@ def refuse(status: Status, designs: NDArray[np.bool_]) -> None:
 
 
 def no_poses(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """What an effect computes per pose that has no outputs per pose: the motion's status."""
+    """Return what an effect computes per pose that has no outputs per pose: the motion's status."""
     return {"status": scene.status()}
 
 
 def largest(scene: Scene, compute: ComputeFunction, name: str, quantity: str, threshold: float) -> Advice | None:
-    """Advice from the largest magnitude of one output over the turn, of the designs where it is known all the way."""
+    """Return the advice from the largest magnitude of one output over the turn,
+    of the designs where it is known all the way.
+    """
     found = np.abs(np.asarray(compute(scene, frozenset({name}))[name], np.float64))
     turning = np.isfinite(found).all(axis=1)
     return Advice(quantity, found[turning].max(axis=1), threshold) if turning.any() else None

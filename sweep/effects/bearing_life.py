@@ -53,7 +53,7 @@ EPS = 2.0**-53
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted loads of every pose."""
+    """Return the wanted loads of every pose."""
     if "forces" not in scene.memo:
         kinetostatics.compute(scene, frozenset({"force_d", "moment_d"}))
     forces, status = scene.memo["forces"]
@@ -68,7 +68,8 @@ def _data(scene: Scene) -> Array:
 
 
 def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Mean loads and lives, on samples (no errors then) or with the integrals refined to the accuracy asked for.
+    """Return mean loads and lives, on samples (no errors then) or with the integrals refined to the
+    accuracy asked for.
 
     |psi'| has a kink at each limit position, and a load jumps where the axial one passes e_limit: the integrals are
     split at these places, and on panels that close in on whatever else there is.  A bearing that carries nothing has no
@@ -111,20 +112,20 @@ def _of_turn(worst: Status) -> Status:
 
 
 def _loads(scene: Scene) -> tuple[Array, Array, Status]:
-    """Equivalent loads of both bearings (n, m, 2), |psi'| (n, m) and the worst status of each design."""
+    """Return equivalent loads of both bearings (n, m, 2), |psi'| (n, m) and the worst status of each design."""
     found = compute(scene, frozenset(_LOADS))
     load = np.stack([np.asarray(found[name], np.float64) for name in _LOADS], axis=2)
     return load, np.abs(scene.records[0][:, :, 22]), np.asarray(found["status"].max(axis=1), np.uint8)
 
 
 def _integrands(load: Array, way: Array, size: Array, exponent: Array) -> Array:
-    """(P/size)^p |psi'| of both bearings and |psi'|, (k, m, 3)."""
+    """Return (P/size)^p |psi'| of both bearings and |psi'|, (k, m, 3)."""
     power = (load / size[:, None, :]) ** exponent[:, None, None]
     return np.concatenate([power * way[:, :, None], way[:, :, None]], axis=2)
 
 
 def _switches(scene: Scene) -> Array:
-    """What changes its sign where the integrands have kinks or jumps, (k, m, 3).
+    """Return what changes its sign where the integrands have kinks or jumps, (k, m, 3).
 
     The rocker's speed; the axial load; and by how much it exceeds the part e V of the radial load of its bearing.
     """
@@ -143,7 +144,7 @@ def _discriminant(scene: Scene, rows: Rows, stage: int, name: str, which: Rows, 
 
 
 def _refined(scene: Scene, rows: Rows, size: Array, target: float) -> tuple[Array, Array, Status]:
-    """The three integrals over the turn of some designs, their errors and the status."""
+    """Return the three integrals over the turn of some designs, their errors and the status."""
     status, scene = np.zeros(rows.size, np.uint8), scene.precise()  # plain poses may be noise near a change point
     exponent = scene.inputs["life_exponent"][rows]
 

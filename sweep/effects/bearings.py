@@ -92,7 +92,9 @@ ROLLING_LIMITS = (
 
 
 def _data(scene: Scene, inputs: tuple[Parameter, ...]) -> Array:
-    """Columns of the bearing kernels: the radius c at which the coupler force acts, then the inputs but the torque."""
+    """Return columns of the bearing kernels:
+    the radius c at which the coupler force acts, then the inputs but the torque.
+    """
     return np.column_stack([scene.records[1][:, 14], scene.table(tuple(p.name for p in inputs[1:]))])
 
 
@@ -111,7 +113,7 @@ def _compute(
 
 
 def together(scene: Scene, shaft: str) -> NDArray[np.bool_]:
-    """Designs both of whose supports of a shaft stand at one place, (n,)."""
+    """Return designs both of whose supports of a shaft stand at one place, (n,)."""
     same: NDArray[np.bool_] = scene.inputs[f"support_{shaft}1"] == scene.inputs[f"support_{shaft}2"]
     return same
 
@@ -121,7 +123,7 @@ def _pressures(scene: Scene) -> Array:
 
 
 def permissible_load(scene: Scene) -> Array:
-    """C_dyn (60 n L_h/10^6)^(-1/p) with the turns of the crank, (n, 1)."""
+    """Return C_dyn (60 n L_h/10^6)^(-1/p) with the turns of the crank, (n, 1)."""
     given = scene.inputs
     turns = given["speed"] / (2.0 * np.pi) * given["required_life"]
     load: Array = given["dynamic_capacity"] * (turns * 1e-6) ** (-1.0 / given["life_exponent"])

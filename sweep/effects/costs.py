@@ -16,7 +16,8 @@ from sweep.effects.places import ON_TIP, tool_place
 from sweep.effects.placing import Placed, first_scene
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Family, Parameter
-from sweep.families.capabilities import JointRecords, LinkTree
+from sweep.families.capabilities import JointRecords
+from sweep.families.link_tree import LinkTree
 
 POSES = 360
 MOTION = "motion"
@@ -54,7 +55,9 @@ class Cost(NamedTuple):
 
 
 def designs(full: Family, n: int, seed: int = 0) -> Array:
-    """Crank-rockers or slider-cranks a few percent round a regular one, with the inputs of the family's effects."""
+    """Return crank-rockers or slider-cranks a few percent round a regular one,
+    with the inputs of the family's effects.
+    """
     noise = np.random.default_rng(seed).uniform(-0.05, 0.05, (n, len(full.parameters)))
     values = [_value(full, p) for p in full.parameters]
     matrix = np.array(values, dtype=np.float64) * (1.0 + noise)
@@ -65,7 +68,7 @@ def designs(full: Family, n: int, seed: int = 0) -> Array:
 
 
 def _value(full: Family, p: Parameter) -> float | None:
-    """Value of a parameter or an input: of the small machine, or of the family's example and by the kind of input."""
+    """Return a parameter or an input of the small machine, or of the family's example and by the kind of input."""
     linked = full.find(LinkTree) is not None
     if tool_place(full) == ON_TIP:
         # a tool at the tip loads whatever else is measured: it is there for its own effect alone
@@ -82,7 +85,7 @@ def _value(full: Family, p: Parameter) -> float | None:
 
 
 def least_time(run: Callable[[], object], repeats: int = 5) -> float:
-    """Least processor time of several runs [s], the first one, which compiles, not counted."""
+    """Return the least processor time of several runs [s], the first one, which compiles, not counted."""
     run()
     times = []
     for _ in range(repeats):
@@ -128,7 +131,7 @@ def costs(names: Sequence[str] = NAMES, *, n: int = 64, each: bool = False, repe
 
 
 def motion_ns(name: str, n: int, repeats: int) -> float:
-    """Nanoseconds per pose of a family's motion and the joint records made of it, where it has any."""
+    """Return nanoseconds per pose of a family's motion and the joint records made of it, where it has any."""
     bare = family(name)
     matrix, angles = designs(bare, n), Angles.of(2.0 * np.pi * np.arange(POSES)[None] / POSES)
     linked = bare.find(JointRecords) is not None

@@ -53,7 +53,7 @@ _POINT = ("x_point", "y_point", "z_point")
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted components; each group of three costs what one of them does."""
+    """Return the wanted components; each group of three costs what one of them does."""
     status = scene.status()
     groups = [[name.format(axis=axis) for axis in "xyz"] for name, _, _ in _GROUPS.values()]
     out = [None if wanted.isdisjoint(names) else np.empty((*scene.shape, 3)) for names in groups]
@@ -71,7 +71,9 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def advise(scene: Scene) -> Advice | None:
-    """Coupler mass against the follower's inertia at C, plus how far its centre of mass lies off the line B-C."""
+    """Return the coupler mass against the follower's inertia at C,
+    plus how far its centre of mass lies off the line B-C.
+    """
     given, slider = scene.inputs, "m_slider" in scene.inputs
     follower = "slider" if slider else "rocker"
     if not {"m_coupler", f"m_{follower}"} <= set(given):

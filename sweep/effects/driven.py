@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.effects import loads
-from sweep.effects.base import Scene
-from sweep.effects.handed import INERTIAS, LOADS, behind, computed
+from sweep.effects.base import Driven, Scene
+from sweep.effects.handed import INERTIAS, LOADS, behind, computed, inputs_of_loads
 from sweep.effects.places import ON_TIP, tool_place
-from sweep.families.base import Array
+from sweep.families.base import Array, Parameter
+
+# Units of what a stage has to be given to need a torque.
+WEIGHING = frozenset({"mass", "inertia", "force", "torque"})
 
 STEP = 2e-3  # of the follower's angle, for the slope of the load: error of fourth order against rounding
 _DRIVE = frozenset({"drive_torque"})
@@ -30,9 +35,33 @@ class DrivenSide(NamedTuple):
     bend: Array
 
 
+def drives_something(scene: Scene) -> NDArray[np.bool_]:
+    """Return whether each design's follower drives a mass or works against a load besides its own, (n,)."""
+    tip = _weighs(scene, scene.inputs, loads.FREE_TOOL) if tool_place(scene.family) == ON_TIP else False
+    return np.asarray(_behind_weighs(scene) | tip)
+
+
+def _behind_weighs(scene: Scene) -> NDArray[np.bool_]:
+    """Return whether any stage behind has a mass or a load in each design, (n,)."""
+    found = np.zeros(len(scene.designs), np.bool_)
+    for stage in scene.after:
+        found |= _weighs(stage, stage.inputs, inputs_of_loads(stage.family))
+    return found
+
+
+def _weighs(stage: Scene | Driven, given: dict[str, Array], inputs: Sequence[Parameter]) -> NDArray[np.bool_]:
+    """Return whether one of these inputs that are a mass, an inertia or a load is not zero, (n,)."""
+    found = np.zeros(len(stage.designs), np.bool_)
+    for p in inputs:
+        if p.unit in WEIGHING:
+            found |= (given[p.name] != 0.0) if p.name in given else False
+            found |= p.name in stage.curves
+    return found
+
+
 def driven_side(scene: Scene, slopes: bool) -> DrivenSide | None:
-    """What the follower drives besides itself; None where that is nothing.  Slopes are zero unless asked for."""
-    found = _stages(scene, slopes)
+    """Return what the follower drives besides itself; None where that is nothing. Slopes are zero unless asked for."""
+    found = _stages(scene, slopes) if _behind_weighs(scene).any() else None
     tip = _tip(scene)
     if found is None or tip is None:
         return found if tip is None else tip
@@ -40,23 +69,27 @@ def driven_side(scene: Scene, slopes: bool) -> DrivenSide | None:
 
 
 def _stages(scene: Scene, slopes: bool) -> DrivenSide | None:
-    """The stages behind: phi of the next one is kappa psi + offset."""
+    """Return the stages behind: phi of the next one is kappa psi + offset."""
     handed_back = behind(scene, LOADS, _DRIVE | frozenset(INERTIAS))
     if handed_back is None:
         return None
-    kappa = scene.after[0].kappa[:, None]
+    kappa, weighs = scene.after[0].kappa[:, None], _behind_weighs(scene)[:, None]
     good = np.where(np.asarray(handed_back["status"]) == 0, 1.0, np.nan)
-    torque, inertia, bend = (np.asarray(handed_back[n], np.float64) * good for n in ("drive_torque", *INERTIAS))
+    # A massless stage needs nothing, also where it does not move.
+    torque, inertia, bend = (
+        np.where(weighs, np.asarray(handed_back[n], np.float64) * good, 0.0) for n in ("drive_torque", *INERTIAS)
+    )
     slope = np.zeros_like(torque)
     if slopes:
         near, far = (_moved(scene, k * STEP) - _moved(scene, -k * STEP) for k in (1.0, 2.0))
-        slope = (8.0 * near - far) / (12.0 * STEP)
+        slope = np.where(weighs, (8.0 * near - far) / (12.0 * STEP), 0.0)
     # kappa is +1 or -1: its square is 1
     return DrivenSide(kappa * torque, slope, inertia, kappa * bend)
 
 
 def _moved(scene: Scene, angle: float) -> Array:
-    """Torque that the next stage needs of the rocker where that stands further by an angle, at the same rates.
+    """Return the torque that the next stage needs of the rocker where that stands further by an angle,
+    at the same rates.
 
     A force that jumps where a tool pierces has no slope: it is left out of the difference.
     """
@@ -73,7 +106,7 @@ def _moved(scene: Scene, angle: float) -> Array:
 
 
 def _tip(scene: Scene) -> DrivenSide | None:
-    """A tool at the tip of the rocker."""
+    """Return a tool at the tip of the rocker."""
     if tool_place(scene.family) != ON_TIP or "m_tool" not in scene.inputs:
         return None
     names = tuple(p.name for p in loads.FREE_TOOL[1:])

@@ -9,7 +9,7 @@ from kernels.effects.elastic_drive import driven_steady_state
 from kernels.effects.elasticity import quasi_static, steady_state
 from sweep.effects import loads
 from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status, take_over
-from sweep.effects.driven import DrivenSide, driven_side
+from sweep.effects.driven import DrivenSide, driven_side, drives_something
 from sweep.effects.handed import INERTIAS, LOADS, behind
 from sweep.effects.loads import SPEED
 from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
@@ -94,7 +94,7 @@ def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
-    """What a curve and the driven side add to the constant load, (n, m); None where the load is constant."""
+    """Return what a curve and the driven side add to the constant load, (n, m); None where the load is constant."""
     load = loads.follower(scene).load.name
     if load not in scene.curves and driven is None:
         return None
@@ -103,7 +103,7 @@ def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
 
 
 def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted pointwise quantities; status NOT_LINEAR where the deflection is no longer small."""
+    """Return the wanted pointwise quantities; status NOT_LINEAR where the deflection is no longer small."""
     outputs = optional_outputs(_KERNEL_NAMES, wanted, scene.shape)
     lag, displacement, ratio = outputs
     status = scene.status()
@@ -125,11 +125,26 @@ def _status_behind(scene: Scene) -> Status:
 
 
 def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Steady state on its own grid, carried to the wanted angles."""
+    """Return the steady state on its own grid, carried to the wanted angles."""
     return at_poses(scene, *on_finer_grids(scene, scene.angles.phi, GRIDS + FINER, _solve), wanted)
 
 
 def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
+    """Solve the designs that drive something apart from those that do not, so that no design depends on the others."""
+    loaded = drives_something(grid)
+    if loaded.all() or not loaded.any():
+        return _solved(grid, phi, last)
+    found: dict[str, Array] = {}
+    status = np.empty(len(grid.designs), np.uint8)
+    for rows in (np.flatnonzero(loaded), np.flatnonzero(~loaded)):
+        part, codes = _solved(grid.only(rows), np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi), last)
+        for name, values in part.items():
+            found.setdefault(name, np.empty((len(grid.designs), *values.shape[1:])))[rows] = values
+        status[rows] = codes
+    return found, status
+
+
+def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
     n = len(grid.designs)
     status, floquet = np.empty(n, np.uint8), np.empty(n)
     lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
@@ -144,7 +159,7 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
 
 
 def _equation(scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenSide) -> tuple[Array, Array, Array]:
-    """Factors of eta' and of eta, and the right side, over that of eta''; (3) with (5), (n, N)."""
+    """Return factors of eta' and of eta, and the right side, over that of eta''; (3) with (5), (n, N)."""
     inertia, stiffness, damping, speed, _ = (data[:, k, None] for k in range(5))
     square = p * p
     orders = np.arange(p.shape[1] // 2 + 1)
@@ -159,7 +174,9 @@ def _equation(scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenS
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Floquet multiplier and the reductions of lag and elongation; finer grids for the designs that need them."""
+    """Return the Floquet multiplier and the reductions of lag and elongation;
+    finer grids for the designs that need them.
+    """
     columns = _turn(scene, wanted, GRIDS)
     late = np.flatnonzero(columns["status"] == st.NOT_CONVERGED)
     if late.size:
@@ -180,7 +197,7 @@ def _turn(scene: Scene, wanted: frozenset[str], grids: tuple[int, ...]) -> Colum
 
 
 def advise_static(scene: Scene) -> Advice | None:
-    """Largest quasi-static lag over the turn: an angle, or the share of the coupler's length."""
+    """Return the largest quasi-static lag over the turn: an angle, or the share of the coupler's length."""
     found = compute_static(scene, frozenset({"lag"}))
     lag = np.abs(np.asarray(found["lag"], np.float64))
     turning = np.isfinite(lag).all(axis=1)
@@ -192,7 +209,7 @@ def advise_static(scene: Scene) -> Advice | None:
 
 
 def advise_dynamic(scene: Scene) -> Advice | None:
-    """Sheet 5, criterion (ii): max|eta_qs''/nu^2|/max|eta_qs|, 0.7 to 2.8 times of which dynamics adds to the lag."""
+    """Return max|eta_qs''/nu^2|/max|eta_qs|; dynamics adds 0.7 to 2.8 times this share to the lag."""
     found = compute_static(scene.on_grid(GRIDS[-1]), frozenset({"lag", "frequency_ratio"}))
     lag, ratio = (np.asarray(found[name], np.float64) for name in ("lag", "frequency_ratio"))
     turning = np.isfinite(lag).all(axis=1)
@@ -218,6 +235,7 @@ def _static(kind: loads.Follower) -> Effect:
         inputs=INPUTS[kind.name],
         tool_inputs=_AT_TIP,
         takes_load=LOADS,
+        may_drive_nothing=True,
         outputs=_static_outputs(kind),
         least=("frequency_ratio",),
         compute=compute_static,
@@ -241,6 +259,7 @@ def _dynamic(kind: loads.Follower) -> Effect:
         inputs=INPUTS[kind.name],
         tool_inputs=_AT_TIP,
         takes_load=LOADS,
+        may_drive_nothing=True,
         outputs=outputs,
         compute=compute_dynamic,
         called_for="max|lag''/nu^2|/max|lag| above a third of the tolerance",

@@ -30,7 +30,7 @@ def effect_poses(
     angles: Angles,
     wanted: frozenset[str],
 ) -> Columns:
-    """The family's own poses, then each effect with a wanted output; the status is the first that is not OK.
+    """Return the family's own poses, then each effect with a wanted output; the status is the first that is not OK.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def run_design(
     wanted: frozenset[str],
     accuracy: Accuracy,
 ) -> Columns:
-    """Design outputs of an effect, block by block."""
+    """Return design outputs of an effect, block by block."""
     whole_turn = placed.entry.design_result
     assert whole_turn is not None
     bare = np.ascontiguousarray(designs[:, :own])
@@ -130,7 +130,7 @@ def run_design(
 
 
 def on_own_columns(step: Step, own: int) -> Step:
-    """A family's own step for a design matrix with further columns behind the family's."""
+    """Return a family's own step for a design matrix with further columns behind the family's."""
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         return step.run(np.ascontiguousarray(designs[:, :own]), wanted, accuracy)
@@ -139,7 +139,7 @@ def on_own_columns(step: Step, own: int) -> Step:
 
 
 def input_columns(inputs: tuple[Parameter, ...], designs: Array, own: int) -> dict[str, Array]:
-    """The inputs of the effects by name, each (n,)."""
+    """Return the inputs of the effects by name, each (n,)."""
     return {p.name: np.ascontiguousarray(designs[:, own + k]) for k, p in enumerate(inputs)}
 
 

@@ -72,7 +72,7 @@ _COUPLES = {
 
 
 def _losses(kind: loads.Follower) -> dict[str, tuple[str, str]]:
-    """What the kernel gives as losses, in its order."""
+    """Return what the kernel gives as losses, in its order."""
     rocker = kind is loads.ROCKER
     follower = ("torque", "friction torque on the rocker about its axis")
     found = {
@@ -96,12 +96,12 @@ def _outputs(kind: loads.Follower) -> tuple[Output, ...]:
 
 
 def behind(scene: Scene) -> Columns | None:
-    """Driving torque with friction and status of the next stage; None at the end of the chain."""
+    """Return the driving torque with friction and status of the next stage; None at the end of the chain."""
     return handed_behind(scene, KEY, frozenset({"drive_torque_friction"}))
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted quantities with friction; status JAMMED where the iteration does not contract."""
+    """Return the wanted quantities with friction; status JAMMED where the iteration does not contract."""
     status, handed_back, kind = scene.status(), behind(scene), loads.follower(scene)
     if handed_back is not None:
         take_over(status, handed_back["status"])

@@ -7,8 +7,8 @@ from importlib import import_module
 import numpy as np
 
 from sweep.effects.base import Scene
-from sweep.families.base import Array, Columns
-from sweep.families.capabilities import LinkTree
+from sweep.families.base import Array, Columns, Family, Parameter
+from sweep.families.link_tree import LinkTree
 
 LOADS, FRICTION = "D1, D3", "D2"  # keys of the effects that hand something back
 INERTIAS = ("reduced_inertia", "dreduced_inertia")
@@ -17,15 +17,22 @@ _ROUTES = {LOADS: ("kinetostatics", "links"), FRICTION: ("friction", "link_frict
 
 
 def computed(scene: Scene, key: str, wanted: frozenset[str]) -> Columns:
-    """Outputs of the effect of that key for one stage."""
+    """Return outputs of the effect of that key for one stage."""
     by_records, by_links = _ROUTES[key]
     route = by_records if scene.family.find(LinkTree) is None else by_links
     found: Columns = import_module(f"sweep.effects.{route}").compute(scene, wanted)
     return found
 
 
+def inputs_of_loads(family: Family) -> tuple[Parameter, ...]:
+    """Return the inputs of the effect that hands back a family's load; none where there is no such effect."""
+    register = import_module("sweep.effects")  # it imports the users of this module when they are asked for
+    entries = [register.effect(name) for name in register.NAMES]
+    return tuple(p for e in entries if e.key == LOADS and e.serves(family) for p in e.inputs_of(family))
+
+
 def behind(scene: Scene, key: str, wanted: frozenset[str]) -> Columns | None:
-    """What the next stage hands back; None at the end of the chain."""
+    """Return what the next stage hands back; None at the end of the chain."""
     if scene.driven is None:
         return None
     memo = f"behind {key}"
@@ -36,14 +43,16 @@ def behind(scene: Scene, key: str, wanted: frozenset[str]) -> Columns | None:
 
 
 def carried(scene: Scene, handed_back: Columns) -> Array:
-    """Inertia of the later stages reduced to this crank and its derivative, (n, m, 2)."""
+    """Return the inertia of the later stages reduced to this crank and its derivative, (n, m, 2)."""
     inertia, slope = (np.asarray(handed_back[name], np.float64) for name in INERTIAS)
     first, second = scene.gear
     return np.stack([first * first * inertia, 2.0 * first * second * inertia + first**3 * slope], axis=2)
 
 
 def on_output(scene: Scene, load: Array, handed_back: Columns | None, name: str) -> Array:
-    """The load of the output link, and the next stage's driving torque, column ``name``, that acts on it besides."""
+    """Return the load of the output link, and the next stage's driving torque, column ``name``,
+    that acts on it besides.
+    """
     if handed_back is None:
         return load
     return load - scene.after[0].kappa[:, None] * np.asarray(handed_back[name], np.float64)

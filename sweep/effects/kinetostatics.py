@@ -31,7 +31,7 @@ FORMULAS = (
 
 
 def forces(follower: str) -> dict[str, str]:
-    """The six vectors, in the order in which the kernel gives them."""
+    """Return the six vectors, in the order in which the kernel gives them."""
     about = "about D" if follower == "rocker" else "about C"
     return {
         "force_a": "force of the frame on the crank",
@@ -55,7 +55,7 @@ INERTIAS = {
 
 
 def force_outputs(follower: str, suffix: str = "", text: str = "", equation: str = EQUATION) -> tuple[Output, ...]:
-    """Magnitude and components of the six vectors, and the force and the moment on the frame."""
+    """Return the magnitude and components of the six vectors, and the force and the moment on the frame."""
     found = []
     for name, meaning in forces(follower).items():
         unit = name.split("_")[0].replace("moment", "torque")
@@ -76,7 +76,7 @@ def _outputs(follower: str) -> tuple[Output, ...]:
 
 
 def wanted_groups(wanted: frozenset[str], suffix: str = "") -> tuple[bool, bool, bool]:
-    """Whether any force or moment, any couple, any inertia is wanted: what is not is not compiled."""
+    """Return whether any force or moment, any couple, any inertia is wanted: what is not is not compiled."""
     vectors = (
         f"{name}{suffix}{tail}"
         for name in (*FORCES, "shaking_force", "shaking_moment")
@@ -89,7 +89,9 @@ def wanted_groups(wanted: frozenset[str], suffix: str = "") -> tuple[bool, bool,
 def vector_columns(
     forces: Array | None, records: tuple[Array, Array], wanted: frozenset[str], suffix: str = ""
 ) -> Columns:
-    """Wanted magnitudes and components of the six vectors, (n, m, 18), and of force and moment on the frame."""
+    """Return the wanted magnitudes and components of the six vectors, (n, m, 18),
+    and of force and moment on the frame.
+    """
     columns: Columns = {}
     if forces is None:
         return columns
@@ -110,7 +112,7 @@ def vector_columns(
 
 
 def frame_moment(forces: Array, records: tuple[Array, Array]) -> Array:
-    """Moment of crank and follower on the frame about the origin of the family's frame, (n, m, 3).
+    """Return the moment of crank and follower on the frame about the origin of the family's frame, (n, m, 3).
 
     The moments of the bearings are about A, and about D or, where a slider moves, about C; each force adds its arm.
     """
@@ -124,7 +126,7 @@ def frame_moment(forces: Array, records: tuple[Array, Array]) -> Array:
 
 
 def magnitude(vectors: Array) -> Array:
-    """Length of vectors (n, m, 3)."""
+    """Return the length of vectors (n, m, 3)."""
     x, y, z = vectors[:, :, 0], vectors[:, :, 1], vectors[:, :, 2]
     length: Array = np.sqrt(x * x + y * y + z * z)
     return length
@@ -142,17 +144,17 @@ def drive(scene: Scene, handed_back: Columns | None, name: str = "drive_torque")
 
 
 def bodies(scene: Scene) -> Array:
-    """Masses, centres, inertias and gravity in the order of the kernels."""
+    """Return masses, centres, inertias and gravity in the order of the kernels."""
     return scene.table(loads.follower(scene).bodies)
 
 
 def behind(scene: Scene) -> Columns | None:
-    """Driving torque, reduced inertia and status of the next stage; None at the end of the chain."""
+    """Return the driving torque, reduced inertia and status of the next stage; None at the end of the chain."""
     return handed_behind(scene, KEY, frozenset({"drive_torque", *INERTIAS}))
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted reactions and inertias; a group none of whose outputs is wanted is not compiled."""
+    """Return the wanted reactions and inertias; a group none of whose outputs is wanted is not compiled."""
     status, handed_back = scene.status(), behind(scene)
     sizes = zip((18, 2, 2), wanted_groups(wanted), strict=True)
     forces, couples, inertia = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
@@ -178,7 +180,7 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def advise(scene: Scene) -> Advice | None:
-    """Share of the largest force at C that inertia and weight make; 1 where there is no useful load."""
+    """Return the share of the largest force at C that inertia and weight make; 1 where there is no useful load."""
     load = loads.follower(scene).load.name
     whole = compute(scene, frozenset({"force_c"}))
     still = {name: np.zeros_like(x) if name.startswith(("m_", "j_")) else x for name, x in scene.inputs.items()}

@@ -14,7 +14,7 @@ from sweep.effects.bearings import together
 from sweep.effects.handed import FRICTION, behind
 from sweep.families import family
 from sweep.families.base import Array, Columns, Output, Parameter
-from sweep.families.capabilities import LinkJoint, LinkTree
+from sweep.families.link_tree import LinkJoint, LinkTree
 
 EQUATION = "docs/links.md (7)-(9)"
 FORMULAS = (
@@ -26,13 +26,13 @@ FORMULAS = (
 )
 SUFFIX, TEXT = "_friction", ", friction included"
 PASSES = "friction_passes"
-SUPPORTED = ("shaft", "guide")
+SUPPORTED = ("shaft", "sleeve")
 
 
 def _of_joint(joint: LinkJoint) -> tuple[Parameter, ...]:
-    """Inputs of a joint in the order of the kernel's columns: those that it has."""
+    """Return inputs of a joint in the order of the kernel's columns: those that it has."""
     j, text = joint.name, joint.text
-    bare = 0.0 if joint.kind in ("contact", "guide") else None
+    bare = 0.0 if joint.kind in ("contact", "sleeve") else None
     found = [
         Parameter(f"mu_{j}", "ratio", f"coefficient of friction: {text}", not_negative=True),
         Parameter(f"radius_{j}", "length", f"friction radius: {text}", default=bare, not_negative=True),
@@ -54,7 +54,7 @@ def _columns_of(joint: LinkJoint) -> tuple[str, ...]:
 
 
 def _data(scene: Scene) -> Array:
-    """Columns of the kernel of each joint, (n, Q, 5); 0 for what a kind of joint does not have."""
+    """Return columns of the kernel of each joint, (n, Q, 5); 0 for what a kind of joint does not have."""
     zero, tree = np.zeros(len(scene.designs)), links.tree_of(scene)
     rows = [np.column_stack([scene.inputs.get(name, zero) for name in _columns_of(j)]) for j in tree.joints]
     return np.ascontiguousarray(np.stack(rows, axis=1))
@@ -69,7 +69,7 @@ def _losses(tree: LinkTree) -> dict[str, tuple[str, str]]:
 
 
 def _supports(tree: LinkTree) -> dict[str, tuple[int, int, str]]:
-    """Loads of supports by name: the number of the joint, that of the support, in words."""
+    """Return loads of supports by name: the number of the joint, that of the support, in words."""
     return {
         f"load_support_{j.name}{k + 1}": (q, k, f"load across the axis of support {k + 1}: {j.text}{TEXT}")
         for q, j in enumerate(tree.joints)
@@ -79,7 +79,7 @@ def _supports(tree: LinkTree) -> dict[str, tuple[int, int, str]]:
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted quantities with friction; status JAMMED where the iteration does not settle."""
+    """Return the wanted quantities with friction; status JAMMED where the iteration does not settle."""
     tree, status, shape = links.tree_of(scene), scene.status(), scene.shape
     handed_back = behind(scene, FRICTION, frozenset({"drive_torque_friction"}))
     if handed_back is not None:

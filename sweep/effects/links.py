@@ -12,7 +12,7 @@ from sweep.effects.base import Advice, Effect, Index, Scene, take_over
 from sweep.effects.handed import INERTIAS, LOADS, behind, carried, on_output
 from sweep.families import family
 from sweep.families.base import Array, Columns, Output, Parameter
-from sweep.families.capabilities import LinkJoint, LinkTree
+from sweep.families.link_tree import LinkJoint, LinkTree
 
 EQUATION = "docs/links.md (1)-(6)"
 FORMULAS = (
@@ -24,7 +24,7 @@ FORMULAS = (
 KINDS = {
     "shaft": kernel.SHAFT,
     "hinge": kernel.HINGED_BALL,
-    "guide": kernel.GUIDE,
+    "sleeve": kernel.GUIDE,
     "ball": kernel.BALL,
     "contact": kernel.CONTACT,
 }
@@ -42,7 +42,7 @@ TOOL_TORQUE = "tool_torque"
 
 
 def tree_of(scene: Scene) -> LinkTree:
-    """The tree of a scene's family."""
+    """Return the tree of a scene's family."""
     tree = scene.family.find(LinkTree)
     assert tree is not None
     return tree
@@ -50,7 +50,7 @@ def tree_of(scene: Scene) -> LinkTree:
 
 @lru_cache
 def body_inputs(tree: LinkTree) -> tuple[Parameter, ...]:
-    """Masses, centres and inertias of all bodies."""
+    """Return masses, centres and inertias of all bodies."""
     return tuple(
         p for body in tree.bodies for p in (loads.rod_inputs if body.slender else _whole)(body.name, body.axes)
     )
@@ -61,18 +61,18 @@ def _whole(name: str, axes: str) -> tuple[Parameter, ...]:
 
 
 def inputs(tree: LinkTree) -> tuple[Parameter, ...]:
-    """All inputs of the loads of a tree."""
+    """Return all inputs of the loads of a tree."""
     load = (loads.LINK_TORQUE,) if tree.output >= 0 else ()
     tip = loads.TIP if tree.tip is None else ()
     return (*body_inputs(tree), *loads.GRAVITY, *loads.FREE_TOOL, *tip, *load, loads.SPEED, loads.CHANGE)
 
 
 def vectors(joints: tuple[LinkJoint, ...], suffix: str = "", text: str = "") -> dict[str, tuple[str, str]]:
-    """Names of the vectors that are given, with unit and meaning: forces and moments of joints, of the frame."""
+    """Return names of the vectors that are given, with unit and meaning: forces and moments of joints, of the frame."""
     found = {}
     for joint in joints:
         found[f"force_{joint.name}{suffix}"] = ("force", f"{joint.text}: force of the {joint.acts}{text}")
-        if joint.kind in ("shaft", "guide"):
+        if joint.kind in ("shaft", "sleeve"):
             found[f"moment_{joint.name}{suffix}"] = (
                 "torque", f"{joint.text}: moment of the {joint.acts}{text}",
             )  # fmt: skip
@@ -80,7 +80,7 @@ def vectors(joints: tuple[LinkJoint, ...], suffix: str = "", text: str = "") -> 
 
 
 def vector_outputs(named: dict[str, tuple[str, str]], equation: str = EQUATION) -> tuple[Output, ...]:
-    """Magnitude and components of vectors."""
+    """Return the magnitude and components of vectors."""
     return tuple(
         o
         for name, (unit, text) in named.items()
@@ -98,7 +98,9 @@ def _tool_vector() -> dict[str, tuple[str, str]]:
 def vector_columns(
     tree: LinkTree, forces: Array | None, on_frame: Array | None, wanted: frozenset[str], suffix: str = ""
 ) -> Columns:
-    """Wanted magnitudes and components of joint reactions (n, m, Q, 6) and of what the frame bears (n, m, 6)."""
+    """Return the wanted magnitudes and components of joint reactions (n, m, Q,
+    6) and of what the frame bears (n, m, 6).
+    """
     found = {}
     if forces is not None:
         for k, joint in enumerate(tree.joints):
@@ -119,12 +121,12 @@ def _columns(found: dict[str, Array], wanted: frozenset[str]) -> Columns:
 
 
 def asked(names: dict[str, tuple[str, str]] | tuple[str, ...], wanted: frozenset[str]) -> bool:
-    """Whether a vector, or a component of one, is wanted."""
+    """Return whether a vector, or a component of one, is wanted."""
     return any(f"{name}{tail}" in wanted for name in names for tail in ("", "_x", "_y", "_z"))
 
 
 def bodies(scene: Scene) -> Array:
-    """Masses, centres, inertias and gravity in the order of the kernel, (n, 10 B + 3)."""
+    """Return masses, centres, inertias and gravity in the order of the kernel, (n, 10 B + 3)."""
     tree, given = tree_of(scene), scene.inputs
     columns: list[Array] = []
     zero = np.zeros(len(scene.designs))
@@ -138,14 +140,14 @@ def bodies(scene: Scene) -> Array:
 
 
 def tool(scene: Scene) -> Array:
-    """Mass of the tool and its place in the axes of the body that carries it, (n, 4)."""
+    """Return the mass of the tool and its place in the axes of the body that carries it, (n, 4)."""
     tree = tree_of(scene)
     tip = scene.table(tuple(p.name for p in loads.TIP)) if tree.tip is None else tree.tip(scene.designs)
     return np.column_stack([scene.inputs["m_tool"], tip])
 
 
 def drive(scene: Scene, handed_back: Columns | None, name: str = "drive_torque") -> Array:
-    """Crank speed and its rate, load of the output link, force on the tool, (n, m or 1, 6)."""
+    """Return the crank speed and its rate, load of the output link, force on the tool, (n, m or 1, 6)."""
     tree, (speed, change) = tree_of(scene), scene.crank()
     load = scene.load(loads.LINK_TORQUE.name) if tree.output >= 0 else np.zeros_like(speed)
     load = on_output(scene, load, handed_back, name)
@@ -155,19 +157,19 @@ def drive(scene: Scene, handed_back: Columns | None, name: str = "drive_torque")
 
 @lru_cache
 def joint_table(tree: LinkTree) -> Index:
-    """The joints as the kernels take them, (Q, PER_JOINT)."""
+    """Return the joints as the kernels take them, (Q, PER_JOINT)."""
     rows = [(KINDS[j.kind], j.body, j.freedom, *j.lines, _rod(tree, j)) for j in tree.joints]
     return np.array(rows, np.int64)
 
 
 def _rod(tree: LinkTree, joint: LinkJoint) -> int:
-    """The slender body among those of a joint; -1 where there is none."""
+    """Return the slender body among those of a joint; -1 where there is none."""
     ends = (joint.body,) if joint.lines[1] == 0 else tree.ends[joint.lines[0]]
     return next((k for k in ends if k >= 0 and tree.bodies[k].slender), -1)
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted reactions, driving torque and inertias; what is not wanted is not compiled."""
+    """Return the wanted reactions, driving torque and inertias; what is not wanted is not compiled."""
     tree, status = tree_of(scene), scene.status()
     handed_back = behind(scene, LOADS, frozenset({"drive_torque", *INERTIAS}))
     shape = scene.shape
@@ -198,7 +200,7 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def advise(scene: Scene) -> Advice | None:
-    """Share of the driving torque's range that inertia and weight make."""
+    """Return the share of the driving torque's range that inertia and weight make."""
     names = frozenset({"drive_torque"})
     whole = compute(scene, names)
     still = {name: np.zeros_like(x) if name.startswith(("m_", "j_")) else x for name, x in scene.inputs.items()}

@@ -18,7 +18,7 @@ _FRAMES = {
 
 
 def body_inputs(body: str, frame: str, default: float | None = None) -> tuple[Parameter, ...]:
-    """Mass, centre of mass and inertia of a body whose axes lie as ``frame`` says; ``default`` mass."""
+    """Return the mass, centre of mass and inertia of a body whose axes lie as ``frame`` says; ``default`` mass."""
     centre = (
         Parameter(f"com_{body}_{axis}", "length", f"centre of mass of the {body} ({frame})", default=0.0)
         for axis in "xyz"
@@ -41,7 +41,7 @@ def _body(body: str) -> tuple[Parameter, ...]:
 
 
 def rod_inputs(body: str, frame: str) -> tuple[Parameter, ...]:
-    """Mass, centre of mass and inertia of a slender rod."""
+    """Return the mass, centre of mass and inertia of a slender rod."""
     return (
         Parameter(f"m_{body}", "mass", f"mass of {body}", default=0.0, not_negative=True),
         Parameter(f"com_{body}_x", "length", f"centre of mass of {body} ({frame})", default=0.0),
@@ -114,6 +114,6 @@ SLIDER = _follower("slider", "slider_", _FORCE)
 
 
 def follower(scene: Scene) -> Follower:
-    """The kind of follower of a scene's family."""
+    """Return the kind of follower of a scene's family."""
     joints = scene.family.find(JointRecords)
     return SLIDER if joints is not None and joints.follower == SLIDER.name else ROCKER

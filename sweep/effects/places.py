@@ -9,7 +9,9 @@ ON_LINE, ON_COUPLER, ON_TIP = 0, 1, 2  # where a tool can hang, in the order of 
 
 
 def tool_place(family: Family) -> int | None:
-    """Where a tool can hang on a family with joint records: ON_LINE, ON_COUPLER, ON_TIP; None for nowhere."""
+    """Return the place where a tool can hang on a family with joint records: ON_LINE, ON_COUPLER, ON_TIP;
+    None for nowhere.
+    """
     if family.find(JointRecords) is None:
         return None
     point = family.find(ToolPoint)

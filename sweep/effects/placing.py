@@ -62,7 +62,7 @@ def _design(entry: Effect) -> tuple[Output, ...]:
 
 
 def stages_of(family: Family) -> tuple[tuple[Family, str], ...]:
-    """The stages of a chain with their numbers; a family alone is one stage without a number."""
+    """Return the stages of a chain with their numbers; a family alone is one stage without a number."""
     if isinstance(family, Chain):
         return tuple((stage.family, str(stage.number)) for stage in family.stages)
     return ((family, ""),)
@@ -75,7 +75,7 @@ def first_scene(
     given: dict[str, Array],
     curves: Mapping[str, Curve] = MappingProxyType({}),
 ) -> Scene:
-    """The scene of a family, or of a chain's first stage with those behind it.
+    """Return the scene of a family, or of a chain's first stage with those behind it.
 
     ``given`` are the inputs by name, each (n,), ``curves`` what adds to some of them over the turn.
     """

@@ -31,12 +31,12 @@ _NAMES = tuple(o.name for o in OUTPUTS)
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted directions and angles of every pose."""
+    """Return the wanted directions and angles of every pose."""
     return filled(directions, scene.records, _NAMES, wanted, scene.status())
 
 
 def components(scene: Scene) -> tuple[tuple[Array, ...], Status]:
-    """t_tau, t_rho and t_k, which the bearing criteria take, and a fresh status."""
+    """Return t_tau, t_rho and t_k, which the bearing criteria take, and a fresh status."""
     if "direction" not in scene.memo:
         scene.memo["direction"] = compute(scene, frozenset({"t_tau", "t_rho", "t_k"}))
     found = scene.memo["direction"]

@@ -39,7 +39,7 @@ ERROR = 1e-14
 
 
 def extrema(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Wanted extrema and status, each (n,)."""
+    """Return the wanted extrema and status, each (n,)."""
     ellipse = scene.family.find(PressureEllipse)
     if ellipse is None:
         raise TypeError(f"{scene.family.name} has no ellipse of the coupler direction")

@@ -24,7 +24,7 @@ _NAMES = tuple(o.name for o in OUTPUTS)
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Magnitude and components of every pose; in a chain with respect to the crank angle of stage 1."""
+    """Return the magnitude and components of every pose; in a chain with respect to the crank angle of stage 1."""
     first, second = scene.rates or (np.ones(scene.shape), np.zeros(scene.shape))
     rates = np.ascontiguousarray(first), np.ascontiguousarray(second)
     return filled(centre_acceleration, (*scene.records, *rates), _NAMES, wanted, scene.status())

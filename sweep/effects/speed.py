@@ -50,7 +50,7 @@ Loss: TypeAlias = Callable[[Scene, Array], tuple[Array, Status]]
 
 
 def outputs(suffix: str, text: str) -> tuple[Output, ...]:
-    """The curves over the turn."""
+    """Return the curves over the turn."""
     return (
         Output(f"crank_speed{suffix}", "rad/s", f"speed of the crank in the steady state{text}", EQUATION),
         Output(f"crank_acceleration{suffix}", "rad/s^2", f"its angular acceleration{text}", EQUATION),
@@ -58,7 +58,7 @@ def outputs(suffix: str, text: str) -> tuple[Output, ...]:
 
 
 def numbers(suffix: str, text: str) -> tuple[Output, ...]:
-    """What a turn has one of."""
+    """Return what a turn has one of."""
     return (
         Output(f"unevenness{suffix}", "1", f"(largest - smallest crank speed)/mean{text}", EQUATION),
         Output(f"fastest{suffix}", "rad/s", f"largest crank speed{text}", EQUATION),
@@ -87,7 +87,7 @@ def _solve(loss: Loss | None, finest: int, grid: Scene, phi: Array, last: bool) 
 def steady(
     inertia: Array, excess: Array, speed: Array, slope: Array | None, phi: Array, coarsest: float
 ) -> tuple[dict[str, Array], Status]:
-    """The kernel's numbers, (n,), and curves at phi, (n, m), without a suffix, and the status."""
+    """Return the kernel's numbers, (n,), and curves at phi, (n, m), without a suffix, and the status."""
     n = len(inertia)
     unevenness, fastest, slowest, energy, missed = (np.empty(n) for _ in range(5))
     crank_speed, acceleration = (np.empty((n, phi.shape[1])) for _ in range(2))
@@ -101,7 +101,7 @@ def steady(
 
 
 def samples(grid: Scene) -> tuple[Array, Array]:
-    """Reduced inertia and torque excess J'w^2/2 - M_drive(w, 0): weights and load reduced to the crank."""
+    """Return the reduced inertia and torque excess J'w^2/2 - M_drive(w, 0): weights and load reduced to the crank."""
     even = grid.inputs | {"speed_change": np.zeros(len(grid.designs))}
     after = tuple(d._replace(inputs=d.inputs | {"speed_change": even["speed_change"]}) for d in grid.after)
     turning = Scene(grid.family, grid.designs, grid.angles, even, after, curves=grid.curves)
@@ -118,7 +118,7 @@ def _grids(scene: Scene, loss: Loss | None) -> tuple[int, ...]:
 
 
 def compute(scene: Scene, wanted: frozenset[str], loss: Loss | None = None, suffix: str = "") -> Columns:
-    """Speed and acceleration of the crank at the wanted angles."""
+    """Return the speed and acceleration of the crank at the wanted angles."""
     grids = _grids(scene, loss)
     found, status = on_finer_grids(scene, scene.angles.phi, grids, partial(_solve, loss, grids[-1]))
     return at_poses(scene, {f"{name}{suffix}": x for name, x in found.items()}, status, wanted)
@@ -127,7 +127,7 @@ def compute(scene: Scene, wanted: frozenset[str], loss: Loss | None = None, suff
 def turn(
     scene: Scene, wanted: frozenset[str], accuracy: Accuracy, loss: Loss | None = None, suffix: str = ""
 ) -> Columns:
-    """Unevenness, extreme speeds and the reductions of speed and acceleration."""
+    """Return the unevenness, extreme speeds and the reductions of speed and acceleration."""
     grids = _grids(scene, loss)
     found, status = on_finer_grids(scene, scene.on_grid(grids[-1]).angles.phi, grids, partial(_solve, loss, grids[-1]))
     found = {f"{name}{suffix}": x for name, x in found.items()}

@@ -37,7 +37,8 @@ SETTLED = 1e-7  # share of the largest torque excess or loss by which the last p
 
 
 def loss(grid: Scene, slope: Array) -> tuple[Array, Status]:
-    """Torque on the crank that friction takes, (n, N), at the speed over the turn that it makes, and the status.
+    """Return the torque on the crank that friction takes, (n, N), at the speed over the turn that it makes,
+    and the status.
 
     The speed is found on a grid of GRIDS[-1] poses: what that misses of it changes the loss by as small a share.
     """
@@ -62,7 +63,7 @@ def loss(grid: Scene, slope: Array) -> tuple[Array, Status]:
 
 
 def _turning(inertia: Array, excess: Array, mean: Array, motor: Array | None, phi: Array) -> tuple[Array, Array]:
-    """Speed and acceleration over the turn; even where there is no steady state, which its status says."""
+    """Return the speed and acceleration over the turn; even where there is no steady state, which its status says."""
     found, _ = steady(inertia, excess, mean, motor, phi, LEFT)
     usable = np.logical_and.reduce(np.isfinite(found["crank_speed"]), axis=1, keepdims=True)
     speed = np.where(usable, found["crank_speed"], mean[:, None])
@@ -70,7 +71,9 @@ def _turning(inertia: Array, excess: Array, mean: Array, motor: Array | None, ph
 
 
 def _lost(grid: Scene, speed: Array, change: Array, status: Status) -> Array:
-    """Driving torque with friction minus that without, where the crank turns like this; ``status`` is worsened."""
+    """Return the driving torque with friction minus that without, where the crank turns like this;
+    ``status`` is worsened.
+    """
     turning = Scene(
         grid.family, grid.designs, grid.angles, grid.inputs, grid.after, curves=grid.curves, uneven=(speed, change)
     )

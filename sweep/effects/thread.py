@@ -72,7 +72,7 @@ def _per_pose(scene: Scene, name: str) -> Array:
 
 
 def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Tension behind the eyelet and its parts."""
+    """Return the tension behind the eyelet and its parts."""
     wrap, motion = _wrap(scene)
     names = ("eyelet_radius", "thread_adhesion", "thread_friction", "thread_bending", "thread_count", "thread_density")
     outputs = {o.name: np.empty(scene.shape) if o.name in wanted else None for o in CONTOUR_OUTPUTS}
@@ -85,7 +85,7 @@ def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def euler(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Tension by Euler's law and force on the eyelet."""
+    """Return the tension by Euler's law and force on the eyelet."""
     wrap, motion = _wrap(scene)
     outputs = {o.name: np.empty(scene.shape) if o.name in wanted else None for o in CAPSTAN_OUTPUTS}
     status = np.array(motion["status"], np.uint8)
@@ -94,7 +94,7 @@ def euler(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def speed(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Speed and acceleration of the thread, and the ratio of tensions that the speed makes."""
+    """Return the speed and acceleration of the thread, and the ratio of tensions that the speed makes."""
     path = _path(scene)
     found = scene.family.poses(scene.designs, scene.angles, frozenset({path.rate, path.rate2}))
     first, second = (np.asarray(found[name], np.float64) for name in (path.rate, path.rate2))

@@ -41,7 +41,9 @@ def on_finer_grids(scene: Scene, phi: Array, grids: Sequence[int], solve: Solver
 
 
 def at_poses(scene: Scene, found: dict[str, Array], turn: Status, wanted: frozenset[str]) -> Columns:
-    """Wanted curves of a whole-turn effect at the scene's poses; a turn that is not OK speaks for all of them."""
+    """Return the wanted curves of a whole-turn effect at the scene's poses;
+    a turn that is not OK speaks for all of them.
+    """
     status = scene.status()
     take_over(status, np.broadcast_to(turn[:, None], status.shape))
     columns: Columns = {name: found[name] for name in wanted}
@@ -57,7 +59,8 @@ def per_turn(
     limit: float = RESOLVED,
     known: Array | float = RESOLVED,
 ) -> Columns:
-    """The wanted ones of ``numbers`` and of the reductions of ``curves``, sampled on an odd grid in ``found``.
+    """Return the wanted ones of ``numbers`` and of the reductions of ``curves``,
+    sampled on an odd grid in ``found``.
 
     ``limit`` is the share of a curve that the grid may miss, ``known`` the relative error of what it is made of.
     """
@@ -69,14 +72,14 @@ def per_turn(
 
 
 def reduction_outputs(outputs: Sequence[Output]) -> tuple[Output, ...]:
-    """The reductions over the turn of these pose outputs, as design outputs of the effect itself."""
+    """Return the reductions over the turn of these pose outputs, as design outputs of the effect itself."""
     return tuple(reduction.output(o, Turn()) for o in outputs for reduction in REDUCTIONS)
 
 
 def reductions(
     name: str, values: Array, status: Status, limit: float = RESOLVED, known: Array | float = RESOLVED
 ) -> Columns:
-    """All reductions of one curve from its samples on a uniform odd grid, (n, N), with their errors.
+    """Return all reductions of one curve from its samples on a uniform odd grid, (n, N), with their errors.
 
     ``status`` (n,) becomes NOT_CONVERGED where the grid misses more than the share ``limit`` of the curve; what is not
     OK gives nan.
@@ -108,5 +111,5 @@ def reductions(
 
 
 def chosen(columns: Columns, wanted: frozenset[str], status: Status) -> Columns:
-    """The wanted outputs with their errors, and the status."""
+    """Return the wanted outputs with their errors, and the status."""
     return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}

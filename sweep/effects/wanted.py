@@ -15,7 +15,7 @@ AXES = ("_x", "_y", "_z")
 
 
 def expanded(family: Family, wanted: Iterable[str], *, poses: bool = False) -> list[str]:
-    """The wanted names, with the outputs of an effect in place of its name.
+    """Return the wanted names, with the outputs of an effect in place of its name.
 
     ``friction`` stands for the design outputs that the friction effect has of its own, and for the largest magnitude
     over the turn of each of its pose outputs; of some, such as a life, for the least value.  A vector counts by its
@@ -37,7 +37,7 @@ def expanded(family: Family, wanted: Iterable[str], *, poses: bool = False) -> l
 
 
 def names_of_effects(family: Family, poses: bool = False) -> dict[str, tuple[str, ...]]:
-    """The outputs that the name of each effect stands for, by the name."""
+    """Return the outputs that the name of each effect stands for, by the name."""
     found: dict[str, tuple[str, ...]] = {}
     if isinstance(family, Machine):
         for m in family.members:

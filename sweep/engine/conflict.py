@@ -9,7 +9,7 @@ MOST = 6
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """Keys whose values differ, such as ``limits.swing.min 170 -> 50 deg``; at most six of them."""
+    """Return keys whose values differ, such as ``limits.swing.min 170 -> 50 deg``; at most six of them."""
     found = list(_lines(old, new, ""))
     more = [f"and {len(found) - MOST} more"] if len(found) > MOST else []
     return found[:MOST] + more

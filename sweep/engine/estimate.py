@@ -93,13 +93,23 @@ def estimate(study: Study, jobs: int, tell: Callable[[int, int], None] = lambda 
     )
 
 
-def other_accuracies(study: Study, jobs: int) -> tuple[tuple[str, float], ...]:
-    """What the same sweep would take at the accuracies of :func:`neighbours`: in words, and the estimated seconds."""
-    return tuple((words, estimate(other, jobs).seconds) for words, other in neighbours(study))
+def other_accuracies(
+    study: Study, jobs: int, tell: Callable[[int, int], None] = lambda _, __: None
+) -> tuple[tuple[str, float], ...]:
+    """Return what the same sweep would take at other accuracies: in words, and the estimated seconds.
+
+    ``tell`` is called with how many of them are done, and how many there are.
+    """
+    found, others = [], neighbours(study)
+    for k, (words, other) in enumerate(others):
+        tell(k, len(others))
+        found.append((words, estimate(other, jobs).seconds))
+    return tuple(found)
 
 
 def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
-    """The same study with one digit less and one more, or with half and twice the samples; in words, and the study.
+    """Return the same study with one digit less and one more, or with half and twice the samples;
+    in words, and the study.
 
     With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range
     of `sweep.summarise` is left out.

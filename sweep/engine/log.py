@@ -19,14 +19,14 @@ LIBRARIES = ("linksweep", "numpy", "numba", "llvmlite", "scipy", "pandas", "pyar
 
 
 def command(study: Study, folder: Path, smoke: bool, accuracy: float | None, certify: bool | None) -> str:
-    """The command that makes the dataset again."""
+    """Return the command that makes the dataset again."""
     words = ["sweep", "run", str(study.path), "--out", str(folder), *(["--smoke"] if smoke else [])]
     words += [] if accuracy is None else ["--accuracy", repr(accuracy)]
     return shlex.join([*words, *(["--certify"] if certify else [])])
 
 
 def circumstances(jobs: int, backend: str) -> dict[str, Any]:
-    """What may differ between runs that give the same bytes."""
+    """Return what may differ between runs that give the same bytes."""
     return {
         "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "host": socket.gethostname(),
@@ -41,7 +41,7 @@ def circumstances(jobs: int, backend: str) -> dict[str, Any]:
 
 
 def _commit() -> str | None:
-    """Commit of the sources, None where they are not a git work tree or there is no git."""
+    """Return the commit of the sources, None where they are not a git work tree or there is no git."""
     line = ["git", "-C", str(Path(__file__).resolve().parent), "rev-parse", "HEAD"]
     try:
         done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=10)

@@ -25,7 +25,7 @@ OWN_FILES = (
 
 
 def open_plan(study: Study, folder: Path, force: bool) -> Plan:
-    """The plan in the folder if it is this study's, otherwise a new one; foreign data only go with ``force``."""
+    """Return the plan in the folder if it is this study's, otherwise a new one; foreign data only go with ``force``."""
     from sweep.chunks.plan import make_plan
 
     noted = store.read_plan(folder)
@@ -50,7 +50,7 @@ def open_plan(study: Study, folder: Path, force: bool) -> Plan:
 
 
 def _differs_in_limits_only(study: Study, noted: dict[str, Any], plan: Plan) -> bool:
-    """Whether the designs of a dataset can be sorted anew: every row and every bit of it has been kept."""
+    """Return whether the designs of a dataset can be sorted anew: every row and every bit of it has been kept."""
     apart = ("limits", *NOT_IN_CHUNKS)
     before, now = ({k: v for k, v in data.items() if k not in apart} for data in (noted.get("data") or {}, study.data))
     kept = study.output.keep == "all" and study.output.dtype == "float64"
@@ -71,24 +71,24 @@ def _with_other_limits(study: Study, folder: Path, plan: Plan) -> Plan:
 
 
 def known_folder(folder: Path) -> Path | None:
-    """Where the chunks lie that this dataset's are made from."""
+    """Return the folder of the chunks that those of this dataset are made from."""
     where = (store.read_plan(folder) or {}).get("known")
     return store.beside(folder) / where if isinstance(where, str) else None
 
 
 def is_part(folder: Path) -> bool:
-    """Whether the folder is for some of the chunks only, as ``sweep split`` makes it."""
+    """Return whether the folder is for some of the chunks only, as ``sweep split`` makes it."""
     return "part" in (store.read_plan(folder) or {})
 
 
 def part_range(folder: Path, chunks: int) -> range:
-    """Indices of the chunks that belong into the folder."""
+    """Return indices of the chunks that belong into the folder."""
     first, stop = (store.read_plan(folder) or {}).get("part", (0, chunks))
     return range(first, stop)
 
 
 def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
-    """In words what sets the data in the folder apart from what this run would compute."""
+    """Say what sets the data in the folder apart from what this run would compute."""
     before, now = (
         {key: value for key, value in data.items() if key not in NOT_IN_CHUNKS}
         for data in (noted.get("data") or noted["chunk_data"], study.data)
@@ -109,7 +109,7 @@ def _set_foreign_aside(folder: Path, plan: Plan, others: tuple[str, ...]) -> Non
 
 
 def old_name() -> str:
-    """Where data go that are set aside now."""
+    """Return the name under which data are set aside now."""
     return f"{store.OLD}/{time.strftime('%Y%m%d-%H%M%S')}"
 
 
@@ -140,7 +140,7 @@ def refuse_or_clear_older(folder: Path, force: bool) -> None:
 
 
 def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
-    """Content of ``_plan.json``, with what an earlier run noted of the optimum."""
+    """Return the content of ``_plan.json``, with what an earlier run noted of the optimum."""
     noted = store.read_plan(folder) or {}
     return plan.as_dict() | {
         "about": {"name": study.name, "title": study.title, "question": study.question},

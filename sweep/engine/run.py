@@ -108,7 +108,7 @@ def run(
 
 
 def _search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> None:
-    """Optimum, proof and front, as far as the study asks for them."""
+    """Compute optimum, proof and front, as far as the study asks for them."""
     if study.optimise is not None:
         _optimise(replace(study, pareto=None), folder, jobs, progress)
     prove(study, folder, jobs, backend, progress)
@@ -217,7 +217,7 @@ def _results(
     stop: Stop,
     allowed: float,
 ) -> Iterator[Done]:
-    """Finished chunks in the order they become ready; no new one is begun when the allowed time [s] is over."""
+    """Yield finished chunks in the order they become ready; no new one is begun when the allowed time [s] is over."""
     from sweep.chunks.chunk import warm
     from sweep.engine.worker import ChunkTask
 
@@ -240,7 +240,9 @@ def _raise_if_signalled(stop: Stop, folder: Path) -> None:
 
 
 def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
-    """What an optimum or a front depends on: the chunks by their plan's note, the study, the optimiser's sources."""
+    """Return what an optimum or a front depends on:
+    the chunks by their plan's note, the study, the optimiser's sources.
+    """
     from sweep.chunks.plan import optimiser_hash
 
     return f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
@@ -272,7 +274,7 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
 
 
 def _raise_if_cut_short(folder: Path) -> None:
-    """The optimum stands there, but the emergency brake has kept some starts from being searched."""
+    """Raise where the optimum stands there but the emergency brake has kept some starts from being searched."""
     from sweep.optimise import read_survey
 
     found = read_survey(store.beside(folder) / store.OPTIMUM)

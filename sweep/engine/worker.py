@@ -50,7 +50,7 @@ class ChunkTask:
         return self.__dict__ | {"study": replace(self.study)}
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Done:
-        """The chunk of that index, unless ``should_stop`` answers true before it is ready."""
+        """Return the chunk of that index, unless ``should_stop`` answers true before it is ready."""
         start, end = self.plan.bounds(number)
         try:
             self._check_sources()

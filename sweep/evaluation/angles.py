@@ -40,7 +40,7 @@ def in_radians(
     others: Iterable[str] = (),
     domain: Domain | None = None,
 ) -> Table:
-    """The table with its angles in rad, under the plain names of their columns.
+    """Return the table with its angles in rad, under the plain names of their columns.
 
     Parameters
     ----------
@@ -89,12 +89,12 @@ def in_radians(
 
 
 def plain_names(table: Iterable[Any]) -> tuple[str, ...]:
-    """The names of the columns without the units in their headers."""
+    """Return the names of the columns without the units in their headers."""
     return tuple(found[1] if (found := _HEADER.fullmatch(str(key))) else str(key) for key in table)
 
 
 def grid_in_radians(name: str, unit: str, phi: ArrayLike, angles: AngleUnit | None) -> ArrayLike:
-    """The argument ``phi=`` in rad where the variable is an angle; as it is where it is not."""
+    """Return the argument ``phi=`` in rad where the variable is an angle; as it is where it is not."""
     _check_unit(angles)
     if unit != "rad":
         return phi
@@ -111,7 +111,7 @@ def _check_unit(angles: object) -> None:
 
 
 def _plain_name(name: str, unit: str, is_angle: bool, table: Iterable[Any]) -> str:
-    """The name without its unit; only angles have one, since lengths may be of any unit."""
+    """Return the name without its unit; only angles have one, since lengths may be of any unit."""
     place = f"column {name} [{unit}]"
     if not is_angle:
         allowed = f"the column {name}: a table has one length unit throughout, only angles say theirs, as alpha [deg]"

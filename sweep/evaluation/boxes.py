@@ -13,7 +13,7 @@ from sweep.reductions.box import ROUNDING, Box
 
 
 def box_route(family: Family, box: Box, accuracy: Accuracy) -> Route:
-    """The route to one box; it costs what the extrema do that it is made of."""
+    """Return the route to one box; it costs what the extrema do that it is made of."""
     from sweep.evaluation.routes import routes
 
     cost = sum(route.ns_per_design for route in routes(family, box.asked, accuracy))

@@ -25,7 +25,7 @@ class Coordinate(NamedTuple):
 
 
 def coordinate(name: str) -> Coordinate | None:
-    """What a column says of a joint: ``x_b2`` of stage 2, ``looper.tip_z`` in the machine's frame; else None."""
+    """Return what a column says of a joint: ``x_b2`` of stage 2, ``looper.tip_z`` in the machine's frame; else None."""
     member, stem, stage = parts(name)
     match = _OF_MACHINE.fullmatch(stem) if member else _OF_FAMILY.fullmatch(stem)
     if match is None:
@@ -36,7 +36,9 @@ def coordinate(name: str) -> Coordinate | None:
 
 
 def motion_curves(family: Family) -> tuple[str, ...]:
-    """Position and its derivatives, deviations, pressure angles; of a machine those of its members, and relations."""
+    """Return the position and its derivatives, deviations, pressure angles;
+    of a machine those of its members, and relations.
+    """
     if isinstance(family, Machine):
         members = [f"{m.name}.{name}" for m in family.members for name in _ladder(m.family, 2)]
         return (*members, *(r.outputs[0].name for r in family.relations))
@@ -46,7 +48,7 @@ def motion_curves(family: Family) -> tuple[str, ...]:
 
 
 def joint_curves(family: Family) -> tuple[str, ...]:
-    """Coordinates of the joints, of every stage in its own frame, of a machine's points in one frame."""
+    """Return coordinates of the joints, of every stage in its own frame, of a machine's points in one frame."""
     if isinstance(family, Machine):
         return tuple(f"{m.name}.{point}_{axis}" for m in family.members for point in m.points for axis in AXES)
     if isinstance(family, Chain):
@@ -55,7 +57,7 @@ def joint_curves(family: Family) -> tuple[str, ...]:
 
 
 def _ladder(family: Family, orders: int) -> list[str]:
-    """The position and its derivatives to an order."""
+    """Return the position and its derivatives to an order."""
     names = [family.position]
     while len(names) <= orders and names[-1] in family.derivative_of:
         names.append(family.derivative_of[names[-1]])

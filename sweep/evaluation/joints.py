@@ -87,7 +87,7 @@ class _Where:
 
 
 def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: AngleUnit | None = None) -> pd.DataFrame:
-    """Joint coordinates of every stage and member of one design, fixed pivots included.
+    """Return joint coordinates of every stage and member of one design, fixed pivots included.
 
     Parameters
     ----------
@@ -151,7 +151,9 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
 
 
 def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
-    """The stages of a mechanism with their joints, in the order of members and stages; arguments as of `joints`."""
+    """Return the stages of a mechanism with their joints, in the order of members and stages;
+    arguments as of `joints`.
+    """
     family = find_family(mechanism).precise()
     matrix, _ = design_matrix(family, design)
     if len(matrix) != 1:
@@ -182,7 +184,7 @@ def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) 
 
 
 def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, last: _Where) -> Iterator[Part]:
-    """Every stage in its own frame, the last one where ``last`` says."""
+    """Yield every stage in its own frame, the last one where ``last`` says."""
     stages = stages_of(family)
     status = np.zeros(phi.size, np.uint8)
     for k, stage in enumerate(stages):
@@ -214,7 +216,7 @@ def _needed(family: Family) -> set[str]:
 def _part(
     family: Family, matrix: Array, angles: Angles, phi: Array, found: dict[str, Any], where: _Where, status: Any
 ) -> Part:
-    """The joints of one stage, turned and moved into the frame of ``where``."""
+    """Return the joints of one stage, turned and moved into the frame of ``where``."""
     skeleton = family.find(Skeleton)
     moving = {
         name: np.stack([found[x][0] if x else np.zeros(phi.size) for x in at], axis=-1)
@@ -243,7 +245,7 @@ def _part(
 
 
 def _tip(family: Family, matrix: Array, angle: Array, tip: Array) -> Array:
-    """A point fixed to the output link, (m, 3), in the stage's frame."""
+    """Return a point fixed to the output link, (m, 3), in the stage's frame."""
     link = family.find(OutputLink)
     assert link is not None
     cos, sin, origin = np.cos(angle), np.sin(angle), link.origin(matrix)[0]

@@ -20,7 +20,7 @@ Loads: TypeAlias = "Mapping[str, Curve | tuple[Any, Any] | Mapping[str, Any]]"
 
 
 def curves_of(family: Family, loads: Loads | None) -> dict[str, Curve]:
-    """The curves of the argument ``loads=``, by the input that each adds to.
+    """Return the curves of the argument ``loads=``, by the input that each adds to.
 
     Raises
     ------

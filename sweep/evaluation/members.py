@@ -32,7 +32,9 @@ SLOPE = 1e-5  # rad, for the slope that says what the error of an angle does to 
 
 
 def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) -> tuple[list[Route], list[str]]:
-    """Routes of members, margins and timings, and the names that are left to general reductions over the machine."""
+    """Return routes of members, margins and timings,
+    and the names that are left to general reductions over the machine.
+    """
     from sweep.evaluation.routes import routes
 
     found: list[Route] = []
@@ -70,19 +72,21 @@ def machine_routes(machine: Machine, wanted: Sequence[str], accuracy: Accuracy) 
 
 
 def is_alone(member: Member) -> bool:
-    """Whether the member turns with the main shaft, so that its extrema over a turn are those of its family."""
+    """Return whether the member turns with the main shaft, so that its extrema over a turn are those of its family."""
     return member.driver is None and member.ratio == 1
 
 
 def is_of_point(machine: Machine, name: str) -> bool:
-    """Whether a dotted name is about a point in the machine's frame, which the member alone does not know."""
+    """Return whether a dotted name is about a point in the machine's frame, which the member alone does not know."""
     found, member = quantity(machine, name), machine.split(name)
     assert member is not None
     return found is not None and bool(found.of) and member[0].own(found.of) not in member[0].family.pose_output
 
 
 def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
-    """What a member's own route gives, under the machine's names; computed once where no design varies the member."""
+    """Return what a member's own route gives, under the machine's names;
+    computed once where no design varies the member.
+    """
     from sweep.evaluation.summaries import design_outputs
 
     own = m.designs(designs)
@@ -104,7 +108,9 @@ def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, wind
 
 
 def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
-    """Of all members the weakest; a member that another drives has to assemble at the angles that it gets."""
+    """Return the margin of the weakest member;
+    a member that another drives has to assemble at the angles that it gets.
+    """
     from sweep.evaluation.summaries import design_outputs
 
     status = np.zeros(len(designs), np.uint8)
@@ -141,7 +147,9 @@ def _timing(machine: Machine, timing: Timing | Reading, accuracy: Accuracy) -> R
 
 
 def _value(machine: Machine, reading: Reading, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
-    """A pose output at a crank angle that the design gives; its error is that of the angle, by the slope there."""
+    """Return a pose output at a crank angle that the design gives;
+    its error is that of the angle, by the slope there.
+    """
     from sweep.evaluation.summaries import design_outputs
 
     place = reading.places[0]

@@ -12,7 +12,7 @@ from sweep.quantities.names import by_magnitude, error_of, without_minus
 
 
 def negative_route(family: Family, name: str, accuracy: Accuracy) -> Route:
-    """The route to the negative of the output that ``name`` is about."""
+    """Return the route to the negative of the output that ``name`` is about."""
     from sweep.evaluation.routes import routes
 
     of = without_minus(name)

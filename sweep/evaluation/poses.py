@@ -38,7 +38,7 @@ def evaluate(
     angles: AngleUnit | None = None,
     loads: Loads | None = None,
 ) -> pd.DataFrame:
-    """Pose outputs of mechanisms at given crank angles, one row per pose, in the order of the input.
+    """Return pose outputs of mechanisms at given crank angles, one row per pose, in the order of the input.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def evaluate(
 
 
 def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> pd.DataFrame:
-    """The result with input columns in front, each of whose rows belongs to ``repeats`` rows of the result."""
+    """Return the result with input columns in front, each of whose rows belongs to ``repeats`` rows of the result."""
     import pandas as pd
 
     if not kept:
@@ -125,7 +125,7 @@ def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> 
 
 
 def _values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
-    """The argument phi= as a plain array."""
+    """Return the argument phi= as a plain array."""
     grid = numbers(phi, "phi", "phi, position")
     if grid.ndim > 1:
         raise InputError("phi", f"shape {grid.shape}", "one angle, or a plain list of angles for every design", "phi")
@@ -148,7 +148,7 @@ def _check_column(mechanism: Family, extras: Container[str]) -> None:
 
 
 def _grid(mechanism: Family, table: Table, phi: ArrayLike) -> NDArray[np.float64]:
-    """The argument phi= for every design, checked against the table and the domain."""
+    """Return the argument phi= for every design, checked against the table and the domain."""
     variable = mechanism.domain.name
     if variable in map(str, table):
         allowed = f"either phi= for every design, or a column {variable}, not both"
@@ -171,7 +171,7 @@ def check_march(mechanism: Family, grid: NDArray[np.float64]) -> None:
 
 
 def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:
-    """The wanted names without repetition; an unknown one is an error that names the nearest."""
+    """Return the wanted names without repetition; an unknown one is an error that names the nearest."""
     wanted = wanted_names(want, f"pose outputs of {mechanism.name}")
     for name in wanted:
         if name not in mechanism.pose_names and name != "status":

@@ -29,7 +29,7 @@ from sweep.reductions.work import group_ns, group_order
 
 
 def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
-    """What will be computed and how, in order; each route's outputs can be asked of `design_outputs` alone.
+    """Return what will be computed and how, in order; each route's outputs can be asked of `design_outputs` alone.
 
     Raises
     ------

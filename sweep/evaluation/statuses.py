@@ -12,18 +12,19 @@ from sweep.quantities.names import error_of
 
 
 def meaning(code: int) -> str:
-    """What one status code says; a number that is none of ours says so."""
+    """Return what one status code says; a number that is none of ours says so."""
     return MEANING.get(int(code), f"status {int(code)}: unknown")
 
 
 def meanings(codes: Iterable[int]) -> list[str]:
-    """What each of many status codes says, in their order."""
+    """Return what each of many status codes says, in their order."""
     known: dict[int, str] = {}
     return [known.setdefault(int(code), meaning(code)) for code in codes]
 
 
 def explained(columns: Columns, names: Iterable[str]) -> Columns:
-    """The columns with a status wherever one of these values is missing or has left float64, and no error of it.
+    """Return the columns with a status wherever one of these values is missing or has left float64,
+    and no error of it.
 
     The status of what no kernel has explained is INVALID_INPUT: the scale of its parameters is beyond float64.
     """

@@ -49,6 +49,7 @@ PARTIAL = (
     st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
     st.NO_EVENT,
 )  # fmt: skip
+GOES_ON = np.isin(np.arange(256), PARTIAL)
 
 
 def summarise(
@@ -65,7 +66,7 @@ def summarise(
     angles: AngleUnit | None = None,
     loads: Loads | None = None,
 ) -> pd.DataFrame:
-    """Design outputs of mechanisms, one row per design, in the order of the input.
+    """Return design outputs of mechanisms, one row per design, in the order of the input.
 
     Parameters
     ----------
@@ -146,7 +147,7 @@ def design_outputs(
     accuracy: Accuracy,
     window: Part = None,
 ) -> Columns:
-    """Design outputs of a design matrix, cheapest first; what does not turn is left out of the dear ones.
+    """Return design outputs of a design matrix, cheapest first; what does not turn is left out of the dear ones.
 
     Parameters
     ----------
@@ -180,7 +181,7 @@ def design_outputs(
     for route in ways:
         assert route.run is not None
         # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
-        alive = np.flatnonzero(np.isin(status, PARTIAL))
+        alive = np.flatnonzero(GOES_ON[status])
         with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
             found = route.run(designs[alive], accuracy, window)
         for name in route.outputs:
@@ -195,7 +196,7 @@ def design_outputs(
 
 
 def _spread(values: NDArray[np.generic], rows: Index, n: int) -> NDArray[np.generic]:
-    """Values of some rows as a whole column: False or nan in the others."""
+    """Return values of some rows as a whole column: False or nan in the others."""
     if rows.size == n:
         return values
     whole: NDArray[np.generic] = np.zeros(n, np.bool_) if values.dtype == np.bool_ else np.full(n, np.nan)

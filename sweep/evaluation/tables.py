@@ -62,7 +62,7 @@ def design_matrix(
 
 
 def wanted_names(want: str | Sequence[str], place: str) -> list[str]:
-    """The names of wanted outputs without repetition, from a list or from one text between commas.
+    """Return the names of wanted outputs without repetition, from a list or from one text between commas.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def wanted_names(want: str | Sequence[str], place: str) -> list[str]:
 
 
 def kept_columns(table: Table, keep: bool | str | Sequence[str], made: Collection[str], rows: int) -> dict[str, Any]:
-    """Columns of the input that a result shall repeat in front of its own, as they are.
+    """Return columns of the input that a result shall repeat in front of its own, as they are.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def kept_columns(table: Table, keep: bool | str | Sequence[str], made: Collectio
 
 
 def _column_names(table: Table) -> dict[str, Any]:
-    """Names of the columns, each once, and the keys under which the table has them."""
+    """Return names of the columns, each once, and the keys under which the table has them."""
     if not isinstance(table, Mapping) and not (hasattr(table, "columns") and hasattr(table, "iloc")):
         raise InputError("table", type(table).__name__, "a DataFrame, or a dict of columns", "table")
     names = [str(key) for key in table]
@@ -143,7 +143,7 @@ def _parameter_column(family: Parametrised, p: Parameter, table: Table, keys: di
     if p.sign:
         _refuse(values <= 0.0 if p.positive else values < 0.0, values, p.name, f"a {p.sign} {p.unit}")
     if p.choices is not None:
-        _refuse(~np.isin(values, p.choices), values, p.name, p.choice)
+        _refuse(np.logical_and.reduce([values != x for x in p.choices]), values, p.name, p.choice)
     return values
 
 
@@ -169,7 +169,7 @@ def _column(table: Table, keys: dict[str, Any], name: str) -> Array:
 
 
 def numbers(values: object, name: str, place: str) -> Array:
-    """Values as float64.
+    """Return values as float64.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def numbers(values: object, name: str, place: str) -> Array:
 
 
 def _converted(values: object) -> Array | None:
-    """Values as float64, None where one of them is no number."""
+    """Return values as float64, None where one of them is no number."""
     try:
         array = np.asarray(values)
         # A date, a time span or a complex number is none, though numpy would take it for one.
@@ -198,7 +198,7 @@ def _converted(values: object) -> Array | None:
 
 
 def _entries(values: object) -> list[Any]:
-    """What stands in the rows, whatever it is; one row where it is no column."""
+    """Return what stands in the rows, whatever it is; one row where it is no column."""
     if isinstance(values, np.ndarray):
         return list(values.flat)
     if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
@@ -223,5 +223,5 @@ def _refuse(bad: np.ndarray[Any, np.dtype[np.bool_]], values: Array, name: str, 
 
 
 def parameter_units(parameters: Iterable[Parameter]) -> dict[str, str]:
-    """Units of parameters as result tables name them: "length" is that of the user, angles are in rad."""
+    """Return units of parameters as result tables name them: "length" is that of the user, angles are in rad."""
     return {p.name: {"angle": "rad", "ratio": "1", "sign": "1"}.get(p.unit, p.unit) for p in parameters}

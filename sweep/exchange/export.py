@@ -100,7 +100,7 @@ def export(
 def _writer(
     kind: str, mechanism: Mechanism, design: Table, phi: float, poses: int, unit: str, speed: float | None
 ) -> Callable[[Path], None]:
-    """What writes the file once its path is known; what can be wrong with the design is found here."""
+    """Return what writes the file once its path is known; what can be wrong with the design is found here."""
     if kind == "csv":
         from sweep.exchange.hardpoints import write_hardpoints
 
@@ -126,7 +126,7 @@ def _writer(
 
 
 def _numbers(design: Table) -> dict[str, float]:
-    """The columns of one design as numbers."""
+    """Return the columns of one design as numbers."""
     columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
     found = {}
     for key, value in columns.items():

@@ -67,7 +67,7 @@ class Model:
         return len(self.accessors) - 1
 
     def mesh(self, shape: str, colour: str) -> int:
-        """The mesh of a shape in a colour, made when it is first asked for."""
+        """Return the mesh of a shape in a colour, made when it is first asked for."""
         if (shape, colour) not in self.mesh_of:
             self.mesh_of[shape, colour] = len(self.meshes)
             primitive = self.shapes[shape] | {"material": self.materials.index(colour)}
@@ -94,7 +94,7 @@ class Model:
 
 
 def write_glb(name: str, placed: list[Placed], path: Path, metres: float, seconds: float) -> None:
-    """One turn in ``seconds``; ``metres`` is the length unit of the joints."""
+    """Write an animation of one turn in ``seconds``; ``metres`` is the length unit of the joints."""
     model = Model()
     poses = placed[0].part.phi.size
     times = model.accessor(np.linspace(0.0, seconds, poses), "SCALAR")
@@ -129,7 +129,7 @@ def _material(name: str, rgb: tuple[float, float, float]) -> dict[str, Any]:
 
 
 def _group(model: Model, one: Placed, times: int, size: float) -> int:
-    """The node of a part with those of its links, joints and axes."""
+    """Return the node of a part with those of its links, joints and axes."""
     part, children, thick = one.part, [], 0.008 * size
     for k, link in enumerate(part.links):
         pairs = list(zip(link.joints, link.joints[1:], strict=False))
@@ -174,12 +174,12 @@ def _group(model: Model, one: Placed, times: int, size: float) -> int:
 
 
 def _slides(part: Part, link: Link) -> bool:
-    """Whether a link is known by one joint only, and that one moves."""
+    """Return whether a link is known by one joint only, and that one moves."""
     return len(link.joints) == 1 and link.joints[0] not in part.kinds
 
 
 def _block(model: Model, part: Part, link: Link, colour: str, times: int, thick: float) -> int:
-    """A block on the joint of a slider, along the line it moves on."""
+    """Return a block on the joint of a slider, along the line it moves on."""
     slides = [part.axes[name] for name, kind in part.kinds.items() if kind == "slide"]
     axis, reach = slides[0] if slides else np.array([0.0, 0.0, 1.0]), 4.0 * thick
     path = part.joints[link.joints[0]] - reach * axis
@@ -192,7 +192,7 @@ def _block(model: Model, part: Part, link: Link, colour: str, times: int, thick:
 
 
 def _bar(model: Model, name: str, colour: str, start: Array, end: Array, times: int, thick: float) -> int:
-    """A bar from one path to the other: turned with its direction, stretched where a joint slides along it."""
+    """Return a bar from one path to the other: turned with its direction, stretched where a joint slides along it."""
     along = end - start
     length = np.linalg.norm(along, axis=1)
     rotation = _following(along / np.maximum(length, 1e-300)[:, None])
@@ -210,7 +210,7 @@ def _bar(model: Model, name: str, colour: str, start: Array, end: Array, times: 
 
 
 def _following(directions: Array) -> Array:
-    """Quaternions (x, y, z, w) that turn z into each direction, each from the one before by the shortest way."""
+    """Return quaternions (x, y, z, w) that turn z into each direction, each from the one before by the shortest way."""
     found = np.empty((len(directions), 4))
     found[0] = _unit(_from_z(directions[0]))
     for k in range(1, len(directions)):
@@ -239,7 +239,7 @@ def _unit(values: Array) -> Array:
 
 
 def _cylinder() -> tuple[Array, Array, NDArray[np.int64]]:
-    """A cylinder of radius 1 from z = 0 to 1, its ends open: the balls of the joints close them."""
+    """Return a cylinder of radius 1 from z = 0 to 1, its ends open: the balls of the joints close them."""
     angle = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
     k = np.arange(SIDES)
@@ -251,7 +251,7 @@ def _cylinder() -> tuple[Array, Array, NDArray[np.int64]]:
 
 
 def _ball() -> tuple[Array, Array, NDArray[np.int64]]:
-    """A ball of radius 1."""
+    """Return a ball of radius 1."""
     polar = np.linspace(0.0, math.pi, RINGS + 1)
     angle = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
     points = np.array(

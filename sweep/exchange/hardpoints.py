@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def write_hardpoints(mechanism: Mechanism, design: Table, path: Path, phi: float, unit: str) -> None:
-    """A row for each joint and each axis (a unit vector, named axis_A) of every stage, in the first of which it is."""
+    """Write a row for each joint and each axis (a unit vector, named axis_A) under the first stage that has it."""
     with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(["member", "stage", "frame", "name", "x", "y", "z", "unit"])

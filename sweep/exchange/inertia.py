@@ -17,7 +17,7 @@ SPARE = 2.0  # moments that do not count are made so many times what they have t
 
 
 def inertial(design: Mapping[str, float], name: str, stage: str, unit: str) -> Xml.Element:
-    """Mass, centre and inertia of a body.
+    """Return the mass, centre and inertia of a body.
 
     A body about a fixed axis turns by its moment about that axis and its products with it alone, a slider by none: what
     does not count is filled up, so that the tensor is that of a body.

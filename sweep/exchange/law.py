@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def write_law(
     mechanism: Mechanism, design: Table, path: Path, phi: float, poses: int, unit: str, speed: float | None
 ) -> None:
-    """Position with its derivatives by the shaft's angle, deviations and pressure angles, at equal steps of one turn.
+    """Write position, derivatives by the shaft's angle, deviations and pressure angles at equal steps of one turn.
 
     Over an interval the steps go from one end to the other; a march begins at 0.  With ``speed`` [rad/s] there is a
     column of time, from 0, but for an interval.  Units stand in the headings of a CSV, ``s [mm]``, and in

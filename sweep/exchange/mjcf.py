@@ -58,7 +58,7 @@ class Loop:
 
 
 def write_mjcf(family: Family, placed: list[Placed], design: Mapping[str, float], path: Path, unit: str) -> None:
-    """The model in its first pose.
+    """Write the model in its first pose.
 
     Bodies get the masses, centres and inertias (``m_crank``, ``com_crank_x``, ``j_crank_xx`` ...) of the design, else
     those of steel bars.  Stages of a chain are coupled at their common shaft, members of a machine to the first one.
@@ -92,18 +92,20 @@ def write_mjcf(family: Family, placed: list[Placed], design: Mapping[str, float]
 
 
 def _tag(part: Part) -> str:
-    """What stands behind the names of a stage: member and number, each behind a space."""
+    """Return what stands behind the names of a stage: member and number, each behind a space."""
     return "".join(f" {word}" for word in (part.member, part.stage) if word)
 
 
 def _of_member(design: Mapping[str, float], member: str) -> dict[str, float]:
-    """The columns of one member without its name, of a family all."""
+    """Return the columns of one member without its name, of a family all."""
     head = f"{member}." if member else ""
     return {name.removeprefix(head): float(value) for name, value in design.items() if name.startswith(head)}
 
 
 def _driver(machine: Machine, name: str, first: str) -> tuple[str, float]:
-    """The joint that drives a member's crank, and the ratio of both; ``first`` is the crank of the first member."""
+    """Return the joint that drives a member's crank, and the ratio of both;
+    ``first`` is the crank of the first member.
+    """
     members = {member.name: member for member in machine.members}
     member = members[name]
     if member.driver is None:
@@ -122,7 +124,7 @@ def _geared(equality: Xml.Element, joint: str, other: str, ratio: float) -> None
 
 
 def _loop(one: Placed, finger: float, metres: float) -> Loop:
-    """The stage's joints and directions, from its joint records."""
+    """Return the stage's joints and directions, from its joint records."""
     part = one.part
     records = part.family.find(JointRecords)
     if records is None:
@@ -154,7 +156,7 @@ def _loop(one: Placed, finger: float, metres: float) -> Loop:
 
 
 def _triad(along: Array, axis: Array) -> Array:
-    """Columns x along a link, y across, z its axis."""
+    """Return columns x along a link, y across, z its axis."""
     x = along / np.linalg.norm(along)
     return np.column_stack([x, np.cross(axis, x), axis])
 
@@ -163,7 +165,7 @@ def _stage(
     world: Xml.Element, equality: Xml.Element, loop: Loop, part: Part, design: Mapping[str, float], unit: str,
     thick: float,
 ) -> None:  # fmt: skip
-    """Crank, follower, and the coupler on one of them; x of a body along its link, z along its axis."""
+    """Add crank, follower, and the coupler on one of them; x of a body lies along its link, z along its axis."""
     tag, follower = loop.tag, loop.follower
     a, b, c = (float(np.linalg.norm(end)) for end in (loop.B - loop.A, loop.C - loop.B, loop.C - loop.D))
     crank = _body(world, f"crank{tag}", loop.A, loop.crank)
@@ -211,5 +213,5 @@ def _body(parent: Xml.Element, name: str, at: Array, frame: Array) -> Xml.Elemen
 
 
 def words(values: Array) -> str:
-    """Numbers as MuJoCo reads them, to the last bit."""
+    """Return numbers as MuJoCo reads them, to the last bit."""
     return " ".join(repr(float(x)) for x in values)

@@ -45,7 +45,7 @@ class PlacedDesign:
 
 
 def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence[float] | Array) -> PlacedDesign:
-    """The mechanism whose joints stand on given points of a drawing, in one position.
+    """Return the mechanism whose joints stand on given points of a drawing, in one position.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
 
 
 def reader_of(family: str) -> Hardpoints:
-    """What reads the points of a family.
+    """Return what reads the points of a family.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def _checked(reader: Hardpoints, points: Mapping[str, Sequence[float] | Array]) 
 
 
 def _joints(family: Family, reading: Reading, given: Mapping[str, Array]) -> dict[str, Array]:
-    """Where the joints that have a given point stand, in the drawing's frame."""
+    """Return the places, in the drawing's frame, of the joints that have a given point."""
     (part,) = parts(family, reading.parameters, reading.phi)
     z, x = reading.z, reading.x
     turn = np.column_stack([x, np.cross(z, x), z])

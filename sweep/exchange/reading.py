@@ -23,7 +23,7 @@ Groups: TypeAlias = dict[str, Points]
 
 
 def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "") -> Points:
-    """Points of one stage or member by name, in the unit of the file.
+    """Return points of one stage or member by name, in the unit of the file.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def _label(member: str, stage: str) -> str:
 
 
 def _of_dxf(file: Path) -> tuple[Groups, bool]:
-    """The named points and axes of the front views, whose third coordinate is kept."""
+    """Return the named points and axes of the front views, whose third coordinate is kept."""
     ezdxf = ezdxf_or_refuse()
     try:
         space = ezdxf.readfile(file).modelspace()
@@ -104,7 +104,7 @@ def _of_dxf(file: Path) -> tuple[Groups, bool]:
 
 
 def _of_glb(file: Path) -> tuple[Groups, bool]:
-    """The joints of the first pose and the axes; coordinates are float32."""
+    """Return the joints of the first pose and the axes; coordinates are float32."""
     data = file.read_bytes()
     if len(data) < 20 or data[:4] != b"glTF":
         raise InputError("file", file.name, "a model by sweep export (glTF 2.0, binary)", str(file))

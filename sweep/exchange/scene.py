@@ -34,7 +34,7 @@ class Placed:
 
 
 def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Placed]:
-    """All parts over one turn as of :func:`over`, each with its place in the scene.
+    """Return all parts over one turn as of :func:`over`, each with its place in the scene.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pl
 
 
 def over(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Part]:
-    """All parts over one turn from ``phi`` on, the last pose being the first one again.
+    """Return all parts over one turn from ``phi`` on, the last pose being the first one again.
 
     An interval is run through to its end, back to its beginning and to ``phi`` again, which is its beginning if it lies
     outside.  A march begins at 0.
@@ -82,7 +82,7 @@ def _there_and_back(ends: Array, start: float, poses: int) -> Array:
 
 
 def _closed(part: Part) -> Part:
-    """The first pose once more behind the last."""
+    """Return the first pose once more behind the last."""
     return _taken(part, [*range(part.phi.size), 0], np.append(part.phi, 2.0 * math.pi))
 
 
@@ -93,7 +93,7 @@ def _taken(part: Part, rows: list[int], phi: Array) -> Part:
 
 
 def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
-    """All parts in one position.
+    """Return all parts in one position.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
 
 
 def side_by_side(found: Sequence[Part]) -> list[Placed]:
-    """Parts of one frame stay together; each further frame stands beside those before it, along x."""
+    """Place the parts of one frame together, and each further frame beside those before it, along x."""
     placed, right = [], math.nan
     for frame in dict.fromkeys(part.frame for part in found):
         same = [part for part in found if part.frame == frame]
@@ -124,11 +124,11 @@ def side_by_side(found: Sequence[Part]) -> list[Placed]:
 
 
 def extent(found: Sequence[Part]) -> float:
-    """Largest extent of all joints over the turn."""
+    """Return the largest extent of all joints over the turn."""
     points = np.vstack([path for part in found for path in part.joints.values()])
     return float(np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
 
 
 def shown_name(joint: str) -> str:
-    """A joint as the docs write it: A, B, C1, but point and line."""
+    """Return a joint as the docs write it: A, B, C1, but point and line."""
     return joint.upper() if len(joint) < 3 else joint

@@ -61,7 +61,7 @@ Mechanism: TypeAlias = "str | Sequence[str] | Mapping[str, Any] | Specification 
 
 
 def chain_names(text: str) -> tuple[str, ...]:
-    """Names of the families of a chain in one text.
+    """Return names of the families of a chain in one text.
 
     >>> chain_names("rssr+guide"), chain_names("rssr, guide"), chain_names("rssr")
     (('rssr', 'guide'), ('rssr', 'guide'), ('rssr',))
@@ -70,7 +70,8 @@ def chain_names(text: str) -> tuple[str, ...]:
 
 
 def family(name: Mechanism) -> Family:
-    """The family of that name, the chain of the families named in a list or as "rssr+guide", or a machine of members.
+    """Return the family of that name, the chain of the families named in a list or as "rssr+guide",
+    or a machine of members.
 
     Raises
     ------
@@ -95,7 +96,7 @@ def family(name: Mechanism) -> Family:
 
 
 def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = None) -> Machine:
-    """Several mechanisms on one main shaft, accepted wherever a family's name is.
+    """Return several mechanisms on one main shaft, accepted wherever a family's name is.
 
     Parameters
     ----------

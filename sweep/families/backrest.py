@@ -96,7 +96,9 @@ _COLUMNS = backrest.Design._fields
 
 
 def kernel_matrix(designs: Array, names: tuple[str, ...]) -> Array:
-    """Columns of the kernel's design matrix from those of an entry; what the entry lacks is 0, the root the first."""
+    """Return columns of the kernel's design matrix from those of an entry;
+    what the entry lacks is 0, the root the first.
+    """
     matrix = np.zeros((len(designs), len(_COLUMNS)), designs.dtype)
     matrix[:, -1] = 1.0
     for k, name in enumerate(names):
@@ -106,7 +108,7 @@ def kernel_matrix(designs: Array, names: tuple[str, ...]) -> Array:
 
 
 def solved(matrix: Array, modes: np.ndarray, angles: Angles, wanted: frozenset[str], position: str) -> Columns:
-    """Wanted outputs and status from the kernel; ``position`` is the entry's name of the bracket angle."""
+    """Return the wanted outputs and status from the kernel; ``position`` is the entry's name of the bracket angle."""
     shape, dtype = (len(matrix), angles.phi.shape[1]), np.result_type(matrix, angles.phi)
     # the complex step goes through the radius too, or no extremum over the beam could be followed
     matrix, radius = matrix.astype(dtype, copy=False), np.ascontiguousarray(angles.phi, dtype)
@@ -129,13 +131,13 @@ _NAMES = tuple(p.name for p in PARAMETERS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted outputs and status of every design at its beam radii, each (n, m)."""
+    """Return the wanted outputs and status of every design at its beam radii, each (n, m)."""
     modes = np.full(len(designs), int(backrest.Mode.LAW), np.uint8)
     return solved(kernel_matrix(designs, _NAMES), modes, angles, wanted, "phi_rho")
 
 
 def beam_of(names: tuple[str, ...]) -> Interval:
-    """The beam radius, from empty to full, for an entry with those parameters."""
+    """Return the beam radius, from empty to full, for an entry with those parameters."""
     empty, full = names.index("rho_empty"), names.index("rho_full")
 
     def ends(designs: Array) -> tuple[Array, Array]:

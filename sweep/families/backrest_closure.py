@@ -15,7 +15,9 @@ _NAMES = tuple(p.name for p in PARAMETERS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted outputs and status of every design at its beam radii, each (n, m); the count of roots in any case."""
+    """Return the wanted outputs and status of every design at its beam radii, each (n, m);
+    the count of roots in any case.
+    """
     modes = np.full(len(designs), int(backrest.Mode.CLOSURE), np.uint8)
     return regulated.solved(regulated.kernel_matrix(designs, _NAMES), modes, angles, wanted, "phi")
 

@@ -29,7 +29,9 @@ _COUPLE = _NAMES.index("couple")
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted outputs and status of every design at its beam radii, each (n, m); the count of roots in any case."""
+    """Return the wanted outputs and status of every design at its beam radii, each (n, m);
+    the count of roots in any case.
+    """
     with_couple, without = int(backrest.Mode.COUPLE), int(backrest.Mode.TENSION)
     modes = np.where(designs[:, _COUPLE].real == 1.0, with_couple, without).astype(np.uint8)
     return regulated.solved(regulated.kernel_matrix(designs, _NAMES), modes, angles, wanted, "phi")

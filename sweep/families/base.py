@@ -89,7 +89,7 @@ class Output:
         return self.own or self.name
 
     def of_stage(self, number: int) -> Output:
-        """The same output of the stage of that number in a chain, under its name there."""
+        """Return the same output of the stage of that number in a chain, under its name there."""
         words = f"stage {number}: {self.text}"
         return replace(self, name=f"{self.name}{number}", text=words, stage=str(number), own=self.name)
 
@@ -128,7 +128,7 @@ class Accuracy:
     proven: tuple[str, ...] = ()
 
     def of(self, name: str) -> Accuracy:
-        """The accuracy of one output: without proof where only others are to be proven."""
+        """Return the accuracy of one output: without proof where only others are to be proven."""
         return replace(self, certify=False) if self.certify and self.proven and name not in self.proven else self
 
 
@@ -221,11 +221,11 @@ class Family:
         return self if self.precise_poses is None else replace(self, poses=self.precise_poses)
 
     def find(self, kind: type[Capability]) -> Capability | None:
-        """The first capability of a type, None where the family has none."""
+        """Return the first capability of a type, None where the family has none."""
         return next(iter(self.every(kind)), None)
 
     def every(self, kind: type[Capability]) -> tuple[Capability, ...]:
-        """All capabilities of a type: a chain has one of each stage."""
+        """Return all capabilities of a type: a chain has one of each stage."""
         return tuple(found for found in self.capabilities if isinstance(found, kind))
 
     @cached_property
@@ -249,12 +249,14 @@ class Family:
         return {self.position: ""}
 
     def outward_sign(self, position: str) -> str:
-        """The sign parameter that tells the extended from the folded limit of a position; "" where there is none."""
+        """Return the sign parameter that tells the extended from the folded limit of a position;
+        "" where there is none.
+        """
         return self.outward
 
 
 def guarded(poses: PoseFunction) -> PoseFunction:
-    """Poses that answer a parameter that is no number, and a value beyond float64, by INVALID_INPUT and nan.
+    """Return poses that answer a parameter that is no number, and a value beyond float64, by INVALID_INPUT and nan.
 
     For kernels that read some parameters only where they matter.
     """
@@ -291,7 +293,7 @@ def filled(
 
 
 def poses_of(kernel: Callable[..., object], names: tuple[str, ...]) -> PoseFunction:
-    """The poses of a kernel(designs, cos, sin, status, one array or None per output)."""
+    """Return the poses of a kernel(designs, cos, sin, status, one array or None per output)."""
 
     def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
         status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
@@ -325,7 +327,7 @@ def filled_with_places(
 def optional_outputs(
     names: tuple[str, ...], wanted: frozenset[str], shape: tuple[int, ...], dtype: DTypeLike = np.float64
 ) -> list[Array | None]:
-    """An empty array for each wanted name and None for the others, in the order of a kernel's out arguments.
+    """Return an empty array for each wanted name and None for the others, in the order of a kernel's out arguments.
 
     ``dtype`` is complex128 where the designs or angles are (exact gradients by the complex step).
     """

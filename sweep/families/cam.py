@@ -56,14 +56,14 @@ _PROFILE = tuple(o.name for o in PROFILE_OUTPUTS)
 def cam_poses(
     kernel: Callable[..., object], names: tuple[str, ...], designs: Array, angles: Angles, wanted: frozenset[str]
 ) -> Columns:
-    """Wanted pose outputs and status of a cam's kernel, each (n, m)."""
+    """Return the wanted pose outputs and status of a cam's kernel, each (n, m)."""
     status = np.empty((len(designs), angles.phi.shape[1]), np.uint8)
     dtype = np.result_type(designs, angles.phi)
     return filled(kernel, (designs, angles.phi), names, wanted, status, dtype)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its cam angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
     of_roller = wanted & {o.name for o in ROLLER_OUTPUTS}
     found = cam_poses(translating.poses, _PROFILE, designs, angles, wanted | ({"s"} if of_roller else set()))
     if of_roller:
@@ -76,7 +76,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def follower_line(designs: Array) -> tuple[Array, Array]:
-    """The point of the follower's line nearest to the cam's axis, and the direction of lift, each (n, 3)."""
+    """Return the point of the follower's line nearest to the cam's axis, and the direction of lift, each (n, 3)."""
     zero = np.zeros(len(designs))
     at = np.stack([zero, -parameter(PARAMETERS, "e", designs), zero], axis=1)
     return at, np.tile(X, (len(designs), 1))

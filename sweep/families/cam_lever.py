@@ -38,19 +38,19 @@ POSE_OUTPUTS = (
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its cam angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
     return cam_poses(swinging.poses, tuple(o.name for o in POSE_OUTPUTS), designs, angles, wanted)
 
 
 def lever_origin(designs: Array) -> Array:
-    """The axis of the lever, (n, 3)."""
+    """Return the axis of the lever, (n, 3)."""
     origin = np.zeros((len(designs), 3), designs.dtype)
     origin[:, 0] = parameter(PARAMETERS, "e", designs)
     return origin
 
 
 def roller(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """The roller's centre in the fixed frame, (n, m, 3)."""
+    """Return the roller's centre in the fixed frame, (n, m, 3)."""
     psi = np.asarray(motion["psi"], np.float64)
     e, c = (parameter(PARAMETERS, name, designs)[:, None] for name in ("e", "c"))
     return np.stack([e + c * np.cos(psi), c * np.sin(psi), np.zeros_like(psi)], axis=-1)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from kernels.links import Links
+    from kernels.series.form import Form
     from sweep.families.base import Angles, Columns
 
 Array: TypeAlias = NDArray[np.float64]
@@ -39,6 +39,11 @@ class Assembly:
     stage: str = ""
 
 
+def constant(*numbers: float) -> DesignMap:
+    """The same numbers for every design, (n, k)."""
+    return lambda designs: np.tile(np.array(numbers), (len(designs), 1))
+
+
 @dataclass(frozen=True)
 class JointRecords:
     """Positions, directions and their rates at the joints, from which the effects of loads work.
@@ -53,74 +58,41 @@ class JointRecords:
 
 
 @dataclass(frozen=True)
-class LinkBody:
-    """A body of a :class:`LinkTree`: its name in the names of inputs, and where its axes x, y, z lie, in words.
-
-    A ``slender`` one is a rod along x between two balls, of which the spin about x has no inertia.
-    """
-
-    name: str
-    axes: str
-    slender: bool = False
-
-
-@dataclass(frozen=True)
-class LinkJoint:
-    """A joint of a :class:`LinkTree` whose reaction is given.
-
-    Parameters
-    ----------
-    name, text : in the names of outputs; what it is
-    kind : "shaft" turns about an axis on two supports, "guide" slides along it too; "hinge" is a ball by which a body
-        hangs on its parent, "ball" one that closes a loop; "contact" slides
-    acts : which body's force on which it is, in words
-    body, freedom : of a shaft, a guide, a hinge the body; the number of the freedom whose axis is its own
-    lines : of a ball, a contact the first of the lines that make it, and how many
-    """
-
-    name: str
-    text: str
-    kind: Literal["shaft", "hinge", "guide", "ball", "contact"]
-    acts: str
-    body: int = -1
-    freedom: int = -1
-    lines: tuple[int, int] = (-1, 0)
-
-
-LinkFill: TypeAlias = "Callable[[Array, Angles, Columns, Links], None]"
-
-
-@dataclass(frozen=True)
-class LinkTree:
-    """Bodies of any number with the joints between them, from which loads are computed: :mod:`kernels.links`.
-
-    Parameters
-    ----------
-    bodies, joints : in the order of their numbers
-    parents, freedoms, ends : the tree as :class:`kernels.links.Links` takes it, of an ordinary design
-    needs : pose outputs that ``fill(designs, angles, motion, links)`` writes the poses of the bodies from
-    carrier : number of the body that a tool hangs on
-    tip : place of the tool in the axes of that body, (n, 3); None where it is an input
-    output : number of the freedom that is the family's position, on which a load acts; -1 where no load does
-    """
-
-    bodies: tuple[LinkBody, ...]
-    joints: tuple[LinkJoint, ...]
-    parents: tuple[int, ...]
-    freedoms: tuple[tuple[int, int], ...]
-    ends: tuple[tuple[int, int], ...]
-    needs: tuple[str, ...]
-    fill: LinkFill
-    carrier: int
-    tip: DesignMap | None = None
-    output: int = -1
-
-
-@dataclass(frozen=True)
 class PressureEllipse:
     """The curve of the coupler direction across the follower's motion, (n, 7), for its extrema in closed form."""
 
     curve: DesignMap
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A pose output as a fused chain has it: a derivative of a x + b y + c of what its last stage moves.
+
+    ``order`` is that of the derivative by the crank angle, 0, 1 or 2; ``made_of(designs)``, (n, 3), gives a, b, c of
+    the stage's own designs.
+    """
+
+    order: int
+    made_of: DesignMap
+
+
+@dataclass(frozen=True)
+class InSeries:
+    """A stage whose motion can be fused with that of the stages before and behind it (:mod:`kernels.series`).
+
+    Parameters
+    ----------
+    form : its inline closures
+    curves : the pose outputs whose extrema a fused search finds where it is the last stage
+    components : of those pose outputs that a grid has at once, the component: "x1", "x2", "x3", "y0", "y1", "y2"
+    opening : of a family that can be the first stage, ``opening(designs, status, distance)``: does it turn, and how
+        far is its nearest singularity
+    """
+
+    form: Form
+    curves: Mapping[str, Curve]
+    components: Mapping[str, str]
+    opening: Callable[[Array, NDArray[np.uint8], Array], None] | None = None
 
 
 @dataclass(frozen=True)

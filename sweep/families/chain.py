@@ -30,7 +30,7 @@ class Stage:
     offset: int | None = None
 
     def designs(self, designs: Array) -> Array:
-        """The design matrix of this stage alone."""
+        """Return the design matrix of this stage alone."""
         return np.ascontiguousarray(designs[:, self.columns])
 
 
@@ -46,13 +46,13 @@ class Chain(Family):
         return {self.position: ""} | {f"{s.family.position}{s.number}": str(s.number) for s in self.stages}
 
     def outward_sign(self, position: str) -> str:
-        """The sign parameter of the stage whose position it is."""
+        """Return the sign parameter of the stage whose position it is."""
         stage = self.positions[position]
         own = self.stages[int(stage) - 1].family.outward if stage else ""
         return own and f"{own}{stage}" if stage else self.outward
 
     def precise(self) -> Chain:
-        """The chain with the most accurate poses its stages have."""
+        """Return the chain with the most accurate poses its stages have."""
         return (
             self
             if self.precise_poses is None
@@ -71,14 +71,15 @@ class _Plan:
 
 
 def stages_of(family: Family) -> tuple[Stage, ...]:
-    """The stages of a chain; a family alone is its own only stage."""
+    """Return the stages of a chain; a family alone is its own only stage."""
     if isinstance(family, Chain):
         return family.stages
     return (Stage(1, family, slice(0, len(family.parameters))),)
 
 
 def driven_guide(family: Family) -> tuple[Stage, Stage] | None:
-    """Both stages of a chain in which a crank-rocker drives a linkage with a guided point; None for any other family.
+    """Return both stages of a chain in which a crank-rocker drives a linkage with a guided point;
+    None for any other family.
 
     The crank-rocker is one whose limit positions can be prescribed (`LimitLocus`).
     """
@@ -91,7 +92,7 @@ def driven_guide(family: Family) -> tuple[Stage, Stage] | None:
 
 
 def chain(families: tuple[Family, ...]) -> Chain:
-    """The chain of these families, each driven by the one before it.
+    """Return the chain of these families, each driven by the one before it.
 
     Parameters and the stages' own outputs carry the stage number; the outputs of the last stage also stand without a
     number, their derivatives being those with respect to phi of stage 1.
@@ -150,7 +151,7 @@ def _precise(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
 
 
 def _loops(stage: Stage) -> list[Assembly]:
-    """The loops of a stage under the chain's names."""
+    """Return the loops of a stage under the chain's names."""
     return [
         Assembly(
             f"{loop.discriminant}{stage.number}",
@@ -163,7 +164,9 @@ def _loops(stage: Stage) -> list[Assembly]:
 
 
 def _of_last(stage: Stage) -> list[object]:
-    """Points and output link of the last stage: its outputs also stand without a number, in the frame of that stage."""
+    """Return points and output link of the last stage:
+    its outputs also stand without a number, in the frame of that stage.
+    """
     links = [OutputLink(partial(_on_stage, stage, link.origin)) for link in stage.family.every(OutputLink)]
     return [*stage.family.every(Points), *links]
 
@@ -200,7 +203,7 @@ def _with_respect_to_chain(output: Output, last: Family) -> Output:
 
 
 def _derivatives(family: Family, name: str) -> list[str]:
-    """The derivatives 1..k up to ``name`` of the output it derives from; empty if it is no derivative."""
+    """Return the derivatives 1..k up to ``name`` of the output it derives from; empty if it is no derivative."""
     lower = {derivative: of for of, derivative in family.derivative_of.items()}
     names: list[str] = []
     while name in lower:
@@ -237,7 +240,9 @@ def _plan(stages: tuple[Stage, ...], outputs: Mapping[str, Output], wanted: froz
 
 
 def driving_names(family: Family, driven: Family) -> set[str]:
-    """Pose outputs of a stage from which the next one gets its input angle: cosine and sine where it has them."""
+    """Return pose outputs of a stage from which the next one gets its input angle:
+    cosine and sine where it has them.
+    """
     angle = family.position
     turned = {f"cos_{angle}", f"sin_{angle}"}
     if not turned <= set(family.pose_names):
@@ -260,7 +265,8 @@ def _poses(
     angles: Angles,
     wanted: frozenset[str],
 ) -> Columns:
-    """Wanted pose outputs and status, computed in blocks so that the intermediate arrays stay in the cache.
+    """Return the wanted pose outputs and status,
+    computed in blocks so that the intermediate arrays stay in the cache.
 
     ``plans`` keeps what was planned before: the optimiser asks the same of one design at a time.
     """
@@ -289,7 +295,7 @@ def _blocks(shape: tuple[int, int]) -> Iterator[tuple[slice, slice]]:
 
 
 def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angles) -> Columns:
-    """All stages of one block, the derivatives carried along by the chain rule."""
+    """Return all stages of one block, the derivatives carried along by the chain rule."""
     results: list[dict[str, Any]] = []
     inner: list[Any] = []  # derivatives of the angle that drives the present stage
     status = np.zeros((designs.shape[0], angles.cos.shape[1]), np.uint8)
@@ -318,7 +324,9 @@ def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angle
 
 
 def drive(result: dict[str, Any], angle: str, kappa: Array, offset: Array) -> Angles:
-    """The input angles of the stage driven by ``result``: status, and the output ``angle`` or its cosine and sine."""
+    """Return the input angles of the stage driven by ``result``:
+    status, and the output ``angle`` or its cosine and sine.
+    """
     shape = result["status"].shape
     # a family that says it works from cos and sin alone gets no angle at all
     phi: Array = np.broadcast_to(np.float64(np.nan), shape)

@@ -6,9 +6,10 @@ import re
 
 from kernels.links import DRIVEN
 from sweep.families.base import Family
-from sweep.families.capabilities import Assembly, Dimensions, JointRecords, LinkTree, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, JointRecords, OutputLink, Points, Skeleton
 from sweep.families.check_outputs import output_faults
 from sweep.families.domain import Turn
+from sweep.families.link_tree import LinkTree
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _LETTERS = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -20,7 +21,7 @@ class FamilyError(TypeError):
 
 
 def check_family(family: Family) -> Family:
-    """The family itself, once every rule of an entry is kept.
+    """Return the family itself, once every rule of an entry is kept.
 
     Raises
     ------
@@ -97,7 +98,9 @@ def _drawing(family: Family) -> list[str]:
 
 
 def _tree(tree: LinkTree) -> list[str]:
-    """Faults of a tree of links: numbers that name nothing, loops that are closed by too few lines or too many."""
+    """Return faults of a tree of links:
+    numbers that name nothing, loops that are closed by too few lines or too many.
+    """
     bodies, faults = range(len(tree.bodies)), []
     faults += [f"LinkTree: parent {p} of body {k} is no earlier body" for k, p in enumerate(tree.parents) if p >= k]
     if len(tree.parents) != len(tree.bodies) or any(body not in bodies for body, _ in tree.freedoms):

@@ -13,7 +13,7 @@ ERROR, MINUS = "err_", "minus_"  # what stands before the columns of errors and 
 
 
 def output_faults(family: Family) -> list[str]:
-    """What is wrong with the outputs of an entry, each with its remedy."""
+    """Return what is wrong with the outputs of an entry, each with its remedy."""
     return [*_definitions(family), *_position(family), *_derivatives(family), *_events(family), *_steps(family)]
 
 
@@ -78,7 +78,9 @@ def _derivatives(family: Family) -> list[str]:
 
 
 def _orders(family: Family) -> list[str]:
-    """Over a turn the limit positions are roots of the derivative; an angle may drive the crank of a next stage."""
+    """Demand the derivatives of the position over a turn:
+    limits are their roots, and an angle may drive a next stage.
+    """
     position = family.pose_output.get(family.position)
     if position is None or not isinstance(family.domain, Turn):
         return []
@@ -92,7 +94,7 @@ def _orders(family: Family) -> list[str]:
 
 
 def _returns(of: Mapping[str, str], name: str) -> bool:
-    """Whether the derivatives of an output lead back to it."""
+    """Return whether the derivatives of an output lead back to it."""
     start = name
     passed: set[str] = set()
     while name in of and name not in passed:

@@ -10,17 +10,8 @@ from kernels.families import cylindrical_looper
 from kernels.families.cylindrical_looper.links import links as fill_links
 from kernels.links import DRIVEN, FRAME, SLIDE, TURN
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import (
-    Assembly,
-    Dimensions,
-    Link,
-    LinkBody,
-    LinkJoint,
-    LinkTree,
-    Made,
-    Points,
-    Skeleton,
-)
+from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Points, Skeleton
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.linked import filled_by, point_of
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.skeletons import crank_axis, links, parameter, standing
@@ -87,7 +78,7 @@ _BLOCKS = (
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     # what is no number counts even where the place of the ball does not
     beside = (designs[:, _D2] != 0.0) | ~np.isfinite(designs[:, _D2:]).all(axis=1)
     if not beside.any():
@@ -98,7 +89,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.ndarray) -> Columns:
-    """Poses of designs some of which have the second ball beside the axis."""
+    """Return poses of designs some of which have the second ball beside the axis."""
     found: Columns = {}
     for rows in (beside, ~beside):
         own = angles if len(angles.cos) == 1 else Angles(*(np.ascontiguousarray(x[rows]) for x in angles))
@@ -110,24 +101,24 @@ def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.
 
 
 def first_coupler_square(designs: Array) -> Array:
-    """b1^2 of every design."""
+    """Return b1^2 of every design."""
     square: Array = designs[:, 1] * designs[:, 1]
     return square
 
 
 def second_coupler_square(designs: Array) -> Array:
-    """b2^2 of every design."""
+    """Return b2^2 of every design."""
     square: Array = designs[:, 9] * designs[:, 9]
     return square
 
 
 def rocker_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """The point of the shaft at the height of the rocker's ball, (n, m, 3)."""
+    """Return the point of the shaft at the height of the rocker's ball, (n, m, 3)."""
     return _on_shaft(designs, np.asarray(motion["z_c1"], np.float64))
 
 
 def looper_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """The point of the shaft at the height of the working point, (n, m, 3)."""
+    """Return the point of the shaft at the height of the working point, (n, m, 3)."""
     return _on_shaft(designs, np.asarray(motion["z_p"], np.float64))
 
 
@@ -151,10 +142,10 @@ LINKS = LinkTree(
         LinkJoint("a1", "bearing of crank 1", "shaft", "frame on crank 1", body=0, freedom=0),
         LinkJoint("b1", "ball of crank 1", "hinge", "crank 1 on coupler 1", body=4),
         LinkJoint("c1", "rocker's ball", "ball", "coupler 1 on the rocker", lines=(0, 3)),
-        LinkJoint("key", "key of the rocker on the shaft", "guide", "shaft on the rocker", body=3, freedom=4),
+        LinkJoint("key", "key of the rocker on the shaft", "sleeve", "shaft on the rocker", body=3, freedom=4),
         LinkJoint("hold", "hold of the rocker along the shaft", "contact", "frame, or shaft, on the rocker",
                   lines=(6, 1)),
-        LinkJoint("d", "guide of the shaft", "guide", "frame on the shaft", body=2, freedom=2),
+        LinkJoint("d", "guide of the shaft", "sleeve", "frame on the shaft", body=2, freedom=2),
         LinkJoint("a2", "bearing of crank 2", "shaft", "frame on crank 2", body=1, freedom=1),
         LinkJoint("b2", "ball of crank 2", "hinge", "crank 2 on coupler 2", body=5),
         LinkJoint("c2", "ball of the sliding drive", "ball", "coupler 2 on the shaft", lines=(3, 3)),

@@ -17,7 +17,7 @@ TWO_TURNS, TWO_TURNS_DEG = 2.0 * TWO_PI * (1.0 + 1e-9), 720.0
 
 
 def reads_as_degrees(largest: float) -> bool:
-    """Whether crank angles, the largest of which is given, were written in degrees though rad were expected.
+    """Return whether crank angles, the largest of which is given, were written in degrees though rad were expected.
 
     Crank angles may run on over many turns.  Between two turns in rad and two turns in degrees a grid whose largest
     value is a whole or half number was written in degrees: one in rad ends at a multiple of pi.
@@ -72,7 +72,9 @@ Domain: TypeAlias = Turn | Interval | March
 
 
 def equal_steps(domain: Domain, designs: Array, poses: int) -> Array:
-    """So many values of the variable for the first design: one turn from 0 in equal steps, or a whole interval."""
+    """Return so many values of the variable for the first design:
+    one turn from 0 in equal steps, or a whole interval.
+    """
     if isinstance(domain, Interval):
         first, last = domain.ends(designs)
         return np.linspace(float(first[0]), float(last[0]), poses, dtype=np.float64)

@@ -43,7 +43,7 @@ poses = poses_of(epicyclic_dwell.poses, _NAMES)
 
 
 def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Dwell measures to rounding: every root is bisected."""
+    """Return dwell measures to rounding: every root is bisected."""
     n = len(designs)
     status, values = np.empty(n, np.uint8), [np.empty(n) for _ in DWELL_OUTPUTS]
     epicyclic_dwell.dwell_measures(designs, status, *values)
@@ -52,7 +52,7 @@ def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
 
 
 def planet_centre(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """The planet's centre, (n, m, 3), in planet radii."""
+    """Return the planet's centre, (n, m, 3), in planet radii."""
     n, mesh, a = (parameter(PARAMETERS, name, designs)[:, None] for name in ("n", "mesh", "a"))
     x = a + (n + mesh) * angles.cos
     return np.stack([x, (n + mesh) * angles.sin, np.zeros_like(x)], axis=-1)

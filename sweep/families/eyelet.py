@@ -41,7 +41,7 @@ poses = poses_of(eyelet.poses, _NAMES)
 
 
 def guide(number: int) -> Fixed:
-    """Guide 1 or 2, where the thread comes from and goes to."""
+    """Return guide 1 or 2, where the thread comes from and goes to."""
 
     def at(designs: Array) -> Array:
         e, x, y, z = (parameter(PARAMETERS, name.format(number), designs) for name in ("e", "dX{}", "dY{}", "Z{}"))

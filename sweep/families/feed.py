@@ -82,7 +82,7 @@ _LENGTHS = [k for k, p in enumerate(PARAMETERS) if p.unit == "length"]
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     shape = (len(designs), angles.cos.shape[1])
     status = np.empty(shape, np.uint8)
     outputs = np.empty((len(_POSES), *shape), np.result_type(designs, angles.cos))
@@ -91,7 +91,9 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Entry, leaving and what lies between; the errors are estimates from the rounding of a tooth's height."""
+    """Return the entry, leaving and what lies between;
+    the errors are estimates from the rounding of a tooth's height.
+    """
     status, values = np.empty(len(designs), np.uint8), np.empty((len(_EVENTS), len(designs)))
     feed.feeding(designs, status, values)
     columns: dict[str, Array] = dict(zip(_EVENTS, values, strict=True))

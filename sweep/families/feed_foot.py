@@ -32,7 +32,9 @@ _ROWS = [_RACK.index(name) for name in ("y_t", "dy_t", "d2y_t", "x_t", "dx_t", "
 
 
 def path_of(designs: Array, nodes: int) -> tuple[Array, np.ndarray]:
-    """Path of the tooth above the plate at so many equal crank angles, (n, 6, nodes), and the status of the linkage."""
+    """Return the path of the tooth above the plate at so many equal crank angles, (n, 6, nodes),
+    and the status of the linkage.
+    """
     phi = np.arange(nodes)[None, :] * (2.0 * np.pi / nodes)
     rack = np.ascontiguousarray(designs[:, :_RACK_COLUMNS])
     status, outputs = np.empty((len(designs), nodes), np.uint8), np.empty((len(_RACK), len(designs), nodes))
@@ -53,7 +55,7 @@ def _marched(designs: Array, nodes: int) -> tuple[Columns, Array, Array, Array]:
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design over one turn in equal steps from 0, each (n, m)."""
+    """Return the wanted pose outputs and status of every design over one turn in equal steps from 0, each (n, m)."""
     nodes, apart = nodes_for(angles.phi.shape[1])
     columns, path, heights, forces = _marched(designs, nodes)
     found: Columns = {
@@ -65,12 +67,14 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Loss of contact, landing, impacts and what they cost, of the last turn marched."""
+    """Return the loss of contact, landing, impacts and what they cost, of the last turn marched."""
     return chosen(_marched(designs, NODES)[0], wanted)
 
 
 def contact(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """The softest spring and the least preload with which a rigid foot stays on the rack from entry to leaving."""
+    """Return the softest spring and the least preload with which a rigid foot stays on the rack from
+    entry to leaving.
+    """
     mass, _, preload, omega = designs[:, _FEET[:4]].T
     unit = mass * omega * omega
     path, status = path_of(designs, NODES)
@@ -88,7 +92,7 @@ def contact(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
 
 
 def feeding(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Entry, leaving and path of the tooth, as of the rack alone."""
+    """Return the entry, leaving and path of the tooth, as of the rack alone."""
     return feed.events(np.ascontiguousarray(designs[:, :_RACK_COLUMNS]), wanted, accuracy)
 
 
@@ -98,7 +102,7 @@ def _rack(designs: Array, angles: Angles, *names: str) -> list[Array]:
 
 
 def of_rack(joint: str) -> Made:
-    """A joint of the feed mechanism."""
+    """Return a joint of the feed mechanism."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x, y = _rack(designs, angles, f"x_{joint}", f"y_{joint}")
@@ -108,13 +112,13 @@ def of_rack(joint: str) -> Made:
 
 
 def plate(designs: Array) -> Array:
-    """Where the foot stands on the needle plate: above the tooth's place at phi = 0."""
+    """Return the place of the foot on the needle plate: above the tooth's place at phi = 0."""
     (x,) = _rack(designs, Angles.of(np.zeros((1, 1))), "x_t")
     return np.stack([x[:, 0], designs[:, _PLATE], 0.0 * x[:, 0]], axis=1)
 
 
 def foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """The foot."""
+    """Return the foot."""
     y = np.asarray(found["y_foot"], np.float64)
     return plate(designs)[:, None, :] + np.stack([0.0 * y, y, 0.0 * y], axis=-1)
 

@@ -53,7 +53,7 @@ POSE_OUTPUTS = (
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     shape = (len(designs), angles.phi.shape[1])
     status = np.empty(shape, np.uint8)
     outputs = np.empty((len(triad.OUTPUTS), *shape), np.result_type(designs, angles.phi))
@@ -66,7 +66,7 @@ def _columns(designs: Array, *names: str) -> list[Array]:
 
 
 def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
-    """H, on the arm of the horizontal chain's rocker."""
+    """Return H, on the arm of the horizontal chain's rocker."""
     chain = np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(PARAMETERS, SIGMA.name, designs)])
     psi = np.asarray(CRANK_ROCKER.poses(chain, angles, frozenset({"psi"}))["psi"], np.float64)
     e, arm, ahead = _columns(designs, "h_e", "rh", "dh")
@@ -74,7 +74,7 @@ def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
 
 
 def eccentric(number: int) -> Made:
-    """Centre of an eccentric."""
+    """Return the centre of an eccentric."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x, y, radius, ahead = _columns(designs, *(f"{name}{number}" for name in ("xE", "yE", "rE", "dE")))
@@ -85,7 +85,7 @@ def eccentric(number: int) -> Made:
 
 
 def rack_joint(number: int) -> Made:
-    """Joint of a link on the rack."""
+    """Return the joint of a link on the rack."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x, y, chi = (np.asarray(found[name], np.float64) for name in ("x_t", "y_t", "chi"))

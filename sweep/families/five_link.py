@@ -7,7 +7,8 @@ from kernels.families.five_link.links import links as fill_links
 from kernels.links import DRIVEN, FRAME, TURN
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, Link, LinkBody, LinkJoint, LinkTree, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Link, OutputLink, Points, Skeleton
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.linked import filled_by
 from sweep.families.skeletons import CRANK, CRANK_ROCKER_SIZES, ROCKER, crank_axis, standing
 
@@ -61,7 +62,7 @@ _PLACES = tuple(o.name for o in PLACE_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_with_places(five_link.poses, designs, angles, _VALUES, _PLACES, wanted)
 
 

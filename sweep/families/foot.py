@@ -80,7 +80,7 @@ FEET = [0, 1, 2, 3, 6, 8, 9]  # columns of what the march takes
 
 
 def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
-    """Events, status and the heights and forces at the nodes of the last turn.
+    """Return events, status and the heights and forces at the nodes of the last turn.
 
     ``feet`` (n, 7) are mass, spring, preload, speed, restitution, stiffness and damping of the fabric.
     """
@@ -101,13 +101,13 @@ def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
 
 
 def nodes_for(poses: int) -> tuple[int, int]:
-    """How many nodes are marched for so many poses of a turn, and how many nodes apart the poses stand."""
+    """Return how many nodes are marched for so many poses of a turn, and how many nodes apart the poses stand."""
     apart = -(-NODES // poses)
     return poses * apart, apart
 
 
 def chosen(columns: Columns, wanted: frozenset[str]) -> Columns:
-    """The wanted columns and the status: NO_EVENT where one of them is about an event that does not happen."""
+    """Return the wanted columns and the status: NO_EVENT where one of them is about an event that does not happen."""
     found = {name: x for name, x in columns.items() if name in wanted}
     status = np.array(columns["status"], np.uint8)
     for values in found.values():
@@ -116,14 +116,14 @@ def chosen(columns: Columns, wanted: frozenset[str]) -> Columns:
 
 
 def path_of(designs: Array, nodes: int) -> Array:
-    """Path of the rack at so many equal crank angles, (n, 6, nodes)."""
+    """Return the path of the rack at so many equal crank angles, (n, 6, nodes)."""
     path = np.empty((len(designs), 6, nodes))
     foot.rack_path(designs, path)
     return path
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design over one turn in equal steps from 0, each (n, m)."""
+    """Return the wanted pose outputs and status of every design over one turn in equal steps from 0, each (n, m)."""
     nodes, apart = nodes_for(angles.phi.shape[1])
     path = path_of(designs, nodes)
     columns, heights, forces = marched(path, designs[:, FEET])
@@ -133,7 +133,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Entry, first jump, limits of spring and preload."""
+    """Return the entry, first jump, limits of spring and preload."""
     status, values = np.empty(len(designs), np.uint8), np.empty((len(_CLOSED), len(designs)))
     foot.closed_forms(designs, status, values)
     columns: Columns = dict(zip(_CLOSED, values, strict=True))
@@ -141,19 +141,19 @@ def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
 
 
 def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Loss of contact, landing, impacts and what they cost, of the last turn marched."""
+    """Return the loss of contact, landing, impacts and what they cost, of the last turn marched."""
     columns, _, _ = marched(path_of(designs, NODES), designs[:, FEET])
     return chosen(columns, wanted)
 
 
 def foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """The foot, above the middle of the rack's travel."""
+    """Return the foot, above the middle of the rack's travel."""
     y = np.asarray(found["y_foot"], np.float64)
     return np.stack([0.0 * y, y, 0.0 * y], axis=-1)
 
 
 def rack_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """The rack's tooth."""
+    """Return the rack's tooth."""
     y = np.asarray(found["y_rack"], np.float64)
     return np.stack([-parameter(PARAMETERS, "X", designs)[:, None] * np.cos(angles.phi) + 0.0 * y, y, 0.0 * y], axis=-1)
 

@@ -68,7 +68,9 @@ _POINT = {"x_m": "s", "y_m": "dev", "dx_m": "ds", "dy_m": "ddev", "d2x_m": "d2s"
 
 
 def as_crank_rocker(designs: Array) -> Array:
-    """Design matrix of the same linkage as a crank-rocker, (n, 8); no number where the coupler point is none."""
+    """Return the design matrix of the same linkage as a crank-rocker, (n, 8);
+    no number where the coupler point is none.
+    """
     matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)), designs.dtype)
     matrix[:, :4], matrix[:, 7] = designs[:, :4], designs[:, 6]
     with np.errstate(invalid="ignore"):
@@ -77,7 +79,7 @@ def as_crank_rocker(designs: Array) -> Array:
 
 
 def as_guide(designs: Array) -> Array:
-    """Design matrix of the same linkage as a guide whose line is the frame's, (n, 9)."""
+    """Return the design matrix of the same linkage as a guide whose line is the frame's, (n, 9)."""
     matrix = np.zeros((len(designs), len(guide.PARAMETERS)), designs.dtype)
     matrix[:, :6], matrix[:, 8] = designs[:, :6], designs[:, 6]
     return matrix
@@ -101,17 +103,17 @@ def _poses(
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return _poses(crank_rocker.poses, guide.poses, designs, angles, wanted)
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """As :func:`poses`, in twice the working precision; for float64 only."""
+    """Compute what :func:`poses` does, in twice the working precision; for float64 only."""
     return _poses(crank_rocker.precise_poses, guide.precise_poses, designs, angles, wanted)
 
 
 def _as_ours(step: Step) -> Step:
-    """A step of the crank-rocker for this design matrix."""
+    """Return a step of the crank-rocker for this design matrix."""
 
     def run(designs: Array, *rest: object) -> Columns:
         return step.run(as_crank_rocker(designs), *rest)  # type: ignore[arg-type]
@@ -125,7 +127,7 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
 
 
 def ellipse(designs: Array) -> Array:
-    """The curve of the coupler direction across the rocker's motion, (n, 7)."""
+    """Return the curve of the coupler direction across the rocker's motion, (n, 7)."""
     return crank_rocker.ellipse(as_crank_rocker(designs))
 
 

@@ -44,7 +44,7 @@ EDGE = {"k1": -1.0, "k2": -0.5, "k3": 0.5, "k4": 1.0}
 
 
 def edge_point(share: float) -> Made:
-    """A point of the edge, at a share of the larger distance of a guide from the cam axis."""
+    """Return a point of the edge, at a share of the larger distance of a guide from the cam axis."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x1, y1, x2, y2, a = (parameter(PARAMETERS, name, designs) for name in ("X1", "Y1", "X2", "Y2", "a"))
@@ -55,7 +55,7 @@ def edge_point(share: float) -> Made:
 
 
 def turned(x: Array, y: Array, angles: Angles) -> Array:
-    """Points of the cam, (n,) or (n, m) each in its own axes, turned with it: (n, m, 3)."""
+    """Return points of the cam, (n,) or (n, m) each in its own axes, turned with it: (n, m, 3)."""
     x, y = (values if values.ndim == 2 else values[:, None] for values in (x, y))
     x, y = x * angles.cos - y * angles.sin, x * angles.sin + y * angles.cos
     return np.stack([x, y, 0.0 * x], axis=-1)

@@ -35,7 +35,7 @@ DOMAIN = March(text="cam angle")
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status, each (n, m), of the last of the turns that are marched."""
+    """Return the wanted pose outputs and status, each (n, m), of the last of the turns that are marched."""
     needed = wanted | {"L"} if "P" in wanted else wanted
     shape = (len(designs), angles.cos.shape[1])
     outputs, status = optional_outputs(_KERNEL, needed, shape), np.empty(shape, np.uint8)
@@ -51,7 +51,9 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def contact(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Where the thread passes the plane of the cam: on the edge, or on the straight line between the guides."""
+    """Return the place where the thread passes the plane of the cam:
+    on the edge, or on the straight line between the guides.
+    """
     y, on = (np.asarray(found[name], np.float64) for name in ("y_contact", "contact"))
     at = frictionless.turned(parameter(PARAMETERS, "a", designs)[:, None] * y * y, y, angles)
     guides = (np.stack([parameter(PARAMETERS, f"{axis}{k}", designs) for axis in "XYZ"], axis=1) for k in (1, 2))

@@ -47,7 +47,7 @@ _SAMPLED_OUTPUTS = tuple(o for o in MAX_OUTPUTS if o.name.startswith("max"))
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its carrier angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its carrier angles, each (n, m)."""
     shape = (designs.shape[0], angles.cos.shape[1])
     status = np.empty(shape, np.uint8)
     outputs = optional_outputs(_POSE_NAMES, wanted, shape, np.result_type(designs, angles.cos))
@@ -57,7 +57,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Dwell measures from their closed forms and a bracketed root; to rounding, whatever the accuracy asked.
+    """Return dwell measures from their closed forms and a bracketed root; to rounding, whatever the accuracy asked.
 
     The errors are bounds of those measured: below 8 roundings on the oracle table.
     """
@@ -71,7 +71,7 @@ def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
 
 
 def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Maxima over the turn from all stationary points, to rounding.
+    """Return the maxima over the turn from all stationary points, to rounding.
 
     The errors are bounds of those measured against 60 digits on 1100 designs: below 40 roundings, growing towards
     k = 1, a = -1, where three singularities meet, as the distance to the power -5/4.  They are relative for a maximum,
@@ -89,7 +89,7 @@ def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> 
 
 
 def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Maxima over ``accuracy.samples`` equidistant carrier angles, the first at phi = 0."""
+    """Return the maxima over ``accuracy.samples`` equidistant carrier angles, the first at phi = 0."""
     assert accuracy.samples is not None
     status, outputs = _empty(_SAMPLED_OUTPUTS, wanted, len(designs))
     geared_dwell.dense_maxima(designs, *half_turn(accuracy.samples), status, *outputs.values())
@@ -98,7 +98,8 @@ def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -
 
 @lru_cache(maxsize=32)
 def half_turn(samples: int) -> tuple[Array, Array]:
-    """The equidistant grid of one turn, folded: rows 1 -+ cos(phi) and sin(phi) around phi = 0 and around phi = pi.
+    """Return the equidistant grid of one turn, folded:
+    rows 1 -+ cos(phi) and sin(phi) around phi = 0 and around phi = pi.
 
     phi and -phi have the same magnitudes, so half of the samples stand for all.  The last angle is repeated up to a
     multiple of 16, which the vectorised loop takes without a remainder; the grid of an odd number misses phi = pi.
@@ -130,7 +131,7 @@ def _columns(outputs: dict[str, Array | None], status: np.ndarray[tuple[int], np
 
 
 def planet_centre(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """The planet's centre, (n, m, 3), in planet radii: both gears are of one size."""
+    """Return the planet's centre, (n, m, 3), in planet radii: both gears are of one size."""
     x = parameter(PARAMETERS, "a", designs)[:, None] + 2.0 * angles.cos
     return np.stack([x, 2.0 * angles.sin, np.zeros_like(x)], axis=-1)
 

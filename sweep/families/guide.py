@@ -14,14 +14,17 @@ from sweep.families.capabilities import (
     Arm,
     Assembly,
     CrankRockerLoop,
+    Curve,
     Dimensions,
     GuidedPoint,
+    InSeries,
     JointRecords,
     Link,
     Points,
     PressureEllipse,
     Skeleton,
     ToolPoint,
+    constant,
 )
 from sweep.families.hardpoints import GUIDE_POINTS
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
@@ -139,6 +142,35 @@ def tool_direction(designs: Array) -> Array:
     return np.column_stack([np.cos(designs[:, 6]), np.sin(designs[:, 6]), 0.0 * designs[:, 6]])
 
 
+def _in_frame(designs: Array, along: Array, across: Array) -> Array:
+    """A coordinate of the coupler point from s and dev, (n, 3): what it takes of each, and a constant."""
+    h = parameter(PARAMETERS, "h", designs)
+    return np.column_stack([along, across, across * h])
+
+
+def x_of_point(designs: Array) -> Array:
+    """x_m as a combination of s, dev and 1, (n, 3)."""
+    lam = parameter(PARAMETERS, "lam", designs)
+    return _in_frame(designs, np.cos(lam), -np.sin(lam))
+
+
+def y_of_point(designs: Array) -> Array:
+    """y_m as a combination of s, dev and 1, (n, 3)."""
+    lam = parameter(PARAMETERS, "lam", designs)
+    return _in_frame(designs, np.sin(lam), np.cos(lam))
+
+
+_ALONG, _ACROSS = constant(1.0, 0.0, 0.0), constant(0.0, 1.0, 0.0)
+IN_SERIES = InSeries(
+    guide.FORM,
+    {
+        "s": Curve(0, _ALONG), "ds": Curve(1, _ALONG), "d2s": Curve(2, _ALONG),
+        "dev": Curve(0, _ACROSS), "ddev": Curve(1, _ACROSS), "d2dev": Curve(2, _ACROSS),
+        "x_m": Curve(0, x_of_point), "y_m": Curve(0, y_of_point),
+    },
+    {"ds": "x1", "d2s": "x2", "d3s": "x3", "dev": "y0", "ddev": "y1", "d2dev": "y2"},
+)  # fmt: skip
+
 FAMILY = Family(
     name="guide",
     title="planar four-bar with a guided coupler point",
@@ -155,6 +187,7 @@ FAMILY = Family(
     capabilities=(
         Dimensions(links("a b c"), arms=(Arm(("xi", "eta"), ("b",)),)),
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
+        IN_SERIES,
         JointRecords(joint_records, (), "rocker"),
         PressureEllipse(ellipse),
         CrankRockerLoop(as_crank_rocker),

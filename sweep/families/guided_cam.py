@@ -63,7 +63,7 @@ ROUNDING = 2.0**-53
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its cam angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
     asked = wanted | {"S"} if WRAP.name in wanted else wanted
     columns = filled_with_places(guided_cam.poses, designs, angles, _VALUES, _PROFILE, asked)
     if WRAP.name in wanted:
@@ -74,7 +74,8 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Least radius and what it is made of; maxima of smooth functions found to rounding, whatever the accuracy asked.
+    """Return the least radius and what it is made of;
+    maxima of smooth functions found to rounding, whatever the accuracy asked.
 
     The errors are bounds of those measured against 10^5 samples: a maximum to 64 roundings of the lengths it is made
     of, its place to the root of them.
@@ -91,26 +92,28 @@ def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
 
 
 def cam_axis(designs: Array) -> Array:
-    """Centre of the cam on the follower's way: R0 behind the least displacement, which is one of the whole turn."""
+    """Return the centre of the cam on the follower's way:
+    R0 behind the least displacement, which is one of the whole turn.
+    """
     least = np.asarray(size(designs, frozenset({"least_displacement"}), Accuracy())["least_displacement"], np.float64)
     e, radius = (parameter(PARAMETERS, name, designs) for name in ("e", "R0"))
     return np.stack([e, least - radius, np.zeros(len(designs))], axis=1)
 
 
 def follower_line(designs: Array) -> tuple[Array, Array]:
-    """The follower's way: across the line of the guides."""
+    """Return the follower's way: across the line of the guides."""
     e = parameter(PARAMETERS, "e", designs)
     return np.stack([e, 0.0 * e, 0.0 * e], axis=1), np.tile(np.array(Y), (len(designs), 1))
 
 
 def follower(designs: Array, angles: Angles, found: Columns) -> Array:
-    """The end of the follower, which lies on the cam and carries the thread."""
+    """Return the end of the follower, which lies on the cam and carries the thread."""
     s = np.asarray(found["S"], np.float64)
     return np.stack([np.broadcast_to(parameter(PARAMETERS, "e", designs)[:, None], s.shape), s, 0.0 * s], axis=-1)
 
 
 def guide(side: float) -> Fixed:
-    """One of the two guides, on either side of the plane of the cam."""
+    """Return one of the two guides, on either side of the plane of the cam."""
 
     def at(designs: Array) -> Array:
         x, z = (parameter(PARAMETERS, name, designs) for name in ("X1", "Z1"))

@@ -21,7 +21,7 @@ PLACE = "points"
 
 
 def crank_rocker(points: Mapping[str, Array]) -> Reading:
-    """Dimensions of a spatial crank-rocker from A, axis_A, B, C, D, axis_D."""
+    """Return dimensions of a spatial crank-rocker from A, axis_A, B, C, D, axis_D."""
     a, b, c, d, u, z = (points[name] for name in ("A", "B", "C", "D", "axis_A", "axis_D"))
     small = NOTHING * size(points)
     across = np.cross(z, u)
@@ -51,7 +51,9 @@ def crank_rocker(points: Mapping[str, Array]) -> Reading:
 
 
 def slider_crank(points: Mapping[str, Array]) -> Reading:
-    """Dimensions of a spatial slider-crank from A, axis_A, B, C, axis_D and, if the line is given by a point, D."""
+    """Return dimensions of a spatial slider-crank from A, axis_A, B, C, axis_D and,
+    if the line is given by a point, D.
+    """
     a, b, c, u, y = (points[name] for name in ("A", "B", "C", "axis_A", "axis_D"))
     d = points.get("D", c)
     small = NOTHING * size(points)
@@ -78,12 +80,15 @@ def slider_crank(points: Mapping[str, Array]) -> Reading:
 
 
 def four_bar(points: Mapping[str, Array]) -> Reading:
-    """Dimensions of a planar four-bar from A, B, C, D and, if wanted, axis_A (else z) and the coupler point M."""
+    """Return dimensions of a planar four-bar from A, B, C, D and, if wanted,
+    axis_A (else z) and the coupler point M.
+    """
     return _planar(points, points.get("M"))
 
 
 def guide(points: Mapping[str, Array]) -> Reading:
-    """As :func:`four_bar`, with the coupler point ``point``, and ``axis_line`` and ``line`` (else ``point``) of a line.
+    """Read what :func:`four_bar` does, the coupler point ``point``,
+    and ``axis_line`` and ``line`` (else ``point``) of a line.
 
     Without ``line`` the guiding line runs through the coupler point, which then is where it deviates by 0.
     """
@@ -97,7 +102,7 @@ def guide(points: Mapping[str, Array]) -> Reading:
 
 
 def planar_slider_crank(points: Mapping[str, Array]) -> Reading:
-    """Dimensions of a planar slider-crank from A, B, C, axis_D and, if wanted, D and axis_A (else z)."""
+    """Return dimensions of a planar slider-crank from A, B, C, axis_D and, if wanted, D and axis_A (else z)."""
     a, b, c = (points[name] for name in ("A", "B", "C"))
     z, small = points.get("axis_A", np.array([0.0, 0.0, 1.0])), NOTHING * size(points)
     x = points["axis_D"] - (points["axis_D"] @ z) * z
@@ -136,13 +141,13 @@ def _planar(points: Mapping[str, Array], point: Array | None) -> Reading:
 
 
 def size(points: Mapping[str, Array]) -> float:
-    """Largest extent of the points."""
+    """Return the largest extent of the points."""
     places = np.array([point for name, point in points.items() if not name.startswith("axis_")])
     return float(np.ptp(places, axis=0).max())
 
 
 def _square(vector: Array, axis: Array, small: float) -> Array:
-    """Direction of the part of a vector that is square to an axis."""
+    """Return the direction of the part of a vector that is square to an axis."""
     rest = vector - (vector @ axis) * axis
     length = float(np.linalg.norm(rest))
     if length <= small:

@@ -56,12 +56,12 @@ _PLACES = tuple(o.name for o in PLACE_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its cam-lever angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its cam-lever angles, each (n, m)."""
     return filled_with_places(heddle.poses, designs, angles, _VALUES, _PLACES, wanted)
 
 
 def rod_square(designs: Array) -> Array:
-    """BC^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
+    """Return BC^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
     square: Array = np.square(designs[:, 1])
     return square
 
@@ -71,26 +71,28 @@ def _column(name: str, designs: Array) -> Array:
 
 
 def shaft_pivot(designs: Array) -> Array:
-    """O4, along O2O3 behind O3: the picture lays both frames along one line."""
+    """Return O4, along O2O3 behind O3: the picture lays both frames along one line."""
     x = _column("O2O3", designs) + _column("O3O4", designs)
     return np.stack([x, 0.0 * x, 0.0 * x], axis=1)
 
 
 def shaft_line(designs: Array) -> tuple[Array, Array]:
-    """The vertical on which the shaft moves: through the slide of its rod, of a long rod through E at mid-stroke."""
+    """Return the vertical on which the shaft moves:
+    through the slide of its rod, of a long rod through E at mid-stroke.
+    """
     at = shaft_pivot(designs)
     at[:, 0] += np.where(_column("EG", designs) > 0.0, _column("x_s", designs), _column("O4E", designs))
     return at, np.tile(np.array(Y), (len(designs), 1))
 
 
 def _arm(pivot: Array, length: Array, angle: Array) -> Array:
-    """The end of an arm at an angle from x, (n, m, 3)."""
+    """Return the end of an arm at an angle from x, (n, m, 3)."""
     end: Array = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1) * length[:, None, None]
     return pivot[:, None, :] + end
 
 
 def lower_arm(designs: Array, angles: Angles, found: Columns) -> Array:
-    """D: the lower arm of the bell crank, square to O3O4 at mid-stroke."""
+    """Return D: the lower arm of the bell crank, square to O3O4 at mid-stroke."""
     x = _column("O2O3", designs)
     turn = np.asarray(found["chi"], np.float64) - _column("chi_mid", designs)[:, None]
     pivot = np.stack([x, 0.0 * x, 0.0 * x], axis=1)
@@ -98,18 +100,18 @@ def lower_arm(designs: Array, angles: Angles, found: Columns) -> Array:
 
 
 def shaft_lever(designs: Array, angles: Angles, found: Columns) -> Array:
-    """E: the arm of the shaft lever to the heddle rod, horizontal at mid-stroke."""
+    """Return E: the arm of the shaft lever to the heddle rod, horizontal at mid-stroke."""
     return _arm(shaft_pivot(designs), _column("O4E", designs), np.asarray(found["lam"], np.float64))
 
 
 def shaft_lever_back(designs: Array, angles: Angles, found: Columns) -> Array:
-    """F: the arm of the shaft lever to the link, square to the other one."""
+    """Return F: the arm of the shaft lever to the link, square to the other one."""
     length = _column("O4F", designs) * _column("side_F", designs)
     return _arm(shaft_pivot(designs), length, np.asarray(found["lam"], np.float64) + 0.5 * np.pi)
 
 
 def shaft(designs: Array, angles: Angles, found: Columns) -> Array:
-    """G: the heddle shaft on its vertical."""
+    """Return G: the heddle shaft on its vertical."""
     y = np.asarray(found["y"], np.float64)
     return shaft_line(designs)[0][:, None, :] + np.stack([0.0 * y, y, 0.0 * y], axis=-1)
 

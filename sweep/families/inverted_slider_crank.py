@@ -42,24 +42,24 @@ _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_with_places(inverted_slider_crank.poses, designs, angles, _VALUES, _JOINTS, wanted)
 
 
 def _one(designs: Array) -> Array:
-    """The discriminant is the squared cosine of the pressure angle as it stands."""
+    """Return 1 for every design: the discriminant is the squared cosine of the pressure angle as it stands."""
     return np.ones(len(designs))
 
 
 def rocker_origin(designs: Array) -> Array:
-    """The rocker pivot, (n, 3)."""
+    """Return the rocker pivot, (n, 3)."""
     origin = np.zeros((len(designs), 3))
     origin[:, 0] = designs[:, 1]
     return origin
 
 
 def slot_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """The foot of the rocker pivot on the slot, (n, m, 3): ``h`` from the pivot, square to the slot."""
+    """Return the foot of the rocker pivot on the slot, (n, m, 3): ``h`` from the pivot, square to the slot."""
     psi = np.asarray(motion["psi"], np.float64)
     h, e = (parameter(PARAMETERS, name, designs)[:, None] for name in ("h", "e"))
     return np.stack([e - h * np.sin(psi), h * np.cos(psi), np.zeros_like(psi)], axis=-1)

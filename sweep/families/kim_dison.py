@@ -84,7 +84,7 @@ _NEEDS = {
 
 
 def _theirs(name: str) -> str:
-    """The crank-rocker's name of a quantity."""
+    """Return the crank-rocker's name of a quantity."""
     return name.replace("alpha", "psi")
 
 
@@ -93,7 +93,9 @@ def _ours(name: str) -> str:
 
 
 def as_crank_rocker(designs: Array) -> Array:
-    """Design matrix of the same linkage as a crank-rocker, (n, 8); no number where the crank's motion is none."""
+    """Return the design matrix of the same linkage as a crank-rocker, (n, 8);
+    no number where the crank's motion is none.
+    """
     matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)), designs.dtype)
     matrix[:, :5] = designs[:, :5]
     with np.errstate(invalid="ignore"):
@@ -129,17 +131,19 @@ def _poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return _poses(crank_rocker.poses, designs, angles, wanted)
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """As :func:`poses`, in twice the working precision; for float64 only."""
+    """Compute what :func:`poses` does, in twice the working precision; for float64 only."""
     return _poses(crank_rocker.precise_poses, designs, angles, wanted)
 
 
 def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Both limit positions and the angle between them, to rounding: the crank is then in the plane of the rocker."""
+    """Return both limit positions and the angle between them, to rounding:
+    the crank is then in the plane of the rocker.
+    """
     n = len(designs)
     status, values = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
     errors = np.empty_like(values)
@@ -168,7 +172,7 @@ def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
 
 
 def _as_ours(step: Step) -> Step:
-    """A step of the crank-rocker under the symbols of this family."""
+    """Return a step of the crank-rocker under the symbols of this family."""
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         asked = frozenset(_theirs(name) for name in wanted)
@@ -192,7 +196,7 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
 
 
 def ellipse(designs: Array) -> Array:
-    """The curve of the coupler direction across the rocker's motion, (n, 7)."""
+    """Return the curve of the coupler direction across the rocker's motion, (n, 7)."""
     return crank_rocker.ellipse(as_crank_rocker(designs))
 
 

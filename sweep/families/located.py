@@ -19,7 +19,7 @@ EYE = "eye"  # on the coupler, the link between the points b and c
 
 
 def coordinates(m: Member, point: str, designs: Array, own_designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
-    """Coordinates of a point in the machine's frame, (n, m)."""
+    """Return coordinates of a point in the machine's frame, (n, m)."""
     start, at = m.columns.stop + 1, m.origin(designs)
     if point == TIP:
         link = m.family.find(OutputLink)
@@ -38,13 +38,13 @@ def coordinates(m: Member, point: str, designs: Array, own_designs: Array, resul
 
 
 def coupler_joints(m: Member) -> tuple[Coordinates, Coordinates] | None:
-    """Coordinates of both joints of the coupler; None where the family does not give them."""
+    """Return coordinates of both joints of the coupler; None where the family does not give them."""
     named = {name: at for points in m.family.every(Points) for name, at in points.at.items()}
     return (named["b"], named["c"]) if {"b", "c"} <= set(named) else None
 
 
 def is_planar(m: Member) -> bool:
-    """Whether the coupler moves in a plane z = constant, so that its two joints tell how it stands."""
+    """Return whether the coupler moves in a plane z = constant, so that its two joints tell how it stands."""
     joints = coupler_joints(m)
     return joints is not None and all(at[2] is None for at in joints)
 
@@ -55,7 +55,9 @@ def _local(m: Member, point: str, result: Mapping[str, Any]) -> list[Any]:
 
 
 def _on_coupler(m: Member, result: Mapping[str, Any], eye: list[Any]) -> list[Any]:
-    """A point of the coupler: along it from b; of a planar one also across it, counter-clockwise, and along z."""
+    """Return a point of the coupler: along it from b;
+    of a planar one also across it, counter-clockwise, and along z.
+    """
     b, c = (_local(m, point, result) for point in "bc")
     along = [end - start for start, end in zip(b, c, strict=True)]
     length = np.sqrt(along[0] ** 2 + along[1] ** 2 + along[2] ** 2)
@@ -66,7 +68,7 @@ def _on_coupler(m: Member, result: Mapping[str, Any], eye: list[Any]) -> list[An
 
 
 def velocity(m: Member, point: str, designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
-    """Velocity analogue of a point in the machine's frame, (n, m): the place of a member does not move."""
+    """Return the velocity analogue of a point in the machine's frame, (n, m): the place of a member does not move."""
     if point == TIP:
         start = m.columns.stop + 1
         x, y = designs[:, [start + 3]], designs[:, [start + 4]]

@@ -49,16 +49,16 @@ class Member:
     columns: slice = field(default_factory=lambda: slice(0, 0))
 
     def designs(self, designs: Array) -> Array:
-        """The design matrix of this member's family."""
+        """Return the design matrix of this member's family."""
         return np.ascontiguousarray(designs[:, self.columns])
 
     def origin(self, designs: Array) -> Array:
-        """Where the origin of its frame stands in the machine's frame, (n, 3)."""
+        """Return the place of its frame's origin in the machine's frame, (n, 3)."""
         start = self.columns.stop + 1  # behind its own parameters and the phase
         return designs[:, start : start + 3]
 
     def own(self, name: str) -> str:
-        """A dotted name as the member's family knows it; "" for a name of another member."""
+        """Return a dotted name as the member's family knows it; "" for a name of another member."""
         prefix = f"{self.name}."
         return name.removeprefix(prefix) if name.startswith(prefix) else ""
 
@@ -118,11 +118,11 @@ class Machine(Family):
     timings: tuple[Timing | Reading, ...] = ()
 
     def member(self, name: str) -> Member:
-        """The member of that name."""
+        """Return the member of that name."""
         return next(m for m in self.members if m.name == name)
 
     def split(self, name: str) -> tuple[Member, str] | None:
-        """Member and the name there of a dotted name; None for a name of the machine itself."""
+        """Return the member and the name there of a dotted name; None for a name of the machine itself."""
         return next(((m, m.own(name)) for m in self.members if m.own(name)), None)
 
     @cached_property
@@ -131,25 +131,25 @@ class Machine(Family):
         return {f"{m.name}.{p}": f"{m.name}.{stage}" for m in self.members for p, stage in m.family.positions.items()}
 
     def outward_sign(self, position: str) -> str:
-        """The sign parameter of the member whose position it is."""
+        """Return the sign parameter of the member whose position it is."""
         found = self.split(position)
         assert found is not None
         own = found[0].family.outward_sign(found[1])
         return own and f"{found[0].name}.{own}"
 
     def precise(self) -> Machine:
-        """The machine with the most accurate poses its members have."""
+        """Return the machine with the most accurate poses its members have."""
         return _built(self, tuple(replace(m, family=m.family.precise()) for m in self.members))
 
     def with_families(self, families: Mapping[str, Family]) -> Machine:
-        """The same machine with other families of its members: those that effects extended."""
+        """Return the same machine with other families of its members: those that effects extended."""
         return _built(self, tuple(replace(m, family=families.get(m.name, m.family)) for m in self.members))
 
 
 def assemble(
     name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | Reading | Event, ...]
 ) -> Machine:
-    """The machine of these members; each may be driven by one that stands before it."""
+    """Return the machine of these members; each may be driven by one that stands before it."""
     timings = tuple(r for r in relations if isinstance(r, Timing | Reading))
     events = tuple(r for r in relations if isinstance(r, Event))
     others = tuple(r for r in relations if not isinstance(r, Timing | Reading | Event))
@@ -229,7 +229,9 @@ def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: fro
 
 
 def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted outputs of members and relations, and the first status that is not OK, in the order of the members."""
+    """Return the wanted outputs of members and relations, and the first status that is not OK,
+    in the order of the members.
+    """
     relations = [r for r in machine.relations if not wanted.isdisjoint(o.name for o in r.outputs)]
     needed = set(wanted).union(*(r.needs(wanted) for r in relations))
     for m in reversed(machine.members):
@@ -253,12 +255,16 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
 
 
 def _whole(values: Any, shape: tuple[int, int]) -> Any:
-    """Values of one design for all where it was computed once; an array of their own, which may be written on."""
+    """Return values of one design for all where it was computed once;
+    an array of their own, which may be written on.
+    """
     return values if values.shape == shape else np.array(np.broadcast_to(values, shape))
 
 
 def _driving(member: Member, needed: set[str]) -> set[str]:
-    """What the driver of a member has to give: its output and as many derivatives as the member's outputs need."""
+    """Return what the driver of a member has to give:
+    its output and as many derivatives as the member's outputs need.
+    """
     own = {name for name in map(member.own, needed) if name}
     if member.driver is None or not own:
         return set()
@@ -271,7 +277,7 @@ def _driving(member: Member, needed: set[str]) -> set[str]:
 
 
 def _orders(family: Family, name: str) -> list[str]:
-    """The derivatives 1..k up to ``name`` of the output it derives from; empty if it is no derivative."""
+    """Return the derivatives 1..k up to ``name`` of the output it derives from; empty if it is no derivative."""
     lower = {derivative: of for of, derivative in family.derivative_of.items()}
     names: list[str] = []
     while name in lower:
@@ -281,7 +287,7 @@ def _orders(family: Family, name: str) -> list[str]:
 
 
 def _member(m: Member, designs: Array, angles: Angles, own: set[str], found: Mapping[str, Any]) -> dict[str, Any]:
-    """Pose outputs of a member by their own names, and ``status``; what no design varies is computed once."""
+    """Return pose outputs of a member by their own names, and ``status``; what no design varies is computed once."""
     columns = slice(m.columns.start, m.columns.stop + 1)  # its own parameters and the phase
     rows = designs[:, columns]
     if m.driver is None and angles.cos.shape[0] == 1 and len(rows) > 1 and (rows[1:] == rows[0]).all():
@@ -302,7 +308,7 @@ def _member(m: Member, designs: Array, angles: Angles, own: set[str], found: Map
 
 
 def _turned(m: Member, phase: Array, angles: Angles, found: Mapping[str, Any]) -> Angles:
-    """The input angles of a member: of its driver, times its ratio, plus its phase."""
+    """Return the input angles of a member: of its driver, times its ratio, plus its phase."""
     if m.driver is not None:
         return Angles.of(m.ratio * found[".".join(m.driver)] + phase[:, None])
     if m.ratio == 1 and not phase.any():
@@ -331,7 +337,7 @@ def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str
 
 
 def _made_of(m: Member, point: str, own: set[str]) -> set[str]:
-    """Pose outputs that a point's coordinates and velocity are made of, as far as they are wanted."""
+    """Return pose outputs that a point's coordinates and velocity are made of, as far as they are wanted."""
     at, moves = (any(f"{of}{point}_{axis}" in own for axis in AXES) for of in ("", "d"))
     found = {name for name in m.moving.get(point, ()) if name} if moves else set()
     if point == TIP:

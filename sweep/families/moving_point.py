@@ -15,7 +15,7 @@ _ORDERS = ("", "d", "d2", "d3")
 
 
 def point_outputs(equation: str) -> tuple[tuple[Output, ...], ...]:
-    """Place, velocity, acceleration and jerk of the working point, three components each."""
+    """Return the place, velocity, acceleration and jerk of the working point, three components each."""
     return tuple(
         tuple(Output(f"{order}{axis}_p", "length", f"{kind}working point along {axis}", equation) for axis in AXES)
         for order, kind in zip(_ORDERS, _KINDS, strict=True)
@@ -23,7 +23,9 @@ def point_outputs(equation: str) -> tuple[tuple[Output, ...], ...]:
 
 
 def magnitude_outputs(equation: str) -> tuple[Output, ...]:
-    """Magnitudes of the working point's velocity, acceleration and jerk, per radian of the family's own crank."""
+    """Return magnitudes of the working point's velocity, acceleration and jerk,
+    per radian of the family's own crank.
+    """
     return (
         Output("speed_p", "length", "magnitude of the working point's velocity analogue", equation),
         Output("acceleration_p", "length", "magnitude of the working point's acceleration analogue", equation),
@@ -32,14 +34,14 @@ def magnitude_outputs(equation: str) -> tuple[Output, ...]:
 
 
 def joint_outputs(joints: Sequence[tuple[str, str]], equation: str) -> tuple[Output, ...]:
-    """Coordinates of joints, given as (suffix of the name, what it is)."""
+    """Return coordinates of joints, given as (suffix of the name, what it is)."""
     return tuple(
         Output(f"{axis}_{name}", "length", f"{text}, along {axis}", equation) for name, text in joints for axis in AXES
     )
 
 
 def ladders(*names: str) -> dict[str, str]:
-    """For each name and its first two derivatives the next derivative."""
+    """Map each name and its first two derivatives to the next derivative."""
     return {f"{low}{name}": f"{high}{name}" for name in names for low, high in pairwise(_ORDERS)}
 
 

@@ -59,7 +59,7 @@ def move_records(rotation: Array, origin: Array, per_pose: Array, per_design: Ar
 
 
 def place(member: str, given: Place | dict[str, Any] | None) -> Place:
-    """A member's place from what a user gives, checked.
+    """Return a member's place from what a user gives, checked.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def place(member: str, given: Place | dict[str, Any] | None) -> Place:
 
 
 def vector(value: object, where: str) -> tuple[float, float, float]:
-    """Three finite numbers.
+    """Return three finite numbers.
 
     Raises
     ------

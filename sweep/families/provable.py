@@ -14,7 +14,7 @@ _by_rocker = cache(box_by_rocker.recorded)
 
 
 def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
-    """Leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
+    """Return leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
     s = searched
     problem = Problem(s.branch, s.objective, s.cos2, s.links, s.target)
     found = proof.explore(
@@ -32,7 +32,7 @@ def _explored_by_rocker(searched: Searched, leaves: tuple[Numbers, ...]) -> tupl
 
 
 def _tests(lengths: tuple[str, ...]) -> tuple[str, ...]:
-    """What each kind of row says where it fails."""
+    """Return what each kind of row says where it fails."""
     room = 5 - len(lengths)
     return (
         "ball on the other side of the crank axis", "limits change places", "crank not positive",

@@ -19,7 +19,7 @@ class Frame(NamedTuple):
     at: Array
 
     def turned(self, vector: list[Any]) -> list[Any]:
-        """Components in the machine's frame of a vector of the member's frame, each (n, m)."""
+        """Return components in the machine's frame of a vector of the member's frame, each (n, m)."""
         return [sum(self.rotation[k, j] * vector[j] for j in range(3)) for k in range(3)]
 
 
@@ -100,11 +100,11 @@ class Distance:
         return ()
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Coordinates of both points."""
+        """Return coordinates of both points."""
         return frozenset(f"{point}_{axis}" for point in self.points for axis in AXES)
 
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """Distance and components, (n, m)."""
+        """Return the distance and components, (n, m)."""
         a, b = self.points
         parts = [found[f"{b}_{axis}"] - found[f"{a}_{axis}"] for axis in AXES]
         return _vector(self.name, parts)
@@ -132,11 +132,11 @@ class Speed:
         return ()
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Velocities of the points."""
+        """Return velocities of the points."""
         return frozenset(velocity for point in self.points for velocity in _velocities(point))
 
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """The speed, (n, m)."""
+        """Return the speed, (n, m)."""
         parts = [found[name] for name in _velocities(self.points[-1])]
         if len(self.points) == 2:
             parts = [part - found[name] for part, name in zip(parts, _velocities(self.points[0]), strict=True)]
@@ -170,11 +170,11 @@ class ShaftTorque:
         return ()
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """The drive torques."""
+        """Return the drive torques."""
         return frozenset(name for name, _ in self.torques)
 
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """The torque, (n, m): equal power on both sides of every gear."""
+        """Return the torque, (n, m): equal power on both sides of every gear."""
         return {self.name: sum(ratio * found[name] for name, ratio in self.torques)}
 
 
@@ -214,14 +214,16 @@ class Shaking:
         return not wanted.isdisjoint((self._moment, *(f"{self._moment}_{axis}" for axis in AXES)))
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """The frame's forces on crank and follower of every member, and the members' moments where one is wanted."""
+        """Return the frame's forces on crank and follower of every member,
+        and the members' moments where one is wanted.
+        """
         kinds = ["force_a{}_{}", "force_d{}_{}", *(["shaking_moment{}_{}"] if self._turning(wanted) else [])]
         return frozenset(
             f"{member}.{kind.format(stage, axis)}" for member, stage in self.members for kind in kinds for axis in AXES
         )
 
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """Force and moment on the frame, (n, m); the force is minus that of the frame."""
+        """Return the force and moment on the frame, (n, m); the force is minus that of the frame."""
         force: list[Any] = [0.0, 0.0, 0.0]
         moment: list[Any] = [0.0, 0.0, 0.0]
         for member, stage in self.members:
@@ -239,6 +241,6 @@ class Shaking:
 
 
 def _vector(name: str, parts: list[Any]) -> dict[str, Any]:
-    """Magnitude and components."""
+    """Return the magnitude and components."""
     columns = {f"{name}_{axis}": part for axis, part in zip(AXES, parts, strict=True)}
     return columns | {name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)}

@@ -60,17 +60,17 @@ _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_with_places(rssp.poses, designs, angles, _VALUES, _JOINTS, wanted)
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """As :func:`poses`, in twice the working precision; for float64 only."""
+    """Compute what :func:`poses` does, in twice the working precision; for float64 only."""
     return filled_with_places(rssp.precise_poses, designs, angles, _VALUES, _JOINTS, wanted)
 
 
 def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Rotatability, margin and largest pressure angle, exact."""
+    """Return rotatability, margin and largest pressure angle, exact."""
     n = len(designs)
     status = np.empty(n, np.uint8)
     least, turns, angle = np.empty(n), np.empty(n), np.empty(n)
@@ -95,7 +95,7 @@ def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
 
 
 def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Both limit positions of the slider, to rounding; the errors are bounds of the rounding errors."""
+    """Return both limit positions of the slider, to rounding; the errors are bounds of the rounding errors."""
     n = len(designs)
     status = np.empty(n, np.uint8)
     values = {o.name: np.empty(n) for o in LIMIT_OUTPUTS}
@@ -137,14 +137,14 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
 
 
 def ellipse(designs: Array) -> Array:
-    """The curve of the coupler direction across the slide, (n, 7)."""
+    """Return the curve of the coupler direction across the slide, (n, 7)."""
     out = np.empty((len(designs), 7))
     rssp.pressure_ellipse(designs, out)
     return out
 
 
 def coupler_square(designs: Array) -> Array:
-    """b^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
+    """Return b^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
     square: Array = designs[:, 1] * designs[:, 1]
     return square
 

@@ -26,12 +26,15 @@ from sweep.families.base import (
 from sweep.families.capabilities import (
     Assembly,
     CrankRockerLoop,
+    Curve,
+    InSeries,
     JointRecords,
     LimitLocus,
     OutputLink,
     Points,
     PressureEllipse,
     Skeleton,
+    constant,
 )
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
@@ -185,9 +188,11 @@ def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
         columns["err_margin"] = error
         if angle is not None:
             # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
+            turning, far = status == st.OK, np.full(n, np.nan)
             with np.errstate(divide="ignore"):
-                linear = error / np.abs(np.sin(2.0 * angle))
-            columns["err_max_pressure_angle"] = np.minimum(linear, np.sqrt(error)) + 8.0 * ROUNDING
+                linear = error[turning] / np.abs(np.sin(2.0 * angle[turning]))
+            far[turning] = np.minimum(linear, np.sqrt(error[turning])) + 8.0 * ROUNDING
+            columns["err_max_pressure_angle"] = far
     return columns
 
 
@@ -305,6 +310,8 @@ def _sampled(accuracy: Accuracy) -> bool:
     return accuracy.samples is not None
 
 
+CURVES = {"dpsi": Curve(1, constant(1.0, 0.0, 0.0)), "d2psi": Curve(2, constant(1.0, 0.0, 0.0))}
+
 FAMILY = Family(
     name="rssr",
     title="spatial crank-rocker",
@@ -325,6 +332,7 @@ FAMILY = Family(
     capabilities=(
         CRANK_ROCKER_SIZES,
         Assembly("discriminant", "pressure_angle", discriminant_scale),
+        InSeries(rssr.FORM, CURVES, {"dpsi": "x1", "d2psi": "x2", "d3psi": "x3"}, rssr.opening),
         JointRecords(joint_records, JOINT_NEEDS, "rocker"),
         PressureEllipse(ellipse),
         CrankRockerLoop(np.ascontiguousarray),

@@ -18,7 +18,7 @@ SLIDER_CRANK = (CRANK, COUPLER, Link("slider", ("c",)))
 
 
 def links(names: str) -> tuple[tuple[str, ...], ...]:
-    """Links that are each given by one length, the names with blanks between."""
+    """Return links that are each given by one length, the names with blanks between."""
     return tuple((name,) for name in names.split())
 
 
@@ -27,7 +27,7 @@ SLIDER_CRANK_SIZES = Dimensions(links("a b"))
 
 
 def parameter(parameters: tuple[Parameter, ...], name: str | None, designs: Array) -> Array:
-    """The column of a parameter, (n,); zeros where there is none."""
+    """Return the column of a parameter, (n,); zeros where there is none."""
     if name is None:
         return np.zeros(len(designs))
     column: Array = designs[:, [p.name for p in parameters].index(name)]
@@ -35,7 +35,7 @@ def parameter(parameters: tuple[Parameter, ...], name: str | None, designs: Arra
 
 
 def crank_axis(parameters: tuple[Parameter, ...], f: str, alpha: str) -> Fixed:
-    """The crank's centre, ``f`` along the axis (0, sin alpha, cos alpha) from the origin."""
+    """Return the crank's centre, ``f`` along the axis (0, sin alpha, cos alpha) from the origin."""
     return Fixed(partial(_along, parameters, f, alpha), partial(_along, parameters, None, alpha))
 
 
@@ -54,7 +54,9 @@ def standing(
     axis: tuple[float, float, float] | None = Z,
     kind: Literal["axis", "slide", "point"] = "axis",
 ) -> Fixed:
-    """A point whose coordinates are parameters, or 0 where none is named, and a constant direction through it."""
+    """Return a point whose coordinates are parameters, or 0 where none is named,
+    and a constant direction through it.
+    """
     return Fixed(partial(_coordinates, parameters, (x, y, z)), None if axis is None else partial(_same, axis), kind)
 
 
@@ -67,7 +69,7 @@ def _same(vector: tuple[float, float, float], designs: Array) -> Array:
 
 
 def line(of: Callable[[Array], tuple[Array, Array]]) -> Fixed:
-    """A line along which something moves: ``of`` gives a point of it and its direction, each (n, 3)."""
+    """Return a line along which something moves: ``of`` gives a point of it and its direction, each (n, 3)."""
     return Fixed(partial(_one_of, of, 0), partial(_one_of, of, 1), "slide")
 
 

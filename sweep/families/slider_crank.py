@@ -43,14 +43,14 @@ _FROM_SPATIAL = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def as_spatial(designs: Array) -> Array:
-    """Design matrix of the same linkage as a spatial slider-crank, (n, 6)."""
+    """Return the design matrix of the same linkage as a spatial slider-crank, (n, 6)."""
     matrix = np.zeros((len(designs), len(rssp.PARAMETERS)), designs.dtype)
     matrix[:, 0], matrix[:, 1], matrix[:, 2], matrix[:, 5] = designs[:, 0], designs[:, 1], -designs[:, 2], designs[:, 3]
     return matrix
 
 
 def turned(angles: Angles) -> Angles:
-    """The crank angles counted from the common perpendicular, with the same bits."""
+    """Return the crank angles counted from the common perpendicular, with the same bits."""
     return Angles(angles.phi + 0.5 * np.pi, np.ascontiguousarray(-angles.sin), angles.cos)
 
 
@@ -64,17 +64,17 @@ def _poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return _poses(rssp.poses, designs, angles, wanted)
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """As :func:`poses`, in twice the working precision; for float64 only."""
+    """Compute what :func:`poses` does, in twice the working precision; for float64 only."""
     return _poses(rssp.precise_poses, designs, angles, wanted)
 
 
 def _as_ours(step: Step) -> Step:
-    """A step of the spatial slider-crank with this family's crank angle."""
+    """Return a step of the spatial slider-crank with this family's crank angle."""
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         found = step.run(as_spatial(designs), wanted, accuracy)

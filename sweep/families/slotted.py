@@ -11,17 +11,8 @@ from kernels.families import slotted
 from kernels.families.slotted.links import links as fill_links
 from kernels.links import DRIVEN, FRAME, SLIDE, TURN
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import (
-    Assembly,
-    Dimensions,
-    Link,
-    LinkBody,
-    LinkJoint,
-    LinkTree,
-    OutputLink,
-    Points,
-    Skeleton,
-)
+from sweep.families.capabilities import Assembly, Dimensions, Link, OutputLink, Points, Skeleton
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.linked import filled_by
 from sweep.families.skeletons import CRANK, crank_axis, links, standing
 
@@ -69,7 +60,7 @@ _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_with_places(_with_slide, designs, angles, _VALUES, _JOINTS, wanted)
 
 
@@ -80,12 +71,12 @@ def _with_slide(*given: Any) -> None:
 
 
 def unit(designs: Array) -> Array:
-    """1 for every design: the discriminant is the squared cosine of the pressure angle itself."""
+    """Return 1 for every design: the discriminant is the squared cosine of the pressure angle itself."""
     return np.ones(len(designs))
 
 
 def pivot(designs: Array) -> Array:
-    """The point (e, 0, g) of the driven axis, (n, 3)."""
+    """Return the point (e, 0, g) of the driven axis, (n, 3)."""
     return np.stack([designs[:, 1], np.zeros(len(designs)), designs[:, 3]], axis=1)
 
 
@@ -100,7 +91,7 @@ LINKS = LinkTree(
     joints=(
         LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
         LinkJoint("b", "ball of the crank", "ball", "crank on the arm, or on the block of the fork", lines=(0, 3)),
-        LinkJoint("c", "guide of the driven link", "guide", "driven link on the arm, or on the block", body=2,
+        LinkJoint("c", "guide of the driven link", "sleeve", "driven link on the arm, or on the block", body=2,
                   freedom=2),
         LinkJoint("d", "bearing of the driven link", "shaft", "frame on the driven link", body=1, freedom=1),
     ),

@@ -29,7 +29,7 @@ FindFamily = Callable[[str | Sequence[str]], Family]
 
 
 def specification(members: Mapping[str, Any], relations: Mapping[str, Any] | None) -> Specification:
-    """What a user wrote, brought to one form.
+    """Return what a user wrote, brought to one form.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def _hashable(value: Any) -> Any:
 
 
 def built(given: Specification, find: FindFamily) -> Machine:
-    """The machine of a specification.
+    """Return the machine of a specification.
 
     Raises
     ------
@@ -131,7 +131,9 @@ def _member(name: str, table: dict[str, Any], earlier: Mapping[str, Member], fin
 
 
 def _eye(member: Member, given: Any, where: str) -> tuple[float, ...]:
-    """A point of the coupler; how a spatial one turns about its own line is not known, so it lies on that line."""
+    """Return a point of the coupler; how a spatial one turns about its own line is not known,
+    so it lies on that line.
+    """
     x, y, z = vector(given, where)
     if coupler_joints(member) is None:
         raise InputError("eye", given, f"a member with a coupler; {member.family.name} has none", where)
@@ -154,13 +156,13 @@ def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[s
 
 
 def _outputs(members: Mapping[str, Member], others: tuple[Any, ...]) -> Mapping[str, Output]:
-    """Pose outputs of the machine: of its members, their points, and relations of several."""
+    """Return pose outputs of the machine: of its members, their points, and relations of several."""
     relations = tuple(r for r in others if not isinstance(r, Timing))
     return assemble("", tuple(members.values()), relations).pose_output
 
 
 def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Reading:
-    """The value of a pose output at a crank angle."""
+    """Return the value of a pose output at a crank angle."""
     where, given = f"machine.relations.{name}", table["value"]
     if len(table) != 1:
         raise InputError(name, dict(table), "value alone", where)
@@ -173,7 +175,7 @@ def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) ->
 
 
 def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Event:
-    """The event where a pose output of the machine, a relation's or a member's, passes a level."""
+    """Return the event where a pose output of the machine, a relation's or a member's, passes a level."""
     where = f"machine.relations.{name}"
     for key in table:
         if key not in EVENT_KEYS:

@@ -10,18 +10,8 @@ from kernels.families import spherical_looper
 from kernels.families.spherical_looper.links import links as fill_links
 from kernels.links import DRIVEN, FRAME, TURN
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import (
-    Arm,
-    Assembly,
-    Dimensions,
-    Fixed,
-    Link,
-    LinkBody,
-    LinkJoint,
-    LinkTree,
-    Points,
-    Skeleton,
-)
+from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Points, Skeleton
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.linked import filled_by, point_of
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.skeletons import crank_axis, links, parameter, standing
@@ -89,24 +79,24 @@ _BLOCKS = (
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_blocks(spherical_looper.poses, designs, angles, _BLOCKS, wanted)
 
 
 def first_coupler_square(designs: Array) -> Array:
-    """b1^2 of every design."""
+    """Return b1^2 of every design."""
     square: Array = designs[:, 1] * designs[:, 1]
     return square
 
 
 def second_coupler_square(designs: Array) -> Array:
-    """b2^2 of every design."""
+    """Return b2^2 of every design."""
     square: Array = designs[:, 18] * designs[:, 18]
     return square
 
 
 def second_shaft(designs: Array) -> Array:
-    """Direction of the shaft of crank 2, (n, 3)."""
+    """Return the direction of the shaft of crank 2, (n, 3)."""
     theta, beta = parameter(PARAMETERS, "theta2", designs), parameter(PARAMETERS, "beta2", designs)
     return np.stack([np.sin(theta) * np.cos(beta), np.sin(theta) * np.sin(beta), np.cos(theta)], axis=1)
 

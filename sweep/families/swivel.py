@@ -8,7 +8,8 @@ from kernels.families import swivel
 from kernels.families.swivel.links import links as fill_links
 from kernels.links import DRIVEN, FRAME, TURN
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Dimensions, Link, LinkBody, LinkJoint, LinkTree, Points, Skeleton
+from sweep.families.capabilities import Dimensions, Link, Points, Skeleton
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.linked import filled_by, point_of
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, point_outputs
 from sweep.families.skeletons import CRANK, crank_axis, links, standing
@@ -38,7 +39,7 @@ _BLOCKS = (ROD_OUTPUTS, *POINT_OUTPUTS, JOINT_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_blocks(swivel.poses, designs, angles, _BLOCKS, wanted)
 
 

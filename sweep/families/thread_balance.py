@@ -98,7 +98,9 @@ class ThreadBalance:
         return (Parameter(f"{self.name}_stock", "length", text, default=self.stock),)
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Coordinates of the moving points, and what the take-ups give; where they are bent too if that is wanted."""
+        """Return coordinates of the moving points, and what the take-ups give;
+        where they are bent too if that is wanted.
+        """
         names = [f"{place}_{axis}" for place in self.path if isinstance(place, str) for axis in AXES]
         taken = [place.taken for place in self.path if isinstance(place, TakeUp)]
         wraps = [place.wrap for place in self.path if isinstance(place, TakeUp) and self._bent(wanted)]
@@ -108,7 +110,7 @@ class ThreadBalance:
         return not wanted.isdisjoint((f"{self.name}_wrap", f"{self.name}_tension"))
 
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """The outputs, (n, m); ``found`` has the main shaft's angle as "phi", and the stock."""
+        """Return the outputs, (n, m); ``found`` has the main shaft's angle as "phi", and the stock."""
         needed: Any = 0.0 * found[PHI]
         taken: Any = 0.0 * found[PHI]
         wraps: list[Any] = []
@@ -138,7 +140,7 @@ class ThreadBalance:
         return {f"{self.name}_{key}": values for key, values in columns.items()}
 
     def _tension(self, surplus: Any, wraps: Sequence[Any]) -> Any:
-        """Tension behind the last bend by the law of contours, with the reported constants of the thread."""
+        """Return the tension behind the last bend by the law of contours, with the reported constants of the thread."""
         pull = (self.tension - self.stiffness * surplus) / GF
         pull = np.where(np.real(pull) > 0.0, pull, 0.0)
         alpha, beta, bending, count, density = (float(p.default or 0.0) for p in (ALPHA, BETA, BENDING, COUNT, DENSITY))
@@ -151,7 +153,9 @@ class ThreadBalance:
 
 
 def bend(before: Vector, after: Vector) -> Any:
-    """Angle by which a thread turns between unit vectors, (13): 2 arctan(|e1 - e2|/|e1 + e2|), exact near 0 and pi."""
+    """Return the angle by which a thread turns between unit vectors, (13):
+    2 arctan(|e1 - e2|/|e1 + e2|), exact near 0 and pi.
+    """
     off, both = (_size([a + sign * b for a, b in zip(before, after, strict=True)]) for sign in (-1.0, 1.0))
     with np.errstate(divide="ignore", invalid="ignore"):  # folded back upon itself: arctan of infinity, half a turn
         folded = np.real(both) == 0.0
@@ -163,7 +167,7 @@ def _size(parts: Sequence[Any]) -> Any:
 
 
 def _piece(start: Vector, end: Vector) -> tuple[Any, Vector]:
-    """Length and direction of a straight piece; a piece of no length has no direction (nan)."""
+    """Return the length and direction of a straight piece; a piece of no length has no direction (nan)."""
     parts = [b - a for a, b in zip(start, end, strict=True)]
     length = _size(parts)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -179,14 +183,14 @@ def _point(place: Any, found: Mapping[str, Any]) -> Vector:
 
 
 def _over(curve: TableCurve, phi: Any) -> Any:
-    """The curve at real or complex angles (derivative by the complex step)."""
+    """Return the curve at real or complex angles (derivative by the complex step)."""
     if not np.iscomplexobj(phi):
         return curve(phi)
     return curve(phi.real) + 1j * phi.imag * curve.slope(phi.real)
 
 
 def thread_balance(name: str, table: Mapping[str, Any], members: Mapping[str, Member]) -> ThreadBalance:
-    """The relation of a user's table, checked.
+    """Return the relation of a user's table, checked.
 
     Raises
     ------
@@ -211,7 +215,9 @@ def thread_balance(name: str, table: Mapping[str, Any], members: Mapping[str, Me
 
 
 def _bends(path: Sequence[Place]) -> int | None:
-    """Number of bends along a path: take-ups, and points between two others; None where no piece is straight."""
+    """Return the number of bends along a path: take-ups, and points between two others;
+    None where no piece is straight.
+    """
     bends, row, pieces = 0, 0, 0
     for place in path:
         row = 0 if isinstance(place, TakeUp) else row + 1

@@ -8,7 +8,7 @@ from sweep.families.base import Parameter
 
 
 class Range(NamedTuple):
-    """Between which values of a quantity the reported constants were measured."""
+    """The values of a quantity between which the reported constants were measured."""
 
     name: str
     unit: str

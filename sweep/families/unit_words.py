@@ -28,7 +28,7 @@ _PRODUCT = re.compile(r"(1|rad|s|N|[a-z_]{2,})(\^[2-9])?([*/](rad|s|N|[a-z_]{2,}
 
 
 def spelt_out(word: str) -> str:
-    """The internal unit of a product of words.
+    """Return the internal unit of a product of words.
 
     >>> spelt_out("length^4"), spelt_out("force/length"), spelt_out("1/length")
     ('mm^4', 'N/mm', '1/mm')
@@ -37,7 +37,7 @@ def spelt_out(word: str) -> str:
 
 
 def is_known(word: str) -> bool:
-    """Whether a unit is written in these words, so that study files can convert it and results can name it.
+    """Return whether a unit is written in these words, so that study files can convert it and results can name it.
 
     >>> is_known("length/time"), is_known("parsec"), is_known("N s")
     (True, False, False)
@@ -46,7 +46,8 @@ def is_known(word: str) -> bool:
 
 
 def of_derivative(unit: str, variable: str) -> str:
-    """The unit of the derivative of a quantity by a variable of the domain; radians are left out of quotients.
+    """Return the unit of the derivative of a quantity by a variable of the domain;
+    radians are left out of quotients.
 
     >>> of_derivative("length", "rad"), of_derivative("rad", "rad"), of_derivative("N", "length")
     ('length', '1', 'N/length')

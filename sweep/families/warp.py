@@ -18,7 +18,7 @@ LINKS = (
 
 
 def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
-    """The back-rest in the plane of the beam; ``angle`` is the entry's output of the bracket's angle."""
+    """Return the back-rest in the plane of the beam; ``angle`` is the entry's output of the bracket's angle."""
 
     def column(name: str, designs: Array) -> Array:
         return parameter(parameters, name, designs)[:, None]
@@ -28,7 +28,7 @@ def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
         return np.stack([-np.cos(psi), np.sin(psi), 0.0 * psi], axis=1)
 
     def made(needs: tuple[str, ...], at: Callable[..., tuple[Array, Array]]) -> Made:
-        """A point of the plane: ``at(column, designs, rho, *needs)`` gives its x and y, each (n, m)."""
+        """Return a point of the plane: ``at(column, designs, rho, *needs)`` gives its x and y, each (n, m)."""
 
         def place(designs: Array, angles: Angles, found: Columns) -> Array:
             values = (np.asarray(found[name], np.float64) for name in needs)
@@ -62,31 +62,31 @@ Columned = Callable[[str], Array]
 
 
 def _slider(of: Columned, rho: Array, phi: Array, reach: Array) -> tuple[Array, Array]:
-    """The slider's foot on the line of the bracket; (1)."""
+    """Return the slider's foot on the line of the bracket; (1)."""
     return of("a2") - reach * np.cos(phi), of("b2") + reach * np.sin(phi)
 
 
 def _spring(of: Columned, rho: Array, phi: Array) -> tuple[Array, Array]:
-    """The spring's end on the bracket; (6)."""
+    """Return the spring's end on the bracket; (6)."""
     turn = phi + of("nu")
     return of("a2") - of("lM") * np.cos(turn), of("b2") + of("lM") * np.sin(turn)
 
 
 def _pin(of: Columned, rho: Array, h: Array) -> tuple[Array, Array]:
-    """Where the pin touches the guide; (2)."""
+    """Return the point where the pin touches the guide; (2)."""
     return of("xE") - h * np.cos(of("psi")), of("yE") + h * np.sin(of("psi"))
 
 
 def _on_beam(of: Columned, rho: Array, theta: Array) -> tuple[Array, Array]:
-    """Where the yarn leaves the beam, which it does on the side away from the fell; (3)."""
+    """Return the point where the yarn leaves the beam, on the side away from the fell; (3)."""
     return -rho * np.cos(theta), rho * np.sin(theta)
 
 
 def _from_beam(of: Columned, rho: Array, x: Array, y: Array, theta: Array) -> tuple[Array, Array]:
-    """Where it meets the back-rest; (3)."""
+    """Return the point where the yarn meets the back-rest; (3)."""
     return x - of("r") * np.cos(theta), y + of("r") * np.sin(theta)
 
 
 def _to_fell(of: Columned, rho: Array, x: Array, y: Array, gamma: Array) -> tuple[Array, Array]:
-    """Where it leaves the back-rest; (4)."""
+    """Return the point where the yarn leaves the back-rest; (4)."""
     return x + of("r") * np.sin(gamma), y + of("r") * np.cos(gamma)

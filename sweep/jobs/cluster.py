@@ -99,7 +99,7 @@ class Dask:
         return self._client
 
     def _jobs(self, jobs: int) -> Callable[[], int]:
-        """How many threads the cluster has at the moment; workers may come and go."""
+        """Return how many threads the cluster has at the moment; workers may come and go."""
 
         def now() -> int:
             if time.monotonic() - self._counted > COUNT_SECONDS:

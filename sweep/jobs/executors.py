@@ -30,7 +30,7 @@ UNTRACKED = "ignore:resource_tracker:UserWarning"
 
 
 class Here:
-    """One after the other in the thread that asks."""
+    """Runs tasks one after the other in the thread that asks."""
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """See `Executor`."""
@@ -77,7 +77,7 @@ class Processes:
 
 
 def worker_processes(jobs: int) -> Any:
-    """The pool of worker processes; they hear no signals and end with this process."""
+    """Return the pool of worker processes; they hear no signals and end with this process."""
     from joblib.externals.loky import get_reusable_executor
     from joblib.externals.loky.backend import resource_tracker
 
@@ -105,7 +105,7 @@ _searches: ContextVar[Executor | None] = ContextVar("linksweep_searches", defaul
 
 
 def executor(name: str, jobs: int) -> Executor:
-    """The executor of that name in `EXECUTORS`, checked together with the number of its workers.
+    """Return the executor of that name in `EXECUTORS`, checked together with the number of its workers.
 
     Parameters
     ----------
@@ -130,13 +130,13 @@ def executor(name: str, jobs: int) -> Executor:
 
 
 def for_tasks(place: Executor, count: int) -> Executor:
-    """Where so many tasks run: a single one is not worth a pool of this machine."""
+    """Choose where so many tasks run: a single one is not worth a pool of this machine."""
     return Here() if count < 2 and isinstance(place, (Threads, Processes)) else place
 
 
 @contextmanager
 def at_work(place: Executor) -> Iterator[Executor]:
-    """Within this context the searches use this executor too, unless it shares the interpreter with them.
+    """Let the searches within this context use this executor too, unless it shares the interpreter with them.
 
     An executor that is a context manager keeps its workers until the context ends.
     """
@@ -152,5 +152,5 @@ def at_work(place: Executor) -> Iterator[Executor]:
 
 
 def place_of_searches() -> Executor:
-    """Where starts of the optimiser run that are worth a process: on the cluster of the run, if it has one."""
+    """Choose where starts of the optimiser run that are worth a process: on the cluster of the run, if it has one."""
     return _searches.get() or Processes()

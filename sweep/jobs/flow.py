@@ -28,7 +28,7 @@ class Executor(Protocol):
     """Runs a task for many numbers."""
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
-        """What the task returns, in the order in which it is ready.
+        """Yield what the task returns, in the order in which it is ready.
 
         Parameters
         ----------
@@ -52,7 +52,7 @@ def flow(
     stop: Stop,
     grace: float = math.inf,
 ) -> Iterator[T]:
-    """Outcomes as they come; one number more than there are workers is on its way, so that none of them waits.
+    """Yield outcomes as they come; one number more than there are workers is on its way, so that none of them waits.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ class Progress:
                 self._line()
 
     def advance(self, designs: int) -> None:
-        """So many more designs are finished."""
+        """Count so many more designs as finished."""
         with self._listener():
             self.done += designs
             if self.bar is not None:
@@ -93,7 +93,7 @@ class Progress:
                 self._line_if_due()
 
     def expect(self, total: int) -> None:
-        """So much there is in all, as is known by now."""
+        """Note how much there is in all, as is known by now."""
         with self._listener():
             self.total = total
             if self.bar is not None:
@@ -152,7 +152,7 @@ class Phases:
         self.end()
 
     def say(self, label: str, done: int = 0, total: int = 0, unit: str = "steps") -> None:
-        """So much is done of this piece of work; another one than before begins its own count."""
+        """Note how much is done of this piece of work; another one than before begins its own count."""
         if self.now is None or self.now.label != label:
             self.end()
             self.now = Progress(label, total, done, self.show, self.stream, unit, quiet=True).__enter__()
@@ -163,7 +163,7 @@ class Phases:
             self.now.advance(done - self.now.done)
 
     def end(self) -> None:
-        """The present piece is finished."""
+        """Note that the present piece is finished."""
         if self.now is not None:
             self.now.__exit__(None, None, None)
             self.now = None

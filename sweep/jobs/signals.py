@@ -55,7 +55,8 @@ class Stop:
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """Within this context a signal raises KeyboardInterrupt as well: for work of one process that looks at no flag.
+        """Let a signal within this context raise KeyboardInterrupt as well:
+        for work of one process that looks at no flag.
 
         It ends the context without a word; the flag says why.  A compiler may swallow the interruption and fail over it
         later: once the flag is set, any error is a consequence.
@@ -73,7 +74,7 @@ class Stop:
 
 @contextmanager
 def stop_on_signal() -> Iterator[Stop]:
-    """Within this context SIGINT and SIGTERM set the flag (a handler that raises can hang a pool of workers).
+    """Let SIGINT and SIGTERM set the flag within this context (a handler that raises can hang a pool of workers).
 
     Outside the main thread Python allows no handlers; then the flag is set by errors only.
     """
@@ -91,7 +92,8 @@ def stop_on_signal() -> Iterator[Stop]:
 
 @contextmanager
 def unheard() -> Iterator[None]:
-    """Processes begun within do not hear signals: Ctrl-C reaches the whole group, also who is still starting up.
+    """Keep signals from processes begun within:
+    Ctrl-C reaches the whole group, also those that are still starting up.
 
     This process hears what came in between as soon as the context ends.
     """
@@ -121,7 +123,7 @@ _promised: list[tuple[float, str]] = []
 
 @contextmanager
 def leaving_within(seconds: float, words: str) -> Iterator[None]:
-    """From a signal within this context on the process has so many seconds to leave; then it ends, whatever it does.
+    """Give the process so many seconds to leave after a signal within this context; then it ends, whatever it does.
 
     For a program of its own, not for a library: compiling and other people's code look at no flag.  Outside of
     :func:`stop_on_signal` a signal raises KeyboardInterrupt, or :class:`Terminated`.
@@ -158,7 +160,7 @@ def _interruption(number: int) -> KeyboardInterrupt:
 
 
 def _say_nothing(what: object) -> None:
-    """In place of the words about an interruption in the middle of somebody's callback."""
+    """Say nothing, in place of the words about an interruption in the middle of somebody's callback."""
 
 
 def _countdown(number: int) -> None:
@@ -176,7 +178,8 @@ def _leave(number: int, words: str) -> None:
 
 
 def depend_on_parent(parent: int) -> None:
-    """In a worker process: leave signals, which a terminal sends to the whole group, to the parent, and die with it.
+    """Leave signals, which a terminal sends to the whole group, to the parent of this worker process,
+    and die with it.
 
     Without its parent a worker holds no lock on the folder and would wait for work for minutes.
     """

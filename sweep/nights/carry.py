@@ -22,7 +22,7 @@ TABLES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store
 
 @dataclass(frozen=True)
 class Carried:
-    """From which night how many chunks were linked; ``whole`` if there is nothing left to compute."""
+    """The night from which chunks were linked, and how many; ``whole`` if there is nothing left to compute."""
 
     night: str
     chunks: int
@@ -77,7 +77,8 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
 
 
 def searched(study: Study, folder: Path) -> bool:
-    """Whether optimum and front in a folder, as far as the study asks for them, are its own and of these sources.
+    """Return whether optimum and front in a folder, as far as the study asks for them,
+    are its own and of these sources.
 
     A search that time has cut short is made again.
     """
@@ -97,7 +98,7 @@ def searched(study: Study, folder: Path) -> bool:
 
 
 def _link_report(source: Path, target: Path) -> None:
-    """The report and what belongs to it.  What a new report would write into is copied, not linked."""
+    """Link the report and what belongs to it; what a new report would write into is copied."""
     if not (source / REPORT).is_file():
         return
     copied = [*(source / FIGURES).glob("*.svg"), *(source / name.removeprefix("_") for name in TABLES)]

@@ -40,7 +40,8 @@ class Changes:
 
 
 def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str]]:
-    """Headline figures of a complete dataset and their units: designs, those within the limits, the best objective.
+    """Return headline figures of a complete dataset and their units:
+    designs, those within the limits, the best objective.
 
     The best objective is that of the optimum, or where the study has none that of the best design of the sweep.
     """
@@ -143,7 +144,7 @@ def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
 
 
 def slower(name: str, seconds: float, history: Sequence[NightRecord]) -> Changes:
-    """Whether a study takes longer than the recent median allows; one slow night by itself is no alarm.
+    """Return whether a study takes longer than the recent median allows; one slow night by itself is no alarm.
 
     Parameters
     ----------
@@ -174,7 +175,7 @@ def _far(old: float, new: float, rtol: float) -> bool:
 
 
 def _role(path: Path, role: str) -> pd.Series[Any] | None:
-    """One row of the optimiser's table."""
+    """Return one row of the optimiser's table."""
     if not path.is_file():
         return None
     table = store.read_table(path)

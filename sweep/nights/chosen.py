@@ -25,7 +25,7 @@ class Chosen:
 
 
 def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
-    """The studies in these places: study files, folders with one, or folders of such folders.
+    """Return the studies in these places: study files, folders with one, or folders of such folders.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def _files(place: Path) -> list[Path]:
 
 
 def in_order(studies: Sequence[Chosen], earlier: Sequence[Path]) -> list[Chosen]:
-    """What was cut off or not begun in the last night comes first, the rest in the order given.
+    """Sort the studies: what was cut off or not begun in the last night comes first, the rest in the order given.
 
     Parameters
     ----------

@@ -47,12 +47,12 @@ def one_at_a_time(into: Path) -> Iterator[None]:
 
 
 def nights(into: Path) -> list[Path]:
-    """The folders of all nights, ended or not, the oldest first."""
+    """Return the folders of all nights, ended or not, the oldest first."""
     return sorted(path for path in into.iterdir() if _NAME.fullmatch(path.name) and path.is_dir())
 
 
 def good_nights(into: Path) -> list[Path]:
-    """The nights in which every study is complete, the oldest first."""
+    """Return the nights in which every study is complete, the oldest first."""
     found = []
     for path in nights(into):
         record = read_night(path)

@@ -97,7 +97,7 @@ class _Night:
         return self.settings.budget - (time.monotonic() - self.begin)
 
     def through(self, studies: list[Chosen]) -> NightRecord:
-        """All studies, then what concerns the night as a whole."""
+        """Return all studies, then what concerns the night as a whole."""
         names = ", ".join(one.name for one in studies)
         self.journal.note("night", f"night {self.folder.name}: {names}", studies=[one.name for one in studies])
         records: dict[str, StudyRecord] = {}
@@ -123,7 +123,7 @@ class _Night:
         return result
 
     def study(self, one: Chosen) -> StudyRecord:
-        """One study: link, compute, report, compare."""
+        """Link, compute, report and compare one study."""
         if one.study is None:
             return StudyRecord("failed", 2, message=one.fault)
         if self.left <= 0.0:
@@ -150,7 +150,7 @@ class _Night:
         return call([*words, *(["--smoke"] if self.settings.smoke else [])], target / RUN_LOG, self.left)
 
     def finished(self, study: Study, target: Path, carried: Carried | None, ended: Ended) -> StudyRecord:
-        """Report, figures and comparison of a complete dataset."""
+        """Return the report, figures and comparison of a complete dataset."""
         message, cut = "", ended.message if ended.code == TimeUsedUp.exit_code else ""
         if not (target / REPORT).is_file():
             message = call(["report", str(target)], target / RUN_LOG, max(self.left, 0.0)).message
@@ -184,7 +184,7 @@ class _Night:
     def figures(
         self, study: Study, target: Path, carried: Carried | None
     ) -> tuple[Mapping[str, float], Mapping[str, str]]:
-        """Headline figures; those of linked data are known."""
+        """Return headline figures; those of linked data are known."""
         if carried and carried.whole:
             known = read_night(self.settings.into / carried.night)
             if known is not None and study.name in known.studies and known.studies[study.name].figures:
@@ -192,12 +192,12 @@ class _Night:
         return figures(study, target / store.DESIGNS)
 
     def base(self, name: str) -> Path | None:
-        """The last good night that has this study whole."""
+        """Return the last good night that has this study whole."""
         return next((night for night in self.good if store.is_complete(night / name / store.DESIGNS)), None)
 
 
 def exit_code(studies: Mapping[str, StudyRecord]) -> int:
-    """What a night ends with: the gravest of its studies' codes."""
+    """Return what a night ends with: the gravest of its studies' codes."""
     failed = [record.code for record in studies.values() if record.state == "failed"]
     if failed:
         return StoreError.exit_code if StoreError.exit_code in failed else failed[0]
@@ -208,7 +208,7 @@ def exit_code(studies: Mapping[str, StudyRecord]) -> int:
 
 
 def _words(name: str, record: StudyRecord) -> str:
-    """One study in words."""
+    """Return one study in words."""
     if record.state == "waiting":
         return f"{name}: not begun, the time was over"
     linked = f", {record.linked} chunks linked from {record.linked_from}" if record.linked else ""
@@ -226,7 +226,7 @@ def _words(name: str, record: StudyRecord) -> str:
 
 
 def _verdict(record: NightRecord) -> str:
-    """The last line of a night."""
+    """Return the last line of a night."""
     changed = [f"{name} ({own.changed})" for name, own in record.studies.items() if own.changed]
     late = [name for name, own in record.studies.items() if own.state in ("cut", "waiting")]
     failed = [name for name, own in record.studies.items() if own.state == "failed"]

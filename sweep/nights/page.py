@@ -100,7 +100,7 @@ def write_page(into: Path) -> Path:
 
 
 def study_rows(name: str, nights: Sequence[NightRecord], into: Path) -> StudyRows:
-    """What the page says of one study."""
+    """Return what the page says of one study."""
     mine = [(night.name, night.studies[name]) for night in nights if name in night.studies]
     last_night, last = mine[-1]
     reports = [night for night, record in mine if record.report and (into / night / name / "report.html").is_file()]
@@ -120,7 +120,7 @@ def study_rows(name: str, nights: Sequence[NightRecord], into: Path) -> StudyRow
 
 
 def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> Trend:
-    """A headline figure, in the unit a designer reads."""
+    """Return a headline figure, in the unit a designer reads."""
 
     def shown(record: StudyRecord) -> str:
         unit = record.units.get(name, "")
@@ -136,7 +136,7 @@ def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[s
 
 
 def _times(mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> Trend:
-    """Nights in which something was computed."""
+    """Return nights in which something was computed."""
     points = [
         Point(order.index(night), record.seconds, record.changed == SLOWER, f"{night}: {record.seconds:.3g} s")
         for night, record in mine

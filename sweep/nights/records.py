@@ -57,7 +57,7 @@ class NightRecord:
         return all(record.state == "complete" for record in self.studies.values())
 
     def as_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """Return the record as JSON has it."""
         return asdict(self) | {"good": self.good}
 
 
@@ -67,7 +67,7 @@ def write_night(folder: Path, record: NightRecord) -> None:
 
 
 def read_night(folder: Path) -> NightRecord | None:
-    """The record of a night; None where the night has not come to its end."""
+    """Return the record of a night; None where the night has not come to its end."""
     path = folder / NIGHT
     if not path.is_file():
         return None
@@ -85,7 +85,7 @@ def append_history(into: Path, record: NightRecord) -> None:
 
 
 def read_history(into: Path) -> list[NightRecord]:
-    """All nights that came to their end, the oldest first; lines that cannot be read are left out."""
+    """Return all nights that came to their end, the oldest first; lines that cannot be read are left out."""
     path = into / HISTORY
     if not path.is_file():
         return []

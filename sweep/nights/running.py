@@ -60,7 +60,7 @@ def call(words: Sequence[str], log: Path, seconds: float) -> Ended:
 
 
 def _wait(process: subprocess.Popen[bytes], seconds: float) -> int:
-    """Exit code as a shell has it; 124 where the time was over."""
+    """Return the exit code as a shell has it; 124 where the time was over."""
     try:
         code = process.wait(timeout=max(seconds, 0.0))
     except subprocess.TimeoutExpired:

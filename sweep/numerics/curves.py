@@ -34,13 +34,13 @@ class TableCurve:
     values: tuple[float, ...]
 
     def __call__(self, phi: Array) -> Array:
-        """Values at any angles, of the same shape."""
+        """Return values at any angles, of the same shape."""
         start = self.phi[0]
         found: Array = self._cubics(start + np.mod(phi - start, TWO_PI))
         return found
 
     def slope(self, phi: Array) -> Array:
-        """Derivative at any angles."""
+        """Return the derivative at any angles."""
         start = self.phi[0]
         found: Array = self._cubics(start + np.mod(phi - start, TWO_PI), 1)
         return found
@@ -66,7 +66,7 @@ class SeriesCurve:
     sin: tuple[float, ...] = ()
 
     def __call__(self, phi: Array) -> Array:
-        """Values at any angles, of the same shape."""
+        """Return values at any angles, of the same shape."""
         total = np.full_like(phi, self.mean)
         for factors, function in ((self.cos, np.cos), (self.sin, np.sin)):
             for order, factor in enumerate(factors, start=1):
@@ -78,7 +78,7 @@ Curve: TypeAlias = TableCurve | SeriesCurve
 
 
 def table_curve(phi: Array, values: Array) -> TableCurve:
-    """The curve of a table, its points in any order of the turn.
+    """Return the curve of a table, its points in any order of the turn.
 
     Parameters
     ----------

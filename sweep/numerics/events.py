@@ -19,7 +19,7 @@ Functions: TypeAlias = Callable[[Index, Array], Array]
 
 
 def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
-    """Designs (k,) and crank angles (k,) in [0, 2 pi) at which one of the functions changes its sign.
+    """Return designs (k,) and crank angles (k,) in [0, 2 pi) at which one of the functions changes its sign.
 
     Parameters
     ----------
@@ -68,7 +68,9 @@ def _one(functions: Functions, row: Index, which: Index, phi: Array) -> Array:
 
 
 def _reaches(values: Array, left: Array, right: Array, row: Index, column: Index, which: Index) -> Mask:
-    """Whether a dip may go through zero: a parabola goes below its lowest sample by an eighth of the bend at most."""
+    """Return whether a dip may go through zero:
+    a parabola goes below its lowest sample by an eighth of the bend at most.
+    """
     a, b, c = (np.abs(y[row, column, which]) for y in (left, values, right))
     return np.asarray(b <= a + c - 2.0 * b)
 
@@ -89,7 +91,7 @@ def _bottom(
 
 
 def with_events(edges: Array, rows: Index, phi: Array) -> Array:
-    """Ends of panels (n, p + 1) with further ends (k,) put in; rows with fewer of them repeat their last end."""
+    """Return ends of panels (n, p + 1) with further ends (k,) put in; rows with fewer of them repeat their last end."""
     n = len(edges)
     count = np.bincount(rows, minlength=n)
     added = np.repeat(edges[:, -1:], int(count.max(initial=0)), axis=1)

@@ -74,7 +74,7 @@ class _Panels(NamedTuple):
 
 
 def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
-    """Integrals of n curves over x, each to a relative error.
+    """Return integrals of n curves over x, each to a relative error.
 
     Parameters
     ----------

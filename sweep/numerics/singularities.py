@@ -33,11 +33,11 @@ class Singularities(NamedTuple):
     rho: Array
 
     def only(self, which: Index) -> Singularities:
-        """Those of some designs."""
+        """Return those of some designs."""
         return Singularities(self.phi[which], self.rho[which])
 
     def distance(self, phi: Array) -> Array:
-        """How far the nearest zero is from crank angles (n,), or (n, m)."""
+        """Return how far the nearest zero is from crank angles (n,), or (n, m)."""
         one = phi.reshape(len(self.phi), -1)
         away = np.abs(one[:, :, None] - self.phi[:, None, :])
         away = np.abs(away - TWO_PI * np.round(away / TWO_PI))
@@ -46,7 +46,7 @@ class Singularities(NamedTuple):
 
 
 def singularities(discriminants: Sequence[Curve], n: int) -> Singularities:
-    """The nearest complex zeros of the discriminants of n designs, from their dips over the turn.
+    """Return the nearest complex zeros of the discriminants of n designs, from their dips over the turn.
 
     A dip D + D''/2 x^2 vanishes at x = +- i rho with rho^2 = D/(D''/2).  The parabola through three samples is taken
     again ever closer to the dip.
@@ -87,7 +87,8 @@ def _dips(curve: Curve, n: int, number: int) -> Singularities:
 
 
 def crowded(near: Singularities, share: float) -> Array:
-    """Crank angles (n, m) of a turn in rising order, spaced by at most a share of the distance of the nearest zero.
+    """Return crank angles (n, m) of a turn in rising order,
+    spaced by at most a share of the distance of the nearest zero.
 
     About each zero they stand at phi + rho sinh(t) for equidistant t, which spaces them by hypot(rho, x) dt.
     """
@@ -100,7 +101,7 @@ def crowded(near: Singularities, share: float) -> Array:
 
 
 def turn_edges(near: Singularities, share: float) -> Array:
-    """Ends of panels of a turn from 0 to 2 pi, (n, p + 1), no longer than a share of the distance of a zero."""
+    """Return ends of panels of a turn from 0 to 2 pi, (n, p + 1), no longer than a share of the distance of a zero."""
     inner = crowded(near, share)
     ends = np.zeros((len(inner), 1))
     return np.concatenate([ends, inner, ends + TWO_PI], axis=1)

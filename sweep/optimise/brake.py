@@ -15,6 +15,6 @@ class Brake:
         self.stop, self.pulled = stop, False
 
     def __call__(self) -> bool:
-        """Whether to stop."""
+        """Return whether to stop."""
         self.pulled = self.pulled or time.monotonic() >= self.end or (self.stop is not None and self.stop())
         return self.pulled

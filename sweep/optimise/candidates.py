@@ -31,7 +31,8 @@ OUTSIDE, STUCK = 1e100, 1e200  # above every objective: misses its limits, does 
 
 
 def from_sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int) -> Array:
-    """Diverse good designs, best first: a Sobol sample between the bounds, and what is found around the best of it.
+    """Return the diverse good designs, best first:
+    a Sobol sample between the bounds, and what is found around the best of it.
 
     Ranked by :func:`ranking`.  Same arguments, same designs.
 
@@ -70,7 +71,9 @@ def from_sample(problem: Problem, signs: Sequence[dict[str, float]], count: int,
 
 
 def _one_turn(problem: Problem) -> tuple[Array, Array]:
-    """Where samples are drawn: what repeats itself after a turn only in the middle turn of its bounds."""
+    """Return the bounds in which samples are drawn:
+    what repeats itself after a turn only in the middle turn of its bounds.
+    """
     periodic = () if problem.coordinates is None else problem.coordinates.periodic
     share = np.array(
         [
@@ -82,7 +85,9 @@ def _one_turn(problem: Problem) -> tuple[Array, Array]:
 
 
 def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array) -> Array:
-    """Ranks of designs that the poses found good; where these hid most of a peak, the rank by the true extrema."""
+    """Return ranks of designs that the poses found good;
+    where these hid most of a peak, the rank by the true extrema.
+    """
     out = merit.copy()
     for own, base in enumerate(bases):
         rows = np.flatnonzero((kind == own) & np.isfinite(merit))
@@ -95,7 +100,7 @@ def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[
 def _improved(
     problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Every design replaced by the best of a sample around it, again and again; no better one halves the radius."""
+    """Replace every design by the best of a sample around it, again and again; no better one halves the radius."""
     place, merit = place.copy(), merit.copy()
     radius = np.full(len(place), RADIUS)
     for _ in range(ROUNDS):
@@ -116,7 +121,8 @@ def _improved(
 
 
 def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> Array:
-    """Objective where all limits are nearly kept; far above it the largest violation; then what does not turn.
+    """Return the objective where all limits are nearly kept; far above it the largest violation;
+    then what does not turn.
 
     Cheap limits first: parameters, then margins and pressure angles, then the others; only designs that nearly keep
     them go on.  Infinite where there is no design or no objective.
@@ -159,7 +165,7 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
 
 
 def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accuracy) -> dict[str, Array]:
-    """Outputs and parameters (n,) of designs."""
+    """Return outputs and parameters (n,) of designs."""
     from sweep.evaluation.summaries import design_outputs
 
     names = problem.family.parameter_names
@@ -171,7 +177,9 @@ def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accur
 
 
 def _missed(limit: Any, value: Array) -> Array:
-    """Violation relative to the bound (n,); an output that a design does not have misses its limit by far."""
+    """Return the violation relative to the bound (n,);
+    an output that a design does not have misses its limit by far.
+    """
     value = compared(limit.output, value)
     out = np.zeros(len(value))
     for bound, sense in ((limit.minimum, 1.0), (limit.maximum, -1.0)):

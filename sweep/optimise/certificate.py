@@ -39,7 +39,7 @@ class Multipliers:
 
 
 def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, within: float = ACTIVE) -> Multipliers:
-    """Multipliers of the active rows and bounds by non-negative least squares (equations are free in sign).
+    """Return multipliers of the active rows and bounds by non-negative least squares (equations are free in sign).
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class Result:
 
 
 def in_words(labels: tuple[Label, ...], found: Multipliers, variables: tuple[str, ...]) -> dict[str, float]:
-    """Active limits and bounds with their multipliers, by name; several points of one limit are one."""
+    """Return active limits and bounds with their multipliers, by name; several points of one limit are one."""
     words: dict[str, float] = {}
     for label, weight in zip(labels, found.weights, strict=True):
         if label.side != "objective" and abs(weight) > 1e-9:

@@ -34,14 +34,14 @@ class Coordinates(Protocol):
         ...
 
     def make(self, columns: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The parameters in ``made``, (n,) each, nan where there is no such design.
+        """Return the parameters in ``made``, (n,) each, nan where there is no such design.
 
         ``columns`` holds what is given and all other parameters; complex columns give complex parameters.
         """
         ...
 
     def read(self, family: Family, designs: Array) -> Mapping[str, Array]:
-        """What is given, (n,) each, of designs (n, P)."""
+        """Return what is given, (n,) each, of designs (n, P)."""
         ...
 
 
@@ -79,7 +79,7 @@ class LocusCoordinates:
         return f"branch{self.stage.number}"
 
     def make(self, columns: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The links that do what is prescribed; nan where the locus has no mechanism there."""
+        """Return the links that do what is prescribed; nan where the locus has no mechanism there."""
         matrix = np.column_stack([columns[name] for name in self._asked])
         matrix[:, 0] *= -columns[self._branch].real
         links = self.stage.links_of(self.stage.way.solve(matrix))

@@ -15,7 +15,7 @@ from sweep.families.base import Array
 
 
 def times(a: Any, b: Any) -> Array:
-    """``a @ b`` of two matrices, or of a matrix and a vector on either side."""
+    """Return ``a @ b`` of two matrices, or of a matrix and a vector on either side."""
     left, right = np.asarray(a, np.float64), np.asarray(b, np.float64)
     first = np.ascontiguousarray(left.reshape(1, -1) if left.ndim == 1 else left)
     second = np.ascontiguousarray(right.reshape(-1, 1) if right.ndim == 1 else right)
@@ -25,7 +25,9 @@ def times(a: Any, b: Any) -> Array:
 
 
 def least_squares(a: Array, b: Array, tolerance: float) -> Array:
-    """Shortest x with the least ``|a x - b|``; what depends on other columns up to ``tolerance`` does not count."""
+    """Return the shortest x with the least ``|a x - b|``;
+    what depends on other columns up to ``tolerance`` does not count.
+    """
     x = np.zeros(a.shape[1])
     if a.size:
         dense.least_squares(np.ascontiguousarray(a, np.float64), np.ascontiguousarray(b, np.float64), tolerance, x)
@@ -33,7 +35,7 @@ def least_squares(a: Array, b: Array, tolerance: float) -> Array:
 
 
 def non_negative(a: Array, b: Array) -> Array:
-    """Smallest ``|a x - b|`` with x >= 0."""
+    """Return the smallest ``|a x - b|`` with x >= 0."""
     x = np.zeros(a.shape[1])
     if a.size:
         nnls.nnls(np.ascontiguousarray(a, np.float64), np.ascontiguousarray(b, np.float64), x)
@@ -41,7 +43,7 @@ def non_negative(a: Array, b: Array) -> Array:
 
 
 def symmetric(a: Array) -> tuple[Array, Array]:
-    """Eigenvalues and eigenvectors (in columns) of a symmetric matrix (n, n) or of a stack (k, n, n)."""
+    """Return eigenvalues and eigenvectors (in columns) of a symmetric matrix (n, n) or of a stack (k, n, n)."""
     stack = np.ascontiguousarray(a.reshape(-1, *a.shape[-2:]), np.float64)
     values, axes = np.empty(stack.shape[:2]), np.empty(stack.shape)
     dense.symmetric_axes(stack, values, axes)
@@ -49,7 +51,7 @@ def symmetric(a: Array) -> tuple[Array, Array]:
 
 
 def split(rows: Array, tolerance: float) -> tuple[Array, Array]:
-    """Orthonormal directions (k, n) that rows (m, n) span, and those (n - k, n) that all of them leave alone."""
+    """Return orthonormal directions (k, n) that rows (m, n) span, and those (n - k, n) that all of them leave alone."""
     n = rows.shape[1]
     turned = np.ascontiguousarray(rows.T, np.float64)
     order, q = np.empty(len(rows), np.int64), np.empty((n, n))

@@ -47,7 +47,9 @@ class Descent:
         self.best = self.model.state(fractions)
 
     def run(self) -> State:
-        """Feasible first, then optimal; the result is polished and verified on a finer grid."""
+        """Search for a feasible design first, then for the best;
+        the result is polished and verified on a finer grid.
+        """
         for _ in range(3):
             if not self.best.feasible:
                 self._restore()
@@ -63,7 +65,7 @@ class Descent:
         return self.best
 
     def _restore(self) -> None:
-        """Smallest relaxation of the limits: zero where a feasible design is near."""
+        """Find the smallest relaxation of the limits: zero where a feasible design is near."""
         for _ in range(ROUNDS):
             before = self.best
             if math.isinf(before.known):
@@ -113,7 +115,7 @@ class Descent:
                 extra = extra.take(slice(-REMEMBERED, None))
 
     def _unknown(self, found: Points, known: Points) -> Points:
-        """Extrema of a refused design that are not near a known point, to be held at their crank angles."""
+        """Return the extrema of a refused design that are not near a known point, to be held at their crank angles."""
         apart = np.abs(np.remainder(found.phi[:, None] - known.phi + np.pi, 2.0 * np.pi) - np.pi)
         same = (found.series[:, None] == known.series) & (found.sense[:, None] == known.sense)
         new = ~((apart < NEAR_ANGLE) & same).any(axis=1)
@@ -123,7 +125,7 @@ class Descent:
         return replace(found, how=np.full(len(found), STATIC)).take(new)
 
     def _verified(self) -> bool:
-        """Whether four times as many poses show the same extrema; if not, the search goes on with them."""
+        """Return whether four times as many poses show the same extrema; if not, the search goes on with them."""
         model = self.model
         fine = model.state(self.best.fractions, 4 * model.samples)
         if math.isfinite(self.best.objective):

@@ -23,7 +23,8 @@ GAIN = 1e-9  # relative, of a step that counts
 
 
 def listed(study: Study) -> dict[str, Array]:
-    """The parameters that the study gives as ``{ values = [...] }`` and that keep these values, with them, sorted.
+    """Return the parameters that the study gives as ``{ values = [...] }`` and that keep these values,
+    with them, sorted.
 
     Signs are listed by nature and are not among them.  What [locus] or [fit] sets or scales has no list: there the
     values are proportions, and prescribed ones are ranges.
@@ -50,7 +51,8 @@ def with_neighbours(
     stop: Callable[[], bool] | None,
     jobs: int,
 ) -> list[Result]:
-    """Results with those of searches from the best design with one listed value exchanged for the next, best first.
+    """Return results with those of searches from the best design with one listed value exchanged for the next,
+    best first.
 
     The exchange goes on from the new best as long as it gains, so that the answer cannot be bettered by the next larger
     or smaller value of any one parameter.  Same results for any number of jobs.

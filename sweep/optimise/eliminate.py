@@ -19,7 +19,8 @@ PLACE_BOUNDS = (-math.pi, 3.0 * math.pi)
 
 
 def on_locus(problem: Problem) -> Problem:
-    """The problem on the locus of its first stage, or the problem itself where that has no equations to eliminate.
+    """Return the problem on the locus of its first stage,
+    or the problem itself where that has no equations to eliminate.
 
     Equations for swing (rssr) or stroke (rssp) and phi0 of the first stage become fixed coordinates, the place on the
     locus a variable; the links that follow keep their bounds as limits.  Where the rocker's length is fixed and e and g
@@ -65,7 +66,9 @@ def on_locus(problem: Problem) -> Problem:
 def _directions(
     problem: Problem, bounds: Mapping[str, tuple[float, float]], sized: tuple[str, ...]
 ) -> tuple[float, float] | None:
-    """Least and greatest direction of the offsets (e, g) where the rocker's length c alone is fixed, else None."""
+    """Return the least and greatest direction of the offsets (e,
+    g) where the rocker's length c alone is fixed, else None.
+    """
     if not sized:
         return None
     c, e, g = sized

@@ -60,7 +60,7 @@ def evolved(
     stop: Callable[[], bool] = lambda: False,
     heats: tuple[int, ...] = (),
 ) -> tuple[Array, Array]:
-    """The best place of each strategy that goes on to the end, and its value.
+    """Return the best place of each strategy that goes on to the end, and its value.
 
     Parameters
     ----------

@@ -20,7 +20,8 @@ MOST_KINDS = 64  # combinations of signs among which a sample is shared out
 
 
 def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]]:
-    """The combinations of signs and other values that are chosen, not varied, as the designs of a study have them.
+    """Return the combinations of signs and other values that are chosen, not varied,
+    as the designs of a study have them.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]
 
 
 def filled(study: Study, problem: Problem, starts: Array, count: int, seed: int) -> Array:
-    """At most ``count`` starts: those given (k, P), then the best of a sample that are not near one of them.
+    """Return at most ``count`` starts: those given (k, P), then the best of a sample that are not near one of them.
 
     A sample of the problem's own variables finds more than the space of the study, unless [fit] has to finish every
     design; then designs of the space are drawn.

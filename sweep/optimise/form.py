@@ -93,7 +93,7 @@ class Program:
         return layout.form(complete and layout.has_objective, reaches)
 
     def place(self, name: str, curves: Curves, design: Array, points: Points) -> int:
-        """Number of the point where one of the ``readings`` is taken; -1 where the design has none."""
+        """Return the number of the point where one of the ``readings`` is taken; -1 where the design has none."""
         found = _Layout(curves, points, design, self.scalars).upper(self.readings[name].parts[0])
         return next(iter(found[0][0])) - len(points) if found else -1
 
@@ -201,7 +201,7 @@ class _Layout:
         return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
 
     def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
-        """Sums of plain numbers, and of the ends of curves with them."""
+        """Return sums of plain numbers, and of the ends of curves with them."""
         first = 2 * len(self.points)
         if m.kind == "box":
             tops, bottoms = ([(float(self.points.value[k]), k) for k in side] for side in self._ends(m.series))
@@ -225,7 +225,7 @@ class _Layout:
         return first_passage(self.points.phi, self.points.how, own)
 
     def _keep_first(self, r: Requirement, side: str) -> None:
-        """Rows that let no earlier passage arise where an event is limited."""
+        """Add rows that let no earlier passage arise where an event is limited."""
         for series in r.measure.series:
             if series.passes is None:
                 continue
@@ -235,7 +235,7 @@ class _Layout:
                 self.add({k: -sense}, 0.0, 1.0 / size, sense * level / size, 0.0, False, Label(r.measure.name, side))
 
     def _outward(self, position: str) -> float:
-        """+1 where the extended position of that follower is the largest, -1 where it is the smallest."""
+        """Return +1 where the extended position of that follower is the largest, -1 where it is the smallest."""
         family = self.curves.family
         sign = family.outward_sign(position)
         return float(self.design[family.parameter_names.index(sign)]) if sign else 1.0

@@ -96,7 +96,7 @@ def front_study(
 
 
 def saved(path: Path, key: str) -> Front | None:
-    """The front a file holds, as its search left it; None where there is no file, or one with another key."""
+    """Return the front a file holds, as its search left it; None where there is no file, or one with another key."""
     about = metadata(path)
     if about.get(KEY) != key.encode():
         return None
@@ -123,7 +123,7 @@ def _noted(result: Result | None) -> dict[str, Any] | None:
 def _write(
     path: Path, study: Study, settings: ParetoSettings, best: Front, key: str, kept: Front, ended: str = ""
 ) -> None:
-    """``best`` becomes the rows; ``kept``, the front after its last finished step, is what a search goes on from."""
+    """Write ``best`` as the rows; ``kept``, the front after its last finished step, is what a search goes on from."""
     bounds, results = (list(column) for column in zip(*best.known(), strict=True))
     designs = np.array([r.design for r in results])
     columns: dict[str, Any] = {"bound": bounds}
@@ -147,7 +147,9 @@ def _unit(study: Study, name: str) -> str:
 
 
 def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path) -> list[Array]:
-    """For each bound, the loosest first: the optimum, then diverse best designs of the dataset within the bound."""
+    """Return for each bound, the loosest first,
+    the optimum and then diverse best designs of the dataset within the bound.
+    """
     names = list(study.family.parameter_names)
     optimum = _columns(store.beside(folder) / store.OPTIMUM, [*names, "role"])
     own = np.column_stack([optimum[name] for name in names])[optimum["role"] == "optimum"].astype(np.float64)
@@ -161,7 +163,7 @@ def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Pa
 def within(
     study: Study, settings: ParetoSettings, bounds: tuple[float, ...], folder: Path
 ) -> list[tuple[Array, Array]]:
-    """The best feasible designs (k, P) of a dataset within each bound, k up to 2048, and their objective."""
+    """Return the best feasible designs (k, P) of a dataset within each bound, k up to 2048, and their objective."""
     assert study.objective is not None
     names = study.family.parameter_names
     kept = [(np.empty((0, len(names))), np.empty(0)) for _ in bounds]

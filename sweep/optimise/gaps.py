@@ -28,7 +28,8 @@ class Gap:
 
 
 def gaps(bounds: Array, reached: Array, values: Array) -> list[Gap]:
-    """The gaps of a front, the largest first, of equal ones the looser first; only those that a point could fill.
+    """Return the gaps of a front, the largest first, of equal ones the looser first;
+    only those that a point could fill.
 
     Between the bound of a point and what it reaches the front is flat, so a gap goes from what the looser point reaches
     to the bound of the tighter one.

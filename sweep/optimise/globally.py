@@ -33,7 +33,8 @@ def proportion_starts(
     jobs: int,
     say: Say = unsaid,
 ) -> tuple[Problem, Array]:
-    """The problem with bounds that hold the starts, and the starts: a few of the sweep, then of the global search.
+    """Return the problem with bounds that hold the starts, and the starts:
+    a few of the sweep, then of the global search.
 
     Parameters
     ----------
@@ -62,7 +63,9 @@ def proportion_starts(
 def insensitive(
     study: Study, settings: OptimiseSettings, problem: Problem, stop: Callable[[], bool], jobs: int, say: Say = unsaid
 ) -> tuple[Problem, Array]:
-    """The problem with bounds that hold them, and designs that keep stroke and straightness when they are made."""
+    """Return the problem with bounds that hold them,
+    and designs that keep stroke and straightness when they are made.
+    """
     if settings.globally != "proportions":
         return problem, np.empty((0, len(problem.family.parameters)))
     linear = _linear(study, problem, study.tolerance)

@@ -25,12 +25,14 @@ FIVE_POINTS = {
 
 
 def stepped(problem: Problem, base: Array, fractions: Array) -> Any:
-    """Complex designs (n, P): the imaginary step STEP in one scaled variable (n,) each, and in all that follows."""
+    """Return the complex designs (n, P):
+    the imaginary step STEP in one scaled variable (n,) each, and in all that follows.
+    """
     return problem.placed(base, fractions + 1j * STEP * np.eye(len(fractions)))
 
 
 def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tuple[Array, Array]:
-    """Derivatives of the curves at the points, and of the points' crank angles, by the scaled variables.
+    """Return derivatives of the curves at the points, and of the points' crank angles, by the scaled variables.
 
     A stationary point needs no account of its own motion (envelope theorem); a crossing of the window's edge moves with
     the position curve and its two ends, and takes the curve along its slope.  The angle of a stationary point moves by
@@ -73,7 +75,7 @@ def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tup
 
 
 def reading_gradient(curves: Curves, designs: Any, output: str, phi: float, moves: Array) -> Array:
-    """Gradient of a pose output at a crank angle that moves with the design.
+    """Return the gradient of a pose output at a crank angle that moves with the design.
 
     Parameters
     ----------
@@ -88,7 +90,8 @@ def reading_gradient(curves: Curves, designs: Any, output: str, phi: float, move
 
 
 def scalar_gradient(function: Any, fractions: Array) -> Array:
-    """Gradient of a function of scaled variables that comes as a plain number, from five values per variable.
+    """Return the gradient of a function of scaled variables that comes as a plain number,
+    from five values per variable.
 
     Exact steps of a family are good to 1e-15, so a fourth-order difference over 1e-3 of the bounds is good to 1e-11.
     Near a bound the five points lie on the inner side.

@@ -11,7 +11,7 @@ from sweep.optimise.points import STEP
 
 
 def changes(family: Family, designs: Array, sigma: Array, outputs: Sequence[str], phi: Array) -> dict[str, Array]:
-    """How much outputs change when one dimension is off by its standard deviation, by the complex step.
+    """Return how much outputs change when one dimension is off by its standard deviation, by the complex step.
 
     Parameters
     ----------

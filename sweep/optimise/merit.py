@@ -22,7 +22,7 @@ STUCK = 1e6  # above every objective: does not turn
 
 
 def merit(linear: Elimination, designs: Array) -> tuple[Array, Array]:
-    """Finished designs (n, P), and the objective plus what missed limits cost (n,), the smaller the better.
+    """Return finished designs (n, P), and the objective plus what missed limits cost (n,), the smaller the better.
 
     Designs that do not turn are not finished (nan) and rank by their margin behind all that do.
     """
@@ -59,7 +59,7 @@ def merit(linear: Elimination, designs: Array) -> tuple[Array, Array]:
 
 
 def _outside(linear: Elimination, designs: Array) -> Array:
-    """How far lengths of the guide lie outside their bounds, relative to them (n,)."""
+    """Return how far lengths of the guide lie outside their bounds, relative to them (n,)."""
     missed = np.zeros(len(designs))
     problem = linear.problem
     for name in linear.links:

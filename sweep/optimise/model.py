@@ -44,7 +44,7 @@ class State:
     violation: float
 
     def merit(self, price: float) -> float:
-        """Objective and violation in one number; infinite where the objective does not exist."""
+        """Return the objective and violation in one number; infinite where the objective does not exist."""
         return self.objective + price * self.violation
 
     @property
@@ -95,11 +95,11 @@ class Model:
         self.looks += 1
 
     def design(self, fractions: Array) -> Array:
-        """Design (P,) with its variables at the fractions of their bounds."""
+        """Return the design (P,) with its variables at the fractions of their bounds."""
         return self.problem.placed(self.base, fractions)
 
     def state(self, fractions: Array, samples: int | None = None) -> State:
-        """True extrema of a design, looked for on ``samples`` poses and refined."""
+        """Return the true extrema of a design, looked for on ``samples`` poses and refined."""
         self.check()
         design = self.design(fractions)
         points, turns = self.curves.scan(design, samples or self.samples)
@@ -108,26 +108,26 @@ class Model:
         return State(fractions, design, form, atoms, form.objective(atoms), form.violation(atoms))
 
     def with_points(self, at: State, extra: Points) -> Form:
-        """The form of a design with further points at fixed crank angles."""
+        """Return the form of a design with further points at fixed crank angles."""
         if not len(extra):
             return at.form
         points = Points.joined(at.form.points, self.curves.follow(at.design, extra))
         return self.program.lay_out(self.curves, at.design, points, at.form.complete, self.scale)
 
     def atoms(self, design: Array, form: Form, points: Points) -> Array:
-        """What the form's rows are made of: curves at the points, their angles, plain numbers."""
+        """Return what the form's rows are made of: curves at the points, their angles, plain numbers."""
         scalars = [self._scalar(name, design[None, :])[0] for name in form.scalars]
         return np.concatenate([points.value, points.phi, scalars])
 
     def moved(self, fractions: Array, form: Form, points: Points) -> tuple[Points, Array]:
-        """The points followed to another design, and the atoms there."""
+        """Return the points followed to another design, and the atoms there."""
         self.check()
         design = self.design(fractions)
         there = self.curves.follow(design, points)
         return there, self.atoms(design, form, there)
 
     def jacobian(self, fractions: Array, form: Form, points: Points) -> Array:
-        """Gradients (R, n) of the form's rows by the scaled variables, at followed points."""
+        """Return gradients (R, n) of the form's rows by the scaled variables, at followed points."""
         designs = stepped(self.problem, self.base, fractions)
         values, moves = gradients(self.curves, designs, points, self.program.places)
         scalars = [self._scalar_gradient(name, fractions, designs, points, moves)[None, :] for name in form.scalars]
@@ -140,7 +140,7 @@ class Model:
         return rows
 
     def certificate(self, state: State) -> Multipliers:
-        """Multipliers and residual of the optimality conditions at a checked design."""
+        """Return multipliers and residual of the optimality conditions at a checked design."""
         jacobian = self.jacobian(state.fractions, state.form, state.form.points)
         return multipliers(state.form, state.form.rows(state.atoms, state.objective), jacobian, state.fractions)
 

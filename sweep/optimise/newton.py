@@ -54,7 +54,9 @@ def _corrected(
     model: Model, at: State, form: Form, t: float, parts: tuple[Array, Array, Array],
     bounds: tuple[Array, Array, float | None],
 ) -> tuple[Array, float, float]:  # fmt: skip
-    """Step within bounds brought back to the curved rows, the merit it reaches, and the gain that was promised."""
+    """Return the step within bounds brought back to the curved rows, the merit it reaches,
+    and the gain that was promised.
+    """
     curvature, full, rows = parts
     low, high, floor = bounds
     box = (low, high, -np.inf if floor is None else floor - t)
@@ -82,7 +84,7 @@ def _missed(form: Form, rows: Array) -> float:
 
 
 def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index) -> Array:
-    """Second derivatives of the Lagrangian by the free variables, from differences of exact gradients."""
+    """Return the second derivatives of the Lagrangian by the free variables, from differences of exact gradients."""
     base = times(found.weights, np.nan_to_num(model.jacobian(at.fractions, form, form.points)))
     columns = []
     for j in free:
@@ -109,7 +111,8 @@ def _holding(jacobian: Array, form: Form, found: Multipliers) -> Array:
 
 
 def _upward(curvature: Array, held: Array) -> Array:
-    """The curvature with negative parts made positive, along the rows that hold (their null space) and across apart.
+    """Return the curvature with negative parts made positive,
+    along the rows that hold (their null space) and across apart.
 
     Along them the curvature decides how far to go; across, the rows do.  Turned positive in one go, the strong
     curvature across would stiffen a flat valley, and every step along it would be a hundred times too short.
@@ -142,7 +145,7 @@ def repair(model: Model, state: State) -> State:
 
 
 def polish(model: Model, state: State) -> State:
-    """Newton's method on the optimality conditions of the active rows; kept only while it improves them."""
+    """Take Newton steps on the optimality conditions of the active rows, as long as they improve them."""
     residual = model.certificate(state).residual
     for _ in range(6):
         if not residual > 1e-12 and state.feasible:

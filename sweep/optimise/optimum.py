@@ -26,7 +26,8 @@ def optimum(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
 ) -> list[Result]:
-    """Best designs of a problem: equations eliminated where they can be, a sample, local searches from the best of it.
+    """Return the best designs of a problem:
+    equations eliminated where they can be, a sample, local searches from the best of it.
 
     Where no start becomes feasible the equations may give way as well: a second search, in the parameters themselves,
     begins from the least infeasible design and a sample; of both searches the smallest relaxation comes first.

@@ -41,7 +41,7 @@ class _Checked(Generic[T]):
     code: str
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[int, T] | None:
-        """The number with what the task gives for it, None if it is not to be begun any more."""
+        """Return the number with what the task gives for it, None if it is not to be begun any more."""
         own = optimiser_hash()
         if own != self.code:
             allowed = f"{self.code}, the sources and libraries of the process that searches"
@@ -58,7 +58,7 @@ class SearchTask:
     allowed: float
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Result:
-        """The result from that start."""
+        """Return the result from that start."""
         return search(number, self.problem, self.starts[number], should_stop, self.allowed)
 
 
@@ -70,7 +70,7 @@ def in_processes(
     jobs: int,
     allowed: float = math.inf,
 ) -> list[Result]:
-    """Results of the starts ``numbers`` that were begun before ``asked`` became true, in their order.
+    """Return results of the starts ``numbers`` that were begun before ``asked`` became true, in their order.
 
     Each is what a serial search finds, to the bit.
 
@@ -87,7 +87,7 @@ def in_processes(
 def spread_over(
     task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int, tell: Callable[[], None] = lambda: None
 ) -> list[T]:
-    """What a task gives for each number, in their order, here or in processes; those not begun are left out.
+    """Return what a task gives for each number, in their order, here or in processes; those not begun are left out.
 
     ``tell`` is called after each of them.
     """
@@ -105,7 +105,7 @@ def spread_over(
 def over_processes(
     task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int, tell: Callable[[], None] = lambda: None
 ) -> list[T]:
-    """What a task gives for each number that was begun before ``asked`` became true, in their order.
+    """Return what a task gives for each number that was begun before ``asked`` became true, in their order.
 
     They run on the cluster of the run, if it has one.
 

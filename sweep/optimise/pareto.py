@@ -45,7 +45,7 @@ class Front:
 
     @classmethod
     def of(cls, settings: ParetoSettings) -> Front:
-        """A front of which nothing is known yet."""
+        """Return a front of which nothing is known yet."""
         bounds = tuple(sorted(set(settings.bounds), reverse=not settings.at_least))
         none, never = (None,) * len(bounds), (-1,) * len(bounds)
         return cls(bounds, none, never, given=len(bounds), points=settings.points or len(bounds))
@@ -61,7 +61,7 @@ class Front:
         return self.taken == self.steps or self.filled
 
     def known(self) -> list[tuple[float, Result]]:
-        """The bounds that were begun, with their results."""
+        """Return the bounds that were begun, with their results."""
         return [(b, r) for b, r in zip(self.bounds, self.results, strict=True) if r is not None]
 
 
@@ -86,7 +86,7 @@ def steps(count: int) -> tuple[Step, ...]:
 
 
 def searches(settings: ParetoSettings) -> int:
-    """Local searches a front takes at most, from the settings alone."""
+    """Return local searches a front takes at most, from the settings alone."""
     count = len(Front.of(settings).bounds)
     placed = max((settings.points or count) - count, 0)
     # One more start is the optimum itself, one more from the second bound on the result before.  A placed bound begins
@@ -95,7 +95,7 @@ def searches(settings: ParetoSettings) -> int:
 
 
 def bounded(problem: Problem, settings: ParetoSettings, bound: float) -> Problem:
-    """The problem with the bound in place of its own limit on that side of the second output."""
+    """Return the problem with the bound in place of its own limit on that side of the second output."""
     from sweep.study import Limit
 
     name = settings.output
@@ -115,7 +115,8 @@ def pareto(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
 ) -> list[Result]:
-    """Least objective with the second output at most (at least) each of the bounds, the loosest bound first.
+    """Return the least objective with the second output at most (at least) each of the bounds,
+    the loosest bound first.
 
     With ``settings.points`` further bounds are placed, one after the other in the middle of the largest gap.
     Every bound is searched from its starts and from the result of the next looser one.  Then the results go back from
@@ -154,7 +155,7 @@ def advance(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
 ) -> Iterator[Front]:
-    """The front after each further step; parameters as for :func:`pareto`.
+    """Yield the front after each further step; parameters as for :func:`pareto`.
 
     The steps of a front taken up half way are those of one that was never left, to the bit.  A step that ``stop`` cut
     short leaves the best it found but counts as not taken, and nothing follows it.
@@ -194,7 +195,7 @@ def _placed(
     asked: Callable[[], bool],
     jobs: int,
 ) -> tuple[Front, bool]:
-    """The front with one more bound, in the middle of its largest gap, and whether it was cut short.
+    """Return the front with one more bound, in the middle of its largest gap, and whether it was cut short.
 
     It is searched from the results of both neighbours and from the starts of the next tighter bound that was given.
     Its tighter neighbour is searched from what it finds, and so are looser bounds as far as that is better there.
@@ -233,7 +234,9 @@ def _placed(
 
 
 def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Array, Array]:
-    """What the results reach of the second output, and their objective; the bound and nan where there is none."""
+    """Return what the results reach of the second output, and their objective;
+    the bound and nan where there is none.
+    """
     reached, values = np.array(front.bounds, np.float64), np.full(len(front.bounds), np.nan)
     good = [k for k, r in enumerate(front.results) if r is not None and r.status != st.LIMIT_EXCEEDED]
     if good:
@@ -246,7 +249,7 @@ def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Ar
 
 
 def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None:
-    """Designs to start from; None where the neighbour has nothing new to offer."""
+    """Return designs to start from; None where the neighbour has nothing new to offer."""
     near = front.results[step.neighbour] if 0 <= step.neighbour < len(front.bounds) else None
     if step.first:
         designs = starts if near is None else np.concatenate([near.design[None, :], starts])
@@ -281,7 +284,7 @@ def _search(
 
 
 def _with(front: Front, step: Step, number: int, result: Result) -> Front:
-    """The front with this result where it is the better one."""
+    """Return the front with this result where it is the better one."""
     held = front.results[step.target]
     if held is not None and not _order(result) < _order(held):
         return front

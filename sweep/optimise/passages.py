@@ -17,7 +17,7 @@ NEARING, PASSING = 0, 3  # how a point is held: an extremum that only points to 
 def passages(
     n: int, phi: Array, x: Array, level: float, sense: float
 ) -> list[tuple[int, float, float, int, float, float]]:
-    """Where samples over the turn pass the level in that sense, and where they only come near it.
+    """List where samples over the turn pass the level in that sense, and where they only come near it.
 
     Rows are those of :meth:`sweep.optimise.points.Points.of`.  The extrema that point to the level without reaching it
     say how far another passage is.
@@ -33,7 +33,8 @@ def passages(
 
 
 def first_passage(phi: Array, how: NDArray[np.intp], own: Sequence[int]) -> tuple[int | None, list[int]]:
-    """The point of a curve where it first passes its level in [0, 2 pi), and those before it that only near the level.
+    """Return the point of a curve where it first passes its level in [0, 2 pi),
+    and those before it that only near the level.
 
     Parameters
     ----------

@@ -55,16 +55,16 @@ class Points:
         return len(self.phi)
 
     def take(self, which: Any) -> Points:
-        """The points selected by an index or a mask."""
+        """Return the points selected by an index or a mask."""
         return Points(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
     def shifted(self, offset: float) -> Points:
-        """The same curves at crank angles ``offset`` further on."""
+        """Return the same curves at crank angles ``offset`` further on."""
         return replace(self, phi=self.phi + offset)
 
     @classmethod
     def of(cls, rows: Iterable[tuple[int, float, float, int, float, float]]) -> Points:
-        """Points of (series, phi, sense, how, level, value)."""
+        """Return points of (series, phi, sense, how, level, value)."""
         table = np.array(list(rows), dtype=np.float64).reshape(-1, 6)
         nothing = np.zeros(len(table))
         number, phi, sense, how, level, value = table.T
@@ -72,7 +72,7 @@ class Points:
 
     @classmethod
     def joined(cls, first: Points, second: Points) -> Points:
-        """Both sets, the second after the first."""
+        """Return both sets, the second after the first."""
         pairs = ((getattr(first, name), getattr(second, name)) for name in first.__dataclass_fields__)
         return cls(*(np.concatenate(pair) for pair in pairs))
 
@@ -97,7 +97,7 @@ class Curves:
         self.calls = 0
 
     def poses(self, designs: Any, phi: Any, wanted: frozenset[str] | None = None) -> dict[str, Any]:
-        """Pose outputs at angles phi (m,) shared by all designs (n, P); complex if either is."""
+        """Return pose outputs at angles phi (m,) shared by all designs (n, P); complex if either is."""
         self.calls += 1
         angles = np.asarray(phi)[None, :]
         if np.iscomplexobj(angles) or np.iscomplexobj(designs):
@@ -107,7 +107,8 @@ class Curves:
             return self.family.poses(np.ascontiguousarray(designs), Angles.of(angles), wanted or self.wanted)
 
     def scan(self, design: Array, samples: int) -> tuple[Points, bool]:
-        """All extrema of all curves that can matter, refined, and whether the design has every pose of the turn.
+        """Return all extrema of all curves that can matter, refined,
+        and whether the design has every pose of the turn.
 
         Only maxima in the upper half of a curve's range and minima in the lower half are kept.  A curve that is not
         defined over the whole turn has none.
@@ -133,7 +134,7 @@ class Curves:
         return _without_repetition(points), turns
 
     def curve(self, series: Series, columns: dict[str, Any]) -> Any:
-        """Values of a series (n, m) out of pose outputs on a set of angles."""
+        """Return values of a series (n, m) out of pose outputs on a set of angles."""
         x = columns[series.output]
         if series.pressure:
             with np.errstate(invalid="ignore"):
@@ -141,12 +142,12 @@ class Curves:
         return x
 
     def _room(self, n: int, designs: Any, phi: Any) -> Any:
-        """What tolerances add to the maxima of series n and take from its minima, (n, m)."""
+        """Return what tolerances add to the maxima of series n and take from its minima, (n, m)."""
         room = self.problem.rooms.get(self.series[n].output)
         return np.zeros((len(designs), len(phi))) if room is None else room.at(designs, phi)
 
     def stroke(self, points: Points) -> tuple[int, int]:
-        """The points with the smallest and the largest position."""
+        """Return the points with the smallest and the largest position."""
         own = np.flatnonzero((points.series == self.position) & (points.how == STATIONARY))
         low, high = own[points.sense[own] < 0], own[points.sense[own] > 0]
         if not len(low) or not len(high):
@@ -190,7 +191,7 @@ class Curves:
         return replace(moved, value=self.values(design[None, :], moved)[0])
 
     def values(self, designs: Any, points: Points) -> Any:
-        """Curves (n, K) of designs (n, P) at the points' crank angles."""
+        """Return curves (n, K) of designs (n, P) at the points' crank angles."""
         if not self.wanted:  # an output of a step alone follows no curve
             return np.empty((len(designs), len(points)), dtype=np.result_type(designs))
         columns = self.poses(designs, self._angles(points))
@@ -209,18 +210,20 @@ class Curves:
         return out
 
     def positions(self, designs: Any, points: Points) -> Any:
-        """Position of the follower (n, K) at the points' crank angles."""
+        """Return the position of the follower (n, K) at the points' crank angles."""
         number = np.full(len(points), self.position)
         return self.values(designs, replace(points, series=number, value=np.zeros(len(points))))
 
     def _angles(self, points: Points) -> Array:
-        """The points' angles, then a few that tell the scale of a discriminant where the points cannot."""
+        """Return the points' angles, then a few that tell the scale of a discriminant where the points cannot."""
         if any(s.pressure for s in self.series):
             return np.concatenate([points.phi, np.arange(16) * (math.pi / 8.0)])
         return points.phi
 
     def _local(self, design: Array, phi: Array, points: Points) -> tuple[Array, Array, Array, Array, Array]:
-        """Slope and curvature of each point's own output, slope and value of the position, value there, all (K,)."""
+        """Return the slope and curvature of each point's own output, slope and value of the position,
+        value there, all (K,).
+        """
         three = np.concatenate([phi - NEIGHBOUR, phi, phi + NEIGHBOUR])
         columns = self.poses(design[None, :], three + 1j * STEP)
         k = len(phi)
@@ -253,7 +256,7 @@ class Curves:
     def _inside(
         self, n: int, design: Array, phi: Array, columns: dict[str, Any], points: Points
     ) -> list[tuple[int, float, float, int, float, float]]:
-        """Extrema inside the window of series n, and both senses at every crossing of the window's edges."""
+        """Return the extrema inside the window of series n, and both senses at every crossing of the window's edges."""
         series = self.series[n]
         low, high = self.stroke(points)
         if series.window is None or low < 0:
@@ -277,7 +280,7 @@ class Curves:
 
 
 def _discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
-    """Discriminant over cos^2 of the pressure angle (n, 1): one number for all crank angles.
+    """Return the discriminant over cos^2 of the pressure angle (n, 1): one number for all crank angles.
 
     Taken at the pose whose pressure angle is nearest to half a radian: well away from the dead points, where the ratio
     is 0/0, and from a pressure angle of zero, where the angle (not its cosine) has a kink and no derivative.
@@ -293,7 +296,7 @@ def _discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
 def _extrema(
     n: int, phi: Array, x: Array, wrapped: bool, sense: float, inside: NDArray[np.bool_] | None = None
 ) -> list[tuple[int, float, float, int, float, float]]:
-    """Maxima (sense +1) or minima (-1) of a curve."""
+    """Return the maxima (sense +1) or minima (-1) of a curve."""
     if not np.isfinite(x).all():
         return []
     if wrapped:

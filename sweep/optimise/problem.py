@@ -102,14 +102,16 @@ class Problem:
         return np.asarray(self.upper, np.float64) - np.asarray(self.lower, np.float64)
 
     def scaled(self, designs: Array) -> Array:
-        """Variables of designs (k, P) as fractions of their bounds (k, n); nan where a coordinate does not exist."""
+        """Return variables of designs (k, P) as fractions of their bounds (k, n);
+        nan where a coordinate does not exist.
+        """
         read = {} if self.coordinates is None else self.coordinates.read(self.family, designs)
         names = self.family.parameter_names
         values = [read[n] if n in read else designs[:, names.index(n)] for n in self.variables]
         return (np.column_stack(values) - self.lower) / self.span
 
     def placed(self, base: Array, fractions: Array) -> Array:
-        """Designs like ``base`` (P,) with their variables at fractions of their bounds.
+        """Return designs like ``base`` (P,) with their variables at fractions of their bounds.
 
         Parameters
         ----------
@@ -125,7 +127,8 @@ class Problem:
         return designs if fractions.ndim == 2 else np.asarray(designs[0])
 
     def rows(self, values: Array, **signs: float) -> Array:
-        """Design matrix (k, P) of variable values (k, n); ``signs`` and ``fixed`` and the defaults fill the rest.
+        """Return the design matrix (k, P) of variable values (k, n);
+        ``signs`` and ``fixed`` and the defaults fill the rest.
 
         Raises
         ------

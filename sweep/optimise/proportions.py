@@ -59,7 +59,7 @@ class Proportions:
         self.driver = stages_of(problem.family)[0].family
 
     def designs(self, places: Array) -> Array:
-        """Designs (k, P) at places (k, n), with the point, line and scale still to be found."""
+        """Return designs (k, P) at places (k, n), with the point, line and scale still to be found."""
         values: Array = self.low + places * (self.high - self.low)
         low, wide = self.low[self.log], np.array([math.log(x) for x in self.high[self.log] / self.low[self.log]])
         # numpy's exponential depends on the processor, that of the C library does not
@@ -75,7 +75,7 @@ class Proportions:
         return designs
 
     def merit(self, places: Array) -> Array:
-        """Least objective for these proportions, plus what missed limits cost (k,)."""
+        """Return the least objective for these proportions, plus what missed limits cost (k,)."""
         return merit(self.linear, self.designs(places))[1]
 
 
@@ -88,7 +88,7 @@ class _Group:
     seed: int
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[Array, Array]:
-        """Designs (k, P) and their merits, the best first."""
+        """Return designs (k, P) and their merits, the best first."""
         from scipy.stats import qmc
 
         own = Proportions(self.linear, self.signs[number % len(self.signs)])
@@ -116,7 +116,7 @@ def from_proportions(
     jobs: int = 1,
     say: Say = unsaid,
 ) -> Array:
-    """At most ``count`` diverse designs (k, P), each the end of an evolution strategy, the best first.
+    """Return at most ``count`` diverse designs (k, P), each the end of an evolution strategy, the best first.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def from_proportions(
 
 
 def _turned_into(problem: Problem, designs: Array) -> Array:
-    """Designs whose angles lie within their bounds, by whole turns."""
+    """Return designs whose angles lie within their bounds, by whole turns."""
     out = designs.copy()
     for k, name in enumerate(problem.variables):
         column = problem.family.parameter_names.index(name)
@@ -160,7 +160,9 @@ def _turned_into(problem: Problem, designs: Array) -> Array:
 
 
 def widened(problem: Problem, designs: Array, names: Sequence[str]) -> Problem:
-    """The problem with the bounds of some variables widened so that the designs lie half their size within them."""
+    """Return the problem with the bounds of some variables widened so
+    that the designs lie half their size within them.
+    """
     lower, upper = problem.lower.astype(np.float64), problem.upper.astype(np.float64)
     for k, name in enumerate(problem.variables):
         if name in names and len(designs):

@@ -15,7 +15,7 @@ BEND = 1e-4  # curvature lent to t and to the violation, which have none; it cha
 def quadratic_step(
     curvature: Array, full: Array, rows: Array, form: Form, box: tuple[Array, Array, float], price: float
 ) -> tuple[Array, Array]:
-    """Step (d, t) that makes t + d'Hd/2 + price v small; every limit's linear row may be missed by v.
+    """Return the step (d, t) that makes t + d'Hd/2 + price v small; every limit's linear row may be missed by v.
 
     A least-distance problem, solved by non-negative least squares (Lawson and Hanson 1974, chapter 23): in the axes of
     the curvature, which is positive, the objective is the distance from a point.

@@ -51,7 +51,7 @@ class Robust:
 
 
 def kept(problem: Problem, designs: Array) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """Limited outputs of designs (n, P), and which designs keep all limits on outputs."""
+    """Return limited outputs of designs (n, P), and which designs keep all limits on outputs."""
     from sweep.chunks.cascade import compared, meets
     from sweep.evaluation.summaries import design_outputs
 
@@ -65,7 +65,7 @@ def kept(problem: Problem, designs: Array) -> tuple[dict[str, Array], NDArray[np
 
 
 def bounded(problem: Problem) -> list[Limit]:
-    """The limits on outputs that leave room; those on parameters are about the drawing."""
+    """Return the limits on outputs that leave room; those on parameters are about the drawing."""
     own = [x for x in problem.limits if x.output not in problem.family.parameter_names]
     return [x for x in own if x.minimum is None or x.minimum != x.maximum]
 
@@ -80,7 +80,7 @@ def robust(
     more: Array | None = None,
     tell: Callable[[int, int], None] = lambda _, __: None,
 ) -> Robust | None:
-    """The best design of which the wanted share of toleranced mechanisms keeps all limits.
+    """Return the best design of which the wanted share of toleranced mechanisms keeps all limits.
 
     Every limit gives up the room that the tolerances need, a number of standard deviations: of curves it is followed
     along the turn, and to first order as the design changes, so the search trades acceleration for insensitivity; of
@@ -149,7 +149,7 @@ def _never() -> bool:
 
 
 def _different(problem: Problem, results: Sequence[Result]) -> list[Result]:
-    """Results whose designs are not near those of better ones."""
+    """Return results whose designs are not near those of better ones."""
     places = [problem.scaled(r.design[None, :])[0] for r in results]
     apart: list[int] = []
     for k, place in enumerate(places):
@@ -223,7 +223,7 @@ class _Calibrate:
 
 
 def _quantile(share: float) -> float:
-    """Standard deviations within which so large a share stays, if limits are missed in a few ways."""
+    """Return standard deviations within which so large a share stays, if limits are missed in a few ways."""
     return NormalDist().inv_cdf(1.0 - (1.0 - min(max(share, 0.5), 1.0 - 0.5 / SAMPLES)) / BOTH)
 
 
@@ -265,7 +265,9 @@ def _approached(
 
 
 def _with_room(problem: Problem, design: Array, tolerance: Tolerance, level: float, radius: float | None) -> Problem:
-    """The problem with the room that this design needs taken from its limits, within a distance in scaled variables."""
+    """Return the problem with the room that this design needs taken from its limits,
+    within a distance in scaled variables.
+    """
     sigma = touched(problem.family, tolerance) / SIGMAS
     along = curves_with_room(problem)
     curves = rooms(problem, design, sigma, level, set(along.values()))
@@ -282,7 +284,9 @@ def _with_room(problem: Problem, design: Array, tolerance: Tolerance, level: flo
 def _fixed_rooms(
     problem: Problem, design: Array, sigma: Array, level: float, others: set[str]
 ) -> dict[str, tuple[float, float]]:
-    """Room below and above of limited outputs but ``others``, from exact derivatives by every toleranced dimension."""
+    """Return the room below and above of limited outputs but ``others``,
+    from exact derivatives by every toleranced dimension.
+    """
     names = [x.output for x in bounded(problem) if x.output not in others and not x.output.startswith("rotatable")]
     if not names:
         return {}
@@ -311,5 +315,5 @@ def _drawn_in(limit: Limit, rooms: dict[str, tuple[float, float]]) -> Limit:
 
 
 def yields(problem: Problem, designs: Array, tolerance: Tolerance, seed: int) -> list[float]:
-    """Share of toleranced mechanisms about each design (k, P) that keep all limits on outputs."""
+    """Return the share of toleranced mechanisms about each design (k, P) that keep all limits on outputs."""
     return [_share(problem, design, tolerance, seed) for design in designs]

@@ -32,7 +32,7 @@ class Room:
     slopes: Array
 
     def at(self, designs: Any, phi: Array) -> Any:
-        """Room (n, m) of designs (n, P), which may carry the imaginary step, at crank angles (m,)."""
+        """Return the room (n, m) of designs (n, P), which may carry the imaginary step, at crank angles (m,)."""
         moved = designs[:, list(self.columns)] - self.place
         room = _summed(self.constant + times(moved.real, self.slopes.T), phi)
         if np.iscomplexobj(moved):
@@ -40,7 +40,7 @@ class Room:
         return room
 
     def slope(self, design: Array, phi: Array) -> Array:
-        """Derivative (m,) of the room of one design (P,) by the crank angle."""
+        """Return the derivative (m,) of the room of one design (P,) by the crank angle."""
         moved = design[list(self.columns)] - self.place
         return np.asarray(_summed((self.constant + times(self.slopes, moved))[None, :], phi, True)[0], np.float64)
 
@@ -52,7 +52,7 @@ def _summed(coefficients: Array, phi: Array, derivative: bool = False) -> Array:
 
 
 def curves_with_room(problem: Problem) -> dict[str, str]:
-    """Pose outputs whose limits can have a room along the turn, by the names of these limits.
+    """Return pose outputs whose limits can have a room along the turn, by the names of these limits.
 
     Those of largest and smallest values, as long as no other kind of limit is made of the same curve.
     """
@@ -69,7 +69,7 @@ def curves_with_room(problem: Problem) -> dict[str, str]:
 
 
 def rooms(problem: Problem, design: Array, sigma: Array, level: float, outputs: set[str]) -> dict[str, Room]:
-    """``level`` standard deviations of pose outputs along the turn, and how they change with the variables.
+    """Return ``level`` standard deviations of pose outputs along the turn, and how they change with the variables.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def rooms(problem: Problem, design: Array, sigma: Array, level: float, outputs: 
 
 
 def _shortest(moved: Array, change: Array) -> Array:
-    """Slopes (V,) by the columns that explain the changes (n,) seen with the moves (n, V)."""
+    """Return slopes (V,) by the columns that explain the changes (n,) seen with the moves (n, V)."""
     size = np.abs(moved).max(axis=0)
     size[size == 0.0] = 1.0
     return np.asarray(least_squares(moved / size, change, 1e-10) / size, np.float64)

@@ -50,27 +50,31 @@ class Form:
     reaches: bool
 
     def rows(self, atoms: Array, t: float) -> Array:
-        """The rows' values; a row that is nan counts as far outside."""
+        """Return the rows' values; a row that is nan counts as far outside."""
         if np.isfinite(atoms).all():
             return np.asarray(self.constant + times(self.matrix, atoms) + self.slack * t)
         far = times(self.matrix, np.nan_to_num(atoms, nan=1e30))
         return np.nan_to_num(self.constant + far + self.slack * t, nan=-FAR)
 
     def objective(self, atoms: Array) -> float:
-        """Largest of the objective's rows: the smallest t they allow."""
+        """Return the largest of the objective's rows: the smallest t they allow."""
         own = np.array([label.side == "objective" for label in self.labels], dtype=np.bool_)
         if not own.any():
             return math.inf
         return float(-(self.constant + times(self.matrix, atoms))[own].min())
 
     def violation(self, atoms: Array) -> float:
-        """Largest scaled violation of the limits; infinite where one of them does not exist for this design."""
+        """Return the largest scaled violation of the limits;
+        infinite where one of them does not exist for this design.
+        """
         if not self.complete:
             return math.inf
         return self.known_violation(atoms)
 
     def known_violation(self, atoms: Array) -> float:
-        """Largest scaled violation of those limits that exist for this design; infinite where it reaches nowhere."""
+        """Return the largest scaled violation of those limits that exist for this design;
+        infinite where it reaches nowhere.
+        """
         if not self.reaches:
             return math.inf
         c = self.constant + times(self.matrix, atoms)
@@ -80,7 +84,7 @@ class Form:
         return float(np.maximum(np.where(self.equal, np.abs(c), -c)[own], 0.0).max(initial=0.0))
 
     def near(self, atoms: Array, t: float) -> Form:
-        """The form without the rows that are far inside: no short step reaches them."""
+        """Return the form without the rows that are far inside: no short step reaches them."""
         keep = (self.rows(atoms, t) < AT_HAND) | self.equal
         labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
         return replace(
@@ -89,7 +93,7 @@ class Form:
         )  # fmt: skip
 
     def relaxed(self, hard: set[str]) -> Form:
-        """The elastic program: smallest t by which all limits but the ``hard`` ones have to give way."""
+        """Return the elastic program: smallest t by which all limits but the ``hard`` ones have to give way."""
         keep = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
         soft = np.array([label.name not in hard for label in self.labels], dtype=np.float64)[keep]
         both = self.equal[keep]

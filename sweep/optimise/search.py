@@ -81,14 +81,14 @@ def _result(number: int, problem: Problem, program: Program, descent: Descent, e
 
 
 def _of_relaxation(descent: Descent, state: State) -> tuple[Form, Multipliers]:
-    """The elastic program at a design that misses its limits, and its multipliers."""
+    """Return the elastic program at a design that misses its limits, and its multipliers."""
     form = state.form.relaxed({"rotatable"})
     jacobian = descent.model.jacobian(state.fractions, form, form.points)
     return form, multipliers(form, form.rows(state.atoms, state.violation), jacobian, state.fractions)
 
 
 def _relaxation(program: Program, values: dict[str, float], state: State) -> dict[str, float]:
-    """By how much each violated limit has to give way, in the unit of its output."""
+    """Return by how much each violated limit has to give way, in the unit of its output."""
     if state.feasible:
         return {}
     out: dict[str, float] = {}

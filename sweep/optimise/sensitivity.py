@@ -25,7 +25,8 @@ REACH = 0.1  # step outputs are differentiated over a thousandth of this part of
 def sensitivities(
     family: Family, design: Array, outputs: Sequence[str], window: tuple[float, float] | None = None
 ) -> dict[str, list[Any]]:
-    """Derivatives of design outputs by lengths, angles and ratios of a design: dx/dp = dx/dy dy/dp, y the inner value.
+    """Return derivatives of design outputs by lengths, angles and ratios of a design:
+    dx/dp = dx/dy dy/dp, y the inner value.
 
     A maximum that several extrema share has two: the largest of their gradients where the dimension grows, the smallest
     where it shrinks.  A corner optimum has them of opposite signs.
@@ -69,7 +70,9 @@ def sensitivities(
 
 
 def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
-    """Value of the objective, smallest and largest of the gradients of the extrema that share it (scaled variables)."""
+    """Return the value of the objective,
+    smallest and largest of the gradients of the extrema that share it (scaled variables).
+    """
     program = Program(problem)
     model = Model(problem, program, design, lambda: False)
     state = model.state(problem.scaled(design[None, :])[0])
@@ -85,7 +88,7 @@ def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
 
 
 def _outward(measure: Measure, inner: float) -> float:
-    """Derivative of the output by its inner value."""
+    """Return the derivative of the output by its inner value."""
     if measure.kind == "minus":
         return _outward(measure.parts[0], -inner)
     if measure.inner == "pressure":  # inner = -cos^2 of the angle

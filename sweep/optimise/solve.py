@@ -39,7 +39,7 @@ def minimise(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
 ) -> list[Result]:
-    """Smallest objective under the limits; one result per start that was begun, best first.
+    """Return the smallest objective under the limits; one result per start that was begun, best first.
 
     Parameters, results and errors are those of :func:`explore`.
     """
@@ -54,7 +54,8 @@ def explore(
     jobs: int = 1,
     tell: Tell | None = None,
 ) -> tuple[list[Result], Survey]:
-    """Smallest objective under the limits from one start after the other, until enough is known of the basins.
+    """Return the smallest objective under the limits from one start after the other,
+    until enough is known of the basins.
 
     Parameters
     ----------
@@ -111,7 +112,7 @@ def _first(
     jobs: int,
     tell: Tell | None,
 ) -> tuple[list[Result], str]:
-    """Results of the starts in batches, or of their first heat where there are finalists; and what ended it."""
+    """Return results of the starts in batches, or of their first heat where there are finalists; and what ended it."""
     results: list[Result] = []
     heat = settings if settings.finalists is None else replace(settings, looks=min(TRIAL, settings.looks))
     numbers = list(range(len(starts)))
@@ -129,7 +130,7 @@ def _first(
 
 
 def _cut(results: Sequence[Result], count: int) -> bool:
-    """Whether a search was stopped before so many results were there, or within one."""
+    """Return whether a search was stopped before so many results were there, or within one."""
     return len(results) < count or any(r.ended in CUT for r in results)
 
 
@@ -141,7 +142,8 @@ def _final(
     asked: Callable[[], bool],
     jobs: int,
 ) -> tuple[list[Result], bool]:
-    """The best of the starts that a first heat has left on their way, searched to their end; and whether all were.
+    """Return the best of the starts that a first heat has left on their way, searched to their end;
+    and whether all were.
 
     In a long curved valley the value after so many looks tells how far down it leads.
     """
@@ -165,7 +167,7 @@ def _final(
 
 @contextmanager
 def _signals() -> Iterator[Stop]:
-    """Ctrl-C sets a flag, so that every process ends with its best design; a caller's own handler is left alone."""
+    """Let Ctrl-C set a flag, so that every process ends with its best design; a caller's own handler is left alone."""
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield Stop()
         return
@@ -182,7 +184,7 @@ def _batch(
     asked: Callable[[], bool],
     jobs: int,
 ) -> list[Result]:
-    """Results of some starts, in this process as long as few looks were needed, then in several.
+    """Return results of some starts, in this process as long as few looks were needed, then in several.
 
     A start that needs more looks than that is left to the processes, from its beginning; what is known of it counts if
     they are stopped before they get there.
@@ -212,7 +214,9 @@ def _batch(
 
 
 def ranked(results: list[Result]) -> list[Result]:
-    """Feasible results by objective, then the others by violation; each told how many starts agree with the best."""
+    """Return feasible results by objective, then the others by violation;
+    each told how many starts agree with the best.
+    """
     order = sorted(with_basins(results), key=lambda r: (r.status == st.LIMIT_EXCEEDED, _rank(r), r.start))
     best = order[0]
     near = [r for r in order if _agrees(r, best)]

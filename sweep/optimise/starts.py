@@ -21,7 +21,7 @@ ALIKE = 0.02  # of the average distance of two random designs: nearer designs of
 
 
 def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: float = 0.0) -> Array:
-    """The best designs that keep a distance from each other, best first.
+    """Return the best designs that keep a distance from each other, best first.
 
     The best one is taken, its neighbourhood left out, and so on; the distance (in variables scaled to their bounds) is
     halved until there are enough.  Designs of different signs are never neighbours.  Ties go to the earlier row.
@@ -42,7 +42,8 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: f
 
 
 def spread(place: Array, kind: NDArray[np.intp], count: int, least: float = 0.0) -> list[int]:
-    """Numbers of at most ``count`` rows of ``place`` (k, n), ranked best first, that keep a distance from each other.
+    """Return numbers of at most ``count`` rows of ``place`` (k, n), ranked best first,
+    that keep a distance from each other.
 
     ``kind`` (k,): rows of different kinds are never neighbours.  The distance is never less than ``least``, a share of
     the average one of two random designs.
@@ -63,7 +64,7 @@ def spread(place: Array, kind: NDArray[np.intp], count: int, least: float = 0.0)
 
 
 def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Array]:
-    """The best feasible designs of a dataset (k, P), k up to 10^5, and their objective as it is compared.
+    """Return the best feasible designs of a dataset (k, P), k up to 10^5, and their objective as it is compared.
 
     Only the parameters, the objective and the status are read, batch by batch.
     """
@@ -88,7 +89,8 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
 
 
 def of_task(study: Study, count: int, seed: int) -> Array:
-    """Designs of the study that do its [task], the best first, (k, P), at most ``count``; none without a task.
+    """Return designs of the study that do its [task], the best first, (k, P), at most ``count``;
+    none without a task.
 
     A parameter that the study gives as a number keeps it.
     """
@@ -105,7 +107,9 @@ def of_task(study: Study, count: int, seed: int) -> Array:
 
 
 def drawn(study: Study, count: int, seed: int) -> Array:
-    """Designs of a study's space at random, finished by its [locus] and [fit]: for datasets without feasible rows."""
+    """Return designs of a study's space at random, finished by its [locus] and [fit]:
+    for datasets without feasible rows.
+    """
     from sweep.chunks.chunk import parameter_matrix
     from sweep.synthesis.fit import fit_line
 

@@ -47,7 +47,7 @@ TAILS = (2.0, 98.0)  # percent; beyond are needles that hardly moved and were sc
 
 
 def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Problem:
-    """The optimisation problem of a study.
+    """Return the optimisation problem of a study.
 
     Swept steady parameters vary between the ends of their axes, those that [locus] or [fit] sets or scales as far as
     ``designs`` (k, P) reach and half their size beyond; limits on parameters narrow both.  An angle swept over a whole
@@ -95,14 +95,16 @@ def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Pr
 
 
 def _wanted(study: Study) -> bool:
-    """Whether the search goes along the locus: as the study says, or where that spares it an equation."""
+    """Return whether the search goes along the locus: as the study says, or where that spares it an equation."""
     if study.optimise is not None and study.optimise.variables is not None:
         return study.optimise.variables == "locus"
     return any(limit.output in study.prescribed and limit.minimum == limit.maximum for limit in study.limits)
 
 
 def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | None:
-    """Between which a parameter or a prescribed output may vary; None where it is given, or a sign."""
+    """Return the bounds between which a parameter or a prescribed output may vary;
+    None where it is given, or a sign.
+    """
     names = study.family.parameter_names
     parameter = next(p for p in (*study.family.parameters, *_prescribed(study)) if p.name == name)
     if parameter.choices is not None:
@@ -130,7 +132,9 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
 
 
 def _limited(study: Study, name: str) -> tuple[float, float] | None:
-    """Ends of a length of a guide whose proportions are searched globally: its limits, not what the sweep reached."""
+    """Return ends of a length of a guide whose proportions are searched globally:
+    its limits, not what the sweep reached.
+    """
     limits = [x for x in study.parameter_limits if x.output == name and x.maximum is not None]
     if study.optimise is None or study.optimise.globally != "proportions" or not limits:
         return None
@@ -145,7 +149,8 @@ def _prescribed(study: Study) -> tuple[Parameter, ...]:
 def problem_and_starts(
     study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1, say: Say = unsaid
 ) -> tuple[OptimiseSettings, Problem, Array]:
-    """Settings, problem and starts: the diverse best of the dataset, filled up from samples where they are too few.
+    """Return settings, problem and starts:
+    the diverse best of the dataset, filled up from samples where they are too few.
 
     Where no row of the dataset is feasible, the first starts are the best of random designs.  The mechanisms that do
     the study's [task] come before all others.  With ``optimise.global = "proportions"`` five of six starts come from
@@ -255,7 +260,9 @@ def optimise_study(
 
 
 def read_survey(path: Path) -> Survey | None:
-    """What the starts told of the search that a ``_optimum.parquet`` comes from; None where there is no such file."""
+    """Return what the starts told of the search that a ``_optimum.parquet`` comes from;
+    None where there is no such file.
+    """
     noted = metadata(path).get(b"search")
     if noted is None:
         return None
@@ -264,7 +271,7 @@ def read_survey(path: Path) -> Survey | None:
 
 
 def _table(study: Study, problem: Problem, results: list[Result], nominal: Result) -> dict[str, Any]:
-    """One row per start, best first, then the reference; a robust design stands before the ``nominal`` best."""
+    """Return one row per start, best first, then the reference; a robust design stands before the ``nominal`` best."""
     designs = np.array([r.design for r in results])
     roles = ["nominal" if r is nominal else "start" for r in results[1:]]
     rows: dict[str, list[Any]] = {"role": ["optimum", *roles]}
@@ -290,7 +297,9 @@ def _seed(study: Study) -> int:
 
 
 def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
-    """The study's reference design (1, P), which may lie outside the bounds or off the locus, and its violation."""
+    """Return the study's reference design (1, P), which may lie outside the bounds or off the locus,
+    and its violation.
+    """
     design, _ = design_matrix(study.family, study.reference or {})
     if problem.coordinates is not None:
         problem = problem_of(study, design, on_locus=False)
@@ -299,7 +308,7 @@ def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
 
 
 def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
-    """Pose curves of optimum and reference over one turn; no rows where the study wants none."""
+    """Return pose curves of optimum and reference over one turn; no rows where the study wants none."""
     family = study.family
     wanted = [*motion_curves(family), *joint_curves(family)]
     shown = [k for k, role in enumerate(table["role"]) if role in ("optimum", "reference")]
@@ -315,7 +324,7 @@ def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
 
 
 def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Array], dict[str, list[Any]]]) -> Any:
-    """Rows about the optimum and about the reference, one below the other."""
+    """Return rows about the optimum and about the reference, one below the other."""
     rows: dict[str, list[Any]] = {"role": []}
     for k, role in enumerate(table["role"]):
         if role != "start":

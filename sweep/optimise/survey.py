@@ -92,7 +92,7 @@ class Survey:
 def survey(
     problem: Problem, starts: Array, results: Sequence[Result], settings: OptimiseSettings, ended: str
 ) -> Survey:
-    """What the results of a search tell of it.
+    """Return what the results of a search tell of it.
 
     Parameters
     ----------
@@ -121,12 +121,12 @@ def survey(
 
 
 def later(found: Survey) -> Survey:
-    """The survey of a search whose time ran out when its starts had been searched."""
+    """Return the survey of a search whose time ran out when its starts had been searched."""
     return replace(found, ended="time", late=True)
 
 
 def with_basins(results: Sequence[Result]) -> list[Result]:
-    """Results, ranked by their objective, with the number of their basin: 1 for the best, 0 where infeasible."""
+    """Return results, ranked by their objective, with the number of their basin: 1 for the best, 0 where infeasible."""
     order = sorted(results, key=lambda r: (r.status == st.LIMIT_EXCEEDED, _objective(r), r.start))
     number, first, found = 0, math.nan, []
     for r in order:
@@ -151,7 +151,7 @@ def _unseen(n: int, met: Counter[int]) -> float:
 
 
 def _distinct(problem: Problem, starts: Array, numbers: list[int]) -> int:
-    """How many of some starts stand in distinct valleys."""
+    """Return how many of some starts stand in distinct valleys."""
     place = problem.scaled(starts)
     others = [c for c in range(starts.shape[1]) if c not in problem.columns]
     least = DISTINCT * math.sqrt(place.shape[1] / 6.0)
@@ -167,7 +167,7 @@ def _distinct(problem: Problem, starts: Array, numbers: list[int]) -> int:
 
 
 def _kinds(problem: Problem, starts: Array, results: Sequence[Result]) -> tuple[tuple[str, int, int], ...]:
-    """Starts and basins for each combination of the parameters that are chosen, not varied."""
+    """Return starts and basins for each combination of the parameters that are chosen, not varied."""
     others = [c for c in range(starts.shape[1]) if c not in problem.columns]
     differ = [c for c in others if len(np.unique(starts[:, c])) > 1]
     names = problem.family.parameter_names
@@ -181,7 +181,7 @@ def _kinds(problem: Problem, starts: Array, results: Sequence[Result]) -> tuple[
 
 
 def started(count: int) -> str:
-    """A number of starts in words."""
+    """Return a number of starts in words."""
     return f"{count} start{'' if count == 1 else 's'}"
 
 

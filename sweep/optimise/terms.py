@@ -14,7 +14,7 @@ ENDS = 4  # foremost and rearmost joints that are followed: a step rarely brings
 def numbers(
     m: Measure, design: Array, parameters: tuple[str, ...], scalars: tuple[str, ...], first: int, above: bool
 ) -> list[tuple[Term, float]]:
-    """A plain number, every piece of a size, or every length with both signs.
+    """Return a plain number, every piece of a size, or every length with both signs.
 
     Where only one of them has to stay on its side of a bound, it is the one that makes the output.
 
@@ -47,7 +47,7 @@ def box(
     first: int,
     above: bool,
 ) -> list[tuple[Term, float]]:
-    """The foremost ends of the joints less the rearmost ones, joints that stand still among them.
+    """Return the foremost ends of the joints less the rearmost ones, joints that stand still among them.
 
     ``maxima`` and ``minima`` are the values of the joints' coordinates at their extrema, and their places among the
     atoms; none where the design has none of them.

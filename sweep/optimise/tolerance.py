@@ -19,13 +19,13 @@ BAND = (2.5, 97.5)  # percent
 
 
 def touched(family: Family, tolerance: Tolerance) -> Array:
-    """Tolerance (P,) of every parameter: that of lengths, of angles, zero for all others."""
+    """Return the tolerance (P,) of every parameter: that of lengths, of angles, zero for all others."""
     widths = {"length": tolerance.lengths, "angle": tolerance.angles}
     return np.array([widths.get(p.unit, 0.0) if p.choices is None else 0.0 for p in family.parameters])
 
 
 def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, samples: int = SAMPLES) -> Array:
-    """Designs (samples, P) about one, every length and angle normally distributed, independent of each other.
+    """Return designs (samples, P) about one, every length and angle normally distributed, independent of each other.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def tolerance_rows(
     accuracy: Accuracy,
     window: tuple[float, float] | None = None,
 ) -> dict[str, list[Any]]:
-    """Distribution of design outputs under manufacturing tolerances by 2048 designs about the given one.
+    """Return the distribution of design outputs under manufacturing tolerances by 2048 designs about the given one.
 
     Parameters
     ----------

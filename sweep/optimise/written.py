@@ -49,7 +49,7 @@ TEXTS = {
 
 
 def certificates(results: list[Result]) -> dict[str, list[Any]]:
-    """What is known of each result, column by column."""
+    """Return what is known of each result, column by column."""
     return {
         "violation": [r.violation for r in results],
         "kkt_residual": [r.kkt_residual for r in results],
@@ -65,7 +65,7 @@ def certificates(results: list[Result]) -> dict[str, list[Any]]:
 
 
 def outputs(study: Study, designs: Array) -> dict[str, Any]:
-    """Every wanted output of designs (k, P) with its error estimate."""
+    """Return every wanted output of designs (k, P) with its error estimate."""
     from sweep.evaluation.summaries import design_outputs
 
     columns = design_outputs(study.family, designs, study.want, study.accuracy, study.window)

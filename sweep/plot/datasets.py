@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArray[Any]:
-    """What the best design of each cell of two swept parameters attains, and the share of feasible designs.
+    """Show what the best design of each cell of two swept parameters attains, and the share of feasible designs.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArr
 
 
 def front(folder: str | Path) -> Axes:
-    """The objective against a second criterion: designs of the sweep, and the front where one was searched.
+    """Show the objective against a second criterion: designs of the sweep, and the front where one was searched.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def front(folder: str | Path) -> Axes:
 
 
 def tolerance(folder: str | Path, output: str | None = None) -> Axes:
-    """What manufacture makes of the optimum: the spread of its outputs, or one of them as a histogram.
+    """Return what manufacture makes of the optimum: the spread of its outputs, or one of them as a histogram.
 
     Parameters
     ----------
@@ -131,7 +131,8 @@ def tolerance(folder: str | Path, output: str | None = None) -> Axes:
 
 
 def sensitivity(folder: str | Path) -> Axes:
-    """By how much a small change of each dimension changes the objective at the optimum, the most telling first.
+    """Show by how much a small change of each dimension changes the objective at the optimum,
+    the most telling first.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ def motion(
     speed: float | None = None,
     angles: AngleUnit | None = None,
 ) -> NDArray[Any]:
-    """Curves over one turn, one panel for each.
+    """Show curves over one turn, one panel for each.
 
     Parameters
     ----------
@@ -94,7 +94,8 @@ def mechanism(
     unit: str = "mm",
     angles: AngleUnit | None = None,
 ) -> NDArray[Any]:
-    """The mechanism in one or several positions with paths of its joints, axes and senses; a panel for each frame.
+    """Return the mechanism in one or several positions with paths of its joints, axes and senses;
+    a panel for each frame.
 
     Parameters
     ----------
@@ -138,7 +139,7 @@ def polar_load(
     stage: str = "",
     angles: AngleUnit | None = None,
 ) -> Axes:
-    """The force on a link at a fixed axis over one turn, its direction as the angle and its size as the radius.
+    """Show the force on a link at a fixed axis over one turn, its direction as the angle and its size as the radius.
 
     Parameters
     ----------
@@ -199,7 +200,7 @@ def polar_load(
 
 
 def _plain(mechanism: Mechanism, design: Table) -> dict[str, Any]:
-    """The columns that are parameters of the mechanism itself."""
+    """Return the columns that are parameters of the mechanism itself."""
     names = find_family(mechanism).parameter_names
     columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
     return {str(key): values for key, values in columns.items() if str(key) in names}

@@ -61,7 +61,7 @@ class Proof:
 def concluded(
     question: Question, leaves: Leaves, best: float, wanted_gap: float, boxes: int, seconds: float, cut_short: bool
 ) -> Proof:
-    """What follows from the leaves."""
+    """Return what follows from the leaves."""
     outcome, bounds = leaves.outcome, np.where(leaves.outcome == EMPTY, np.inf, leaves.bound)
     volume = np.prod((leaves.high - leaves.low) / (question.high - question.low), axis=1)
     small = outcome == TOO_SMALL
@@ -91,7 +91,7 @@ def concluded(
 
 
 def reason(question: Question, outcome: int, kinds: Array) -> str:
-    """What proves a box, in words."""
+    """Return what proves a box, in words."""
     if outcome == BOUND:
         return f"{question.objective} at least the target"
     if outcome == EMPTY:
@@ -135,7 +135,7 @@ def write(path: Path, question: Question, leaves: Leaves, proof: Proof, target: 
 
 
 def read_proof(path: Path) -> Proof | None:
-    """What a certificate says; None where there is no such file."""
+    """Return what a certificate says; None where there is no such file."""
     import pyarrow.parquet as pq
 
     if not path.is_file():

@@ -47,18 +47,18 @@ class Question:
         return np.array([self.provable.coordinates.index(name) for name in self.names], np.float64)
 
     def in_kernel(self, value: float) -> float:
-        """A value of the objective in the unit of the proof's rows: sin^2 for a pressure angle."""
+        """Return a value of the objective in the unit of the proof's rows: sin^2 for a pressure angle."""
         return float(np.sin(value) ** 2) if self.provable.objectives[self.objective] == 0 else value
 
     def outside(self, bound: float) -> float:
-        """The value of the objective that a bound in the unit of the rows means."""
+        """Return the value of the objective that a bound in the unit of the rows means."""
         if self.provable.objectives[self.objective] == 0:
             return float(np.arcsin(np.sqrt(min(max(bound, 0.0), 1.0))))
         return bound
 
 
 def question_of(study: Study) -> Question:
-    """What the study asks to be proven.
+    """Return what the study asks to be proven.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def question_of(study: Study) -> Question:
 
 
 def _suited(study: Study) -> ProvableLocus | None:
-    """The locus whose coordinates the study gives: with a rocker of one length that by the rocker.
+    """Return the locus whose coordinates the study gives: with a rocker of one length that by the rocker.
 
     There e and g follow, and their ranges become limits; elsewhere e and g are coordinates, and the rocker follows.
     """
@@ -107,7 +107,7 @@ def _known(study: Study) -> set[str]:
 
 
 def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str, tuple[float, float]]:
-    """Between which ends every coordinate lies; twice the same where it is given."""
+    """Return the ends between which every coordinate lies; twice the same where it is given."""
     found: dict[str, tuple[float, float]] = {}
     chosen = listed(study)
     for name in coordinates:
@@ -128,7 +128,7 @@ def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str
 
 
 def _limits(study: Study, provable: ProvableLocus) -> tuple[float, Array, tuple[str, ...]]:
-    """Least cos^2 of the pressure angle, least and most of every link, and the limits that are not used."""
+    """Return the least cos^2 of the pressure angle, least and most of every link, and the limits that are not used."""
     cos2, left_out = 0.0, []
     links = np.array([-np.inf, np.inf] * len(provable.links))
     for number, name in enumerate(provable.links):
@@ -158,7 +158,7 @@ def _put(links: Array, number: int, limit: Limit) -> None:
 
 
 def described(question: Question) -> Mapping[str, Any]:
-    """What the certificate has to hold so that another program can check it."""
+    """Return what the certificate has to hold so that another program can check it."""
     return {
         "objective": question.objective,
         "coordinates": list(question.provable.coordinates),

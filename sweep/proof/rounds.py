@@ -53,12 +53,12 @@ class Leaves:
         return found
 
     def taken(self, which: Numbers) -> Leaves:
-        """Some of them, by index or mask."""
+        """Return some of them, by index or mask."""
         return Leaves(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
 def empty(rows: int, free: int) -> Leaves:
-    """Room for so many leaves."""
+    """Return the room for so many leaves."""
     return Leaves(
         np.zeros((rows, free)), np.zeros((rows, free)), np.zeros(rows, np.uint8), np.zeros(rows),
         np.full((rows, COMBINED), -1, np.int64), np.zeros((rows, COMBINED)), np.zeros((rows, COMBINED)),
@@ -66,7 +66,7 @@ def empty(rows: int, free: int) -> Leaves:
 
 
 def joined(parts: list[Leaves]) -> Leaves:
-    """All leaves in one."""
+    """Return all leaves in one."""
     return Leaves(*(np.concatenate([getattr(p, n) for p in parts]) for n in Leaves.__dataclass_fields__))
 
 
@@ -92,11 +92,11 @@ class Unit:
     round: int
 
     def path(self, number: int) -> Path:
-        """Where the result of a unit stands."""
+        """Return the path at which the result of a unit stands."""
         return self.folder / f"round-{self.round}-unit-{number:02d}.npz"
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[int, int]:
-        """Number of the unit and of the boxes it judged."""
+        """Return the number of the unit and of the boxes it judged."""
         mine = self.boxes.taken(np.arange(number, len(self.boxes.bound), UNITS))
         if should_stop() or not len(mine.bound):
             return number, 0
@@ -172,7 +172,7 @@ def explored(
 
 
 def _split(boxes: Leaves, question: Question) -> Leaves:
-    """At least as many boxes as units: the widest side of each is halved until there are."""
+    """Halve the widest side of every box until there are at least as many boxes as units."""
     whole = question.high - question.low
     while len(boxes.bound) < UNITS:
         low, high = boxes.low, boxes.high

@@ -69,7 +69,7 @@ def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lam
 
 
 def _best(path: Path, question: Question) -> float:
-    """The objective of the study's optimum; nan where no feasible design was found."""
+    """Return the objective of the study's optimum; nan where no feasible design was found."""
     import pyarrow.parquet as pq
 
     table = pq.read_table(path, columns=["role", "status", question.objective]).to_pylist()
@@ -78,7 +78,7 @@ def _best(path: Path, question: Question) -> float:
 
 
 def _key(question: Question, target: float, asked: ProveSettings) -> str:
-    """What the certificate depends on."""
+    """Return what the certificate depends on."""
     what = [described(question), target, asked.gap, asked.boxes, asked.smallest, UNITS, SHARES, source_hash()]
     return hashlib.sha256(json.dumps(what, default=str, sort_keys=True).encode()).hexdigest()[:16]
 

@@ -9,7 +9,7 @@ from sweep.proof.certificate import Proof
 
 
 def proof_words(proof: Proof, name: str, show: Callable[[float], str]) -> str:
-    """One sentence or two for a report or a terminal.
+    """Return one sentence or two for a report or a terminal.
 
     Parameters
     ----------

@@ -32,12 +32,12 @@ def parts(name: str) -> Parts:
 
 
 def stem(name: str) -> str:
-    """The name without member and stage."""
+    """Return the name without member and stage."""
     return parts(name).stem
 
 
 def at_stage(name: str, number: str) -> str:
-    """The name at the stage of that number without the number; "" for a name of another stage.
+    """Return the name at the stage of that number without the number; "" for a name of another stage.
 
     Names such as ``support_d1`` end in a digit of their own, so that the stage has to be known.
 
@@ -48,7 +48,7 @@ def at_stage(name: str, number: str) -> str:
 
 
 def reduced(prefix: str, name: str) -> str:
-    """The name of a reduction of an output.
+    """Return the name of a reduction of an output.
 
     >>> reduced("max_abs", "needle.d2s")
     'needle.max_abs_d2s'
@@ -58,17 +58,17 @@ def reduced(prefix: str, name: str) -> str:
 
 
 def is_error(name: str) -> bool:
-    """Whether a column holds the error of another."""
+    """Return whether a column holds the error of another."""
     return without_error(name) != name
 
 
 def without_error(name: str) -> str:
-    """The name of the column whose error a column holds, or the name itself."""
+    """Return the name of the column whose error a column holds, or the name itself."""
     return name.removeprefix(ERROR)
 
 
 def error_of(name: str) -> str:
-    """The name of the column that holds the error of another."""
+    """Return the name of the column that holds the error of another."""
     return f"{ERROR}{name}"
 
 
@@ -76,12 +76,12 @@ ERROR = "err_"
 
 
 def negative(name: str) -> str:
-    """The name of the negative of a design output, which is small where the output is to be large."""
+    """Return the name of the negative of a design output, which is small where the output is to be large."""
     return f"{MINUS}{name}"
 
 
 def without_minus(name: str) -> str:
-    """The output that a name is the negative of; "" for any other name."""
+    """Return the output that a name is the negative of; "" for any other name."""
     return name.removeprefix(MINUS) if name.startswith(MINUS) else ""
 
 
@@ -89,20 +89,22 @@ MINUS = "minus_"
 
 
 def is_place(name: str) -> bool:
-    """Whether a design output is a crank angle at which something happens, not a size that could be compared."""
+    """Return whether a design output is a crank angle at which something happens, not a size that could be compared."""
     return parts(name).stem.startswith("phi_")
 
 
 def is_largest(name: str, *, magnitude: bool = False) -> bool:
-    """Whether a design output is the largest value of a pose output, or its largest magnitude."""
+    """Return whether a design output is the largest value of a pose output, or its largest magnitude."""
     return stem(name).startswith("max_abs_" if magnitude else "max_")
 
 
 def is_flag(name: str) -> bool:
-    """Whether a design output is a yes or no."""
+    """Return whether a design output is a yes or no."""
     return stem(name) == "rotatable"
 
 
 def by_magnitude(name: str) -> bool:
-    """Whether limits and objectives compare the magnitude of a design output: its sign tells the assembly mode."""
+    """Return whether limits and objectives compare the magnitude of a design output:
+    its sign tells the assembly mode.
+    """
     return stem(name) in ("swing", "stroke")

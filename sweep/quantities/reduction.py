@@ -42,11 +42,11 @@ class Reduction:
         return "scalar" if not self.modes else f"phi_{self.name}" if self.place else self.name
 
     def prefix(self, domain: Domain) -> str:
-        """What stands before the name of a pose output."""
+        """Return what stands before the name of a pose output."""
         return f"{domain.name}_{self.name}_" if self.place else f"{self.name}_"
 
     def output(self, of: Output, domain: Domain) -> Output:
-        """The design output: this reduction of a pose output."""
+        """Return the design output: this reduction of a pose output."""
         over = "one turn" if domain.unit == "rad" else f"the interval of the {domain.text}"
         variable = "crank angle" if isinstance(domain, Turn) else domain.text
         text = f"{self.text.format(over=over, variable=variable)} {of.name}: {of.text}"
@@ -74,12 +74,12 @@ _BY_LENGTH = sorted(REDUCTIONS, key=lambda reduction: -len(reduction.name) - red
 
 
 def prefixes(domain: Domain) -> tuple[str, ...]:
-    """The prefixes of all reductions that serve a domain."""
+    """Return the prefixes of all reductions that serve a domain."""
     return tuple(reduction.prefix(domain) for reduction in REDUCTIONS if domain.kind in reduction.domains)
 
 
 def split(name: str, domain: Domain) -> Iterator[tuple[Reduction, str]]:
-    """The ways to read a name as a reduction and the name of a pose output."""
+    """Yield the ways to read a name as a reduction and the name of a pose output."""
     for reduction in _BY_LENGTH:
         prefix = reduction.prefix(domain)
         if name.startswith(prefix):
@@ -87,13 +87,13 @@ def split(name: str, domain: Domain) -> Iterator[tuple[Reduction, str]]:
 
 
 def reduced(name: str, domain: Domain) -> set[str]:
-    """What a name may be about: itself, or what follows the prefix of a reduction."""
+    """Return what a name may be about: itself, or what follows the prefix of a reduction."""
     name = without_minus(name) or name
     return {name, *(rest for _, rest in split(name, domain))}
 
 
 def reduction_of(family: Family, name: str) -> tuple[Reduction, Output] | None:
-    """The reduction and the pose output that a name stands for; None where it stands for none."""
+    """Return the reduction and the pose output that a name stands for; None where it stands for none."""
     for reduction, rest in split(name, family.domain):
         pose = family.pose_output.get(rest)
         if pose is not None:

@@ -46,7 +46,8 @@ class Box:
 
 
 def boxes(family: Family) -> dict[str, Box]:
-    """The boxes of a family by name: its own, of a chain every stage's, of a machine the whole and every member's.
+    """Return the boxes of a family by name:
+    its own, of a chain every stage's, of a machine the whole and every member's.
 
     The stages of a chain share an axis, but the angle between their frames is nobody's parameter: only a machine, whose
     members are placed, has a box of several of them.
@@ -63,12 +64,12 @@ def boxes(family: Family) -> dict[str, Box]:
 
 
 def box(family: Family, name: str) -> Box | None:
-    """The box of that name; None where the family has none."""
+    """Return the box of that name; None where the family has none."""
     return boxes(family).get(name) if "box_" in name else None
 
 
 def _own(family: Family, stage: str, columns: slice, axis: int) -> Box | None:
-    """The box of a family that stands alone, in its own frame."""
+    """Return the box of a family that stands alone, in its own frame."""
     at = {name: points[axis] for name, points in _moving(family).items()}
     curves = tuple(dict.fromkeys(f"{name}{stage}" for name in at.values() if name is not None))
     if not curves:
@@ -85,7 +86,7 @@ def _own(family: Family, stage: str, columns: slice, axis: int) -> Box | None:
 
 
 def _of_member(m: Member, found: Box) -> Box:
-    """A member's own box under the machine's names."""
+    """Return a member's own box under the machine's names."""
     output = Output(f"{m.name}.{found.output.name}", "length", f"{m.name}: {found.output.text}")
     pairs = tuple((f"{m.name}.{most}", f"{m.name}.{least}") for most, least in found.reductions)
     still = tuple(partial(_of_columns, piece, m.columns) for piece in found.still)
@@ -93,7 +94,7 @@ def _of_member(m: Member, found: Box) -> Box:
 
 
 def _whole(machine: Machine, axis: int) -> Box | None:
-    """The box of all members in the machine's frame; of a chain its last stage, which is what stands there."""
+    """Return the box of all members in the machine's frame; of a chain its last stage, which is what stands there."""
     curves, pairs, still = [], [], list[Piece]()
     for m in machine.members:
         last = m.family.stages[-1].family if isinstance(m.family, Chain) else m.family
@@ -115,7 +116,9 @@ def _whole(machine: Machine, axis: int) -> Box | None:
 
 
 def _moving(family: Family) -> Mapping[str, Coordinates]:
-    """The moving joints of all links; none where one of them is no pose output, so that its place is not known."""
+    """Return the moving joints of all links;
+    none where one of them is no pose output, so that its place is not known.
+    """
     at = {name: points for found in family.every(Points) for name, points in found.at.items()}
     for skeleton in family.every(Skeleton):
         joints = [joint for link in skeleton.links for joint in link.joints if joint not in skeleton.fixed]
@@ -124,7 +127,7 @@ def _moving(family: Family) -> Mapping[str, Coordinates]:
 
 
 def _standing(family: Family) -> Iterator[Fixed]:
-    """Bearings and points of the frame; a line along which something slides is no joint."""
+    """Yield bearings and points of the frame; a line along which something slides is no joint."""
     for skeleton in family.every(Skeleton):
         yield from (fixed for fixed in skeleton.fixed.values() if fixed.kind != "slide")
 
@@ -142,6 +145,6 @@ def _of_columns(piece: Piece, columns: slice, designs: Any) -> Any:
 
 
 def _placed(m: Member, fixed: Fixed, axis: int, columns: slice, designs: Any) -> Any:
-    """A coordinate in the machine's frame of a point that stands still in the member's."""
+    """Return a coordinate in the machine's frame of a point that stands still in the member's."""
     start = m.columns.stop + 1
     return designs[:, start + axis] + np.asarray(fixed.at(designs[:, columns])) @ m.place.rotation[axis]

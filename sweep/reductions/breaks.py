@@ -36,7 +36,7 @@ class Arcs(NamedTuple):
 
 
 def jumps(values: Array, size: Array, rough: float) -> tuple[Mask, Mask]:
-    """Where rows of samples jump, and which rows the samples resolve apart from that.
+    """Find where rows of samples jump, and which rows the samples resolve apart from that.
 
     Parameters
     ----------
@@ -60,14 +60,14 @@ def jumps(values: Array, size: Array, rough: float) -> tuple[Mask, Mask]:
 
 
 def near_jumps(between: Mask, row: Index, column: Index) -> Mask:
-    """Which samples (row, column) lie within `BESIDE` samples of a jump."""
+    """Return which samples (row, column) lie within `BESIDE` samples of a jump."""
     near = np.logical_or.reduce([np.roll(between, k, axis=1) for k in range(-BESIDE + 1, BESIDE + 1)])
     found: Mask = near[row, column]
     return found
 
 
 def search(curve: Curve, measured: Curve, column: Index, samples: int) -> Arcs:
-    """Highest measured values on the arcs that end and begin at jumps.
+    """Return the highest measured values on the arcs that end and begin at jumps.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ class Quantity:
     locates: bool = False
 
     def requests(self, family: Family, windowed: bool) -> tuple[Request, ...]:
-        """The extrema it is made of; a window concerns deviations across a line only."""
+        """Return the extrema it is made of; a window concerns deviations across a line only."""
         inside = windowed and family.pose_output[self.of].windowed
         return tuple(Request(self.of, mode, inside, self.locates) for mode in self.modes)
 
@@ -97,7 +97,7 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy)
 
 
 def quantity(family: Family, name: str) -> Quantity | None:
-    """What a name stands for where it is computed from poses alone; None where it stands for nothing."""
+    """Return what a name stands for where it is computed from poses alone; None where it stands for nothing."""
     if isinstance(family, Machine):
         member = family.split(name)
         if member is not None:
@@ -122,7 +122,7 @@ def _event(family: Family, name: str) -> Quantity | None:
 
 
 def _of_member(member: Member, found: Quantity | None) -> Quantity | None:
-    """A member's quantity as one of the machine."""
+    """Return a member's quantity as one of the machine."""
     if found is None:
         return None
     of = found.of and f"{member.name}.{found.of}"
@@ -130,7 +130,7 @@ def _of_member(member: Member, found: Quantity | None) -> Quantity | None:
 
 
 def _of_point(machine: Machine, member: Member, own: str) -> Quantity | None:
-    """A reduction of a coordinate in the machine's frame, which the member's family does not know."""
+    """Return a reduction of a coordinate in the machine's frame, which the member's family does not know."""
     for reduction, rest in split(own, machine.domain):
         pose = machine.pose_output.get(f"{member.name}.{rest}")
         if pose is not None:
@@ -146,7 +146,7 @@ def _dotted(member: Member, found: Output) -> Output:
 
 
 def output(family: Family, name: str) -> Output:
-    """Unit and definition of a design output.
+    """Return the unit and definition of a design output.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def output(family: Family, name: str) -> Output:
 
 
 def _known(family: Family, name: str) -> str:
-    """Words for an unknown name: what there is, and the nearest."""
+    """Return words for an unknown name: what there is, and the nearest."""
     names = output_names(family)
     grammar = prefixes(family.domain)
     special = ", ".join(n for n in names if not n.startswith(grammar))
@@ -197,7 +197,9 @@ def _known(family: Family, name: str) -> str:
 
 
 def output_names(family: Family) -> tuple[str, ...]:
-    """All design outputs worth listing: the family's own, margins, limit positions, reductions of every pose output."""
+    """Return all design outputs worth listing:
+    the family's own, margins, limit positions, reductions of every pose output.
+    """
     if isinstance(family, Machine):
         dotted = [f"{m.name}.{name}" for m in family.members for name in output_names(m.family)]
         own = [o.name for relation in family.relations for o in relation.outputs]
@@ -222,7 +224,7 @@ def output_names(family: Family) -> tuple[str, ...]:
 
 
 def limit_names(family: Family, position: str, stage: str) -> dict[str, str]:
-    """Names made of the two limit positions of a follower, and what each is."""
+    """Return names made of the two limit positions of a follower, and what each is."""
     pose = family.pose_output.get(position)
     if pose is None:
         return {}
@@ -271,7 +273,7 @@ def _limit(family: Family, name: str) -> Quantity | None:
 
 
 def limit_order(family: Family, position: str) -> tuple[str, str]:
-    """How the extended and the folded position are told apart, in words."""
+    """Return how the extended and the folded position are told apart, in words."""
     sign = family.outward_sign(position)
     if sign:
         return f"largest (smallest if {sign} = -1)", f"smallest (largest if {sign} = -1)"

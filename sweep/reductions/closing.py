@@ -17,7 +17,7 @@ from sweep.families.domain import Interval
 
 
 def on_closed_turn(family: Family) -> Family:
-    """The family with poses over a closed turn; the family itself unless its domain is an interval."""
+    """Return the family with poses over a closed turn; the family itself unless its domain is an interval."""
     domain = family.domain
     if not isinstance(domain, Interval):
         return family
@@ -31,7 +31,7 @@ def on_closed_turn(family: Family) -> Family:
 
 
 def variable(family: Family, designs: Array, turned: Array, err: Array) -> tuple[Array, Array]:
-    """The domain's variable at angles of the closed turn, (n,), and its error from that of the angle."""
+    """Return the domain's variable at angles of the closed turn, (n,), and its error from that of the angle."""
     if not isinstance(family.domain, Interval):
         return turned, err
     low, high = family.domain.ends(designs)

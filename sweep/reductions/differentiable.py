@@ -14,7 +14,7 @@ DIFFERENCE = 1e-5
 
 
 def differentiable(family: Family) -> Family:
-    """The family with poses that take complex designs and angles; the family itself where they do already."""
+    """Return the family with poses that take complex designs and angles; the family itself where they do already."""
     if family.analytic:
         return family
     return replace(family, poses=partial(_poses, family.poses), analytic=True)

@@ -49,7 +49,9 @@ class Size:
     pieces: tuple[Piece, ...]
 
     def values(self, family: Family, designs: Array) -> Array:
-        """The size of every design, (n,); lengths are brought near 1 by a power of two first: nothing overflows."""
+        """Return the size of every design, (n,);
+        lengths are brought near 1 by a power of two first: nothing overflows.
+        """
         lengths = [k for k, p in enumerate(family.parameters) if p.unit == "length"]
         _, exponent = np.frexp(np.abs(designs[:, lengths]).max(axis=1))
         scaled = designs.copy()
@@ -71,7 +73,7 @@ class _Part:
     stage: str = ""
 
     def of(self, piece: Piece) -> Piece:
-        """A piece of the part as one of the whole."""
+        """Return a piece of the part as one of the whole."""
         return partial(_of_columns, piece, self.columns)
 
 
@@ -80,7 +82,7 @@ def _of_columns(piece: Piece, columns: NDArray[np.intp], designs: Any) -> Any:
 
 
 def sizes(family: Family) -> dict[str, Size]:
-    """All sizes of a family by name: of the whole, of every member, and of every stage."""
+    """Return all sizes of a family by name: of the whole, of every member, and of every stage."""
     groups: dict[tuple[str, str], list[_Part]] = {}
     for part in _parts(family):
         for key in dict.fromkeys((("", ""), (part.member, ""), (part.member, part.stage))):
@@ -94,12 +96,12 @@ def sizes(family: Family) -> dict[str, Size]:
 
 
 def size(family: Family, name: str) -> Size | None:
-    """The size of that name; None where the family has none."""
+    """Return the size of that name; None where the family has none."""
     return sizes(family).get(name) if any(o.name in name for o in ALL) else None
 
 
 def dimension_step(family: Family) -> Step | None:
-    """The route to all sizes; None where a family has none."""
+    """Return the route to all sizes; None where a family has none."""
     found = sizes(family)
     if not found:
         return None
@@ -132,7 +134,7 @@ def _parts(family: Family) -> Iterator[_Part]:
 
 
 def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> Size | None:
-    """The size of some parts together; several stages or members give the least or the largest of all."""
+    """Return the size of some parts together; several stages or members give the least or the largest of all."""
     pieces = tuple(part.of(piece) for part in parts for piece in _PIECES[of.name](part.family))
     if not pieces:
         return None
@@ -143,7 +145,7 @@ def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> Size | Non
 
 
 def _links(family: Family) -> list[Piece]:
-    """The lengths of the moving links; one that is not there (length 0) counts as the longest of the others."""
+    """Return the lengths of the moving links; one that is not there (length 0) counts as the longest of the others."""
     found: list[Piece] = []
     for dimensions in family.every(Dimensions):
         always = [partial(_length, _columns(family, names)) for names in dimensions.links]
@@ -157,7 +159,7 @@ def _ratios(family: Family) -> list[Piece]:
 
 
 def _arms(family: Family) -> list[Piece]:
-    """Squares of the distances of a carried point from both joints of its link, over that of the joints."""
+    """Return squares of the distances of a carried point from both joints of its link, over that of the joints."""
     return [
         partial(_arm, _columns(family, arm.point), _columns(family, arm.link), share)
         for dimensions in family.every(Dimensions)
@@ -167,7 +169,7 @@ def _arms(family: Family) -> list[Piece]:
 
 
 def _pivots(family: Family) -> list[Piece]:
-    """Squares of the distances between the centres of all bearings of links that turn about a fixed axis."""
+    """Return squares of the distances between the centres of all bearings of links that turn about a fixed axis."""
     return [
         partial(_apart, one.at, other.at)
         for skeleton in family.every(Skeleton)

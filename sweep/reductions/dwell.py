@@ -14,7 +14,8 @@ SAMPLES = 512
 
 
 def window_angle(family: Family, designs: Array, window: Window) -> tuple[Array, Array]:
-    """Crank angle over which the position lies in the window, of every design, and its error, each (n,) [rad].
+    """Return the crank angle over which the position lies in the window, of every design, and its error,
+    each (n,) [rad].
 
     Parameters
     ----------

@@ -21,12 +21,12 @@ EPS = 2.0**-53
 
 
 def event_names(family: Family, event: Event) -> tuple[str, str]:
-    """The design outputs of an event: where it happens first, and how often."""
+    """Return the design outputs of an event: where it happens first, and how often."""
     return f"{family.domain.name}_{event.name}", f"count_{event.name}"
 
 
 def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
-    """First place and number of the events that the names are about.
+    """Return the first place and number of the events that the names are about.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy
 
 
 def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) -> tuple[Array, Array, Array, Status]:
-    """First angle of the event and its error, how often it happens, and status, each (n,)."""
+    """Return the first angle of the event and its error, how often it happens, and status, each (n,)."""
     n = len(designs)
     phi, err, number, status = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n), np.zeros(n, np.uint8)
     pending, samples = np.arange(n), accuracy.samples or START
@@ -84,7 +84,9 @@ def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) ->
 
 
 def _crossings(family: Family, designs: Array, rows: Index, values: Array, event: Event) -> tuple[Array, Array, Array]:
-    """How often samples (r, m) pass the level in the event's sense, and the first place with its error, each (r,)."""
+    """Return how often samples (r, m) pass the level in the event's sense,
+    and the first place with its error, each (r,).
+    """
     off = (values - event.level) * (1.0 if event.rising else -1.0)
     passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
     if isinstance(family.domain, Interval):
@@ -103,7 +105,9 @@ def _crossings(family: Family, designs: Array, rows: Index, values: Array, event
 def _root(
     family: Family, designs: Array, event: Event, left: Array, right: Array, low: Array, high: Array
 ) -> tuple[Array, Array]:
-    """Regula falsi in the Illinois form between two samples, all designs at once; its error from the last slope."""
+    """Find a passage between two samples by regula falsi in the Illinois form, all designs at once;
+    its error is from the last slope.
+    """
     sense = 1.0 if event.rising else -1.0
     slope = (high - low) / (right - left)
     side, phi, off = np.zeros(left.size), right.copy(), high.copy()

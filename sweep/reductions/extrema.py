@@ -1,6 +1,8 @@
-"""True extrema over one turn of any pose output of any family, from its poses alone; docs/extrema.md.
+"""True extrema over one turn of any pose output of any family; docs/extrema.md.
 
-Sampled, refined between the samples, and sampled again more densely where the samples do not resolve the curve.
+Sampled, refined between the samples, and sampled again more densely where the samples do not resolve the curve.  A
+chain of families that can be fused has one kernel for that; what it leaves open, and everything else, is searched for
+from poses alone.
 """
 
 from __future__ import annotations
@@ -11,11 +13,14 @@ import numpy as np
 
 from kernels import status as st
 from sweep.families.base import Array, Family
+from sweep.reductions import fused
 from sweep.reductions import search as one_search
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
 from sweep.reductions.sampling import Status, blocks
 from sweep.reductions.search import LIMIT, START
 from sweep.reductions.window import Window
+
+HARD = 512  # samples of the first look at what the fused search has left open
 
 __all__ = ["DESIGN_STATUS", "LIMIT", "START", "Extremum", "Request", "true_extrema"]
 
@@ -51,12 +56,42 @@ def true_extrema(
 
     Notes
     -----
-    Starts with 32 samples.  A design is sampled again, with twice as many or more, if the fourth difference of its
-    samples exceeds a tenth of their size, if they stand wider than a twelfth of the distance of the nearest complex
-    zero of a discriminant, or if refinement moved the peak by more than 5 % of its height.
+    The search from poses starts with 32 samples.  A design is sampled again, with twice as many or more, if the fourth
+    difference of its samples exceeds a tenth of their size, if they stand wider than a twelfth of the distance of the
+    nearest complex zero of a discriminant, or if refinement moved the peak by more than 5 % of its height.
     """
+    found: dict[Request, Extremum] = {}
+    status = np.zeros(len(designs), np.uint8)
+    left = []
+    for request in requests:
+        curve = None if locate or request.place or request.windowed else fused.curve_of(family, request, anywhere)
+        if curve is None:
+            left.append(request)
+            continue
+        quick, now, undecided = curve.extremum(designs, target)
+        rows = np.flatnonzero(undecided)
+        if rows.size:
+            slow, now[rows] = _searched(family, designs[rows], [request], target, locate, anywhere, None, HARD)
+            for column, values in zip(quick, slow[request], strict=True):
+                column[rows] = values
+        found[request], status = quick, np.where(status == st.OK, now, status)
+    if left:
+        slow, now = _searched(family, designs, left, target, locate, anywhere, window)
+        found |= slow
+        status = np.where(status == st.OK, now, status)
+    for extremum in found.values():
+        for column in extremum:
+            column[(status != st.OK) & (status != st.NOT_CONVERGED)] = np.nan
+    return found, status
+
+
+def _searched(
+    family: Family, designs: Array, requests: Sequence[Request], target: float, locate: bool, anywhere: bool,
+    window: Window | None, start: int | None = None,
+) -> tuple[dict[Request, Extremum], Status]:  # fmt: skip
+    """As `true_extrema`, from poses alone, ``start`` samples at first; values stand where the status is not OK too."""
     search = one_search.Search(family, designs, tuple(requests), target, locate, anywhere, window)
-    pending, samples = np.arange(len(designs)), one_search.START
+    pending, samples = np.arange(len(designs)), start or one_search.START
     while pending.size:
         for rows in blocks(pending[search.needed(pending) <= samples], samples, len(search.names)):
             search.block(rows, samples)
@@ -65,7 +100,4 @@ def true_extrema(
             search.status[pending] = st.NOT_CONVERGED
             break
         samples *= 2
-    for extremum in search.found.values():
-        for column in extremum:
-            column[(search.status != st.OK) & (search.status != st.NOT_CONVERGED)] = np.nan
     return search.found, search.status

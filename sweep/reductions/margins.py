@@ -19,7 +19,7 @@ TARGET = 1e-10
 
 
 def margin_suffixes(family: Family) -> tuple[str, ...]:
-    """What follows the names of a stage's margin: nothing for a single family, the stage numbers for a chain.
+    """Return what follows the names of a stage's margin: nothing for a single family, the stage numbers for a chain.
 
     Stages without a discriminant (a geared drive turns always) are left out.
     """
@@ -27,7 +27,8 @@ def margin_suffixes(family: Family) -> tuple[str, ...]:
 
 
 def margins(family: Family, designs: Array, suffixes: tuple[str, ...], accuracy: Accuracy) -> Columns:
-    """Whether the stages turn fully, their smallest cos^2(pressure angle) and largest pressure angle over the turn.
+    """Return whether the stages turn fully,
+    their smallest cos^2(pressure angle) and largest pressure angle over the turn.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ def margins(family: Family, designs: Array, suffixes: tuple[str, ...], accuracy:
 
 
 def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
-    """The whole chain's margins from those of its stages: the weakest stage decides."""
+    """Return the whole chain's margins from those of its stages: the weakest stage decides."""
     rotatable = np.logical_and.reduce([columns[f"rotatable{s}"] for s in suffixes])
     result: Columns = {"rotatable": rotatable, "err_rotatable": np.zeros(rotatable.size)}
     for name, sign in (("margin", -1.0), ("max_pressure_angle", 1.0)):
@@ -78,7 +79,8 @@ def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
 
 
 def with_transmission(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
-    """The columns with the least transmission angle of each suffix: 90 degrees less the largest pressure angle.
+    """Return the columns with the least transmission angle of each suffix:
+    90 degrees less the largest pressure angle.
 
     It is made of the cosine and the sine of that angle, so that it stays exact where the linkage nearly locks.
     """
@@ -92,7 +94,7 @@ def with_transmission(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
 
 
 def own_step(family: Family, suffix: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
-    """The family's own exact route to the margin, if it has one; a chain's first stage turns by itself."""
+    """Return the family's own exact route to the margin, if it has one; a chain's first stage turns by itself."""
     stage = None
     if isinstance(family, Chain):
         if suffix != "1":
@@ -120,7 +122,7 @@ def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accurac
 
 
 def _from_poses(family: Family, designs: Array, suffix: str) -> Columns:
-    """The margin from the family's discriminant, refined to its least value."""
+    """Return the margin from the family's discriminant, refined to its least value."""
     designs = _unit_lengths(family, designs)
     loop = next(found for found in family.every(Assembly) if found.stage == suffix)
     discriminant, angle = loop.discriminant, loop.pressure_angle
@@ -152,7 +154,9 @@ def _from_poses(family: Family, designs: Array, suffix: str) -> Columns:
 
 
 def _unit_lengths(family: Family, designs: Array) -> Array:
-    """The same mechanisms, brought near unit size by a power of two: no discriminant overflows, no bit changes."""
+    """Return the same mechanisms, brought near unit size by a power of two:
+    no discriminant overflows, no bit changes.
+    """
     lengths = [k for k, p in enumerate(family.parameters) if p.unit == "length"]
     scaled = designs.copy()
     if lengths:

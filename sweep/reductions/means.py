@@ -38,7 +38,7 @@ PREFIX = "rms_"
 
 
 def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
-    """Root mean squares over one turn, on samples, or refined until they have settled.
+    """Return the root mean squares over one turn, on samples, or refined until they have settled.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
 
 
 def _refined(family: Family, designs: Array, poses: Sequence[str], target: float) -> tuple[Array, Array, Status]:
-    """Means and their errors (n, q), and the status."""
+    """Return means and their errors (n, q), and the status."""
     n = len(designs)
     found, status = _on_grid(family, designs, np.arange(n), START, poses)
     err = np.full_like(found, np.nan)
@@ -103,7 +103,7 @@ def _by_grids(
     status: Status,
     needed: Array,
 ) -> Index:
-    """Double the grids until the means agree, in place; the rows that this does not settle.
+    """Double the grids until the means agree, in place; return the rows that this does not settle.
 
     ``needed`` (n,) are the samples below which an agreement means nothing; what takes the finest grids to be resolved
     at all is not tried.
@@ -139,7 +139,9 @@ def _by_grids(
 def _on_panels(
     family: Family, designs: Array, poses: Sequence[str], edges: Array, target: float
 ) -> tuple[Array, Array, Status]:
-    """Means, their errors and the status by adaptive quadrature of precise poses: plain ones may be noise alone."""
+    """Return means, their errors and the status by adaptive quadrature of precise poses:
+    plain ones may be noise alone.
+    """
     family, n = family.precise(), len(designs)
     status = np.zeros(n, np.uint8)
     names = list(dict.fromkeys(poses))
@@ -177,14 +179,16 @@ def _on_panels(
 
 
 def _blur(values: Array) -> Array:
-    """What the rounding of the crank angles may do to the integral of the squares: their variation times that."""
+    """Return what the rounding of the crank angles may do to the integral of the squares:
+    their variation times that.
+    """
     squares = values * values
     variation: Array = np.abs(squares - np.roll(squares, 1, axis=1)).sum(axis=1)
     return 2.0 * EPS * TWO_PI * variation
 
 
 def _singularities(family: Family, designs: Array) -> Singularities:
-    """The nearest singularities: as a few samples see them, and closely where they may matter."""
+    """Return the nearest singularities: as a few samples see them, and closely where they may matter."""
     n, names = len(designs), discriminants(family)
     rows = np.arange(n)
     if names and n:
@@ -205,7 +209,7 @@ def _singularities(family: Family, designs: Array) -> Singularities:
 
 
 def _rounding(family: Family, designs: Array, poses: Sequence[str], near: Singularities) -> Array:
-    """What the rounding of the poses may do to the means, (n, q): the difference from more precise poses.
+    """Return what the rounding of the poses may do to the means, (n, q): the difference from more precise poses.
 
     Taken at poses that crowd about the singularities, where rounding is amplified; twice, as it varies between them.
     """

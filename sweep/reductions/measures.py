@@ -91,7 +91,7 @@ class Measure:
         return self.is_angle or any(part.follows_angles for part in self.parts)
 
     def to_inner(self, value: float) -> float:
-        """Inner value that stands for a value of the output."""
+        """Return the inner value that stands for a value of the output."""
         if self.kind == "minus":
             return -self.parts[0].to_inner(-value)
         if self.inner == "pressure":
@@ -107,7 +107,9 @@ class Measure:
         return value
 
     def from_inner(self, value: float) -> float:
-        """Value of the output for an inner value; nan where there is none (a mechanism that does not turn)."""
+        """Return the value of the output for an inner value;
+        nan where there is none (a mechanism that does not turn).
+        """
         if self.kind == "minus":
             return -self.parts[0].from_inner(-value)
         if self.inner == "pressure":
@@ -125,12 +127,12 @@ class Measure:
 
 
 def curve(family: Family, output: str, window: tuple[float, float] | None = None) -> Series:
-    """The series of a plain pose output."""
+    """Return the series of a plain pose output."""
     return Series(output, window=window, wrapped=family.pose_output[output].wraps)
 
 
 def margins(family: Family, stage: str = "") -> tuple[Series, ...]:
-    """Delta/b^2 of the stage of that number; without a number of every stage.  Empty where nothing can lock.
+    """Return Delta/b^2 of the stage of that number; without a number of every stage. Empty where nothing can lock.
 
     In a machine "needle.2" is a stage, "needle." every stage of the member.
     """
@@ -141,7 +143,7 @@ def margins(family: Family, stage: str = "") -> tuple[Series, ...]:
 
 
 def measure(family: Family, name: str, window: tuple[float, float] | None = None) -> Measure:
-    """The measure of a design output.
+    """Return the measure of a design output.
 
     Parameters
     ----------

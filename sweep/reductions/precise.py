@@ -51,7 +51,7 @@ def sharpen_maxima(
 
 
 def nearest(family: Family, designs: Array) -> Singularities:
-    """The nearest singularities of a family's designs, from its most accurate discriminants."""
+    """Return the nearest singularities of a family's designs, from its most accurate discriminants."""
     precise = family.precise()
 
     def curve(name: str) -> Curve:
@@ -61,7 +61,8 @@ def nearest(family: Family, designs: Array) -> Singularities:
 
 
 def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target: float, locate: bool) -> Peaks:
-    """Largest magnitudes (n,) over the turn from the family's precise poses alone; error inf where they are lost.
+    """Return the largest magnitudes (n,) over the turn from the family's precise poses alone;
+    error inf where they are lost.
 
     Parameters
     ----------

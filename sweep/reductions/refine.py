@@ -43,16 +43,16 @@ class Peaks(NamedTuple):
     step: Array
 
     def only(self, which: Index | Mask) -> Peaks:
-        """Some of them."""
+        """Return some of them."""
         return Peaks(*(column[which] for column in self))
 
     def joined(self, others: Peaks) -> Peaks:
-        """These and others."""
+        """Join these and others."""
         return Peaks(*(np.concatenate(pair) for pair in zip(self, others, strict=True)))
 
 
 def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
-    """Peaks of the quartics through five samples.
+    """Return peaks of the quartics through five samples.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
 
 
 def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> Peaks:
-    """Highest points near the given ones, by quartics through five points ever closer together.
+    """Return the highest points near the given ones, by quartics through five points ever closer together.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
 
 
 def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, rounding: Array | float = 0.0) -> Peaks:
-    """Peaks as poses of higher precision have them: their heights are values at their places.
+    """Return peaks as poses of higher precision have them: their heights are values at their places.
 
     One pose at the place of a peak measures how far rounding, and what was left of interpolation, have moved its
     value.  Only where that is more than the ``tolerance``, or the place is not known to ``locate``, the peak is
@@ -153,13 +153,13 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, ro
 
 
 def _attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
-    """Heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
+    """Return heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
     height = sample(which, peaks.phi[:, None])[:, 0]
     return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
 
 
 def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Array]:
-    """Places of extrema from the zeros of the derivative, and their errors.
+    """Return places of extrema from the zeros of the derivative, and their errors.
 
     Parameters
     ----------

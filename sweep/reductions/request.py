@@ -33,7 +33,7 @@ class Extremum(NamedTuple):
 
     @classmethod
     def unknown(cls, count: int) -> Extremum:
-        """All nan."""
+        """Return a record that is all nan."""
         return cls(*(np.full(count, np.nan) for _ in range(4)))
 
 

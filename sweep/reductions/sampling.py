@@ -24,7 +24,7 @@ TWO_PI = 2.0 * np.pi
 
 @lru_cache(maxsize=32)
 def turn(samples: int) -> Angles:
-    """Equidistant crank angles of one turn, from 0, shape (1, samples)."""
+    """Return the equidistant crank angles of one turn, from 0, shape (1, samples)."""
     phi: Array = np.arange(samples, dtype=np.float64)[None, :] * (TWO_PI / samples)
     angles = Angles.of(phi)
     for column in angles:
@@ -33,21 +33,21 @@ def turn(samples: int) -> Angles:
 
 
 def blocks(rows: Index, samples: int, columns: int = 1) -> Iterator[Index]:
-    """Pieces of ``rows`` small enough that their samples of so many columns stay in the cache."""
+    """Yield pieces of ``rows`` small enough that their samples of so many columns stay in the cache."""
     size = max(1, BLOCK * FEW // (samples * max(columns, FEW)))
     for start in range(0, rows.size, size):
         yield rows[start : start + size]
 
 
 def discriminants(family: Family) -> tuple[str, ...]:
-    """Pose outputs that tell how near a stage is to a dead point: one per stage of a chain."""
+    """Return pose outputs that tell how near a stage is to a dead point: one per stage of a chain."""
     return tuple(loop.discriminant for loop in family.every(Assembly))
 
 
 def sample_turn(
     family: Family, designs: Array, samples: int, names: Sequence[str]
 ) -> tuple[dict[str, Array], Status, Mask]:
-    """Pose outputs over one turn, (n, samples), with angles made continuous.
+    """Return pose outputs over one turn, (n, samples), with angles made continuous.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def sample_turn(
 
 
 def pose_columns(family: Family, designs: Array, phi: Array, names: Sequence[str]) -> tuple[dict[str, Array], Status]:
-    """Pose outputs of each design at its own crank angles, (n, m), and their status."""
+    """Return pose outputs of each design at its own crank angles, (n, m), and their status."""
     return _evaluate(family, designs, Angles.of(phi), names)
 
 

@@ -46,7 +46,7 @@ class Candidates(NamedTuple):
     sign: Array
 
     def only(self, which: Index | Mask) -> Candidates:
-        """Some of them."""
+        """Return some of them."""
         return Candidates(self.request[which], self.row[which], self.column[which], self.sign[which])
 
 
@@ -79,13 +79,13 @@ class Search:
         self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
 
     def needed(self, rows: Index) -> Index:
-        """Fewest samples that a request of these designs still needs, 0 where all are found."""
+        """Return the fewest samples that a request of these designs still needs, 0 where all are found."""
         left = np.where(self.undone[:, rows] > 0, self.undone[:, rows], NEVER).min(axis=0, initial=NEVER)
         fewest: Index = np.where(left < NEVER, left, 0)
         return fewest
 
     def places(self, number: Index) -> Mask:
-        """Whether the crank angles of these requests are wanted."""
+        """Return whether the crank angles of these requests are wanted."""
         wanted: Mask = np.array([self.locate or request.place for request in self.requests], np.bool_)[number]
         return wanted
 
@@ -127,7 +127,9 @@ class Search:
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
     ) -> tuple[Candidates, dict[Request, Array], Index, dict[Request, Mask]]:
-        """Candidates of all requests, sizes and jumps of their curves, samples needed by the look of the curves."""
+        """Return candidates of all requests, sizes and jumps of their curves,
+        samples needed by the look of the curves.
+        """
         needed, pieces, scales, breaks = np.full((len(self.requests), rows.size), START), [], {}, {}
         for number, request in enumerate(self.requests):
             values = columns[request.pose]
@@ -226,7 +228,9 @@ class Search:
             column[rivals] = found
 
     def _sampler(self, family: Family, rows: Index, candidates: Candidates, middle: Array) -> Sampler:
-        """Measured values of candidates by the poses of ``family``, angles continuous with the values ``middle``."""
+        """Return measured values of candidates by the poses of ``family``,
+        angles continuous with the values ``middle``.
+        """
         number, row, _, sign = candidates
 
         def sample(active: Index, phi: Array) -> Array:
@@ -248,7 +252,8 @@ class Search:
         return sample
 
     def _rounding(self, rows: Index, columns: dict[str, Array], candidates: Candidates, guards: list[str]) -> Array:
-        """Share of a value that rounding may have changed alike at neighbouring poses, where it leaves no ripple.
+        """Return the share of a value that rounding may have changed alike at neighbouring poses,
+        where it leaves no ripple.
 
         A pose near a dead point amplifies the rounding of its discriminant (docs/extrema.md).  What is rounded are
         terms of the size that the discriminant has where the links meet at a right angle: a tiny crank may keep it far
@@ -321,7 +326,7 @@ class Search:
         return moved
 
     def _polish(self, rows: Index, slope: str, phi: Array, err_phi: Array) -> tuple[Array, Array]:
-        """Places of flat tops from the zero of the derivative, which is steep there."""
+        """Return places of flat tops from the zero of the derivative, which is steep there."""
         precise = self.family.precise()
 
         def sample(active: Index, angles: Array) -> Array:
@@ -331,6 +336,6 @@ class Search:
 
 
 def _tells(discriminant: Array) -> Mask:
-    """Whether a discriminant is a number to rely on: at scales such as 1e100 or 1e-80 it leaves float64."""
+    """Return whether a discriminant is a number to rely on: at scales such as 1e100 or 1e-80 it leaves float64."""
     usable: Mask = (discriminant > 1e-280) & (discriminant < 1e280)
     return usable

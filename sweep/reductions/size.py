@@ -13,7 +13,7 @@ SIZE = Output("size", "length", "largest length of the mechanism, offsets by mag
 
 
 def lengths(family: Family) -> tuple[str, ...]:
-    """Parameters that are lengths of the mechanism itself, not of bodies and bearings that effects ask for."""
+    """Return parameters that are lengths of the mechanism itself, not of bodies and bearings that effects ask for."""
     others = set(input_names(family))
     if isinstance(family, Machine):
         others |= {p.name for relation in family.relations for p in relation.parameters}
@@ -21,7 +21,7 @@ def lengths(family: Family) -> tuple[str, ...]:
 
 
 def size_step(family: Family) -> Step | None:
-    """The route to ``size``; None where a family has ratios of lengths only."""
+    """Return the route to ``size``; None where a family has ratios of lengths only."""
     names = lengths(family)
     if not names:
         return None

@@ -15,13 +15,15 @@ from sweep.reductions.travel import certified_travel
 
 
 def steps_of(family: Family) -> tuple[Step, ...]:
-    """The family's own routes, and those that are made for it here."""
+    """Return the family's own routes, and those that are made for it here."""
     made = (size_step(family), dimension_step(family), certified_travel(family))
     return (*family.steps, *(step for step in made if step is not None))
 
 
 def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | None]]:
-    """The family's own routes to an output, and those of a chain's first stage, which turns as if it were alone."""
+    """Return the family's own routes to an output, and those of a chain's first stage,
+    which turns as if it were alone.
+    """
     found: list[tuple[Step, Output, Stage | None]] = [
         (step, o, None) for step in steps_of(family) for o in step.provides if o.name == name
     ]
@@ -32,13 +34,13 @@ def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | Non
 
 
 def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
-    """The own route to an output that serves this accuracy; there is one at most (tests/test_costs.py)."""
+    """Return the own route to an output that serves this accuracy; there is one at most (tests/test_costs.py)."""
     able = ((step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy.of(name)))
     return next(able, None)
 
 
 def step_ns(family: Family, step: Step, accuracy: Accuracy) -> float:
-    """Estimated time of a family's own step [ns per design]."""
+    """Return the estimated time of a family's own step [ns per design]."""
     if step.cost is not None:
         return step.cost(accuracy)
     row = f"{family.name}: {step.name}"
@@ -46,7 +48,7 @@ def step_ns(family: Family, step: Step, accuracy: Accuracy) -> float:
 
 
 def certified_names(family: Family) -> tuple[str, ...]:
-    """Outputs whose maxima can be proven, those of a chain's first stage included."""
+    """Return outputs whose maxima can be proven, those of a chain's first stage included."""
     names = [o.name for step in steps_of(family) if step.certifies for o in step.provides]
     if isinstance(family, Chain):
         names += [f"{o.name}1" for step in family.stages[0].family.steps if step.certifies for o in step.provides]
@@ -54,12 +56,12 @@ def certified_names(family: Family) -> tuple[str, ...]:
 
 
 def place_names(family: Family) -> set[str]:
-    """Names of the proven maxima's places, whose errors stay estimates."""
+    """Return names of the proven maxima's places, whose errors stay estimates."""
     return {name for name in certified_names(family) if (found := reduction_of(family, name)) and found[0].place}
 
 
 def proofs(certify: bool | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """What ``certify=`` asks for, as ``certify`` and ``proven`` of `Accuracy`."""
+    """Return what ``certify=`` asks for, as ``certify`` and ``proven`` of `Accuracy`."""
     if isinstance(certify, bool):
         return certify, ()
     names = (certify,) if isinstance(certify, str) else tuple(dict.fromkeys(certify))
@@ -67,5 +69,5 @@ def proofs(certify: bool | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
 
 
 def is_proven(family: Family, name: str, accuracy: Accuracy) -> bool:
-    """Whether the error of an output is a proven bound."""
+    """Return whether the error of an output is a proven bound."""
     return accuracy.of(name).certify and name in certified_names(family) and name not in place_names(family)

@@ -19,7 +19,9 @@ ORDERS = 3  # derivatives of the travel that the proof knows
 
 
 def certified_travel(family: Family) -> Step | None:
-    """The step that proves maxima of a guided point's travel; None for a family or chain that has none to prove."""
+    """Return the step that proves maxima of a guided point's travel;
+    None for a family or chain that has none to prove.
+    """
     stages = stages_of(family)
     if stages[-1].family.find(GuidedPoint) is None or any(s.family.find(CrankRockerLoop) is None for s in stages):
         return None
@@ -37,7 +39,7 @@ def certified_travel(family: Family) -> Step | None:
 
 
 def derivatives(family: Family) -> tuple[str, ...]:
-    """The first three derivatives of the travel, from the first."""
+    """Return the first three derivatives of the travel, from the first."""
     names = [family.position]
     while len(names) <= ORDERS:
         names.append(family.derivative_of[names[-1]])
@@ -84,7 +86,7 @@ def _proven(
 
 
 def _loop(stage: Stage, designs: Array) -> Array:
-    """A stage as a crank-rocker, (n, 8)."""
+    """Return a stage as a crank-rocker, (n, 8)."""
     found = stage.family.find(CrankRockerLoop)
     assert found is not None
     return found.matrix(stage.designs(designs))

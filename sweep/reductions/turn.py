@@ -15,8 +15,9 @@ from sweep.reductions.catalogue import STAY, Quantity, quantity
 from sweep.reductions.closing import variable
 from sweep.reductions.dwell import window_angle
 from sweep.reductions.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
+from sweep.reductions.fused import sampled_maxima
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
-from sweep.reductions.sampling import TWO_PI, Mask, Status, blocks, sample_turn
+from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, blocks, sample_turn
 from sweep.reductions.window import Window
 
 Group: TypeAlias = Literal["margin", "limits", "reductions", "means", "events"]
@@ -137,23 +138,39 @@ def sampled_extrema(
     found = {request: Extremum.unknown(n) for request in requests}
     status = np.zeros(n, np.uint8)
     names = list(dict.fromkeys([*(r.pose for r in requests), *([family.position] if window is not None else [])]))
-    for rows in blocks(np.arange(n), samples, len(names)):
-        columns, worst, winds = sample_turn(family, designs[rows], samples, names)
-        state = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst]).astype(np.uint8)
-        good = state == st.OK
-        status[rows] = state
-        if not good.all():
-            rows, columns = rows[good], {name: values[good] for name, values in columns.items()}
-        for request in requests:
-            allowed = None
-            if window is not None and request.windowed:
-                allowed = window.holds(rows, columns[family.position])
-            best, column = np.empty(rows.size), np.empty(rows.size, np.int64)
-            scan.best_sample(columns[request.pose], request.mode, allowed, best, column)
-            found[request].value[rows] = -best if request.mode == -1 else best
-            found[request].phi[rows] = np.where(column < 0, np.nan, column * (TWO_PI / samples))
-            status[rows[column < 0]] = st.NOT_CONVERGED
+    quick = sampled_maxima(family, designs, tuple(requests), samples)
+    unsure = np.ones(n, np.bool_)
+    for request, most in quick.items():
+        found[request].value[:], unsure = most, np.isnan(most)
+    rest = [request for request in requests if request not in quick]
+    for pending, asked in ((np.flatnonzero(unsure), list(requests)), (np.flatnonzero(~unsure), rest)):
+        for rows in blocks(pending, samples, len(names)) if asked else ():
+            columns, worst, winds = sample_turn(family, designs[rows], samples, names)
+            state = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst]).astype(np.uint8)
+            good = state == st.OK
+            status[rows] = state
+            if not good.all():
+                rows, columns = rows[good], {name: values[good] for name, values in columns.items()}
+            for request in asked:
+                status[_best_samples(family, rows, columns, request, samples, window, found[request])] = (
+                    st.NOT_CONVERGED
+                )
     return found, status
+
+
+def _best_samples(
+    family: Family, rows: Index, columns: dict[str, Array], request: Request, samples: int, window: Window | None,
+    found: Extremum,
+) -> Index:  # fmt: skip
+    """Write the best sample of some designs and its crank angle; returns the designs that have none in the window."""
+    allowed = None
+    if window is not None and request.windowed:
+        allowed = window.holds(rows, columns[family.position])
+    best, column = np.empty(rows.size), np.empty(rows.size, np.int64)
+    scan.best_sample(columns[request.pose], request.mode, allowed, best, column)
+    found.value[rows] = -best if request.mode == -1 else best
+    found.phi[rows] = np.where(column < 0, np.nan, column * (TWO_PI / samples))
+    return rows[column < 0]
 
 
 def _value(family: Family, designs: Array, one: Quantity, found: Found, windowed: bool) -> tuple[Array, Array]:

@@ -23,18 +23,18 @@ class Window(NamedTuple):
 
     @classmethod
     def of_stroke(cls, least: Array, most: Array, err: Array, part: tuple[float, float]) -> Window:
-        """The part (fractions of the stroke, from the smallest position) of a motion between two positions."""
+        """Return the part (fractions of the stroke, from the smallest position) of a motion between two positions."""
         # A fraction 0 or 1 is open: rounding of the extreme position must not cut off the pose that reaches it.
         low = least + part[0] * (most - least) if part[0] > 0.0 else np.full(least.size, -np.inf)
         high = least + part[1] * (most - least) if part[1] < 1.0 else np.full(least.size, np.inf)
         return cls(low, high, err)
 
     def holds(self, rows: Index, positions: Array) -> Mask:
-        """Whether the positions (k, m) of the designs ``rows`` (k,) lie in the window."""
+        """Return whether the positions (k, m) of the designs ``rows`` (k,) lie in the window."""
         return (positions >= self.low[rows, None]) & (positions <= self.high[rows, None])
 
     def grazed(self, rows: Index, positions: Array) -> Mask:
-        """Whether the motion may enter or leave the window between two samples and come back at once."""
+        """Return whether the motion may enter or leave the window between two samples and come back at once."""
         doubtful = np.zeros(rows.size, np.bool_)
         for level in (self.low[rows], self.high[rows]):
             scan.grazes(positions, level, doubtful)
@@ -50,12 +50,12 @@ class Edges(NamedTuple):
     err: Array
 
     def only(self, which: Mask) -> Edges:
-        """Some of them."""
+        """Return some of them."""
         return Edges(self.row[which], self.phi[which], self.values[which], self.err[which])
 
 
 def edges(family: Family, designs: Array, rows: Index, window: Window, columns: dict[str, Array], pose: str) -> Edges:
-    """Where the follower enters or leaves the window, and a pose output there.
+    """Find where the follower enters or leaves the window, and a pose output there.
 
     Parameters
     ----------

@@ -8,9 +8,12 @@ import numpy as np
 
 from sweep.costs import nanoseconds
 from sweep.families.base import Accuracy, Family, Work
+from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain, stages_of
 from sweep.families.members import Machine
+from sweep.reductions.fused import curve_of
 from sweep.reductions.margins import margin_suffixes, own_step
+from sweep.reductions.request import Request
 from sweep.reductions.steps import step_ns
 from sweep.reductions.turn import Group, quantities
 
@@ -23,7 +26,7 @@ POSES_PEAK = 30.0
 
 
 def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy) -> float:
-    """Estimated time of a general route [ns per design], made of measured times of poses and of searches."""
+    """Return the estimated time of a general route [ns per design], made of measured times of poses and of searches."""
     stages, pose = _stages(family), pose_ns(family)
     if group == "margin":
         return sum(_margin_ns(family, suffix, accuracy) for suffix in margin_suffixes(family))
@@ -37,17 +40,24 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
         scans = len(asked) if group == "means" else len(requests)
         return (accuracy.samples or POSES_MEAN) * (pose + nanoseconds("work", "scan") * scans + effects)
     assert accuracy.target is not None
-    peaks = (0.5 - np.log10(accuracy.target) / 16.0) * len(requests)
+    quick = {request for request in requests if curve_of(family, request, False) is not None}
+    fused = _stages(family) * nanoseconds("work", "fused extremum") * len(quick)
+    if quick == requests:
+        return fused
+    peaks = (0.5 - np.log10(accuracy.target) / 16.0) * len(requests - quick)
     own = nanoseconds("work", "search") + nanoseconds("work", "peak") * peaks
-    return float(stages * own + (POSES_SEARCH + POSES_PEAK * peaks) * (pose + effects))
+    return float(fused + stages * own + (POSES_SEARCH + POSES_PEAK * peaks) * (pose + effects))
 
 
 def _margin_ns(family: Family, suffix: str, accuracy: Accuracy) -> float:
-    """Estimated time of the margin of a stage, which all stages before it drive."""
+    """Return the estimated time of the margin of a stage, which all stages before it drive."""
     if isinstance(family, Machine):
         name, own = suffix.split(".")
         return _margin_ns(family.member(name).family, own, accuracy)
     found = own_step(family, suffix, accuracy)
+    loop = next((loop for loop in family.every(Assembly) if loop.stage == suffix), None)
+    if found is None and loop is not None and curve_of(family, Request(loop.discriminant, -1), True) is not None:
+        return int(suffix) * nanoseconds("work", "fused extremum")
     if found is None:
         *driving, last = stages_of(family)[: int(suffix or 1)]
         return nanoseconds("margins", last.family.name) + POSES_MARGIN * sum(pose_ns(s.family) for s in driving)
@@ -62,7 +72,7 @@ def _stages(family: Family) -> int:
 
 
 def pose_ns(family: Family) -> float:
-    """Estimated time of the motion of a pose: of a chain or a machine that of all its stages and members."""
+    """Return the estimated time of the motion of a pose: of a chain or a machine that of all its stages and members."""
     if isinstance(family, Machine):
         return sum(pose_ns(member.family) for member in family.members)
     if isinstance(family, Chain):

@@ -27,7 +27,7 @@ class Shown:
 
 
 def shown_designs(data: Dataset, different: Sequence[Group]) -> list[Shown]:
-    """Designs in the order in which they are offered; empty where no design was found.
+    """Return designs in the order in which they are offered; empty where no design was found.
 
     ``different`` are the optima of :func:`sweep.report.groups.groups`, the study's answer first.
     """
@@ -43,7 +43,7 @@ def shown_designs(data: Dataset, different: Sequence[Group]) -> list[Shown]:
 
 
 def _of_front(data: Dataset) -> list[Shown]:
-    """Designs of the front, spread evenly from the loosest bound to the tightest."""
+    """Return designs of the front, spread evenly from the loosest bound to the tightest."""
     pareto = data.study.pareto
     if data.front is None or pareto is None:
         return []

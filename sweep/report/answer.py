@@ -25,7 +25,9 @@ NO_PROOF = "This is no proof of a global optimum"
 
 
 def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]:
-    """Sentences that answer the study's question, the most important first; ``further`` ones come before the limits."""
+    """Return sentences that answer the study's question, the most important first;
+    ``further`` ones come before the limits.
+    """
     total = data.designs
     if data.result is None:
         stops = max(fates(data, found)[:-1], key=lambda fate: fate.count, default=None)
@@ -84,7 +86,7 @@ def _with_speed(data: Dataset, shown: Quantity, value: float) -> str:
 
 
 def rpm(speed: float | None) -> str:
-    """A speed in turns per minute."""
+    """Return a speed in turns per minute."""
     return "" if speed is None else f"{number(speed * 30.0 / math.pi, 5)} rpm"
 
 
@@ -100,7 +102,7 @@ def _limit_sentences(states: list[LimitState]) -> list[str]:
 
 
 def _edge_sentence(data: Dataset) -> list[str]:
-    """Parameters that lie on the edge of what was searched."""
+    """Return parameters that lie on the edge of what was searched."""
     edges = [f"{row.name} ({row.edge}, {row.value})" for row in parameter_rows(data) if row.edge]
     return (
         [f"On the edge of the space that was searched: {'; '.join(edges)}. A wider one may hold better."]
@@ -110,7 +112,9 @@ def _edge_sentence(data: Dataset) -> list[str]:
 
 
 def not_achieved(data: Dataset, found: Scan) -> list[str]:
-    """What the result does not reach: limits it misses, an optimiser that did not settle or lost a better design."""
+    """Return what the result does not reach:
+    limits it misses, an optimiser that did not settle or lost a better design.
+    """
     faults = [f"{s.shown.words}: {s.value} instead of {s.bound}" for s in limit_states(data) if s.state in MISSED]
     objective = data.study.objective
     if data.optimum is not None:
@@ -127,7 +131,7 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
 
 
 def _against_reference(data: Dataset) -> list[str]:
-    """Where the reference is better, and which limits it misses itself."""
+    """Say where the reference is better, and which limits it misses itself."""
     if data.reference is None:
         return []
     criteria = [data.study.objective.output if data.study.objective is not None else None, data.second]
@@ -160,7 +164,7 @@ def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
 
 
 def search_warnings(data: Dataset) -> list[str]:
-    """What a reader has to know before trusting the optimum: time that ran out, fewer starts than asked."""
+    """Return what a reader has to know before trusting the optimum: time that ran out, fewer starts than asked."""
     found = [] if data.survey is None else [f"{text[0].upper()}{text[1:]}." for text in data.survey.warnings]
     front = data.front_steps
     return found if front is None else [*found, f"Time ran out: {front} steps of the front."]
@@ -192,5 +196,5 @@ def _is_number(row: Row, name: str) -> bool:
 
 
 def _count(n: float) -> str:
-    """1 234 567 with thin no-break spaces."""
+    """Write 1 234 567 with thin no-break spaces."""
     return f"{int(n):,}".replace(",", "\u202f")

@@ -23,7 +23,7 @@ class Chosen:
 
 
 def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
-    """A design of a dataset.
+    """Return a design of a dataset.
 
     Parameters
     ----------

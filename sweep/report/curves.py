@@ -25,12 +25,14 @@ NOT_CURVES = ("role", "phi", "status")
 
 
 def style_of(role: str) -> dict[str, Any]:
-    """The reference is dashed, the result solid."""
+    """Return the style of a line: the reference is dashed, the result solid."""
     return {"color": REFERENCE, "linestyle": (0, (4, 2))} if role == "reference" else {"color": OPTIMUM}
 
 
 def shown_curves(columns: list[str], position: str) -> list[str]:
-    """Columns that get a panel, in the order in which they stand: the position, and all that are no coordinates."""
+    """Return columns that get a panel, in the order in which they stand:
+    the position, and all that are no coordinates.
+    """
     return [name for name in columns if name not in NOT_CURVES and (name == position or coordinate(name) is None)]
 
 
@@ -43,7 +45,8 @@ def motion_figure(
     window: tuple[float, float] | None,
     names: list[str] | None = None,
 ) -> Figure:
-    """Panels over the crank angle from the lowest position, so that two mechanisms can be laid over each other.
+    """Return panels over the crank angle from the lowest position,
+    so that two mechanisms can be laid over each other.
 
     ``names`` are the curves that get a panel, all that are none of coordinates if left out.
     """
@@ -100,36 +103,36 @@ def _show_window(
 
 
 def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
-    """Poses whose position lies between two fractions of the stroke, counted from its smallest value."""
+    """Return poses whose position lies between two fractions of the stroke, counted from its smallest value."""
     low, high = np.nanmin(path), np.nanmax(path)
     fraction = (path - low) / (high - low) if high > low else np.zeros_like(path)
     return (fraction >= window[0]) & (fraction <= window[1])
 
 
 def is_angle(position: str) -> bool:
-    """Whether a position is a follower's angle, known up to full turns."""
+    """Return whether a position is a follower's angle, known up to full turns."""
     return stem(position) == "psi"
 
 
 def rotates(turn: pd.DataFrame, position: str) -> bool:
-    """Whether the follower itself turns fully, so that it has no lowest position."""
+    """Return whether the follower itself turns fully, so that it has no lowest position."""
     if not is_angle(position):
         return False
     return turns_fully(np.unwrap(turn[position].to_numpy(float)))
 
 
 def turns_fully(path: Array) -> bool:
-    """Whether an unwrapped angle over one turn of the crank makes a turn itself."""
+    """Return whether an unwrapped angle over one turn of the crank makes a turn itself."""
     return bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
 
 
 def turning(curves: pd.DataFrame, position: str) -> bool:
-    """Whether the follower of any of the mechanisms turns fully."""
+    """Return whether the follower of any of the mechanisms turns fully."""
     return any(rotates(turn, position) for _, turn in curves.groupby("role", sort=False))
 
 
 def motion_caption(curves: pd.DataFrame, position: str, speed: str, window: tuple[float, float] | None) -> str:
-    """What the panels show."""
+    """Return what the panels show."""
     text = "Derivatives are with respect to the crank angle" + (f"; right-hand scales: at {speed}. " if speed else ". ")
     if not turning(curves, position):
         text += "Every curve starts at the lowest position, from which the position counts. "
@@ -141,7 +144,7 @@ def motion_caption(curves: pd.DataFrame, position: str, speed: str, window: tupl
 
 
 def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, Array]:
-    """One closed turn that starts where the position is smallest; the position itself counts from there."""
+    """Return one closed turn that starts where the position is smallest; the position itself counts from there."""
     phi, values = turn["phi"].to_numpy(float), turn[name].to_numpy(float)
     path = turn[position].to_numpy(float)
     if is_angle(position):
@@ -158,7 +161,7 @@ def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, A
 
 
 def _limit_lines(axes: Axes, name: str, shown: Quantity, limits: tuple[Limit, ...]) -> None:
-    """The limits that bound this curve itself, as thin lines; far ones would make the curves flat."""
+    """Draw the limits that bound this curve itself as thin lines; far ones would make the curves flat."""
     reach = FAR_LIMIT * np.abs(axes.dataLim.intervaly).max()
     for value in limit_values(name, limits):
         if abs(value) * shown.factor <= reach:
@@ -166,7 +169,9 @@ def _limit_lines(axes: Axes, name: str, shown: Quantity, limits: tuple[Limit, ..
 
 
 def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
-    """Ordinates, in stored units, that the limits set to a curve itself; both signs where its size is limited."""
+    """Return ordinates, in stored units, that the limits set to a curve itself;
+    both signs where its size is limited.
+    """
     found = []
     for limit in limits:
         for value, outputs in (

@@ -169,7 +169,7 @@ def read_dataset(folder: Path) -> Dataset:
 
 
 def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
-    """The study a dataset answers, from its plan; its title and question stand there under ``about``."""
+    """Return the study a dataset answers, from its plan; its title and question stand there under ``about``."""
     from sweep.study.load import study_from_data
 
     about = plan.get("about", {"name": plan["name"]})
@@ -177,7 +177,7 @@ def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
 
 
 def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str]]:
-    """Units and definitions that stand in the schemas of Parquet files."""
+    """Return units and definitions that stand in the schemas of Parquet files."""
     import pyarrow.parquet as pq
 
     units: dict[str, str] = {}

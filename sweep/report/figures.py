@@ -38,7 +38,7 @@ def house_style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure that no window system ever sees."""
+    """Return an empty figure that no window system ever sees."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -55,13 +55,13 @@ def save(figure: Figure, path: Path) -> Saved:
 
 
 def drawn_before(path: Path) -> Saved:
-    """A figure that was saved earlier."""
+    """Return a figure that was saved earlier."""
     encoded = base64.b64encode(path.read_bytes()).decode("ascii")
     return Saved(path, f"data:image/svg+xml;base64,{encoded}")
 
 
 def crank_axis(axes: Axes, label: str) -> None:
-    """Crank angles over one turn, ticked in quarters."""
+    """Label an axis with crank angles over one turn, ticked in quarters."""
     axes.set_xlim(0, 360)
     axes.set_xticks(range(0, 361, 90))
     axes.set_xlabel(label)

@@ -10,7 +10,7 @@ from sweep.dataset.layout import beside
 
 
 def copy_tables(folder: Path, out: Path) -> None:
-    """The optimum with its curves, sensitivities and tolerances, and the front, where the study has them."""
+    """Copy the optimum with its curves, sensitivities and tolerances, and the front, where the study has them."""
     for name in ("optimum.parquet", "curves.parquet", "sensitivity.parquet", "tolerance.parquet", "pareto.parquet"):
         source, target = beside(folder) / f"_{name}", out / name
         if source.exists():
@@ -20,7 +20,7 @@ def copy_tables(folder: Path, out: Path) -> None:
 
 
 def write_survivors(parts: Sequence[Path], target: Path) -> None:
-    """The designs within all limits, in the order of the sweep, with the parts' units and definitions."""
+    """Write the designs within all limits, in the order of the sweep, with the parts' units and definitions."""
     import pyarrow.compute as pc
     import pyarrow.parquet as pq
 

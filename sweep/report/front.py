@@ -37,7 +37,7 @@ class FrontRow:
 
 
 def front_rows(data: Dataset) -> list[FrontRow]:
-    """The front, the loosest bound first; empty where the study asks for none."""
+    """Return the front, the loosest bound first; empty where the study asks for none."""
     objective, second = _quantities(data)
     if objective is None or second is None or data.study.pareto is None:
         return []
@@ -61,13 +61,13 @@ def front_rows(data: Dataset) -> list[FrontRow]:
 
 
 def front_names(data: Dataset) -> tuple[str, str]:
-    """Symbols of the objective and the second output."""
+    """Return symbols of the objective and the second output."""
     objective, second = _quantities(data)
     return (objective.symbol, second.symbol) if objective is not None and second is not None else ("", "")
 
 
 def front_sentence(data: Dataset) -> str:
-    """What the ends of the front say; nothing where there are none."""
+    """Return what the ends of the front say; nothing where there are none."""
     objective, second = _quantities(data)
     points = [point for point in _points(data) if int(point["status"]) != codes.LIMIT_EXCEEDED]
     if objective is None or second is None or data.study.pareto is None or len(points) < 2:
@@ -81,7 +81,7 @@ def front_sentence(data: Dataset) -> str:
 
 
 def front_note(data: Dataset) -> str:
-    """How much of the front was searched."""
+    """Return how much of the front was searched."""
     if data.study.pareto is None or data.front is None:
         return ""
     given, begun = len(set(data.study.pareto.bounds)), len(data.front)
@@ -95,7 +95,7 @@ def front_note(data: Dataset) -> str:
 
 
 def _gap(data: Dataset) -> str:
-    """Where the front is least known, if that is worth a word."""
+    """Say where the front is least known, if that is worth a word."""
     objective, second = _quantities(data)
     points = _points(data)
     if objective is None or second is None or data.study.pareto is None:
@@ -116,7 +116,7 @@ def _gap(data: Dataset) -> str:
 
 
 def draw_front(axes: Axes, data: Dataset) -> None:
-    """The front as a curve through its designs, and the bounds within which none was found."""
+    """Draw the front as a curve through its designs, and the bounds within which none was found."""
     objective, second = _quantities(data)
     if objective is None or second is None:
         return
@@ -153,7 +153,7 @@ def _state(point: dict[str, Any]) -> str:
 
 
 def _given_way(data: Dataset, relaxation: str) -> str:
-    """By how much limits would have to give way, in the units of the table."""
+    """Say by how much limits would have to give way, in the units of the table."""
     words = []
     for part in filter(None, relaxation.split("; ")):
         name, _, size = part.rpartition(" by ")
@@ -163,7 +163,7 @@ def _given_way(data: Dataset, relaxation: str) -> str:
 
 
 def _held(active: str, second: str) -> str:
-    """Limits by name, and how many dimensions lie on the edge of what was searched."""
+    """Return limits by name, and how many dimensions lie on the edge of what was searched."""
     words = [word.strip() for word in active.split(";") if word.strip()]
     edges = [word for word in words if word.endswith(EDGES)]
     limits = ["this bound" if word.split()[0] == second else word for word in words if word not in edges]

@@ -30,14 +30,14 @@ class Group:
     mirrored: int = 0
 
     def title(self, k: int) -> str:
-        """What the group is called as the ``k``-th of the list."""
+        """Return what the group is called as the ``k``-th of the list."""
         if self.row["role"] == "nominal":
             return "best on paper"
         return "optimum" if self.row["role"] == "optimum" else f"another optimum, {k}"
 
 
 def groups(data: Dataset) -> list[Group]:
-    """The different optima, the study's answer first, then by their objective; empty without a search."""
+    """Return the different optima, the study's answer first, then by their objective; empty without a search."""
     objective = data.study.objective
     if data.optima is None or objective is None:
         return []
@@ -62,7 +62,7 @@ def groups(data: Dataset) -> list[Group]:
 
 
 def _places(data: Dataset, rows: list[dict[str, Any]]) -> tuple[Array, Array, Array]:
-    """Lengths and ratios over the largest of them, angles over half a turn, signs; (k, number of each)."""
+    """Return lengths and ratios over the largest of them, angles over half a turn, signs; (k, number of each)."""
     own = [p for p in data.study.bare.parameters if p.name in data.study.family.parameter_names]
     of = {unit: [p.name for p in own if p.unit == unit and p.choices is None] for unit in ("length", "ratio", "angle")}
     signs = [p.name for p in own if p.choices is not None]
@@ -83,7 +83,9 @@ def _apart(places: tuple[Array, Array, Array], j: int, k: int) -> float:
 
 
 def _mirrored(places: tuple[Array, Array, Array], values: list[float], j: int, k: int) -> bool:
-    """Whether two designs have the same lengths but for signs, and the same objective: one is the other in a mirror."""
+    """Return whether two designs have the same lengths but for signs, and the same objective:
+    one is the other in a mirror.
+    """
     sized = np.abs(places[0])
     same = abs(values[j] - values[k]) <= SAME * max(abs(values[j]), 1e-300)
     return same and float(np.abs(sized[j] - sized[k]).max(initial=0.0)) <= 1e-3 * ALIKE

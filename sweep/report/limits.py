@@ -38,7 +38,7 @@ class LimitState:
 
 
 def limited(data: Dataset, name: str) -> Quantity:
-    """An output under a limit; a parameter keeps its own name."""
+    """Return an output under a limit; a parameter keeps its own name."""
     shown = quantity(name, data.units.get(name, ""))
     return replace(shown, symbol=name, words=name) if name in data.study.family.parameter_names else shown
 
@@ -46,7 +46,7 @@ def limited(data: Dataset, name: str) -> Quantity:
 def limit_state(
     limit: Limit, row: Row | None, reference: Row | None, shown: Quantity, active_names: frozenset[str]
 ) -> LimitState:
-    """Whether a design keeps a limit, and with how much room."""
+    """Return whether a design keeps a limit, and with how much room."""
     value, other = value_of(row, limit.output), value_of(reference, limit.output)
     if _is_flag(limit.output):
         words = {1.0: "yes", 0.0: "no"}
@@ -84,7 +84,7 @@ def limit_state(
 
 
 def bound_words(limit: Limit, shown: Quantity) -> str:
-    """``at most 45°``, ``24.4 to 24.6 mm``."""
+    """Return ``at most 45°``, ``24.4 to 24.6 mm``."""
     if _is_flag(limit.output):
         return "must turn fully"
     if limit.minimum is not None and limit.maximum is not None:
@@ -97,14 +97,14 @@ def bound_words(limit: Limit, shown: Quantity) -> str:
 
 
 def limit_states(data: Dataset) -> list[LimitState]:
-    """Every limit of the study at the result of the study."""
+    """Return every limit of the study at the result of the study."""
     row = data.result
     active = frozenset(data.active)
     return [limit_state(x, row, data.reference, limited(data, x.output), active) for x in data.study.limits]
 
 
 def value_of(row: Row | None, name: str) -> float:
-    """A number of a row; nan where there is no row, or no number."""
+    """Return a number of a row; nan where there is no row, or no number."""
     value = None if row is None else row.get(name)
     return math.nan if value is None else float(value)
 

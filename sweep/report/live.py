@@ -21,7 +21,9 @@ SPATIAL, PLANE = ("three.min.js", "view.js"), ("charts.js", "lines.js", "page.js
 
 
 def live(data: Dataset, cells: Sequence[Cells], different: Sequence[Group]) -> dict[str, Any]:
-    """Variables of the template: the data of both moving sections as JSON, empty where there is nothing to show."""
+    """Return variables of the template:
+    the data of both moving sections as JSON, empty where there is nothing to show.
+    """
     shown = shown_designs(data, different)
     motion = moving(data, shown)
     lines = parallel(data, cells, shown)
@@ -44,5 +46,5 @@ def _head(axis: dict[str, str]) -> str:
 
 
 def _json(values: dict[str, Any]) -> str:
-    """As it may stand within a script element: no character of it can end the element."""
+    """Return JSON as it may stand within a script element: no character of it can end the element."""
     return json.dumps(values, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")

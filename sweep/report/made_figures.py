@@ -20,7 +20,7 @@ NARROW = 4.6  # inches: bars and their names can still be read on a telephone
 
 
 def histogram_figure(found: Histogram, title: str = "") -> Figure:
-    """An output over what is made; what misses its limit has another colour, lines are the limit."""
+    """Return an output over what is made; what misses its limit has another colour, lines are the limit."""
     figure = new_figure(NARROW, 1.9)
     axes = figure.subplots()
     middle = 0.5 * (found.edges[:-1] + found.edges[1:])
@@ -37,7 +37,7 @@ def histogram_figure(found: Histogram, title: str = "") -> Figure:
 
 
 def spread_figure(rows: Sequence[tuple[Quantity, float, float, float]], title: str) -> Figure:
-    """Outputs with low end, mean and high end of what is made, in percent of the nominal value."""
+    """Return outputs with low end, mean and high end of what is made, in percent of the nominal value."""
     figure = new_figure(NARROW, 0.27 * len(rows) + 1.1)
     axes = figure.subplots()
     for k, (_, low, mean, high) in enumerate(rows):
@@ -52,7 +52,7 @@ def spread_figure(rows: Sequence[tuple[Quantity, float, float, float]], title: s
 
 
 def slopes_figure(ranked: Sequence[Slope], objective: Quantity) -> Figure:
-    """Two bars for each dimension: made larger, made smaller; the most telling first."""
+    """Return two bars for each dimension: made larger, made smaller; the most telling first."""
     figure = new_figure(NARROW, 0.28 * len(ranked) + 1.1)
     axes = figure.subplots()
     for offset, values, colour, label in (

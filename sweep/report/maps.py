@@ -44,7 +44,8 @@ def map_figure(
     marks: dict[str, tuple[float, float]],
     overlays: Sequence[Overlay],
 ) -> Figure:
-    """Best objective per cell, and the share of the cell's designs that is feasible; ``marks`` in stored units.
+    """Return the best objective per cell, and the share of the cell's designs that is feasible;
+    ``marks`` in stored units.
 
     Marks outside the space that was searched are left out.
     """
@@ -92,7 +93,7 @@ def map_figure(
 def line_figure(
     line: Grid, x: tuple[Cells, Quantity], designs: float, objective: Quantity | None, marks: dict[str, float]
 ) -> Figure:
-    """As :func:`map_figure`, over the only axis a study sweeps."""
+    """Draw what :func:`map_figure` does, over the only axis that a study sweeps."""
     cells, shown = x
     figure = new_figure(WIDTH, 3.6)
     panels = figure.subplots(1, 2 if objective is not None else 1, squeeze=False)[0]
@@ -122,7 +123,7 @@ def trade_off_figure(
     limit: float | None,
     front: Callable[[Axes], None] | None = None,
 ) -> Figure:
-    """Feasible designs, objective against a second criterion, with those that no other beats in both.
+    """Return feasible designs, objective against a second criterion, with those that no other beats in both.
 
     ``front`` draws what the optimiser made of it.
     """
@@ -174,7 +175,9 @@ def _place(axes: Axes, marks: dict[str, tuple[float, float]], x_factor: float, y
 
 
 def _norm(values: Array) -> object:
-    """Logarithmic where the values span more than a decade, so that a few bad cells do not hide the good ones."""
+    """Choose a logarithmic scale where the values span more than a decade,
+    so that a few bad cells do not hide the good ones.
+    """
     from matplotlib.colors import LogNorm, Normalize
 
     finite = values[np.isfinite(values)]
@@ -187,7 +190,7 @@ def _norm(values: Array) -> object:
 
 
 def _round_between(low: float, high: float) -> list[float]:
-    """1, 2, 5, 10, ... between two bounds, at most eight of them."""
+    """Return 1, 2, 5, 10, ... between two bounds, at most eight of them."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     ticks = [step * 10.0**k for k in decades for step in (1.0, 2.0, 5.0) if low <= step * 10.0**k <= high]
     return ticks[:: max(1, -(-len(ticks) // 8))]

@@ -22,14 +22,14 @@ WORDS = {"space": "corner", "xy": "front", "zy": "side", "xz": "top"}
 
 
 def frames_of(parts: Sequence[Part]) -> dict[str, list[Part]]:
-    """Parts by the frame that they stand in, in their order."""
+    """Return parts by the frame that they stand in, in their order."""
     return {frame: [part for part in parts if part.frame == frame] for frame in dict.fromkeys(p.frame for p in parts)}
 
 
 def mechanism_figure(
     designs: Mapping[str, Sequence[Part]], unit: str, views: Sequence[str] | None = None, positions: int = 1
 ) -> Figure:
-    """A row for each design and a panel for each frame and view, to the same scale down a column.
+    """Return a row for each design and a panel for each frame and view, to the same scale down a column.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def mechanism_figure(
 
 
 def small_figures(designs: Mapping[str, Sequence[Part]], unit: str) -> dict[str, Figure]:
-    """One small picture of every design, its frames side by side, all to the same scale."""
+    """Return one small picture of every design, its frames side by side, all to the same scale."""
     columns = _columns(designs, None)
     figures, panels = {}, []
     for name, parts in designs.items():
@@ -77,7 +77,7 @@ def small_figures(designs: Mapping[str, Sequence[Part]], unit: str) -> dict[str,
 
 
 def draw(axes: Axes, parts: Sequence[Part], view: str, unit: str, positions: int, *, labels: bool = True) -> None:
-    """Parts of one frame in several positions over their turn, the first that exists in full."""
+    """Draw parts of one frame in several positions over their turn, the first that exists in full."""
     seen = projection(view)
     first = first_pose(parts)
     steps = parts[0].phi.size - 1  # the last pose is the first one again
@@ -93,19 +93,19 @@ def draw(axes: Axes, parts: Sequence[Part], view: str, unit: str, positions: int
 
 
 def first_pose(parts: Sequence[Part]) -> int:
-    """The first pose in which every joint exists; 0 where there is none."""
+    """Return the first pose in which every joint exists; 0 where there is none."""
     whole = np.logical_and.reduce([np.isfinite(path).all(axis=1) for part in parts for path in part.joints.values()])
     return int(np.argmax(whole))
 
 
 def exists(parts: Sequence[Part]) -> bool:
-    """Whether there are joints, and a pose in which all of them exist."""
+    """Return whether there are joints, and a pose in which all of them exist."""
     found: list[Array] = [path for part in parts for path in part.joints.values()]
     return bool(found) and bool(np.logical_and.reduce([np.isfinite(path).all(axis=1) for path in found]).any())
 
 
 def mechanism_caption(designs: Mapping[str, Sequence[Part]]) -> str:
-    """What the figure shows, of what there is to see."""
+    """Return what the figure shows, of what there is to see."""
     every = [part for parts in designs.values() for part in parts]
     text = f"{POSITIONS} positions at equal steps, the first one in full; grey: paths of the joints."
     if any(part.kinds for part in every):
@@ -122,7 +122,7 @@ def mechanism_caption(designs: Mapping[str, Sequence[Part]]) -> str:
 
 
 def _columns(designs: Mapping[str, Sequence[Part]], views: Sequence[str] | None) -> list[tuple[str, str]]:
-    """Frames and views of the panels, the same for every design."""
+    """Return frames and views of the panels, the same for every design."""
     by_frame: dict[str, list[Part]] = {}
     for parts in designs.values():
         for frame, same in frames_of(parts).items():

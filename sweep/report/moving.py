@@ -53,7 +53,7 @@ class Motion:
 
 
 def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
-    """What the page moves; None where the study wants no curves or has no design to show."""
+    """Return what the page moves; None where the study wants no curves or has no design to show."""
     if not shown or data.study.output.curves == "none":
         return None
     family = data.study.family
@@ -74,7 +74,7 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
 
 
 def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
-    """A design from its lowest position on, as the static figure has it."""
+    """Return a design from its lowest position on, as the static figure has it."""
     family = data.study.family
     design = {name: float(shown.row[name]) for name in family.parameter_names}
     matrix = np.array([list(design.values())])
@@ -96,7 +96,7 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
 
 
 def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray[np.intp]) -> tuple[Placed, ...]:
-    """Stages and members with their joints in the order of the poses; a march is made in its own order."""
+    """Return stages and members with their joints in the order of the poses; a march is made in its own order."""
     try:
         found = parts(family, design, phi)
     except InputError:  # a mechanism without joints has curves only
@@ -107,7 +107,7 @@ def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray
 
 
 def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
-    """One curve: words, unit, limits, the range that its panel shows."""
+    """Return one curve: words, unit, limits, the range that its panel shows."""
     shown = quantity(name, data.units.get(name, ""))
     speed = data.study.speed
     windowed = name == "dev" and data.study.window is not None
@@ -148,7 +148,7 @@ def _design(data: Dataset, motion: Motion, factor: float) -> dict[str, Any]:
 
 
 def _part(one: Placed) -> dict[str, Any]:
-    """Joints over the poses, fixed ones once; axes, kinds and links by the names that the page shows."""
+    """Return joints over the poses, fixed ones once; axes, kinds and links by the names that the page shows."""
     part: Part = one.part
     name = {joint: f"{shown_name(joint)}{part.stage}" for joint in part.joints}
     return {
@@ -164,11 +164,11 @@ def _part(one: Placed) -> dict[str, Any]:
 
 
 def runs(inside: NDArray[np.bool_]) -> list[list[int]]:
-    """Runs of poses that are inside, as first and last pose."""
+    """Return runs of poses that are inside, as first and last pose."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
     return [[int(first), int(after) - 1] for first, after in edges.reshape(-1, 2)]
 
 
 def packed(values: ArrayLike) -> str:
-    """Numbers as base64 of little-endian float32: a third of the room of decimal digits."""
+    """Return numbers as base64 of little-endian float32: a third of the room of decimal digits."""
     return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode("ascii")

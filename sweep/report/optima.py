@@ -44,7 +44,7 @@ class Optimum:
 
 
 def optima(data: Dataset, found: list[Group], folder: Path) -> list[Optimum]:
-    """The cards of the first few, with their pictures saved in ``folder``; none where there is only one."""
+    """Return the cards of the first few, with their pictures saved in ``folder``; none where there is only one."""
     objective = data.study.objective
     if len(found) < 2 or objective is None:
         return []
@@ -73,7 +73,7 @@ def optima(data: Dataset, found: list[Group], folder: Path) -> list[Optimum]:
 
 
 def optima_sentence(data: Dataset, found: list[Group]) -> str:
-    """How many different optima there are, for the answer."""
+    """Return how many different optima there are, for the answer."""
     objective = data.study.objective
     if len(found) < 2 or objective is None:
         return ""
@@ -85,7 +85,7 @@ def optima_sentence(data: Dataset, found: list[Group]) -> str:
 
 
 def _made(data: Dataset, row: dict[str, Any]) -> str:
-    """Share of what is made within the tolerances that keeps all limits."""
+    """Return the share of what is made within the tolerances that keeps all limits."""
     from sweep.chunks.cascade import meets
     from sweep.evaluation.summaries import design_outputs
 
@@ -102,7 +102,7 @@ def _made(data: Dataset, row: dict[str, Any]) -> str:
 
 
 def _sizes(data: Dataset, row: dict[str, Any]) -> tuple[tuple[str, str], ...]:
-    """What can be measured on the drawing: lengths, angles, ratios and signs of the bare mechanism."""
+    """Return what can be measured on the drawing: lengths, angles, ratios and signs of the bare mechanism."""
     found = []
     own = data.study.bare.parameters
     longest = max((abs(float(row[p.name])) for p in own if p.unit == "length"), default=0.0)
@@ -117,7 +117,7 @@ def _sizes(data: Dataset, row: dict[str, Any]) -> tuple[tuple[str, str], ...]:
 
 
 def _extras(data: Dataset, row: dict[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Outputs of the dimensions alone that tell whether one would build it."""
+    """Return outputs of the dimensions alone that tell whether one would build it."""
     family = data.study.bare
     design = np.array([[float(row[name]) for name in family.parameter_names]])
     found = []

@@ -83,7 +83,7 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
 
 
 def divided_axes(study: Study, feasible: int) -> list[Cells]:
-    """The swept axes, divided into cells: finely if a single map shows them all, else coarsely.
+    """Return the swept axes, divided into cells: finely if a single map shows them all, else coarsely.
 
     Axes of a sample are divided so that a cell holds some of the ``feasible`` designs on average.  Left out are signs,
     which make no map, and what [locus] or [fit] makes.
@@ -107,7 +107,7 @@ def divided_axes(study: Study, feasible: int) -> list[Cells]:
 def draw(
     data: Dataset, found: Scan, cells: list[Cells], parts: dict[str, list[Part]], folder: Path
 ) -> dict[str, Saved]:
-    """Every figure the data allow, saved; keys are the names the template knows."""
+    """Return every figure the data allow, saved; keys are the names the template knows."""
     made = {
         "map": pictures.design_map(data, found, cells),
         "trade_off": pictures.trade_off(data, found),
@@ -135,7 +135,7 @@ class OwnFigure:
 
 
 def own_figures(study: Study, folder: Path) -> list[OwnFigure]:
-    """The pictures that ``[report] figures`` names, as far as they lie in the folder."""
+    """Return the pictures that ``[report] figures`` names, as far as they lie in the folder."""
     found = []
     for entry in study.data.get("report", {}).get("figures", []):
         path = folder / entry["file"]
@@ -152,7 +152,7 @@ def render(
     own: list[OwnFigure],
     more: dict[str, Any],
 ) -> str:
-    """The HTML text; ``more`` are the sections about what can be built, and what moves."""
+    """Return the HTML text; ``more`` are the sections about what can be built, and what moves."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(

@@ -26,7 +26,7 @@ CONSTANT = 1e-12
 
 
 def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> dict[str, Any] | None:
-    """Lines, their axes and the named designs among them; None where there are no two designs to compare.
+    """Return lines, their axes and the named designs among them; None where there are no two designs to compare.
 
     A line's number is that of its row in :func:`sweep.load`, by which ``sweep export`` finds the design.
     """
@@ -56,7 +56,7 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
 
 
 def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
-    """Swept dimensions, then the objective and what is limited."""
+    """Return swept dimensions, then the objective and what is limited."""
     study = data.study
     objective = [] if study.objective is None else [study.objective.output]
     second = [] if data.second is None else [data.second]
@@ -68,7 +68,7 @@ def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
 
 
 def _lines(parts: Sequence[Path], names: list[str], objective: str | None) -> tuple[Array, Array]:
-    """Row numbers and values of the best and of evenly spaced feasible designs, in the order of the rows."""
+    """Return row numbers and values of the best and of evenly spaced feasible designs, in the order of the rows."""
     total = sum(int(rows.size) for rows, _ in _feasible(parts, names))
     step = max(1, -(-total // SPREAD))
     seen = 0
@@ -87,7 +87,7 @@ def _lines(parts: Sequence[Path], names: list[str], objective: str | None) -> tu
 
 
 def _feasible(parts: Sequence[Path], names: list[str]) -> Iterator[tuple[Array, Array]]:
-    """Batches of feasible designs with finite values: row numbers over all parts, and values (n, names)."""
+    """Yield batches of feasible designs with finite values: row numbers over all parts, and values (n, names)."""
     import pyarrow.parquet as pq
 
     start = 0

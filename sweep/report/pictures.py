@@ -30,18 +30,20 @@ if TYPE_CHECKING:
 
 
 def objective_of(study: Study) -> str | None:
-    """The output that is to be small, if the study names one."""
+    """Return the output that is to be small, if the study names one."""
     return None if study.objective is None else study.objective.output
 
 
 def shown_objective(data: Dataset) -> Quantity | None:
-    """The objective as it is shown."""
+    """Return the objective as it is shown."""
     name = objective_of(data.study)
     return None if name is None else quantity(name, data.units.get(name, ""))
 
 
 def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, str] | None = None) -> Figure | None:
-    """What the best design of each cell attains over two axes, the most telling pair if none is given, or over one."""
+    """Show what the best design of each cell attains over two axes, the most telling pair if none is given,
+    or over one.
+    """
     by_name = {c.name: c for c in cells}
     marks = {role: row for role, row in marked(data).items() if row is not None}
     shown = shown_objective(data)
@@ -61,7 +63,7 @@ def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, 
 
 
 def trade_off(data: Dataset, found: Scan) -> Figure | None:
-    """The objective against a second criterion, with the front where one was searched."""
+    """Draw the objective against a second criterion, with the front where one was searched."""
     study, shown = data.study, shown_objective(data)
     against = data.against
     if shown is None or against is None or not (len(found.scatter) or data.front is not None):
@@ -76,7 +78,7 @@ def trade_off(data: Dataset, found: Scan) -> Figure | None:
 
 
 def motion(data: Dataset) -> Figure | None:
-    """The curves over one turn."""
+    """Return the curves over one turn."""
     if data.curves is None or not len(data.curves):
         return None
     study = data.study
@@ -84,12 +86,14 @@ def motion(data: Dataset) -> Figure | None:
 
 
 def mechanism(parts: Mapping[str, Sequence[Part]]) -> Figure | None:
-    """The designs of :func:`drawn_parts` in several positions, the result above or beside the reference."""
+    """Return the designs of :func:`drawn_parts` in several positions, the result above or beside the reference."""
     return mechanism_figure(parts, "mm", positions=POSITIONS) if parts else None
 
 
 def drawn_parts(data: Dataset) -> dict[str, list[Part]]:
-    """Result and reference with their joints over a turn; empty where the study wants none, or they have none."""
+    """Return the result and reference with their joints over a turn;
+    empty where the study wants none, or they have none.
+    """
     if data.study.output.curves == "none":
         return {}
     rows = {role: row for role, row in marked(data).items() if row is not None}
@@ -116,24 +120,26 @@ def tolerance(data: Dataset) -> Figure | None:
 
 
 def sensitivity(data: Dataset) -> Figure | None:
-    """By how much each dimension changes the objective."""
+    """Draw by how much each dimension changes the objective."""
     ranked, objective = slopes(data), shown_objective(data)
     return slopes_figure(ranked, objective) if ranked and objective is not None else None
 
 
 def marked(data: Dataset) -> dict[str, Any]:
-    """The designs that are marked in the pictures of the design space."""
+    """Return the designs that are marked in the pictures of the design space."""
     return {data.result_name: data.result, "reference": data.reference}
 
 
 def axis_quantity(data: Dataset, name: str) -> Quantity:
-    """A swept parameter under its own name, in the unit a designer reads."""
+    """Return a swept parameter under its own name, in the unit a designer reads."""
     shown = quantity(name, data.units.get(name, ""))
     return replace(shown, symbol=name, words=data.definitions.get(name, name))
 
 
 def overlays(study: Study, x: str, y: str) -> list[Overlay]:
-    """Known lines, ``[report] curves`` of the study, that lie in the plane of the map; points in the axes' units."""
+    """Return known lines, ``[report] curves`` of the study, that lie in the plane of the map;
+    points in the axes' units.
+    """
     import numpy as np
 
     factors = {axis.name: axis.factor for axis in study.space.axes}

@@ -11,7 +11,7 @@ from sweep.report.quantities import quantity
 
 
 def proof_sentence(data: Dataset) -> str:
-    """One sentence; empty where the study asked for no proof."""
+    """Return one sentence; empty where the study asked for no proof."""
     found = read_proof(store.beside(data.folder) / PROOF)
     if found is None:
         return ""

@@ -64,25 +64,25 @@ class Quantity:
         return f"{self.heading} [{self.unit}]" if self.unit else self.heading
 
     def show(self, stored: float, digits: int = 5) -> str:
-        """Value with its unit."""
+        """Return the value with its unit."""
         return with_unit(number(stored * self.factor, digits), self.unit)
 
     def at_speed(self, stored: float, speed: float | None, digits: int = 4) -> str:
-        """Value at the scene's speed with its unit, or nothing where a speed says nothing."""
+        """Return the value at the scene's speed with its unit, or nothing where a speed says nothing."""
         if speed is None or self.order == 0:
             return ""
         return with_unit(number(stored * self.speed_scale * speed**self.order, digits), self.speed_unit)
 
 
 def with_unit(text: str, unit: str) -> str:
-    """``45°`` but ``24.5 mm``; nothing is added to a missing value."""
+    """Write ``45°`` but ``24.5 mm``; nothing is added to a missing value."""
     if not unit or text == "–":
         return text
     return text + unit if unit == "°" else f"{text}\u00a0{unit}"
 
 
 def quantity(name: str, unit: str) -> Quantity:
-    """How the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
+    """Return how the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
     unit = internal_unit(unit)
     if of := without_minus(name):  # what is to be made large is shown as itself
         shown = quantity(of, unit)
@@ -126,7 +126,7 @@ SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def _derivative(base: str) -> tuple[int, str, str]:
-    """Order, quantity and stage number of ``d2psi1``."""
+    """Return the order, quantity and stage number of ``d2psi1``."""
     _, root, stage = parts(base)
     match = re.fullmatch(r"(d[23]?)?(s|psi|dev)", root)
     if match:
@@ -142,7 +142,7 @@ def _pretty_unit(unit: str) -> str:
 
 
 def number(value: float, digits: int = 5) -> str:
-    """A number as it is set in a table: significant digits, no trailing zeros, powers of ten written out."""
+    """Return a number as it is set in a table: significant digits, no trailing zeros, powers of ten written out."""
     if not math.isfinite(value):
         return "–" if math.isnan(value) else "∞" if value > 0.0 else "−∞"
     if value == 0.0:
@@ -166,7 +166,7 @@ SIGNED = re.compile(r"(max|min)_(?!abs_)")
 
 
 def change(shown: Quantity, new: float, old: float) -> str:
-    """A value against another: sizes in percent, angles and what changes its sign by their difference."""
+    """Return a value against another: sizes in percent, angles and what changes its sign by their difference."""
     signed = bool(SIGNED.match(shown.name)) and min(new, old) < 0.0
     if shown.unit != "°" and not signed:
         return percent_change(new, old)
@@ -179,7 +179,7 @@ def change(shown: Quantity, new: float, old: float) -> str:
 
 
 def percent_change(new: float, old: float) -> str:
-    """``14.2 % less`` or ``3.1 % more`` than the old magnitude."""
+    """Return ``14.2 % less`` or ``3.1 % more`` than the old magnitude."""
     if not (math.isfinite(new) and math.isfinite(old)) or old == 0.0:
         return ""
     change = 100.0 * (abs(new) / abs(old) - 1.0)

@@ -41,7 +41,7 @@ class SlopeRow:
 
 
 def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
-    """Distribution of the outputs of the optimum; empty where the study names no tolerances."""
+    """Return the distribution of the outputs of the optimum; empty where the study names no tolerances."""
     rows = []
     for row in optimum_rows(data, store.TOLERANCE):
         name = str(row["output"])
@@ -60,7 +60,7 @@ def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
 
 
 def tolerance_words(data: Dataset) -> str:
-    """The tolerances as they are meant."""
+    """Return the tolerances as they are meant."""
     tolerance = data.study.tolerance
     if tolerance is None:
         return ""
@@ -80,7 +80,7 @@ class Slope:
 
 
 def slope_rows(data: Dataset) -> list[SlopeRow]:
-    """Dimensions by how much they change the objective, the most telling first."""
+    """Return dimensions by how much they change the objective, the most telling first."""
     texts = {p.name: p.text for p in data.study.family.parameters}
     return [
         SlopeRow(s.name, texts.get(s.name, ""), s.step, _percent(s.growing), _percent(s.shrinking))
@@ -89,7 +89,7 @@ def slope_rows(data: Dataset) -> list[SlopeRow]:
 
 
 def slopes(data: Dataset) -> list[Slope]:
-    """The numbers of :func:`slope_rows`."""
+    """Return the numbers of :func:`slope_rows`."""
     if data.study.objective is None:
         return []
     units = {p.name: p.unit for p in data.study.family.parameters}
@@ -113,7 +113,7 @@ def _percent(value: float) -> str:
 
 
 def optimum_rows(data: Dataset, file: str) -> list[dict[str, Any]]:
-    """Rows of the optimum in a table beside the dataset; none where there is no such table."""
+    """Return rows of the optimum in a table beside the dataset; none where there is no such table."""
     path = store.beside(data.folder) / file
     if not path.exists():
         return []

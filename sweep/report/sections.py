@@ -17,7 +17,9 @@ COSTS = 8  # dimensions that are shown
 
 
 def buildable(data: Dataset, several: list[Group], folder: Path) -> dict[str, Any]:
-    """Names of the template with what they stand for; pictures are saved in ``folder``, in the style in force."""
+    """Return names of the template with what they stand for;
+    pictures are saved in ``folder``, in the style in force.
+    """
     make, within = made(data), tolerance_words(data)
     costs = (
         ()

@@ -24,7 +24,7 @@ TURN = np.linspace(-0.75 * np.pi, 0.75 * np.pi, 25)
 
 
 def projection(view: str) -> Array:
-    """The (2, 3) matrix of a view: "xy", "zy", "xz" square to a plane, "space" from a corner with z upwards."""
+    """Return the (2, 3) matrix of a view: "xy", "zy", "xz" square to a plane, "space" from a corner with z upwards."""
     if view in VIEWS:
         return np.eye(3)[list(VIEWS[view])]
     (se, ce), (sa, ca) = ((math.sin(x), math.cos(x)) for x in (ELEVATION, AZIMUTH))
@@ -32,7 +32,7 @@ def projection(view: str) -> Array:
 
 
 def is_spatial(parts: Sequence[Part]) -> bool:
-    """Whether joints leave the plane z = 0, or an axis is not square to it."""
+    """Return whether joints leave the plane z = 0, or an axis is not square to it."""
     points = np.vstack([path for part in parts for path in part.joints.values()])
     turned = [axis for part in parts for name, axis in part.axes.items() if part.kinds[name] == "axis"]
     lean = any(abs(axis[0]) + abs(axis[1]) > 1e-9 for axis in turned)
@@ -63,7 +63,7 @@ def draw_frame(axes: Axes, parts: Sequence[Part], seen: Array, *, pose: int = 0,
 
 
 def draw_links(axes: Axes, part: Part, seen: Array, pose: int, *, faint: bool = False) -> None:
-    """The links of a part in one pose; a link of more than two joints as the polygon that it is.
+    """Draw the links of a part in one pose; a link of more than two joints as the polygon that it is.
 
     ``faint`` is for the further positions of a picture that has one in full.
     """
@@ -93,7 +93,7 @@ def _joint(axes: Axes, path: Array, seen: Array, pose: int, *, fixed: bool) -> N
 
 
 def _axis(axes: Axes, at: Array, axis: Array, kind: str, seen: Array, reach: float) -> None:
-    """An axis as a dash-dotted line with the arc of its positive sense, a slide as a line with an arrow."""
+    """Draw an axis as a dash-dotted line with the arc of its positive sense, a slide as a line with an arrow."""
     ends = np.array([at - 1.6 * reach * axis, at + 1.6 * reach * axis]) @ seen.T
     axes.plot(*ends.T, color=FRAME, linewidth=0.8, linestyle=(0, (9, 3, 2, 3)), zorder=1)
     arrow = {"arrowstyle": "-|>", "color": FRAME, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}

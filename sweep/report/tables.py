@@ -60,7 +60,7 @@ class Fate:
 
 
 def output_rows(data: Dataset) -> list[OutputRow]:
-    """Wanted outputs in designer's units, the objective first."""
+    """Return the wanted outputs in designer's units, the objective first."""
     study = data.study
     objective = [study.objective.output] if study.objective is not None else []
     rows = []
@@ -84,7 +84,7 @@ def output_rows(data: Dataset) -> list[OutputRow]:
 
 
 def parameter_rows(data: Dataset) -> list[ParameterRow]:
-    """All parameters of the mechanism with what was searched."""
+    """Return all parameters of the mechanism with what was searched."""
     study, rows = data.study, []
     links = () if study.locus is None else study.locus.made
     own = study.bare.parameter_names
@@ -114,14 +114,14 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
 
 
 def _few_values(study: Study, name: str) -> list[float] | None:
-    """Two or three listed values of an axis: to a sweep they are a choice, not a range."""
+    """Return two or three listed values of an axis: to a sweep they are a choice, not a range."""
     axis = next((axis for axis in study.space.axes if axis.name == name), None)
     listed = "values" in study.written.get(name, {})
     return None if axis is None or axis.values is None or not listed or axis.count > FEW else axis.values.tolist()
 
 
 def fates(data: Dataset, found: Scan) -> list[Fate]:
-    """Designs per status in the order in which the sweep finds out, the feasible ones last."""
+    """Return designs per status in the order in which the sweep finds out, the feasible ones last."""
     counts = data.counts or found.counts
     total = max(sum(counts.values()), 1)
     order = [codes.INVALID_INPUT, codes.NOT_ADMISSIBLE, codes.NOT_ASSEMBLED, codes.NOT_ROTATABLE, codes.UNDECIDABLE]
@@ -139,7 +139,7 @@ def fates(data: Dataset, found: Scan) -> list[Fate]:
 
 
 def _by_limit(data: Dataset) -> list[tuple[str, int]]:
-    """The limits that designs miss, in words, those of the study file's order."""
+    """Return the limits that designs miss, in words, those of the study file's order."""
     shown = [(limited(data, limit.output), limit) for limit in data.study.limits]
     return [
         (f"{quantity.words}: not {bound_words(limit, quantity)}", data.missed[limit.output])
@@ -149,7 +149,9 @@ def _by_limit(data: Dataset) -> list[tuple[str, int]]:
 
 
 def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
-    """Per output: symbol, error estimate at the result, largest estimate in the sweep, the same relative."""
+    """Return for every output its symbol, the error estimate at the result, the largest one in the sweep,
+    and that one relative.
+    """
     rows = []
     for name in data.study.want:
         error = f"err_{name}"
@@ -171,7 +173,7 @@ def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
 
 
 def provenance(data: Dataset) -> list[tuple[str, str]]:
-    """What made the dataset: enough to make it again."""
+    """Return what made the dataset: enough to make it again."""
     rows = [("study", data.study.name), ("fingerprint of the study", data.study.fingerprint)]
     rows += [(key, str(data.plan[key])) for key in ("code", "identity", "designs", "chunks") if key in data.plan]
     accuracy = data.study.accuracy
@@ -185,7 +187,7 @@ def provenance(data: Dataset) -> list[tuple[str, str]]:
 
 
 def run_rows(runs: tuple[dict[str, Any], ...]) -> list[tuple[str, str]]:
-    """When, on what and with which versions the last run was made; how long all of them took."""
+    """Say when, on what and with which versions the last run was made, and how long all of them took."""
     starts = [run for run in runs if run.get("event") == "start"]
     if not starts:
         return []

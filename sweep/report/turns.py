@@ -25,7 +25,7 @@ JOINT_POSES = 180  # of paths in a drawing
 
 
 def reference_row(study: Study) -> dict[str, float] | None:
-    """Parameters and outputs of the study's reference design, computed as the sweep computes its designs."""
+    """Return parameters and outputs of the study's reference design, computed as the sweep computes its designs."""
     if study.reference is None:
         return None
     from sweep.evaluation.summaries import design_outputs
@@ -38,7 +38,7 @@ def reference_row(study: Study) -> dict[str, float] | None:
 
 
 def parts_over_turn(study: Study, rows: Mapping[str, Mapping[str, Any]]) -> dict[str, list[Part]]:
-    """Joints and links over one closed turn, for every role whose design has a pose."""
+    """Return joints and links over one closed turn, for every role whose design has a pose."""
     found = {}
     for role, row in rows.items():
         design = {name: float(row[name]) for name in study.family.parameter_names}
@@ -52,7 +52,7 @@ def parts_over_turn(study: Study, rows: Mapping[str, Mapping[str, Any]]) -> dict
 
 
 def curves(study: Study, rows: Mapping[str, Mapping[str, Any] | None]) -> pd.DataFrame:
-    """Poses over one turn of the design of every role, as ``_curves.parquet`` holds them."""
+    """Return poses over one turn of the design of every role, as ``_curves.parquet`` holds them."""
     import pandas as pd
 
     family = study.family

@@ -39,7 +39,7 @@ def read_space(
     prescribed: Mapping[str, Entry] = MappingProxyType({}),
     tables: Mapping[str, str] = MappingProxyType({}),
 ) -> DesignSpace | None:
-    """The designs of a study, or None if a parameter is faulty (all faults are reported).
+    """Return the designs of a study, or None if a parameter is faulty (all faults are reported).
 
     ``fitted`` parameters are set by [fit]: they must not be given, except lam, which then says where "up" is.
     ``given`` ones have their value from [scene] and must not be given again.  ``made`` ones follow from [locus], whose
@@ -92,7 +92,7 @@ def check_varied(family: Family, space: DesignSpace, raw: Mapping[str, Any], fau
 def read_reference(
     family: Family, raw: Mapping[str, Any], faults: Faults, given: Mapping[str, float] = MappingProxyType({})
 ) -> dict[str, float]:
-    """The parameters of one design, in the order of the family; ``given`` ones need not be repeated."""
+    """Return the parameters of one design, in the order of the family; ``given`` ones need not be repeated."""
     key: Key = ("reference", "design")
     _check_names(family, raw, key, faults, fitted=tuple(given))
     values = {p.name: p.default for p in family.parameters if p.default is not None} | dict(given)
@@ -133,12 +133,12 @@ def _check_names(
 
 
 def missing_parameter(p: Parameter) -> str:
-    """What is needed where a parameter is missing: its meaning and the right ways to write it."""
+    """Return what is needed where a parameter is missing: its meaning and the right ways to write it."""
     return f"{p.text}: {_forms(p)}, or an axis {_axis_form(p)}"
 
 
 def read_entry(p: Parameter, raw: object, key: Key, faults: Faults, sampled: bool) -> Entry | None:
-    """A parameter as written: a value [mm, rad], an axis, or None if it is faulty."""
+    """Return a parameter as written: a value [mm, rad], an axis, or None if it is faulty."""
     before = len(faults.lines)
     entry: Entry | None
     if not isinstance(raw, dict):
@@ -246,12 +246,12 @@ def _checked(p: Parameter, written: float, value: float, key: Key, faults: Fault
 
 
 def _usual(internal: str) -> str:
-    """The unit a designer writes where the internal one is given."""
+    """Return the unit a designer writes where the internal one is given."""
     return {"rad": "deg", "t": "kg", "t*mm^2": "kg*mm^2", "rad/s": "rpm", "N*mm*s": "N*m/rpm"}.get(internal, internal)
 
 
 def _forms(p: Parameter, number: object = None) -> str:
-    """The right ways to write a fixed value of this parameter."""
+    """Return the right ways to write a fixed value of this parameter."""
     if p.choices is not None:
         return f"{p.choice}, or {{ values = {[int(c) for c in p.choices]} }}"
     internal = units.internal_unit(p.unit)
@@ -264,7 +264,7 @@ def _forms(p: Parameter, number: object = None) -> str:
 
 
 def _list_form(p: Parameter) -> str:
-    """The right way to write several values of this parameter."""
+    """Return the right way to write several values of this parameter."""
     internal = units.internal_unit(p.unit)
     return "{ values = [...] }" if internal == "1" else f'{{ values = [...], unit = "{_usual(internal)}" }}'
 

@@ -43,7 +43,7 @@ class Faults:
             self._add(key, f"{spelled(key)} is missing; needed: {needed}")
 
     def misspelt(self, key: Key) -> bool:
-        """Whether a key that is missing stands there with a spelling mistake, which was reported."""
+        """Return whether a key that is missing stands there with a spelling mistake, which was reported."""
         return key in self._misspelt
 
     def unknown(self, key: Key, known: Iterable[str], what: str = "key") -> None:
@@ -77,13 +77,13 @@ class Faults:
 
 
 def spelled(key: Key) -> str:
-    """A key path as one writes it: scene.want[2]."""
+    """Return a key path as one writes it: scene.want[2]."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in key)
     return text.removeprefix(".")
 
 
 def read_section(model: type[S], raw: object, key: Key, faults: Faults) -> S:
-    """The table as the model reads it; faulty keys are reported and left at their defaults."""
+    """Return the table as the model reads it; faulty keys are reported and left at their defaults."""
     if not isinstance(raw, dict):
         faults.value(key, raw, f"a table with the keys {', '.join(_names(model))}")
         return model()
@@ -120,14 +120,14 @@ def _field(model: type[Section], name: str | int) -> Any:
 
 
 def _described(model: type[Section], place: Key) -> str:
-    """Description of the innermost named key at this place."""
+    """Return the description of the innermost named key at this place."""
     named = [k for k, part in enumerate(place) if isinstance(part, str)]
     inner = _model_at(model, place[: named[-1]])
     return str(_field(inner, place[named[-1]]).description)
 
 
 def _model_at(model: type[Section], place: Key) -> type[Section]:
-    """The model of the table at this place: the one named in the annotation of each key on the way."""
+    """Return the model of the table at this place: the one named in the annotation of each key on the way."""
     for part in place:
         if isinstance(part, str):
             model = _table_in(_field(model, part).annotation)

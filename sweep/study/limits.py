@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
 
 def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Output | None:
-    """The design output named by the value at ``key``, or by the key itself; or a fault that gives the nearest."""
+    """Return the design output named by the value at ``key``, or by the key itself;
+    or a fault that gives the nearest.
+    """
     from sweep.evaluation.summaries import output
 
     try:
@@ -35,7 +37,7 @@ def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Out
 
 
 def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple[Limit, ...]:
-    """The limits in the order of the file, in internal units."""
+    """Return the limits in the order of the file, in internal units."""
     found = []
     for name, entry in raw.items():
         key: Key = ("limits", name)
@@ -66,7 +68,7 @@ def check_fitted_stroke(fit: LineFit, family: Family, raw: Mapping[str, Any], fa
 
 
 def _parameter(family: Family, name: str) -> Output | None:
-    """A parameter as something to be bounded: [fit] may set or scale it."""
+    """Return a parameter as something to be bounded: [fit] may set or scale it."""
     found = next((p for p in family.parameters if p.name == name and p.choices is None), None)
     return None if found is None else Output(name, found.unit, found.text)
 
@@ -92,7 +94,7 @@ def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Fault
 
 
 def _read_band(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
-    """A value and how far it may be missed, as "40 +- 0.2 deg"."""
+    """Return a value and how far it may be missed, as "40 +- 0.2 deg"."""
     internal = units.internal_unit(output.unit)
     middle, _, width = (part.strip() for part in text.partition("+-"))
     try:
@@ -112,7 +114,7 @@ def _read_band(output: Output, text: str, key: Key, faults: Faults) -> list[Limi
 
 
 def _read_side(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
-    """A bound on one side, as "<= 45 deg"."""
+    """Return a bound on one side, as "<= 45 deg"."""
     internal = units.internal_unit(output.unit)
     sign, rest = _SIDE.fullmatch(text.strip()).groups()  # type: ignore[union-attr]
     if sign not in ("<=", ">=", "\u2264", "\u2265"):

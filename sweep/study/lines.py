@@ -11,7 +11,8 @@ _SCALAR = re.compile(r"[^,\]}\n#]*")
 
 
 def key_lines(text: str) -> dict[str, int]:
-    r"""The line, from 1, of every key and heading by its path as messages spell it: ``design.b``, ``scene.want[2]``.
+    r"""Return the line, from 1, of every key and heading by its path as messages spell it:
+    ``design.b``, ``scene.want[2]``.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ class _Walk:
         return path
 
     def _entry(self, path: str) -> None:
-        """``a.b = value``."""
+        """Print an entry as ``a.b = value``."""
         line = self._here()
         for name in self._names():
             path = _join(path, name)

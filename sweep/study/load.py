@@ -44,7 +44,7 @@ def load_study(path: str | Path, smoke: bool = False) -> Study:
 
 
 def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
-    """The study of ``Study.data`` (as a dataset's _plan.json keeps it); ``path`` is what messages name.
+    """Return the study of ``Study.data`` (as a dataset's _plan.json keeps it); ``path`` is what messages name.
 
     Raises
     ------
@@ -55,7 +55,8 @@ def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
 
 
 def with_accuracy(study: Study, target: float | None = None, certify: bool | Sequence[str] | None = None) -> Study:
-    """The same study with its extrema refined to another relative error, or with or without the proof of its maxima.
+    """Return the same study with its extrema refined to another relative error,
+    or with or without the proof of its maxima.
 
     Raises
     ------

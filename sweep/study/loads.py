@@ -45,14 +45,14 @@ TABLE, SERIES = ("phi", "values"), ("mean", "cos", "sin")
 
 
 def is_curve(entry: object) -> bool:
-    """Whether an entry of [loads] changes over the turn: it has a key that no constant and no axis has."""
+    """Return whether an entry of [loads] changes over the turn: it has a key that no constant and no axis has."""
     return isinstance(entry, dict) and not {"file", "phi", *SERIES}.isdisjoint(entry)
 
 
 def read_curve(
     raw: dict[str, Any], internal: str, folder: Path, key: Key, faults: Faults
 ) -> tuple[Curve, dict[str, Any]] | None:
-    """The curve in internal units, and the same entry with the content of its file; None with its faults.
+    """Return the curve in internal units, and the same entry with the content of its file; None with its faults.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def _factor(section: CurveSection, name: str, internal: str, key: Key, faults: F
 def _file(
     section: CurveSection, folder: Path, key: Key, faults: Faults
 ) -> tuple[Sequence[float], Sequence[float]] | None:
-    """The two columns of a file beside the study."""
+    """Return the two columns of a file beside the study."""
     import pandas as pd
 
     name = section.file or ""

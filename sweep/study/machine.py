@@ -65,7 +65,9 @@ class RelationSection(Section):
 
 
 def flattened(data: Mapping[str, Any], members: object) -> dict[str, Any]:
-    """The file with the members' entries under dotted names: ``[design.needle] a1`` becomes ``design."needle.a1"``."""
+    """Return the file with the members' entries under dotted names:
+    ``[design.needle] a1`` becomes ``design."needle.a1"``.
+    """
     result = dict(data)
     if not isinstance(members, dict):
         return result
@@ -94,7 +96,7 @@ def _flatten(data: dict[str, Any], key: tuple[str, ...], members: Mapping[str, A
 def read_machine(
     data: Mapping[str, Any], faults: Faults, threads: Mapping[str, dict[str, Any]] = MappingProxyType({})
 ) -> tuple[Specification, Family] | None:
-    """The machine of a file with its threads, or None with its faults."""
+    """Return the machine of a file with its threads, or None with its faults."""
     before = len(faults.lines)
     tables = _tables(data, "machine", faults)
     members = {name: _member(name, raw, faults) for name, raw in tables.items()}
@@ -129,12 +131,12 @@ def read_machine(
 
 
 def _key_of_thread(error: InputError) -> str:
-    """A fault of the path is that of its key in the file."""
+    """Report a fault of the path as one of its key in the file."""
     return "path" if error.name == "thread" or error.place.endswith(".thread") else error.name
 
 
 def _level(given: str | float, internal: str, name: str, faults: Faults) -> float:
-    """The level of an event in the internal unit of its output; a bare number only where there is no unit."""
+    """Return the level of an event in the internal unit of its output; a bare number only where there is no unit."""
     key: Key = ("relations", name, "level")
     if isinstance(given, str):
         return _number(given, internal, key, faults)

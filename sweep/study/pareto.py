@@ -28,7 +28,7 @@ def read_pareto(
     time_budget: float | None,
     faults: Faults,
 ) -> ParetoSettings | None:
-    """The settings of the front, or None if something is faulty (all faults are reported).
+    """Return the settings of the front, or None if something is faulty (all faults are reported).
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[floa
 
 
 def _searchable(family: Family, output: Output, bounds: tuple[float, ...], side: str, faults: Faults) -> bool:
-    """Whether the optimiser can hold such bounds."""
+    """Return whether the optimiser can hold such bounds."""
     from sweep.reductions.measures import measure
 
     try:

@@ -21,7 +21,7 @@ WHOLE_TURN = 2.0 * np.pi * (1.0 - 1e-12)
 
 
 def read_locus(family: Family, faults: Faults) -> OnLocus | None:
-    """The stage that [locus] is about, or None with a fault if it has no locus."""
+    """Return the stage that [locus] is about, or None with a fault if it has no locus."""
     first = stages_of(family)[0].family
     if first.find(LimitLocus) is None:
         known = tuple(dict.fromkeys(way.family for way in LOCI))
@@ -31,7 +31,7 @@ def read_locus(family: Family, faults: Faults) -> OnLocus | None:
 
 
 def read_prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled: bool) -> dict[str, Entry]:
-    """The prescribed outputs as fixed values or axes; faulty ones are reported and left out."""
+    """Return the prescribed outputs as fixed values or axes; faulty ones are reported and left out."""
     known = [p.name for p in locus.prescribed]
     ratio, phi0 = f"time_ratio{locus.number}", f"phi0{locus.number}"
     known.insert(known.index(phi0) + 1, ratio)
@@ -61,7 +61,7 @@ def read_prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, samp
 
 
 def _angle_of_ratio(phi0: str, raw: Mapping[str, Any], ratio: str, faults: Faults, sampled: bool) -> Entry | None:
-    """phi0 from the ratio of the times of both strokes, phi0/(2 pi - phi0), the crank turning evenly."""
+    """Return phi0 from the ratio of the times of both strokes, phi0/(2 pi - phi0), the crank turning evenly."""
     key = ("locus", ratio)
     if phi0 in raw:
         faults.value(key, raw[ratio], f"{phi0} or {ratio}, not both: they say the same")
@@ -80,7 +80,9 @@ def _angle(ratio: Any) -> Any:
 
 
 def prescribed_limits(entries: Mapping[str, Entry]) -> tuple[Limit, ...]:
-    """What is prescribed, as limits: values as equations, axes as bounds; what is swept over a whole turn has none."""
+    """Return what is prescribed, as limits: values as equations, axes as bounds;
+    what is swept over a whole turn has none.
+    """
     found = []
     for name, entry in entries.items():
         ends = _values(entry)

@@ -56,13 +56,15 @@ class Reading:
         return found
 
     def get(self, kind: type[T]) -> T:
-        """The object of that very type that an earlier reader has kept."""
+        """Return the object of that very type that an earlier reader has kept."""
         found = self._found[kind]
         assert isinstance(found, kind)
         return found
 
     def section(self, model: type[S], name: str) -> S:
-        """The table as its model reads it, kept for later readers; all defaults where the file has no such table."""
+        """Return the table as its model reads it, kept for later readers;
+        all defaults where the file has no such table.
+        """
         read = read_section(model, self.data[name], (name,), self.faults) if name in self.data else model()
         return self.put(read)
 
@@ -75,12 +77,12 @@ class Reading:
             self.faults.value((name,), table, f"a table [{name}]")
 
     def texts(self, table: str, key: str) -> list[tuple[int, str]]:
-        """The texts of a list as it stands in the file, with their places, whatever else is wrong with it."""
+        """Return the texts of a list as it stands in the file, with their places, whatever else is wrong with it."""
         raw = self.data[table].get(key) if isinstance(self.data.get(table), dict) else None
         return [(k, name) for k, name in enumerate(raw) if isinstance(name, str)] if isinstance(raw, list) else []
 
     def quantity(self, text: str | None, internal: str, key: Key) -> float | None:
-        """A text such as "7000 rpm" in the internal unit; it must be positive."""
+        """Return a text such as "7000 rpm" in the internal unit; it must be positive."""
         if text is None:
             return None
         try:
@@ -94,14 +96,14 @@ class Reading:
         return value
 
     def share(self, text: str, key: Key) -> float:
-        """A text such as "2 %" as a share between 0 and 1, neither of them."""
+        """Return a text such as "2 %" as a share between 0 and 1, neither of them."""
         share = self.quantity(text, "1", key)
         if share is not None and not share < 1.0:
             self.faults.value(key, text, 'a share below 100 %, as "2 %"')
         return 0.5 if share is None else share
 
     def raise_faults(self) -> None:
-        """End here if there are faults.
+        """Raise an error if there are faults.
 
         Raises
         ------

@@ -26,7 +26,7 @@ ENTRY = {"$ref": "#/definitions/entry"}
 
 
 def study_schema() -> Schema:
-    """The schema as a plain dict, the same at every call."""
+    """Return the schema as a plain dict, the same at every call."""
     definitions: Schema = {"entry": _entry()}
     tables: Schema = {name: _model(model, definitions) for name, model in models(_TABLE).items()}
     tables |= {name: _each(_model(model, definitions)) for name, model in models(_EACH).items()}
@@ -60,13 +60,15 @@ def study_schema() -> Schema:
 
 
 def models(kind: re.Pattern[str] = _TABLE) -> dict[str, type[Section]]:
-    """The models of the tables, by name: of whole tables, or of what stands under each name of one."""
+    """Return the models of the tables, by name: of whole tables, or of what stands under each name of one."""
     found = ((kind.match(model.__doc__ or ""), model) for model in Section.__subclasses__())
     return {match[1]: model for match, model in found if match is not None}
 
 
 def described(table: str) -> str:
-    """What a table is about, as the docstring of its reader says it; of several the one that is about least else."""
+    """Return what a table is about, as the docstring of its reader says it;
+    of several the one that is about least else.
+    """
     docstrings = [(module.__doc__ or "") for name, module in sys.modules.items() if name.startswith("sweep.study.")]
     heads = [text.split("\n")[0].partition(": ") for text in docstrings if text.startswith("[")]
     _, _, words = min((head for head in heads if f"[{table}]" in head[0]), key=lambda head: (len(head[0]), head))
@@ -78,13 +80,13 @@ def _each(schema: Schema) -> Schema:
 
 
 def _entry() -> Schema:
-    """A parameter: a number, a text with its unit, or one of the three tables."""
+    """Return a parameter: a number, a text with its unit, or one of the three tables."""
     tables = [_model(model, {}) for model in (FixedEntry, ListEntry, RangeEntry)]
     return {"anyOf": [{"type": "number"}, {"type": "string"}, *tables]}
 
 
 def _of_family(entry: Family) -> Schema:
-    """What [design] may hold where the mechanism is this family alone."""
+    """Return what [design] may hold where the mechanism is this family alone."""
     own = {p.name: {"description": _described(p), "allOf": [ENTRY]} for p in entry.parameters}
     known = [*own, *sorted(input_names(entry) - own.keys()), "sample"]
     design = {"properties": own, "propertyNames": {"enum": known}}
@@ -103,7 +105,7 @@ def _described(p: Parameter) -> str:
 
 
 def _model(model: type[Section], definitions: Schema) -> Schema:
-    """The schema of one table as a file writes it: without null, with the keys that it must have."""
+    """Return the schema of one table as a file writes it: without null, with the keys that it must have."""
     raw = model.model_json_schema(by_alias=True)
     for name, inner in raw.pop("$defs", {}).items():
         definitions[name] = _cleaned(inner) | _required(_sections()[name])
@@ -120,7 +122,7 @@ def _sections() -> dict[str, type[Section]]:
 
 
 def _cleaned(raw: Any) -> Any:
-    """Without titles, empty defaults, null as a type, and docstrings that only say where a table stands."""
+    """Leave out titles, empty defaults, null as a type, and docstrings that only say where a table stands."""
     if isinstance(raw, list):
         return [_cleaned(item) for item in raw]
     if not isinstance(raw, dict):

@@ -87,20 +87,29 @@ class Sobol:
         self._tables = np.array(tables, np.uint64).reshape(dimensions, INDEX_BITS // _TABLE_BITS, 2**_TABLE_BITS)
 
     def points(self, start: int, stop: int) -> Array:
-        """Points start to stop - 1, one row per dimension."""
+        """Return points start to stop - 1, one row per dimension."""
         index = np.arange(start, stop, dtype=np.int64)
         gray = index ^ (index >> 1)
+        digits: list[int | NDArray[np.int64]] = []
+        for part in range(self._tables.shape[1]):
+            low = part * _TABLE_BITS
+            group = (gray >> low) & (2**_TABLE_BITS - 1)
+            # Of a short slice the upper digits are all the same: one number instead of a column.
+            same = start >> low == (stop - 1) >> low and stop > start
+            digits.append(int(group[0]) if same else group)
         out = np.empty((len(self._shift), index.size))
         for k, tables in enumerate(self._tables):
             x = np.full(index.size, self._shift[k])
-            for part, table in enumerate(tables):
-                x ^= table[(gray >> (part * _TABLE_BITS)) & (2**_TABLE_BITS - 1)]
-            out[k] = (x.astype(np.float64) + self._centre) * 2.0**-BITS
+            for table, group in zip(tables, digits, strict=True):
+                x ^= table[group]
+            out[k] = x
+            out[k] += self._centre
+            out[k] *= 2.0**-BITS
         return out
 
 
 def _direction_numbers(polynomial: int, first: tuple[int, ...]) -> list[int]:
-    """V_1 ... V_INDEX_BITS as integers of BITS digits, by the recurrence of the primitive polynomial."""
+    """Return V_1 ... V_INDEX_BITS as integers of BITS digits, by the recurrence of the primitive polynomial."""
     degree = polynomial.bit_length() - 1
     if degree == 0:  # the first dimension is the van der Corput sequence
         return [1 << (BITS - 1 - j) for j in range(INDEX_BITS)]
@@ -115,7 +124,7 @@ def _direction_numbers(polynomial: int, first: tuple[int, ...]) -> list[int]:
 
 
 def _mix(direction: int, raw: list[int]) -> int:
-    """Each digit plus (mod 2) a random choice of the digits above it."""
+    """Return each digit plus (mod 2) a random choice of the digits above it."""
     mixed = 0
     for digit in range(BITS):
         place = BITS - 1 - digit
@@ -125,7 +134,7 @@ def _mix(direction: int, raw: list[int]) -> int:
 
 
 def _xor_tables(directions: list[int]) -> NDArray[np.uint64]:
-    """For every group of index digits the exclusive or of the direction numbers of each combination."""
+    """Return for every group of index digits the exclusive or of the direction numbers of each combination."""
     tables = np.zeros((INDEX_BITS // _TABLE_BITS, 2**_TABLE_BITS), np.uint64)
     for j, direction in enumerate(directions):
         part, bit = divmod(j, _TABLE_BITS)

@@ -42,13 +42,15 @@ class Axis:
         factor: float = 1.0,
         scale: Scale = "linear",
     ) -> Axis:
-        """``count`` values from ends[0] to ends[1], both included and given in the written unit; count 1 is ends[0]."""
+        """Return ``count`` values from ends[0] to ends[1], both included and given in the written unit;
+        count 1 is ends[0].
+        """
         values = _between(ends, np.arange(count, dtype=np.float64), max(count - 1, 1), scale) * factor
         return cls(name, ends[0] * factor, ends[1] * factor, _read_only(values), unit, factor, scale)
 
     @classmethod
     def listed(cls, name: str, values: Sequence[float], unit: str = "1", factor: float = 1.0) -> Axis:
-        """The values as listed, in their order."""
+        """Return the values as listed, in their order."""
         array = np.asarray(values, dtype=np.float64) * factor
         return cls(name, float(array.min()), float(array.max()), _read_only(array), unit, factor)
 
@@ -56,7 +58,7 @@ class Axis:
     def sampled(
         cls, name: str, ends: tuple[float, float], unit: str = "1", factor: float = 1.0, scale: Scale = "linear"
     ) -> Axis:
-        """Any value between the ends, to be drawn by a sample."""
+        """Return any value between the ends, to be drawn by a sample."""
         return cls(name, ends[0] * factor, ends[1] * factor, None, unit, factor, scale)
 
     @property
@@ -70,7 +72,9 @@ class Axis:
         return self.high > self.low and self.count != 1
 
     def at(self, fraction: Array) -> Array:
-        """Value for numbers in (0, 1): the listed one whose equal share it falls in, or a point between the ends."""
+        """Return the value for numbers in (0, 1):
+        the listed one whose equal share it falls in, or a point between the ends.
+        """
         if self.values is not None:
             return self.values[(fraction * len(self.values)).astype(np.int64)]
         return _between((self.low, self.high), fraction, 1, self.scale)
@@ -107,7 +111,7 @@ class DesignSpace:
         return {axis.name: (axis.low, axis.high) for axis in self.axes}
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Parameter values of the designs start to stop - 1, one array per parameter in the family's order.
+        """Return parameter values of the designs start to stop - 1, one array per parameter in the family's order.
 
         A design has the same bits in whatever slice it is asked for.  Measured on one core, per design and swept
         parameter: lattice 9 to 16 ns, sample 28 ns, sample on a log scale 180 ns.
@@ -144,13 +148,15 @@ class DesignSpace:
 
 
 def _between(ends: tuple[float, float], k: Array, steps: int, scale: Scale) -> Array:
-    """Points k/steps of the way; the ends weighed by k and steps - k, so 0 to 90 in 9 steps gives exact tens."""
+    """Return points k/steps of the way; the ends weighed by k and steps - k, so 0 to 90 in 9 steps gives exact tens."""
     low, high = ends
     if scale == "log":
         # The C library's power, one value at a time: vectorised ones may round by position in the array.
         values = np.array([low ** (1.0 - t) * high**t for t in (k / steps).tolist()])
     else:
-        values = (low * (steps - k) + high * k) / steps
+        values = (low * (steps - k) + high * k) / steps if steps != 1 else low * (1.0 - k) + high * k
+        if steps == 1:  # then both ends are exact
+            return np.clip(values, low, high, out=values)
     inside: Array = np.clip(values, low, high)
     return np.where(k == 0, low, np.where(k == steps, high, inside))
 

@@ -247,12 +247,12 @@ class Study:
 
 
 def _counted(settings: OptimiseSettings | ParetoSettings) -> dict[str, Any]:
-    """Settings without the emergency brake, which decides no value."""
+    """Return settings without the emergency brake, which decides no value."""
     return {key: value for key, value in asdict(settings).items() if key != "time_budget"}
 
 
 def _without_none(content: dict[str, Any], name: str) -> dict[str, Any]:
-    """A key that came later: without a value it leaves the fingerprints of older datasets as they are."""
+    """Return a key that came later: without a value it leaves the fingerprints of older datasets as they are."""
     return {key: value for key, value in content.items() if key != name or value is not None}
 
 

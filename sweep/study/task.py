@@ -37,7 +37,7 @@ WORDS = ("objective", "adjusted", "limit", "kappa", "branch")
 
 
 def load_task(path: str | Path) -> Problem:
-    """The problem of a file's [task] table.
+    """Return the problem of a file's [task] table.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def load_task(path: str | Path) -> Problem:
 
 
 def read_task(raw: object, faults: Faults) -> Problem | None:
-    """The problem of a table [task], or None with its faults."""
+    """Return the problem of a table [task], or None with its faults."""
     before = len(faults.lines)
     if not isinstance(raw, dict):
         faults.missing(("task",), "a table [task] with kind and what is given")
@@ -192,5 +192,5 @@ def _number(raw: object, internal: str, key: Key, faults: Faults) -> Any:
 
 
 def _plain(raw: object) -> bool:
-    """Whether it is a number that a float holds with room to spare; nan is none."""
+    """Return whether it is a number that a float holds with room to spare; nan is none."""
     return isinstance(raw, int | float) and not isinstance(raw, bool) and -1e100 <= raw <= 1e100

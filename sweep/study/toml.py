@@ -19,7 +19,7 @@ _TWICE = ("Cannot overwrite", "Cannot declare", "Duplicate inline")
 
 
 def read_toml(file: Path) -> dict[str, Any]:
-    """The tables of a file.
+    """Return the tables of a file.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def read_toml(file: Path) -> dict[str, Any]:
 
 
 def toml_text(file: Path) -> str:
-    """The text of a file.
+    """Return the text of a file.
 
     Raises
     ------
@@ -99,13 +99,13 @@ def _name(line: str) -> str | None:
 
 
 def _heading(lines: list[str]) -> str:
-    """The table that the last line stands in."""
+    """Return the table that the last line stands in."""
     found = [match[1].strip() for match in map(_TABLE.fullmatch, lines) if match is not None]
     return found[-1] if found else ""
 
 
 def _too_deep(data: dict[str, Any]) -> str | None:
-    """The first key under which tables and lists are nested too deeply."""
+    """Return the first key under which tables and lists are nested too deeply."""
     for key, value in data.items():
         level = [value]
         for _ in range(DEEPEST):

@@ -79,7 +79,7 @@ class UnitFault(ValueError):
 
 
 def example(internal: str) -> str:
-    """What may stand where the internal unit is ``internal``, in words."""
+    """Return what may stand where the internal unit is ``internal``, in words."""
     return _EXAMPLES.get(internal, f"in units such as {internal}")
 
 
@@ -92,7 +92,7 @@ def internal_unit(word: str) -> str:
 
 @lru_cache
 def factor(unit: str, internal: str) -> float:
-    """Multiplier from a written unit to the internal one.
+    """Return the multiplier from a written unit to the internal one.
 
     Angles count as a dimension, so 45 deg is no ratio; but an analogue such as d2s may be given per rad or rad^2.
 
@@ -113,7 +113,7 @@ def factor(unit: str, internal: str) -> float:
 
 
 def split(text: str, internal: str) -> tuple[float, str]:
-    """Number and unit of a text such as "7000 rpm".
+    """Return the number and unit of a text such as "7000 rpm".
 
     Raises
     ------
@@ -144,7 +144,7 @@ def _dimensions(unit: pint.Unit, wanted: pint.Unit) -> dict[str, int]:
 
 
 def _parse(text: str) -> pint.Unit:
-    """A product of known symbols with small whole exponents; nothing else reaches pint's parser."""
+    """Return a product of known symbols with small whole exponents; nothing else reaches pint's parser."""
     parts = re.split(r"\s*([*/])\s*", text.strip())
     for part in parts[::2]:
         match = _TERM.fullmatch(part)

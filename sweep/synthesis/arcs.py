@@ -12,7 +12,7 @@ from sweep.synthesis.locus import LOCI, TWO_PI, locus
 
 
 def admissible_arcs(family: str, requirement: Mapping[str, float]) -> list[tuple[float, float]]:
-    """Arcs of phi1 on which test (i), the side condition, holds; equations (4) and (10) of docs/synthesis.md.
+    """Return arcs of phi1 on which test (i), the side condition, holds; equations (4) and (10) of docs/synthesis.md.
 
     Parameters
     ----------

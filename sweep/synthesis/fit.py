@@ -38,13 +38,13 @@ class LineFit:
     free_direction: bool
 
     def parameters(self, family: Family) -> tuple[str, ...]:
-        """Names of the parameters the fit sets, xi2, eta2 ... in a chain; lam only if its direction is free."""
+        """Return names of the parameters the fit sets, xi2, eta2 ... in a chain; lam only if its direction is free."""
         guided, suffix = _guided(family)
         free = (name for name in guided.fitted if self.free_direction or name != guided.direction)
         return tuple(f"{name}{suffix}" for name in free)
 
     def rescaled(self, family: Family) -> tuple[str, ...]:
-        """Names of the parameters whose given values are proportions only."""
+        """Return names of the parameters whose given values are proportions only."""
         guided, suffix = _guided(family)
         return () if self.stroke is None else tuple(f"{name}{suffix}" for name in guided.scaled)
 
@@ -104,7 +104,7 @@ def fit_line(
 
 
 def _guided(family: Family) -> tuple[GuidedPoint, str]:
-    """The guided point, and what follows the names of its stage's parameters: the stage's number in a chain."""
+    """Return the guided point, and what follows the names of its stage's parameters: the stage's number in a chain."""
     last = stages_of(family)[-1]
     guided = last.family.find(GuidedPoint)
     if guided is not None:
@@ -113,7 +113,9 @@ def _guided(family: Family) -> tuple[GuidedPoint, str]:
 
 
 def _input_angles(family: Family, designs: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """Input angles of the guide over its swing or turn, Chebyshev points, (n, m), and the status of what drives it."""
+    """Return input angles of the guide over its swing or turn, Chebyshev points, (n, m),
+    and the status of what drives it.
+    """
     samples = SWING_SAMPLES if isinstance(family, Chain) else TURN_SAMPLES
     share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))
     if not isinstance(family, Chain):

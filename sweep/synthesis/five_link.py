@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
-    """Five-links whose rocker stands still where that of a crank-rocker does; (10) of docs/five_link.md.
+    """Return five-links whose rocker stands still where that of a crank-rocker does; (10) of docs/five_link.md.
 
     The limit positions, so swing, phi0 and stroke ratio, are those of the crank-rocker; crank and coupler change with
     h, all other links stay.

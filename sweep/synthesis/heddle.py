@@ -45,7 +45,7 @@ class _Requirement:
         return tuple(p.name for p in self.parameters)
 
     def read(self, table: Table) -> Array:
-        """The checked columns, (n, P)."""
+        """Return the checked columns, (n, P)."""
         return design_matrix(self, table)[0]
 
 
@@ -91,7 +91,7 @@ _ARMS = _Requirement(
 
 
 def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
-    """Both extreme positions of a heddle drive for a wanted stroke, one row per row of the table.
+    """Return both extreme positions of a heddle drive for a wanted stroke, one row per row of the table.
 
     Equations (1), (2) and, where the table has the columns O2B and BC, (10) of docs/heddle.md.
 
@@ -130,7 +130,7 @@ def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
 
 
 def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
-    """All rods BC that give the cam lever a wanted swing, one row per rod; (11) of docs/heddle.md.
+    """Return all rods BC that give the cam lever a wanted swing, one row per rod; (11) of docs/heddle.md.
 
     Parameters
     ----------
@@ -169,7 +169,8 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
 
 
 def shed(table: Table) -> pd.DataFrame:
-    """Strokes of the shafts for a clear shed: proportional to the distance from the fell; (14) of docs/heddle.md.
+    """Return strokes of the shafts for a clear shed: proportional to the distance from the fell;
+    (14) of docs/heddle.md.
 
     Parameters
     ----------
@@ -192,7 +193,7 @@ def shed(table: Table) -> pd.DataFrame:
 
 
 def arms(table: Table) -> pd.DataFrame:
-    """Arm O3D of every shaft, the other lengths being common to all shafts; (12), (13) of docs/heddle.md.
+    """Return the arm O3D of every shaft, the other lengths being common to all shafts; (12), (13) of docs/heddle.md.
 
     Parameters
     ----------
@@ -219,7 +220,7 @@ def arms(table: Table) -> pd.DataFrame:
 
 
 def _frame(columns: Mapping[str, np.ndarray], index: pd.Index) -> pd.DataFrame:
-    """The columns with their units: angles by their names, all others but number and status are lengths."""
+    """Return the columns with their units: angles by their names, all others but number and status are lengths."""
     import pandas as pd
 
     found = pd.DataFrame(columns, index=index)
@@ -229,7 +230,7 @@ def _frame(columns: Mapping[str, np.ndarray], index: pd.Index) -> pd.DataFrame:
 
 
 def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
-    """Columns of the extreme positions by one of the two half angles, and their status."""
+    """Return columns of the extreme positions by one of the two half angles, and their status."""
     if mode not in ("exact", "printed"):
         raise InputError("mode", mode, "exact or printed", "synthesis of a heddle drive")
     _refuse(matrix[:, 3] <= matrix[:, 2], matrix[:, 3], "O1O3", "a length above O1O2")
@@ -241,7 +242,7 @@ def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
 
 
 def _closure(matrix: Array, found: Array, lever: Array) -> Array:
-    """Rows for the kernels: O2O3, O3C, both angles xi, and what is given of the cam lever."""
+    """Return rows for the kernels: O2O3, O3C, both angles xi, and what is given of the cam lever."""
     return np.column_stack([matrix[:, 3] - matrix[:, 2], matrix[:, 4], found[:, 1], found[:, 2], lever])
 
 

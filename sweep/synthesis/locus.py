@@ -64,7 +64,7 @@ class Locus:
         return "root" in self.parameter_names
 
     def read(self, table: Table) -> Array:
-        """The checked requirement matrix.
+        """Return the checked requirement matrix.
 
         Raises
         ------
@@ -187,7 +187,7 @@ LOCI = (
 
 
 def locus(family: str, names: tuple[str, ...]) -> Locus:
-    """The way of stating a requirement that the column names tell.
+    """Return the way of stating a requirement that the column names tell.
 
     Raises
     ------
@@ -208,7 +208,8 @@ def locus(family: str, names: tuple[str, ...]) -> Locus:
 
 
 def locus_designs(family: str, columns: Table) -> tuple[Columns, Status]:
-    """Parameters of mechanisms that meet requirements: a derivation of design columns for studies and optimisers.
+    """Return parameters of mechanisms that meet requirements:
+    a derivation of design columns for studies and optimisers.
 
     Parameters
     ----------

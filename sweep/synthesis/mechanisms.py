@@ -31,7 +31,7 @@ _OF_THEIR_OWN: dict[str, Callable[[Table], pd.DataFrame]] = {CentralSlot.name: c
 def synthesise(
     family: str, table: Table, *, max_pressure_angle: float | None = None, angles: AngleUnit | None = None
 ) -> pd.DataFrame:
-    """Mechanisms that meet requirements, one row per solution, in the order of the table.
+    """Return mechanisms that meet requirements, one row per solution, in the order of the table.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def synthesise(
 
 
 def _units(way: Locus) -> dict[str, str]:
-    """Units of the columns that have one, by the letter of the output: an angle psi, a displacement s."""
+    """Return units of the columns that have one, by the letter of the output: an angle psi, a displacement s."""
     mechanism, amplitude = find_family(way.family), way.parameter_names[0]
     letter, unit = mechanism.position, mechanism.pose_output[mechanism.position].unit
     angles = dict.fromkeys(("phi_ext", "phi_fold", "phi0", "max_pressure_angle"), "rad")
@@ -123,7 +123,7 @@ def _limits(way: Locus, found: Found, amplitude: Array) -> dict[str, object]:
 
 
 def _verdict(family: str, found: Found, limit: float | None) -> dict[str, object]:
-    """Tests (iv) and (v) for what passed the first three."""
+    """Return tests (iv) and (v) for what passed the first three."""
     import pandas as pd
 
     status, failed = found.status.copy(), found.failed.copy()

@@ -51,7 +51,7 @@ class OnLocus:
         return tuple(f"{name}{self.number}" for name in find_family(self.family).parameter_names if name not in given)
 
     def allowed(self, name: str, values: Array) -> str | None:
-        """What a prescribed output may be, if not all the values [mm, rad] are that; else None."""
+        """Return what a prescribed output may be, if not all the values [mm, rad] are that; else None."""
         stem = name.removesuffix(self.number) if self.number else name
         if stem == "swing":
             bad, words = ~((values != 0.0) & (np.abs(values) < TWO_PI)), "an angle below one turn, or its negative"
@@ -67,7 +67,7 @@ class OnLocus:
         return words if bad.any() else None
 
     def links(self, columns: Mapping[str, Array]) -> tuple[dict[str, Array], Status]:
-        """The parameters in ``made``, (n,) each, and the status of each design.
+        """Return the parameters in ``made``, (n,) each, and the status of each design.
 
         Parameters
         ----------
@@ -83,10 +83,10 @@ class OnLocus:
         return self.links_of(found), found.status
 
     def links_of(self, found: Found) -> dict[str, Array]:
-        """The parameters in ``made`` out of mechanisms of this stage alone."""
+        """Return the parameters in ``made`` out of mechanisms of this stage alone."""
         own = find_family(self.family).parameter_names
         return {name: found.designs[:, own.index(name.removesuffix(self.number))] for name in self.made}
 
     def outside(self, name: str) -> str:
-        """What a column of the requirement is called in a study."""
+        """Return what a column of the requirement is called in a study."""
         return f"{_PLACE[1] if name == _PLACE[0] else name}{self.number}"

@@ -42,7 +42,8 @@ class CentralSlot:
 
 
 def central_slots(table: Table) -> pd.DataFrame:
-    """Fork slots with s = 0 for a wanted crank angle between the limit positions, one row per row of the table.
+    """Return fork slots with s = 0 for a wanted crank angle between the limit positions,
+    one row per row of the table.
 
     Parameters
     ----------

@@ -138,12 +138,12 @@ def fit_speed(table: Table, confidence: float = 0.95) -> ConstantsFit:
 
 
 def _growth(x: Array) -> Array:
-    """(e^x - 1)/x."""
+    """Return (e^x - 1)/x."""
     return np.where(x > 0.0, np.expm1(x) / np.where(x > 0.0, x, 1.0), 1.0)
 
 
 def _growth_slope(x: Array) -> Array:
-    """Derivative of (e^x - 1)/x, by its series where the quotient would cancel."""
+    """Return the derivative of (e^x - 1)/x, by its series where the quotient would cancel."""
     small = x < 0.05
     safe = np.where(small, 1.0, x)
     series = 0.5 + x * (1.0 / 3.0 + x * (1.0 / 8.0 + x * (1.0 / 30.0 + x * (1.0 / 144.0 + x / 840.0))))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +21,8 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Family
+from sweep.families.capabilities import InSeries
+from sweep.families.chain import Chain
 from sweep.reductions.size import size_step
 from sweep.reductions.travel import certified_travel
 from sweep.reductions.work import POSES_EVENT, POSES_PEAK, POSES_SEARCH
@@ -66,6 +69,7 @@ def work(poses: dict[str, float], rounds: int) -> dict[str, float]:
     names = ("needle208", "crank-rocker-atlas", "looper-sphere")
     study, atlas, sphere = (load_study(ROOT / "studies" / name) for name in names)
     chain, fine, grid = study.bare, Accuracy(target=1e-8), Accuracy(samples=SAMPLES)
+    apart = _unfused(chain)
     spread = spread_designs(study, 20_000)
     turning = _turning(study, spread)
     size, proof = size_step(chain), certified_travel(chain)
@@ -75,8 +79,9 @@ def work(poses: dict[str, float], rounds: int) -> dict[str, float]:
     runs = {
         "fit": sized(spread, partial(_fit, study)),
         "event": sized(spread_designs(sphere, 4000), partial(_outputs, sphere.family, ["phi_arrive"], fine)),
-        "one peak": sized(turning, partial(_outputs, chain, ["max_abs_d2s"], fine)),
-        "two peaks": sized(turning, partial(_outputs, chain, ["max_abs_d2s", "max_abs_ds"], fine)),
+        "one peak": sized(turning, partial(_outputs, apart, ["max_abs_d2s"], fine)),
+        "two peaks": sized(turning, partial(_outputs, apart, ["max_abs_d2s", "max_abs_ds"], fine)),
+        "fused extremum": sized(turning, partial(_outputs, chain, ["max_abs_d2s"], fine)),
         "one scan": sized(turning, partial(_outputs, chain, ["max_d2s"], grid)),
         "three scans": sized(turning, partial(_outputs, chain, ["max_d2s", "min_d2s", "max_abs_d2s"], grid)),
         "size": sized(np.tile(turning, (50, 1)), lambda some: size.run(some, frozenset({"size"}), fine)),
@@ -94,7 +99,18 @@ def work(poses: dict[str, float], rounds: int) -> dict[str, float]:
     found["scan"] = (found.pop("three scans") - found.pop("one scan")) / (2 * SAMPLES)
     found["event"] = max(found["event"] - POSES_EVENT * poses["spherical_looper"], 0.0)
     found["certified travel"] /= 2.0
+    found["fused extremum"] /= 2.0
     return found
+
+
+def _unfused(family: Family) -> Family:
+    """The same chain, whose extrema are searched for on poses."""
+    assert isinstance(family, Chain)
+    stages = []
+    for stage in family.stages:
+        others = tuple(one for one in stage.family.capabilities if not isinstance(one, InSeries))
+        stages.append(replace(stage, family=replace(stage.family, capabilities=others)))
+    return replace(family, stages=tuple(stages))
 
 
 def _fit(study: Study, designs: Array) -> object:

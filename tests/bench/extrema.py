@@ -19,8 +19,9 @@ from studies.accuracy.regions import regions, rotatable
 from studies.accuracy.timing import seconds
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
+from sweep.quantities.reduction import Mode
 from sweep.reductions import extrema, search
-from sweep.reductions.extrema import Mode, Request
+from sweep.reductions.extrema import Request
 from tests.bench.limits import limits
 from tests.climbing import climbed
 from tests.turn_designs import GUIDE, NEEDLE, RSSP, RSSR, crank_rockers, guided_four_bars, needle_drives, slider_cranks

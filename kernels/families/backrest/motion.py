@@ -61,7 +61,7 @@ def poses(
     designs: Array, rho: Array, modes: Status, status: Status, geometry: Array | None, loads: Array | None,
     band: Array | None,
 ) -> None:  # fmt: skip
-    """Geometry, tension and reactions of every design at its beam radii; (1)-(13) of docs/backrest.md.
+    """Compute the geometry, tension and reactions of every design at its beam radii; (1)-(13) of docs/backrest.md.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def poses(
 
 @kernel
 def positions(designs: Array, rho: Array, mode: int, angles: Array, count: Status) -> None:
-    """All bracket angles of every design at one beam radius each; (12) of docs/backrest.md.
+    """Compute all bracket angles of every design at one beam radius each; (12) of docs/backrest.md.
 
     Parameters
     ----------

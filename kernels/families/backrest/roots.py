@@ -15,7 +15,7 @@ _MOST_STEPS = 200  # a bound, so that the loops always end; halving takes some 6
 
 @inline
 def _edge(d: Array, good: float, bad: float, rho: float, mode: int) -> float:
-    """Last angle from ``good`` towards ``bad`` at which the equation is defined."""
+    """Return the last angle from ``good`` towards ``bad`` at which the equation is defined."""
     for _ in range(_MOST_STEPS):
         middle = 0.5 * (good + bad)
         # no number lies between: the edge is known to the last bit
@@ -31,7 +31,9 @@ def _edge(d: Array, good: float, bad: float, rho: float, mode: int) -> float:
 
 @inline
 def _bracketed(d: Array, a: float, fa: float, b: float, fb: float, rho: float, mode: int) -> float:
-    """Root between a and b, where the signs differ: inverse quadratic steps kept in the bracket (Chandrupatla)."""
+    """Return the root between a and b, where the signs differ:
+    inverse quadratic steps kept in the bracket (Chandrupatla).
+    """
     c, fc, t = a, fa, 0.5
     for _ in range(_MOST_STEPS):
         x = a + t * (b - a)
@@ -60,7 +62,7 @@ def _bracketed(d: Array, a: float, fa: float, b: float, fb: float, rho: float, m
 
 @inline
 def _dip(d: Array, low: float, high: float, sign: float, rho: float, mode: int) -> tuple[float, float]:
-    """Where sign * residual is least between two angles: golden sections, stopped once it is below zero."""
+    """Find by golden sections where sign * residual is least between two angles; stop once it is below zero."""
     share = 0.3819660112501051  # (3 - sqrt(5))/2: one new value per step serves the next one too
     x, y = low + share * (high - low), high - share * (high - low)
     fx, fy = sign * residual(d, x, rho, mode)[0], sign * residual(d, y, rho, mode)[0]
@@ -89,7 +91,8 @@ def _kept(roots: Any, count: int, root: float) -> int:
 
 @inline
 def all_roots(d: Array, rho: float, mode: int, roots: Array) -> int:
-    """Roots between phi_lo and phi_hi, ascending, into ``roots`` (at least MOST long); how many there are.
+    """Find the roots between phi_lo and phi_hi, write them ascending into ``roots`` (at least MOST long);
+    return how many there are.
 
     The interval is cut into CELLS cells.  A cell with one undefined end is cut at the edge; a cell pair whose middle is
     a dip towards zero is searched for a pair of roots, so that two close roots are not stepped over.

@@ -53,7 +53,7 @@ def _cycloidal(x: Any) -> Motion:
 
 @inline
 def _modified_sine(x: Any) -> Motion:
-    """Neklutin's: a sine of short period over an eighth at each end, one of long period between."""
+    """Evaluate Neklutin's rise: a sine of short period over an eighth at each end, one of long period between."""
     ends = x.real < 0.125 or x.real > 0.875
     turn = 4.0 * math.pi * x if ends else (4.0 * math.pi * x + math.pi) / 3.0
     s, c = np.sin(turn), np.cos(turn)
@@ -70,7 +70,7 @@ def _modified_sine(x: Any) -> Motion:
 
 @inline
 def normalised(law: int, x: Any) -> Motion:
-    """The curve of a rise at x in [0, 1], and its derivatives with respect to x; (2)-(4)."""
+    """Return the curve of a rise at x in [0, 1], and its derivatives with respect to x; (2)-(4)."""
     if law == POLYNOMIAL_345:
         return _polynomial(x)
     if law == MODIFIED_SINE:
@@ -80,7 +80,7 @@ def normalised(law: int, x: Any) -> Motion:
 
 @inline
 def fourier(designs: Numbers, i: int, first: int, phi: Any) -> Motion:
-    """The sum of c_k cos(k phi) + s_k sin(k phi), and its derivatives; (5)."""
+    """Return the sum of c_k cos(k phi) + s_k sin(k phi), and its derivatives; (5)."""
     u, v = np.cos(phi), np.sin(phi)
     c, s = u, v
     y, d1, d2, d3 = 0.0 * phi, 0.0 * phi, 0.0 * phi, 0.0 * phi
@@ -95,7 +95,7 @@ def fourier(designs: Numbers, i: int, first: int, phi: Any) -> Motion:
 
 @inline
 def law_is_valid(designs: Numbers, i: int, first: int) -> bool:
-    """Whether the columns of the law mean something: a whole law, phases within a turn, numbers."""
+    """Return whether the columns of the law mean something: a whole law, phases within a turn, numbers."""
     law, rise, dwell, fall = (
         designs[i, LAW].real, designs[i, RISE].real, designs[i, DWELL].real, designs[i, FALL].real,
     )  # fmt: skip
@@ -109,7 +109,7 @@ def law_is_valid(designs: Numbers, i: int, first: int) -> bool:
 
 @inline
 def motion(designs: Numbers, i: int, first: int, phi: Any) -> Motion:
-    """The law of one valid design at one cam angle, and its derivatives with respect to the angle; (1)."""
+    """Return the law of one valid design at one cam angle, and its derivatives with respect to the angle; (1)."""
     law = int(designs[i, LAW].real)
     if law == FOURIER:
         return fourier(designs, i, first, phi)

@@ -27,7 +27,7 @@ def poses(
     x_p: Numbers | None,
     y_p: Numbers | None,
 ) -> None:
-    """Lever angle, derivatives, pressure angle and pitch curve of every design at its cam angles.
+    """Compute the lever angle, derivatives, pressure angle and pitch curve of every design at its cam angles.
 
     Parameters
     ----------

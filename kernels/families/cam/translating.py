@@ -27,7 +27,8 @@ def poses(
     x_p: Numbers | None,
     y_p: Numbers | None,
 ) -> None:
-    """Follower displacement, derivatives, pressure angle and pitch curve of every design at its cam angles.
+    """Compute the follower displacement, derivatives,
+    pressure angle and pitch curve of every design at its cam angles.
 
     Parameters
     ----------

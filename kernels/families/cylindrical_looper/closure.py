@@ -62,7 +62,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for links of no length and for what is not finite."""
+    """Return constants of one design; ``valid`` is false for links of no length and for what is not finite."""
     d = designs[i]
     _, exponent = math.frexp(d[0].real)
     unit, per = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)

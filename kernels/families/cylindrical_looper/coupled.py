@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.complex_step import magnitude
-from kernels.driven_ball import EPS, Path, Swung, rotated
+from kernels.driven_ball import EPS, Path, Swung
 from kernels.families.cylindrical_looper.closure import Numbers, Reduced, Status, reduce_design
+from kernels.families.cylindrical_looper.motion import Slide, carried, put_slide
 from kernels.families.cylindrical_looper.shaft_roots import MOST, Loops, chosen, place
 from kernels.looper_outputs import put_angle, put_loop, put_point
 from kernels.vectors import Vector, dot
@@ -60,32 +61,15 @@ def _fixed(designs: Numbers, i: int, r: Reduced) -> Fixed:
     )  # fmt: skip
 
 
-class Pose(NamedTuple):
-    """Both loops at one crank angle: shaft angle and place with their derivatives, and what pressure angles are of."""
-
-    status: int
-    cos: Any
-    sin: Any
-    psi: Vector  # its derivatives
-    s: Any
-    slide: Vector  # its derivatives
-    delta1: Any
-    delta2: Any
-    along1: Any
-    along2: Any
-    across1: Any
-    across2: Any
-
-
 @inline
 def _solve2(j11: Any, j12: Any, j21: Any, j22: Any, per: Any, p: Any, q: Any) -> tuple[Any, Any]:
-    """Solution of the two linear equations, ``per`` one over the determinant."""
+    """Return the solution of the two linear equations, ``per`` one over the determinant."""
     return (p * j22 - q * j12) * per, (q * j11 - p * j21) * per
 
 
 @inline
 def _square(t: Vector, d: Vector) -> Any:
-    """Square of the part of d across t."""
+    """Return the square of the part of d across t."""
     along = dot(t, d)
     size = dot(t, t)
     rest = dot(d, d) - along * along / size if size.real > 0.0 else dot(d, d)
@@ -94,14 +78,14 @@ def _square(t: Vector, d: Vector) -> Any:
 
 @inline
 def _along(t: Vector, d: Vector) -> Any:
-    """Part of d along t; 0 where t has no direction."""
+    """Return the part of d along t; 0 where t has no direction."""
     size = dot(t, t)
     return dot(t, d) / np.sqrt(size) if size.real > 0.0 else 0.0 * size
 
 
 @inline
 def _together(k: Loops, cos: Any, sin: Any, s: Any) -> tuple[Any, Any, Any]:
-    """One step of Newton's method for angle and place at once.
+    """Return one step of Newton's method for angle and place at once.
 
     The place that belongs to a rounded angle is off by more than a rounding where the second coupler stands across the
     shaft; the place that solves both equations is not.
@@ -121,8 +105,8 @@ def _together(k: Loops, cos: Any, sin: Any, s: Any) -> tuple[Any, Any, Any]:
 
 
 @inline
-def _derived(k: Loops, first: Path, second: Path, cos: Any, sin: Any, s: Any, code: int) -> Pose:
-    """Derivatives of angle and place from d . d = b^2 of both couplers, to the third; (8), (9)."""
+def _derived(k: Loops, first: Path, second: Path, cos: Any, sin: Any, s: Any, code: int) -> tuple[Swung, Slide]:
+    """Return derivatives of angle and place from d . d = b^2 of both couplers, to the third; (8), (9)."""
     r1: Vector = (k.c1 * cos, k.c1 * sin, 0.0 * cos)
     r2: Vector = (
         k.d * (cos * k.cos_beta - sin * k.sin_beta), k.d * (sin * k.cos_beta + cos * k.sin_beta), 0.0 * cos,
@@ -151,10 +135,8 @@ def _derived(k: Loops, first: Path, second: Path, cos: Any, sin: Any, s: Any, co
     if k.d == 0.0:  # the second coupler does not see the shaft turn
         way2 = (0.0 * j11, 0.0 * j11, 1.0 + 0.0 * j11)
     along1, along2 = _along(way1, d1), _along(way2, d2)
-    return Pose(
-        code, cos, sin, (p1, p2, p3), s, (s1, s2, s3), along1 * along1, along2 * along2,
-        magnitude(along1), magnitude(along2), _square(way1, d1), _square(way2, d2),
-    )  # fmt: skip
+    one = Swung(code, cos, sin, magnitude(along1), _square(way1, d1), along1 * along1, p1, p2, p3)
+    return one, Slide(code, s, s1, s2, s3, along2 * along2, magnitude(along2), _square(way2, d2))
 
 
 @inline
@@ -170,7 +152,7 @@ def _curve(r: Vector, t: Vector, p1: Any, p2: Any, s2: Any, pin: Vector) -> Vect
 
 @inline
 def _pins(r: Reduced, o: Fixed, u: float, v: float) -> tuple[Path, Path]:
-    """Pins of both cranks from the rocker's foot at s = 0, with three derivatives; (2), (6)."""
+    """Return pins of both cranks from the rocker's foot at s = 0, with three derivatives; (2), (6)."""
     one, two = r.swings, r.moves
     hu, hv, tu, tv = one.a * (one.ca * u), one.a * (one.ca * v), one.a * (one.sa * u), one.a * (one.sa * v)
     pin1 = (one.a * u - one.e, one.y0 + hv, one.lift - one.g - tv)
@@ -188,13 +170,13 @@ def _pins(r: Reduced, o: Fixed, u: float, v: float) -> tuple[Path, Path]:
 
 @inline
 def _about(o: Fixed, x: Any, z: Any, y: Any) -> Vector:
-    """From the frame of crank 2, whose y runs along the shaft, to that of the looper."""
+    """Turn a vector from the frame of crank 2, whose y runs along the shaft, into that of the looper."""
     return x * o.cos_gamma + z * o.sin_gamma, x * o.sin_gamma - z * o.cos_gamma, y
 
 
 @inline
-def _solved(r: Reduced, o: Fixed, first: Path, second: Path, at: NDArray[np.float64]) -> Pose:
-    """Both loops at one crank angle; ``at`` is room for the scan."""
+def _solved(r: Reduced, o: Fixed, first: Path, second: Path, at: NDArray[np.float64]) -> tuple[Swung, Slide]:
+    """Return both loops at one crank angle; ``at`` is room for the scan."""
     p1, p2 = first[0], second[0]
     b1, c1, b2, branch = r.swings.b, r.swings.c, r.moves.b, r.moves.branch
     k = Loops(p1[0], p1[1], p1[2], p2[0], p2[1], p2[2], b1, c1, b2, o.d, o.cos_beta, o.sin_beta, branch, r.slides)
@@ -228,7 +210,9 @@ def _solved(r: Reduced, o: Fixed, first: Path, second: Path, at: NDArray[np.floa
         return _derived(k, first, second, cos, sin, s0, code)
     none = math.nan * k.x1
     lost = short + 0.0 * k.x1
-    return Pose(code, none, none, (none, none, none), none, (none, none, none), lost, lost, none, none, none, none)
+    return Swung(code, none, none, none, none, lost, none, none, none), Slide(
+        code, none, none, none, none, lost, none, none
+    )
 
 
 @kernel
@@ -248,7 +232,8 @@ def coupled_poses(
     magnitudes: Numbers | None,
     joints: Numbers | None,
 ) -> None:
-    """As :func:`kernels.families.cylindrical_looper.motion.poses`, for designs whose second ball is off the axis.
+    """Compute what :func:`kernels.families.cylindrical_looper.motion.poses` does,
+    for designs whose second ball is off the axis.
 
     Parameters
     ----------
@@ -267,35 +252,20 @@ def coupled_poses(
         undefined = 0.0 if o.valid else math.nan
         for j in range(cos_phi.shape[1]):
             first, second = _pins(r, o, cos_phi[row, j], sin_phi[row, j])
-            pose = _solved(r, o, first, second, at)
-            status[i, j] = pose.status
+            one, two = _solved(r, o, first, second, at)
+            status[i, j] = one.status
             scale = r.unit + undefined
-            none = 0.0 * r.swings.e
-            one = Swung(
-                pose.status, pose.cos, pose.sin, pose.along1, pose.across1, pose.delta1,
-                pose.psi[0], pose.psi[1], pose.psi[2],
-            )  # fmt: skip
             put_angle(shaft, i, j, one, undefined)
             if shaft_loop is not None:
-                put_loop(shaft_loop, i, j, pose.delta1, pose.along1, pose.across1, r.unit, undefined)
-            if slide is not None:
-                slide[0, i, j] = pose.s * scale
-                slide[1, i, j] = pose.slide[0] * scale
-                slide[2, i, j] = pose.slide[1] * scale
-                slide[3, i, j] = pose.slide[2] * scale
+                put_loop(shaft_loop, i, j, one.delta, one.root, one.across, r.unit, undefined)
+            put_slide(slide, i, j, two, scale)
             if slide_loop is not None:
-                put_loop(slide_loop, i, j, pose.delta2, pose.along2, pose.across2, r.unit, undefined)
-            tip = (
-                (r.point[0], r.point[1], r.point[2] + pose.s),
-                (none, none, pose.slide[0]),
-                (none, none, pose.slide[1]),
-                (none, none, pose.slide[2]),
-            )
-            path = rotated(pose.cos, pose.sin, pose.psi[0], pose.psi[1], pose.psi[2], tip)
-            foot = (r.swings.e, none, r.swings.g)
+                put_loop(slide_loop, i, j, two.delta, two.root, two.across, r.unit, undefined)
+            foot = (r.swings.e, 0.0 * r.swings.e, r.swings.g)
+            path = carried(r, one, two)
             put_point(point, velocity, acceleration, jerk, magnitudes, i, j, foot, path, scale)
             if joints is not None:
-                ball = (r.swings.c * pose.cos, r.swings.c * pose.sin, r.slides * pose.s)
+                ball = (r.swings.c * one.cos, r.swings.c * one.sin, r.slides * two.s)
                 for n in range(3):
                     joints[n, i, j] = (foot[n] + first[0][n]) * scale
                     joints[3 + n, i, j] = (foot[n] + ball[n]) * scale

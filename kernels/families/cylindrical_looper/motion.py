@@ -34,7 +34,7 @@ class Slide(NamedTuple):
 
 @inline
 def _slide(r: Slider, u: float, v: float) -> Slide:
-    """The slider-crank that moves the shaft along, (1)."""
+    """Return the slider-crank that moves the shaft along, (1)."""
     y = r.k0 + r.ka * v
     at = place(r, u, v)
     code = pose_status(True, at.q.real, tolerance(r, at), None)
@@ -49,7 +49,7 @@ def _slide(r: Slider, u: float, v: float) -> Slide:
 
 @inline
 def _first_crank(r: Reduced, slide: Slide, u: float, v: float) -> Path:
-    """Ball of crank 1 from the foot of the shaft's rocker, which slides with the shaft or does not, (2)."""
+    """Return the ball of crank 1 from the foot of the shaft's rocker, which slides with the shaft or does not, (2)."""
     m, m1, m2, m3 = pin_path(r.swings, u, v)
     if r.slides == 1.0:
         m, m1 = (m[0], m[1], m[2] - slide.s), (m1[0], m1[1], m1[2] - slide.first)
@@ -74,7 +74,8 @@ def poses(
     magnitudes: Numbers | None,
     joints: Numbers | None,
 ) -> None:
-    """Angle and place of the looper's shaft and the working point, with derivatives, of every design and crank angle.
+    """Compute the angle and place of the looper's shaft and the working point, with derivatives,
+    of every design and crank angle.
 
     Equations (1)-(5) of docs/cylindrical_looper.md.
 
@@ -119,13 +120,13 @@ def poses(
             undefined = 0.0 if r.valid else math.nan
             scale = r.unit + undefined
             put_angle(shaft, i, j, one, undefined)
-            _put_slide(slide, i, j, two, scale)
+            put_slide(slide, i, j, two, scale)
             if shaft_loop is not None:
                 put_loop(shaft_loop, i, j, one.delta, magnitude(one.root), one.across, r.unit, undefined)
             if slide_loop is not None:
                 put_loop(slide_loop, i, j, two.delta, two.root, two.across, r.unit, undefined)
             foot = (drive.e, 0.0 * drive.e, drive.g)
-            path = _carried(r, one, two)
+            path = carried(r, one, two)
             put_point(point, velocity, acceleration, jerk, magnitudes, i, j, foot, path, scale)
             if joints is not None:
                 _put_joints(joints, i, j, r, first, one, two, v, scale)
@@ -133,7 +134,7 @@ def poses(
 
 @inline
 def _code(valid: bool, slide_counts: bool, of_slide: int, shaft_counts: bool, of_shaft: int) -> int:
-    """Status of the first loop that counts and is not OK."""
+    """Return the status of the first loop that counts and is not OK."""
     if not valid:
         return st.INVALID_INPUT
     # the slider-crank first: the crank-rocker's driving ball may hang on it
@@ -143,7 +144,7 @@ def _code(valid: bool, slide_counts: bool, of_slide: int, shaft_counts: bool, of
 
 
 @inline
-def _put_slide(slide: Numbers | None, i: int, j: int, two: Slide, scale: Any) -> None:
+def put_slide(slide: Numbers | None, i: int, j: int, two: Slide, scale: Any) -> None:
     """Write place of the shaft along its axis and its three derivatives [length]."""
     if slide is not None:
         slide[0, i, j] = two.s * scale
@@ -153,8 +154,8 @@ def _put_slide(slide: Numbers | None, i: int, j: int, two: Slide, scale: Any) ->
 
 
 @inline
-def _carried(r: Reduced, one: Swung, two: Slide) -> Path:
-    """The working point from the shaft's foot: fixed to the shaft, which turns and slides, (4)."""
+def carried(r: Reduced, one: Swung, two: Slide) -> Path:
+    """Return the working point from the shaft's foot: fixed to the shaft, which turns and slides, (4)."""
     # zeros of the design's own kind: complex where the design is, or the tuples would mix two types
     none = 0.0 * r.swings.e
     along = (

@@ -19,7 +19,7 @@ STEPS = 64  # per turn of the pin while the end of the band is looked for
 
 @inline
 def _output(k: float, a: float, arm: float, mesh: float, phi: float) -> tuple[float, float]:
-    """Output angle, and its velocity analogue times the squared distance of the pin from the output axis."""
+    """Return the output angle, and its velocity analogue times the squared distance of the pin from the output axis."""
     x = arm * math.cos(phi) - mesh * k * math.cos(arm * phi) + a
     y = arm * math.sin(phi) - k * math.sin(arm * phi)
     x1 = -arm * math.sin(phi) + mesh * k * arm * math.sin(arm * phi)

@@ -34,7 +34,7 @@ class Design(NamedTuple):
 
 @inline
 def power(u: Any, v: Any, times: int) -> tuple[Any, Any]:
-    """Cosine and sine of ``times`` the angle, by products: each adds a rounding or two."""
+    """Return the cosine and sine of ``times`` the angle, by products: each adds a rounding or two."""
     c, s = 1.0 + 0.0 * u, 0.0 * v
     while times > 0:
         if times % 2 == 1:
@@ -59,7 +59,7 @@ def poses(
     x_b: Numbers | None,
     y_b: Numbers | None,
 ) -> None:
-    """Output angle, its derivatives and the pin of every design at its carrier angles; (1)-(4).
+    """Compute the output angle, its derivatives and the pin of every design at its carrier angles; (1)-(4).
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ Status = NDArray[np.uint8]
 def weighted_difference(
     designs: Array, cos_phi: Array, sin_phi: Array, wanted: Array, difference: Array, weight: Array, status: Status
 ) -> None:
-    """Weighted difference (27) and its weight; docs/takeup.md (7), (8).
+    """Compute the weighted difference (27) and its weight; docs/takeup.md (7), (8).
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def weighted_difference(
 
 @kernel
 def length_sensitivities(designs: Array, cos_phi: Array, sin_phi: Array, jacobian: Array, status: Status) -> None:
-    """Partial derivatives of L with respect to a, e, f, alpha, Z1, Z2, phi_h; docs/takeup.md (9).
+    """Compute partial derivatives of L with respect to a, e, f, alpha, Z1, Z2, phi_h; docs/takeup.md (9).
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels._jit import inline
 from kernels.complex_step import arctan2, hypotenuse
-from kernels.verdict import pose_status
+from kernels.verdict import follower_status, pose_status
 
 Array: TypeAlias = NDArray[np.float64]
 Status: TypeAlias = NDArray[np.uint8]
@@ -104,7 +104,7 @@ class Driven(NamedTuple):
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
     _, exponent = math.frexp(designs[i, 13].real)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
@@ -134,7 +134,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
 
 @inline
 def rocker_angle(r: Rocker, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
-    """Cosine and sine of the rocker's angle, its first two derivatives by phi, and the status; (1)-(3)."""
+    """Return the cosine and sine of the rocker's angle, its first two derivatives by phi, and the status; (1)-(3)."""
     x, y, z = r.e - r.a * u, r.y0 + r.a * (r.ca * v), r.z0 + r.a * (r.sa * v)
     w = 0.5 * (r.links + (x * x + y * y + z * z)) / r.c
     rr = x * x + y * y
@@ -160,33 +160,27 @@ def rocker_angle(r: Rocker, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
 
 @inline
 def rocker_pin(r: Reduced, cos: Any, sin: Any, one: Any, two: Any) -> Driven:
-    """Pin H of the rocker's arm; (4)."""
+    """Return the pin H of the rocker's arm; (4)."""
     x, y = r.arm * (cos * r.cos_arm - sin * r.sin_arm), r.arm * (sin * r.cos_arm + cos * r.sin_arm)
     return Driven(r.rocker.e + x, y, -(one * y), one * x, -(two * y) - one * one * x, two * x - one * one * y)
 
 
 @inline
 def eccentric(x0: Any, y0: Any, radius: Any, cos: Any, sin: Any, u: Any, v: Any) -> Driven:
-    """Centre of an eccentric that stands ahead of the crank by the angle with that cosine and sine; (5)."""
+    """Return the centre of an eccentric that stands ahead of the crank by the angle with that cosine and sine; (5)."""
     x, y = radius * (u * cos - v * sin), radius * (v * cos + u * sin)
     return Driven(x0 + x, y0 + y, -y, x, -x, -y)
 
 
 @inline
 def bar_angle(r: Reduced, h: Driven, e: Driven) -> tuple[Any, Any, Any, Any, int]:
-    """Cosine and sine of the rack's angle chi, its first two derivatives by phi, and the status; (6)-(8)."""
+    """Return the cosine and sine of the rack's angle chi, its first two derivatives by phi, and the status; (6)-(8)."""
     wx, wy = h.x - e.x, h.y - e.y
     w, f = hypotenuse(wx, wy), hypotenuse(r.fx, r.fy)
     # Heron's product: the triangle of H, E, F without squares of its sides
     product = ((w + f) - r.q) * ((w + f) + r.q) * (r.q - (w - f)) * (r.q + (w - f))
     size = w.real + f.real + r.q.real
-    code = st.OK
-    if not (w.real > 0.0 and f.real > 0.0):
-        code = st.SINGULAR
-    elif product.real < -16.0 * EPS * size**4:
-        code = st.NOT_ASSEMBLED
-    elif product.real <= 16.0 * EPS * size**4:
-        code = st.DEAD_POINT
+    code = follower_status(True, not (w.real > 0.0 and f.real > 0.0), product.real, 16.0 * EPS * size**4)
     root = r.bar_branch * (np.sqrt(product) if code == st.OK else 0.0 * product)
     a1, a2 = 2.0 * (wx * r.fx + wy * r.fy), 2.0 * (wy * r.fx - wx * r.fy)
     a3 = r.q * r.q - f * f - w * w
@@ -204,7 +198,7 @@ def bar_angle(r: Reduced, h: Driven, e: Driven) -> tuple[Any, Any, Any, Any, int
 
 @inline
 def point_of_rack(h: Driven, cos: Any, sin: Any, one: Any, two: Any, x: Any, y: Any) -> Driven:
-    """A point fixed to the rack at (x, y) from H, with its derivatives; (9)."""
+    """Return a point fixed to the rack at (x, y) from H, with its derivatives; (9)."""
     gx, gy = cos * x - sin * y, sin * x + cos * y
     return Driven(
         h.x + gx, h.y + gy, h.x1 - one * gy, h.y1 + one * gx,
@@ -214,5 +208,5 @@ def point_of_rack(h: Driven, cos: Any, sin: Any, one: Any, two: Any, x: Any, y: 
 
 @inline
 def angle_of(cos: Any, sin: Any) -> Any:
-    """Angle of a direction, in (-pi, pi]."""
+    """Return the angle of a direction, in (-pi, pi]."""
     return arctan2(sin, cos)

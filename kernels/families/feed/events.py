@@ -27,7 +27,7 @@ OUTPUTS = (
 
 @inline
 def _height(r: Reduced, phi: float, order: int) -> float:
-    """Height of the tooth above the plate (order 0), or its first derivative by phi (order 1)."""
+    """Return the height of the tooth above the plate (order 0), or its first derivative by phi (order 1)."""
     tooth, _ = tooth_at(r, math.cos(phi), math.sin(phi))
     value: float = tooth.y - r.plate if order == 0 else tooth.y1
     return value
@@ -35,7 +35,8 @@ def _height(r: Reduced, phi: float, order: int) -> float:
 
 @inline
 def _passage(r: Reduced, low: float, high: float, f_low: float, f_high: float, order: int) -> float:
-    """Where the height (or its derivative) passes zero between two crank angles of opposite signs: false position.
+    """Find by false position where the height (or its derivative) passes zero between two crank angles
+    of opposite signs.
 
     The end that stays is given half its value (Illinois), so that both ends close in.
     """
@@ -62,7 +63,7 @@ def _passage(r: Reduced, low: float, high: float, f_low: float, f_high: float, o
 
 @inline
 def _between(r: Reduced, entry: float, leave: float) -> tuple[float, float]:
-    """Greatest height between two crank angles, and the area under the path there."""
+    """Return the greatest height between two crank angles, and the area under the path there."""
     rise, area = 0.0, 0.0
     width = (leave - entry) / _PANELS
     for k in range(_PANELS):
@@ -88,7 +89,7 @@ def _between(r: Reduced, entry: float, leave: float) -> tuple[float, float]:
 
 @kernel
 def feeding(designs: Array, status: Status, outputs: Array) -> None:
-    """Entry and leaving of the tooth, its speed there, stitch length, rise and flatness of every design.
+    """Compute the entry and leaving of the tooth, its speed there, stitch length, rise and flatness of every design.
 
     Equations (11)-(14) of docs/feed.md.  Of several times above the plate the longest counts.
 

@@ -32,7 +32,7 @@ OUTPUTS = (
 def rack_at(
     r: Reduced, u: Any, v: Any
 ) -> tuple[tuple[Any, Any, Any, Any], tuple[Any, Any, Any, Any], Driven, Driven, int]:
-    """Rocker and rack as (cos, sin, first, second derivative), pins H and E, and the status of the pose."""
+    """Return the rocker and rack as (cos, sin, first, second derivative), pins H and E, and the status of the pose."""
     cos, sin, one, two, code = rocker_angle(r.rocker, u, v)
     h = rocker_pin(r, cos, sin, one, two)
     e = eccentric(r.x_ecc, r.y_ecc, r.r_ecc, r.cos_ecc, r.sin_ecc, u, v)
@@ -47,14 +47,14 @@ def rack_at(
 
 @inline
 def tooth_at(r: Reduced, u: Any, v: Any) -> tuple[Driven, int]:
-    """Path of the tooth and the status of the pose."""
+    """Return the path of the tooth and the status of the pose."""
     _, bar, h, _, code = rack_at(r, u, v)
     return point_of_rack(h, bar[0], bar[1], bar[2], bar[3], r.tx, r.ty), code
 
 
 @kernel
 def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, outputs: Array) -> None:
-    """Angles of rocker and rack, points of the rack and path of the tooth; (1)-(9) of docs/feed.md.
+    """Compute angles of rocker and rack, points of the rack and path of the tooth; (1)-(9) of docs/feed.md.
 
     Parameters
     ----------
@@ -90,7 +90,8 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, output
 
 @kernel
 def differences(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status: Status, dq: Array) -> None:
-    """Weighted difference |F - E|^2 - q^2 of the lift coupler for a rack at prescribed angles; (10) of docs/feed.md.
+    """Compute the weighted difference |F - E|^2 - q^2 of the lift coupler for a rack at prescribed angles;
+    (10) of docs/feed.md.
 
     Parameters
     ----------
@@ -119,7 +120,7 @@ def differences(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, stat
 
 @kernel
 def lift_rows(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status: Status, rows: Array) -> None:
-    """The weighted difference as a linear form of the lift coupler's dimensions; (10) of docs/feed.md.
+    """Compute the weighted difference as a linear form of the lift coupler's dimensions; (10) of docs/feed.md.
 
     |F - E|^2 - q^2 = rows[0] fx + rows[1] fy + rows[2] - p0 with p0 = q^2 - fx^2 - fy^2.
 

@@ -65,7 +65,7 @@ class Slope(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> tuple[Reduced, Joint]:
-    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
     unit = unit_scale(designs[i, 2].real)
     a, b, c = designs[i, 0] * unit, designs[i, 1] * unit, designs[i, 2] * unit
     e, f, g = designs[i, 3] * unit, designs[i, 4] * unit, designs[i, 5] * unit
@@ -90,14 +90,16 @@ def reduce_design(designs: Numbers, i: int) -> tuple[Reduced, Joint]:
 
 @inline
 def axial_reach(joint: Joint, s: Any) -> tuple[Any, Any]:
-    """Axial distance z and rho^2 = b^2 - z^2, from the sine of the rocker angle."""
+    """Return the axial distance z and rho^2 = b^2 - z^2, from the sine of the rocker angle."""
     z = joint.sweep * s + joint.axial
     return z, (joint.coupler - z) * (joint.coupler + z)
 
 
 @inline
 def slope(joint: Joint, x: Any, y: Any, w: Any, c: Any, s: Any) -> Slope:
-    """G5, its first two derivatives and rho at the rocker angle of cosine c and sine s; needs rho^2 > 0.  (1), (2)."""
+    """Return G5, its first two derivatives and rho at the rocker angle of cosine c and sine s;
+    needs rho^2 > 0. (1), (2).
+    """
     z, square = axial_reach(joint, s)
     rho = np.sqrt(square)
     per_rho = 1.0 / divisor(rho)  # 0 at the very end of an arc
@@ -112,6 +114,6 @@ def slope(joint: Joint, x: Any, y: Any, w: Any, c: Any, s: Any) -> Slope:
 
 @inline
 def residual_size(r: Reduced, joint: Joint, x: Any, y: Any) -> float:
-    """Rounding error of G5: what its terms are made of, times 8 x 2^-53."""
+    """Return the rounding error of G5: what its terms are made of, times 8 x 2^-53."""
     terms = abs(x.real) + abs(y.real) + abs(r.e.real) + 2.0 + abs(r.y0.real) + r.w_size + joint.size
     return float(8.0 * EPS * terms)

@@ -41,7 +41,9 @@ def _bends(joint: Joint, c: Any, s: Any) -> Bends:
 
 @inline
 def transfer(r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any, t: Any) -> tuple[Any, Any, Any]:
-    """First three derivatives of the mirrored angle, from minus its cosine, minus its sine and dG5/dpsi; (5)."""
+    """Return the first three derivatives of the mirrored angle, from minus its cosine,
+    minus its sine and dG5/dpsi; (5).
+    """
     bends = _bends(joint, -c, -s)
     hu, hv = r.ca * u, r.ca * v
     w1 = r.k2 * u - r.k1 * v
@@ -61,7 +63,7 @@ def transfer(r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any, t: Any) -
 
 @inline
 def _extreme(joint: Joint, x: Any, y: Any, w: Any, c: float, s: float) -> Any:
-    """G5 at the place of an extreme; errors and changes of the place count only at the end of an arc."""
+    """Return G5 at the place of an extreme; errors and changes of the place count only at the end of an arc."""
     if reaches(real_joint(joint), s):
         return slope(joint, x, y, w, c, s).value
     z, _ = axial_reach(real_joint(joint), s)
@@ -72,7 +74,7 @@ def _extreme(joint: Joint, x: Any, y: Any, w: Any, c: float, s: float) -> Any:
 
 @inline
 def _shortfall(r: Reduced, joint: Joint, u: Any, v: Any) -> Any:
-    """Negative number that says how far the links are from reaching; Delta of a crank-rocker; (7)."""
+    """Return the negative number that says how far the links are from reaching; Delta of a crank-rocker; (7)."""
     x, y, w = pose_terms(r, u, v)
     real = real_joint(joint)
     if joint.plain:
@@ -93,7 +95,7 @@ def _shortfall(r: Reduced, joint: Joint, u: Any, v: Any) -> Any:
 
 @inline
 def across(r: Reduced, joint: Joint, v: Any, w: Any, c: Any, s: Any) -> tuple[Any, Any]:
-    """Force through the rocker ball along the rocker and along its axis; dG5/dpsi is its third part; (6)."""
+    """Return the force through the rocker ball along the rocker and along its axis; dG5/dpsi is its third part; (6)."""
     _, square = axial_reach(joint, -s)
     rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
     close = w - joint.shift
@@ -108,7 +110,7 @@ def across(r: Reduced, joint: Joint, v: Any, w: Any, c: Any, s: Any) -> tuple[An
 
 @inline
 def discriminant_of(r: Reduced, joint: Joint, code: int, u: Any, v: Any, w: Any, c: Any, s: Any, t: Any) -> Any:
-    """b^2 cos^2(pressure angle) in units of the crank; negative where the links do not reach; (7)."""
+    """Return b^2 cos^2(pressure angle) in units of the crank; negative where the links do not reach; (7)."""
     if joint.h == 0.0 and joint.s2 == 0.0:
         x, y, _ = pose_terms(r, u, v)
         return x * x + y * y - w * w
@@ -134,7 +136,8 @@ def poses(
     pressure_angle: Numbers | None,
     places: Numbers | None,
 ) -> None:
-    """Position, transfer functions, discriminant, pressure angle and joints of every design at its crank angles.
+    """Compute the position, transfer functions, discriminant,
+    pressure angle and joints of every design at its crank angles.
 
     Equations (1)-(8) of docs/five_link.md; joints in the fixed frame of its section 1.
 

@@ -20,7 +20,7 @@ ONE, UNKNOWN, NONE = 1, 0, -1
 
 @inline
 def _reach_between(joint: Joint, s0: float, s1: float) -> tuple[float, float, float]:
-    """Smallest and largest rho and largest |z| for sines between two values."""
+    """Return the smallest and largest rho and the largest |z| for sines between two values."""
     z0, z1 = joint.sweep * s0 + joint.axial, joint.sweep * s1 + joint.axial
     far = max(abs(z0), abs(z1)) + GUARD * joint.coupler
     near = 0.0 if z0 * z1 <= 0.0 else max(min(abs(z0), abs(z1)) - GUARD * joint.coupler, 0.0)
@@ -31,7 +31,9 @@ def _reach_between(joint: Joint, s0: float, s1: float) -> tuple[float, float, fl
 
 @kernel
 def solutions(joint: Joint, x: float, y: float, w: float) -> int:
-    """ONE: one solution for each sign of dG5/dpsi at most; NONE: no solution; UNKNOWN: neither was proved."""
+    """Return ONE for one solution at most for each sign of dG5/dpsi, NONE for no solution,
+    UNKNOWN where neither was proved.
+    """
     r = math.sqrt(x * x + y * y)
     if not r > 0.0:
         return UNKNOWN

@@ -145,7 +145,9 @@ def _extremes_of_arc(joint: Joint, x: float, y: float, w: float, centre: float, 
 
 @inline
 def arcs(joint: Joint) -> tuple[int, float, float, float, float]:
-    """Number of arcs on which rho^2 >= 0, and centre and half width of both; half width pi is the whole circle."""
+    """Return the number of arcs on which rho^2 >= 0, and centre and half width of both;
+    half width pi is the whole circle.
+    """
     if joint.sweep == 0.0:
         reaches = abs(joint.axial) < joint.coupler
         return (1 if reaches else 0), 0.0, math.pi, 0.0, 0.0
@@ -167,7 +169,8 @@ def arcs(joint: Joint) -> tuple[int, float, float, float, float]:
 
 @kernel
 def all_roots(joint: Joint, x: float, y: float, w: float, noise: float, at: Array) -> int:
-    """Rocker angles (mirrored, in rad) of all solutions, into ``at`` of at least MOST numbers; their number.
+    """Find the rocker angles (mirrored, in rad) of all solutions, write them into ``at`` (at least MOST numbers);
+    return their number.
 
     A place where |G5| comes as near to zero as ``noise`` without crossing it counts as one.
     """
@@ -182,7 +185,9 @@ def all_roots(joint: Joint, x: float, y: float, w: float, noise: float, at: Arra
 
 @kernel
 def extremes(joint: Joint, x: float, y: float, w: float) -> tuple[Place, Place]:
-    """Where G5 is smallest and largest, on the arc where their product is nearest to zero; infinite without an arc."""
+    """Find where G5 is smallest and largest, on the arc where their product is nearest to zero;
+    infinite without an arc.
+    """
     number, centre, half, centre2, half2 = arcs(joint)
     low, high = Place(0.0, math.inf), Place(0.0, -math.inf)
     if number > 0:

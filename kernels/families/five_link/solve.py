@@ -15,6 +15,7 @@ from kernels.families.five_link.closure import Joint, axial_reach, residual_size
 from kernels.families.five_link.proof import NONE, ONE, solutions
 from kernels.families.five_link.roots import MOST, all_roots
 from kernels.trigpoly import rotate
+from kernels.verdict import pose_status
 
 ROUNDS = 10  # of Newton's method; 3 to 5 are usual, and what needs more is left to the scan
 NEAR = 1e-5  # a step below this leaves 1e-10, and the two rounds that follow leave rounding only
@@ -22,13 +23,13 @@ NEAR = 1e-5  # a step below this leaves 1e-10, and the two rounds that follow le
 
 @inline
 def pose_terms(r: Reduced, u: Any, v: Any) -> tuple[Any, Any, Any]:
-    """X, Y, W of the crank-rocker at (cos phi, sin phi)."""
+    """Return X, Y, W of the crank-rocker at (cos phi, sin phi)."""
     return r.e - u, r.y0 + r.ca * v, r.k0 - (r.k2 * u - r.k1 * v)
 
 
 @kernel
 def _newton(joint: Joint, x: float, y: float, w: float) -> tuple[bool, float, float]:
-    """Whether Newton's method settled on a root with dG5/dpsi > 0, its cosine and sine; (3)."""
+    """Return whether Newton's method settled on a root with dG5/dpsi > 0, its cosine and sine; (3)."""
     square = x * x + y * y
     c, s = 0.0, 0.0
     # Crank-rockers with the coupler that the last angle gives, from a quarter turn off the crank pin's direction on.
@@ -53,14 +54,15 @@ def _newton(joint: Joint, x: float, y: float, w: float) -> tuple[bool, float, fl
 
 @inline
 def reaches(joint: Joint, s: float) -> bool:
-    """Whether rho is positive beyond rounding at the rocker angle of sine s."""
+    """Return whether rho is positive beyond rounding at the rocker angle of sine s."""
     _, square = axial_reach(joint, s)
     return bool(square > 32.0 * EPS * joint.coupler * joint.coupler)
 
 
 @kernel
 def _scanned(joint: Joint, x: float, y: float, w: float, noise: float, at: Array) -> tuple[int, float, float]:
-    """Status, cosine and sine of the root that branch and mode name; section "Assembly modes" of the page.
+    """Return the status, cosine and sine of the root that branch and mode name;
+    section "Assembly modes" of the page.
 
     Of the roots with dG5/dpsi > 0 it is the one with the mode-th largest (C - B) . k'.  ``at`` has 2 MOST numbers.
     """
@@ -91,16 +93,11 @@ def _scanned(joint: Joint, x: float, y: float, w: float, noise: float, at: Array
 
 @inline
 def solve_plain(r: Reduced, joint: Joint, x: Any, y: Any, w: Any) -> tuple[int, Any, Any, Any]:
-    """Status, minus cosine, minus sine and dG5/dpsi of a crank-rocker's closure: (2*) of docs/rssr.md."""
+    """Return the status, minus cosine, minus sine and dG5/dpsi of a crank-rocker's closure: (2*) of docs/rssr.md."""
     square = x * x + y * y
     delta = square - w * w
     tolerance = discriminant_tolerance(r, x, y, w) + 16.0 * EPS * abs(w.real) * joint.size
-    code = st.OK
-    if delta.real < -tolerance:
-        code = st.NOT_ASSEMBLED
-    elif delta.real <= tolerance:
-        # B on the rocker axis has every angle as a solution; a dead point has one.
-        code = st.DEAD_POINT if square.real > tolerance else st.SINGULAR
+    code = pose_status(True, delta.real, tolerance, square.real)
     t = np.sqrt(delta) if code == st.OK else 0.0 * delta
     per = divisor(square)
     return code, (x * w + y * t) / per, (x * t - y * w) / per, t
@@ -108,7 +105,7 @@ def solve_plain(r: Reduced, joint: Joint, x: Any, y: Any, w: Any) -> tuple[int, 
 
 @inline
 def solve_general(r: Reduced, joint: Joint, x: Any, y: Any, w: Any, at: Array) -> tuple[int, Any, Any, Any]:
-    """As :func:`solve_plain`, for every five-link."""
+    """Solve as :func:`solve_plain` does, for every five-link."""
     xr, yr, wr = x.real, y.real, w.real
     noise = residual_size(r, joint, x, y)
     real = real_joint(joint)
@@ -138,7 +135,7 @@ def solve_general(r: Reduced, joint: Joint, x: Any, y: Any, w: Any, at: Array) -
 
 @inline
 def real_joint(joint: Joint) -> Joint:
-    """The same constants without their imaginary parts."""
+    """Return the same constants without their imaginary parts."""
     return Joint(
         joint.coupler.real, joint.sweep.real, joint.axial.real, joint.shift.real, joint.share.real, joint.h.real,
         joint.s2.real, joint.plain, joint.size, joint.mode, joint.valid,
@@ -147,7 +144,8 @@ def real_joint(joint: Joint) -> Joint:
 
 @inline
 def solve(r: Reduced, joint: Joint, u: Any, v: Any, at: Array) -> tuple[int, Any, Any, Any, Any]:
-    """Status, minus cosine and minus sine of the mirrored rocker angle, dG5/dpsi and the W of a crank-rocker there.
+    """Return the status, minus cosine and minus sine of the mirrored rocker angle,
+    dG5/dpsi and the W of a crank-rocker there.
 
     ``at`` is room for the scan.
     """

@@ -19,7 +19,8 @@ from kernels.crank_closure import Array, Status
 def with_limits_of(
     designs: Array, psi_ext: Array, psi_fold: Array, h: Array, status: Status, a: Array, b: Array
 ) -> None:
-    """Crank and coupler of the five-links with s2 = 0 that have the limit positions of given crank-rockers.
+    """Compute the crank and coupler of the five-links with s2 = 0
+    that have the limit positions of given crank-rockers.
 
     Parameters
     ----------

@@ -23,7 +23,9 @@ class Contact(NamedTuple):
 
 @inline
 def shortest(cam: Cam) -> Contact:
-    """The global minimum of the length over the edge; minima equally long to rounding: the first along y."""
+    """Return the global minimum of the length over the edge;
+    of minima equally long to rounding it is the first along y.
+    """
     # All extrema lie within reach; the margin keeps one that lies on its very end inside the walk.
     end = reach(cam) + 1e-3
     span = 0.25 * end
@@ -48,7 +50,7 @@ def shortest(cam: Cam) -> Contact:
 
 @inline
 def root_of_slope(cam: Cam, low: float, high: float) -> float:
-    """Where L' rises through zero between low and high: Newton's method kept in the bracket."""
+    """Find where L' rises through zero between low and high, by Newton's method kept in the bracket."""
     y = 0.5 * (low + high)
     for _ in range(HALVINGS):
         _, slope, bend = along_edge(cam, y)

@@ -44,7 +44,7 @@ class Line(NamedTuple):
 
 @inline
 def turned_cam(designs: Array, i: int, u: float, v: float) -> Cam:
-    """Design i, (n, 8) with columns a, X1, Y1, Z1, X2, Y2, Z2, P_h, at u = cos(phi), v = sin(phi)."""
+    """Turn design i, (n, 8) with columns a, X1, Y1, Z1, X2, Y2, Z2, P_h, to u = cos(phi), v = sin(phi)."""
     size = 0.0
     for k in range(1, 8):
         size += abs(designs[i, k].real)
@@ -66,7 +66,7 @@ def turned_cam(designs: Array, i: int, u: float, v: float) -> Cam:
 
 @inline
 def straight(cam: Cam) -> Line:
-    """The line between the guides at the plane of the cam."""
+    """Return the line between the guides at the plane of the cam."""
     share = cam.z1 / (cam.z1 - cam.z2)
     x, y = cam.x1 + share * (cam.x2 - cam.x1), cam.y1 + share * (cam.y2 - cam.y1)
     dx, dy, dz = cam.x2 - cam.x1, cam.y2 - cam.y1, cam.z2 - cam.z1
@@ -75,7 +75,7 @@ def straight(cam: Cam) -> Line:
 
 @inline
 def part(a: float, x: float, y: float, z: float, at: float) -> tuple[float, float, float]:
-    """Distance of the edge's point ``at`` from a guide and its first two derivatives along y; (19), (20)."""
+    """Return the distance of the edge's point ``at`` from a guide and its first two derivatives along y; (19), (20)."""
     dx, dy, tx = a * at * at - x, at - y, 2.0 * a * at
     square = dx * dx + dy * dy + z * z
     distance = np.sqrt(square)
@@ -86,7 +86,7 @@ def part(a: float, x: float, y: float, z: float, at: float) -> tuple[float, floa
 
 @inline
 def along_edge(cam: Cam, at: float) -> tuple[float, float, float]:
-    """Length of the thread over the point ``at`` and its first two derivatives along y; (19), (20)."""
+    """Return the length of the thread over the point ``at`` and its first two derivatives along y; (19), (20)."""
     first = part(cam.a, cam.x1, cam.y1, cam.z1, at)
     second = part(cam.a, cam.x2, cam.y2, cam.z2, at)
     return first[0] + second[0], first[1] + second[1], first[2] + second[2]
@@ -94,7 +94,7 @@ def along_edge(cam: Cam, at: float) -> tuple[float, float, float]:
 
 @inline
 def reach(cam: Cam) -> float:
-    """A |y| beyond which the thread only grows longer; no extremum lies outside."""
+    """Return a |y| beyond which the thread only grows longer; no extremum lies outside."""
     return max(_reach(cam.a.real, cam.x1.real, cam.y1.real), _reach(cam.a.real, cam.x2.real, cam.y2.real))
 
 
@@ -106,13 +106,13 @@ def _reach(a: float, x: float, y: float) -> float:
 
 @inline
 def _nearest(low: float, high: float, centre: float) -> float:
-    """Least distance of an interval from a point."""
+    """Return the least distance of an interval from a point."""
     return max(max(low - centre, centre - high), 0.0)
 
 
 @inline
 def least_distances(cam: Cam, low: float, high: float) -> tuple[float, float]:
-    """Lower bounds of the distances of the guides from the edge between two of its points."""
+    """Return lower bounds of the distances of the guides from the edge between two of its points."""
     a, far, near = cam.a.real, max(low * low, high * high), _nearest(low, high, 0.0)
     bottom, top = a * near * near, a * far
     dx, dy = _nearest(bottom, top, cam.x1.real), _nearest(low, high, cam.y1.real)
@@ -123,7 +123,9 @@ def least_distances(cam: Cam, low: float, high: float) -> tuple[float, float]:
 
 @inline
 def steepest_slope(cam: Cam, low: float, high: float) -> float:
-    """Upper bound of |L''| between two points of the edge, from |turning| <= |tangent|^2 and the largest offsets."""
+    """Return an upper bound of |L''| between two points of the edge,
+    from |turning| <= |tangent|^2 and the largest offsets.
+    """
     a, far = cam.a.real, max(low * low, high * high)
     tangent = 1.0 + 4.0 * a * a * far
     first, second = least_distances(cam, low, high)

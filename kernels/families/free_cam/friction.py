@@ -36,7 +36,7 @@ class Pull(NamedTuple):
 
 @inline
 def pull_of(ratio: float, along: float, across: float) -> Pull:
-    """Numbers of one design: tension ratio, friction coefficients along and across the thread."""
+    """Return numbers of one design: tension ratio, friction coefficients along and across the thread."""
     return Pull(ratio, along, across / math.sqrt(1.0 + across * across))
 
 
@@ -48,7 +48,7 @@ def _usable(friction: Array) -> bool:
 
 @inline
 def lean(cam: Cam, pull: Pull, at: float) -> tuple[float, float]:
-    """T12 . tangent and |T12| at a point of the edge, in units of T1; (24)."""
+    """Return T12 . tangent and |T12| at a point of the edge, in units of T1; (24)."""
     # Tensions in units of T1: only their ratio turns the resultant.
     x, tx = cam.a * at * at, 2.0 * cam.a * at
     d1x, d1y, d2x, d2y = cam.x1 - x, cam.y1 - at, cam.x2 - x, cam.y2 - at
@@ -66,14 +66,16 @@ def lean(cam: Cam, pull: Pull, at: float) -> tuple[float, float]:
 
 @inline
 def excess(cam: Cam, pull: Pull, side: float, at: float) -> float:
-    """T12 . tangent - side sin(rho) |T12|: zero at the limit point of that side, falling along the edge far out."""
+    """Return T12 . tangent - side sin(rho) |T12|:
+    zero at the limit point of that side, falling along the edge far out.
+    """
     along, whole = lean(cam, pull, at)
     return along - side * pull.sine * whole
 
 
 @inline
 def steepest_excess(cam: Cam, pull: Pull, low: float, high: float) -> float:
-    """Upper bound of the slope of :func:`excess` between two points of the edge."""
+    """Return an upper bound of the slope of :func:`excess` between two points of the edge."""
     first, second = least_distances(cam, low, high)
     tangent = math.sqrt(1.0 + 4.0 * cam.a * cam.a * max(low * low, high * high))
     # The edge's tangent turns fastest where it is nearest to y = 0, and that may be inside.
@@ -87,7 +89,7 @@ def steepest_excess(cam: Cam, pull: Pull, low: float, high: float) -> float:
 
 @inline
 def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, most: float) -> float:
-    """The first limit point of one side from ``start`` along the edge, within ``most``; nan if there is none."""
+    """Return the first limit point of one side from ``start`` along the edge, within ``most``; nan if there is none."""
     end = reach(cam) + 1e-3
     at, value = start, excess(cam, pull, side, start)
     # A start on a limit point is one: the walk looks for a change of sign and would step over it.
@@ -107,7 +109,7 @@ def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, mo
 
 @inline
 def _bisected(cam: Cam, pull: Pull, side: float, low: float, high: float, at_low: float) -> float:
-    """Zero of :func:`excess` between low and high by the Illinois method, at most HALVINGS steps."""
+    """Return the zero of :func:`excess` between low and high by the Illinois method, at most HALVINGS steps."""
     f_low, f_high = at_low, excess(cam, pull, side, high)
     for _ in range(HALVINGS):
         middle = high - f_high * (high - low) / (f_high - f_low)
@@ -127,7 +129,7 @@ def _bisected(cam: Cam, pull: Pull, side: float, low: float, high: float, at_low
 
 @inline
 def nearest_limit(cam: Cam, pull: Pull, side: float, centre: float) -> float:
-    """The limit point of one side nearest to ``centre``; nan if there is none within FAR."""
+    """Return the limit point of one side nearest to ``centre``; nan if there is none within FAR."""
     most = FAR * (reach(cam) + 1e-3)
     up = next_limit(cam, pull, side, centre, 1.0, most)
     # Downwards no farther than what was found upwards: beyond it nothing is nearer.
@@ -141,7 +143,8 @@ def nearest_limit(cam: Cam, pull: Pull, side: float, centre: float) -> float:
 def limit_points(
     designs: Array, friction: Array, cos_phi: Array, sin_phi: Array, status: Status, plus: Array, minus: Array
 ) -> None:
-    """Points of the edge where the thread begins to slide along it, nearest to the frictionless contact; (25).
+    """Compute points of the edge where the thread begins to slide along it,
+    nearest to the frictionless contact; (25).
 
     Parameters
     ----------
@@ -184,7 +187,8 @@ def slid(cam: Cam, pull: Pull, before: float) -> float:
 
 @inline
 def landed(designs: Array, i: int, u0: float, v0: float, u1: float, v1: float) -> float:
-    """Where the thread first touches the edge between two poses, off and on: by bisection of the angle between them.
+    """Find by bisection where the thread first touches the edge,
+    between an angle at which it does not and one at which it does.
 
     Taken at the pose before instead, the place would change with the steps of the march.
     """
@@ -208,7 +212,8 @@ def march(
     designs: Array, friction: Array, cos_phi: Array, sin_phi: Array, turns: int, status: Status,
     L: Array | None, wrap: Array | None, y_contact: Array | None, contact: Array | None, sticking: Array | None,
 ) -> None:  # fmt: skip
-    """Way of the thread over an edge with friction, in the order of the given angles; docs/takeup.md, section 5.
+    """Compute the way of the thread over an edge with friction, in the order of the given angles;
+    docs/takeup.md, section 5.
 
     The thread starts where it lies without friction and is led through the angles ``turns`` times; what is given is
     the last time.

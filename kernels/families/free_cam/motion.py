@@ -33,7 +33,7 @@ class Design(NamedTuple):
 
 @inline
 def by_angle(a: float, x: float, y: float, z: float, at: float) -> tuple[float, float, float]:
-    """Distance of a guide: first and second derivative by phi at a fixed y, and the mixed one; (21)."""
+    """Return the distance of a guide: first and second derivative by phi at a fixed y, and the mixed one; (21)."""
     cx, cy, tx = a * at * at, at, 2.0 * a * at
     dx, dy = cx - x, cy - y
     distance = np.sqrt(dx * dx + dy * dy + z * z)
@@ -47,7 +47,7 @@ def by_angle(a: float, x: float, y: float, z: float, at: float) -> tuple[float, 
 
 @inline
 def over_edge(cam: Cam, at: float) -> tuple[float, float]:
-    """First and second derivative by phi of the shortest length; (22), (23)."""
+    """Return the first and second derivative by phi of the shortest length; (22), (23)."""
     one = by_angle(cam.a, cam.x1, cam.y1, cam.z1, at)
     two = by_angle(cam.a, cam.x2, cam.y2, cam.z2, at)
     mixed = one[2] + two[2]
@@ -72,7 +72,8 @@ def poses(
     contact: Array | None,
     minima: Array | None,
 ) -> None:
-    """Shortest thread over the edge of the cam, its derivatives, place and wrap; (18) to (23) of docs/takeup.md.
+    """Compute the shortest thread over the edge of the cam, its derivatives, place and wrap;
+    (18) to (23) of docs/takeup.md.
 
     Parameters
     ----------
@@ -139,7 +140,9 @@ def poses(
 
 @inline
 def follow_minimum(cam: Cam, y: float) -> float:
-    """The minimum as a function of complex designs: one step of Newton's method for the imaginary parts alone."""
+    """Return the minimum as a function of complex designs:
+    one step of Newton's method for the imaginary parts alone.
+    """
     # The real part of the slope is the search's remaining error, which is below rounding: it is left out.
     _, slope, bend = along_edge(cam, y)
     return y + (slope.real - slope) / bend

@@ -20,7 +20,7 @@ def dense_maxima(
     max_abs_d2psi: Array | None,
     max_abs_d3psi: Array | None,
 ) -> None:
-    """Largest |psi'|, |psi''|, |psi'''| over a grid of carrier angles; the sweep's hot loop.
+    """Compute the largest |psi'|, |psi''|, |psi'''| over a grid of carrier angles; the sweep's hot loop.
 
     Parameters
     ----------

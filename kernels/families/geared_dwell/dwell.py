@@ -11,7 +11,9 @@ from kernels.families.geared_dwell.closure import Array, Reduced, Status, pin, r
 
 @inline
 def rising_angle(r: Reduced, psi: float, extreme: float) -> float:
-    """Where psi, rising from its extreme to pi at phi = pi, takes a value; nan if the iteration does not settle."""
+    """Find where psi, rising from its extreme to pi at phi = pi, takes a value;
+    nan if the iteration does not settle.
+    """
     low, high = extreme, math.pi
     phi, before = min(2.0 * extreme, 0.5 * (low + high)), math.inf  # twice the extreme is the root for k -> 1
     for _ in range(100):
@@ -43,7 +45,7 @@ def dwell_measures(
     dwell_deviation: Array | None,
     dwell_band: Array | None,
 ) -> None:
-    """Output turns per carrier turn, return dwell, deviation and band dwell; (10)-(12).
+    """Compute output turns per carrier turn, return dwell, deviation and band dwell; (10)-(12).
 
     Parameters
     ----------

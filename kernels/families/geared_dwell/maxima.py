@@ -16,7 +16,8 @@ from kernels.polynomial import roots_up_to, value_and_slope
 def stretch(
     r: Reduced, k: float, a: float, number: int, s2: Array, q: Array, d: Array, lean: Array
 ) -> tuple[float, float]:
-    """Quadratics of a stretch of the half turn in its own variable tau >= 0; its length and |dtau/dcos(phi)|.
+    """Return the quadratics of a stretch of the half turn in its own variable tau >= 0,
+    its length and |dtau/dcos(phi)|.
 
     ``s2`` is sin^2(phi), ``q`` and ``d`` are Q and D.  The turn is cut at phi = pi/2 with tau = t (number 0) and
     tau = 1 + cos(phi) (number 1).  Where the pin passes nearest to the axis at cos(phi) = 1/k, near a = -k, it is cut
@@ -42,7 +43,7 @@ def stretch(
 
 @inline
 def angle_at(k: float, number: int, tau: float) -> float:
-    """The carrier angle in [0, pi] at a place of a stretch."""
+    """Return the carrier angle in [0, pi] at a place of a stretch."""
     if number == 1:
         return math.pi - 2.0 * math.asin(math.sqrt(0.5 * tau))
     t = tau if number == 0 else ((k - 1.0) + (tau if number == 2 else -tau)) / k
@@ -51,7 +52,7 @@ def angle_at(k: float, number: int, tau: float) -> float:
 
 @inline
 def quadratic(p: Array, x: float) -> float:
-    """p[0] + p[1] x + p[2] x^2."""
+    """Return p[0] + p[1] x + p[2] x^2."""
     value: float = p[0] + x * (p[1] + x * p[2])
     return value
 
@@ -91,7 +92,7 @@ def turn_maxima(
     phi_max_abs_d2psi: Array | None,
     max_abs_d3psi: Array | None,
 ) -> None:
-    """Largest |psi'|, |psi''|, |psi'''| over the turn from all stationary points; (7)-(9).
+    """Compute the largest |psi'|, |psi''|, |psi'''| over the turn from all stationary points; (7)-(9).
 
     Parameters
     ----------

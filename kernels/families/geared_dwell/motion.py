@@ -30,7 +30,7 @@ def poses(
     x_b: Numbers | None,
     y_b: Numbers | None,
 ) -> None:
-    """Position, transfer functions and pin coordinates of every design at its carrier angles; (2)-(6).
+    """Compute the position, transfer functions and pin coordinates of every design at its carrier angles; (2)-(6).
 
     Parameters
     ----------

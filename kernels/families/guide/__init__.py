@@ -9,3 +9,4 @@ from kernels.families.guide.motion import poses as poses
 from kernels.families.guide.precise import precise_poses as precise_poses
 from kernels.families.guide.sensitivities import dev_sensitivities as dev_sensitivities
 from kernels.families.guide.sensitivities import travel_shares as travel_shares
+from kernels.families.guide.stage import FORM as FORM

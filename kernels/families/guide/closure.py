@@ -97,8 +97,8 @@ class Place(NamedTuple):
 
 
 @inline
-def place(r: Reduced, u: Any, v: Any) -> Place:
-    """Evaluate the closure at (cos phi, sin phi) = (u, v); (1), (2)."""
+def place(r: Any, u: Any, v: Any) -> Place:
+    """Evaluate the closure at (cos phi, sin phi) = (u, v); (1), (2).  ``r`` has a, e, k0, k2 of :class:`Reduced`."""
     x, y, w = r.e - r.a * u, r.a * v, r.k0 - r.k2 * u
     rr = x * x + y * y
     return Place(u, v, x, y, w, rr, rr - w * w)

@@ -15,6 +15,7 @@ from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.complex_step import arctan2, magnitude
 from kernels.families.guide.closure import Array, Place, Reduced, Status, discriminant_tolerance, place, reduce_design
+from kernels.families.guide.derivatives import acceleration, jerk, velocity
 from kernels.verdict import pose_status
 
 
@@ -110,23 +111,20 @@ def _put_derivatives(
 ) -> None:  # fmt: skip
     """Write the wanted derivatives up to the highest of them; (5)."""
     b_along, b_across, c_along, c_across, cos_psi, sin_psi, t = point
-    u, v, w = at.u, at.v, at.w
     per_t = 1.0 / t if regular else math.nan * t
-    g_turn, g_near = r.a * (v * cos_psi - u * sin_psi), r.a * (u * cos_psi + v * sin_psi)
-    g_ph = g_turn + r.k2 * v
-    psi1 = -g_ph * per_t
+    first = velocity(r, at, cos_psi, sin_psi, per_t)
+    psi1 = first.p
     if ds is not None:
         ds[i, j] = -(b_across + psi1 * c_across) * r.unit
     if ddev is not None:
         ddev[i, j] = (b_along + psi1 * c_along) * r.unit
     if d2s is not None or d3s is not None or d2dev is not None:
-        psi2 = -(g_near + r.k2 * u + psi1 * (w * psi1 - 2.0 * g_near)) * per_t
+        psi2 = acceleration(r, at, first, per_t)
         if d2s is not None:
             d2s[i, j] = -(b_along + psi2 * c_across + psi1 * psi1 * c_along) * r.unit
         if d2dev is not None:
             d2dev[i, j] = (psi2 * c_along - psi1 * psi1 * c_across - b_across) * r.unit
         if d3s is not None:
-            linear = g_ph - psi1 * (3.0 * g_turn - psi1 * (3.0 * g_turn + t * psi1))
-            psi3 = (linear - 3.0 * psi2 * (w * psi1 - g_near)) * per_t
+            psi3 = jerk(at, first, psi2, t, per_t)
             turning = (psi3 - psi1 * psi1 * psi1) * c_across
             d3s[i, j] = (b_across - turning - 3.0 * psi1 * psi2 * c_along) * r.unit

@@ -21,7 +21,7 @@ BAND = 4.0 * EPS  # what rounding the given numbers does to Delta: a dead point 
 
 @inline
 def _times(a: Twofold, b: Twofold, c: Twofold, d: Twofold) -> tuple[Twofold, Twofold]:
-    """(a + i b)(c + i d)."""
+    """Return (a + i b)(c + i d)."""
     return (
         two.subtract(two.multiply(a, c), two.multiply(b, d)),
         two.add(two.multiply(a, d), two.multiply(b, c)),
@@ -30,7 +30,7 @@ def _times(a: Twofold, b: Twofold, c: Twofold, d: Twofold) -> tuple[Twofold, Two
 
 @inline
 def _dot(a: Twofold, b: Twofold, c: Twofold, d: Twofold) -> Twofold:
-    """(a, b) . (c, d)."""
+    """Return (a, b) . (c, d)."""
     return two.add(two.multiply(a, c), two.multiply(b, d))
 
 
@@ -59,7 +59,7 @@ class Pose(NamedTuple):
 
 @inline
 def _carried(bx: Twofold, by: Twofold, dx: Twofold, dy: Twofold, line: Line) -> tuple[Twofold, Twofold]:
-    """e^{-i lam} b + q d: along and across the line, of a point or a derivative of it."""
+    """Return e^{-i lam} b + q d: along and across the line, of a point or a derivative of it."""
     along, across = _times(bx, by, line.cl, (-line.sl[0], -line.sl[1]))
     more, above = _times(dx, dy, line.qx, line.qy)
     return two.add(along, more), two.add(across, above)
@@ -82,7 +82,8 @@ def precise_poses(
     pressure_angle: Array | None,
     joints: Array | None,
 ) -> None:
-    """As :func:`kernels.families.guide.motion.poses`, for float64 designs only, correct to a few roundings.
+    """Compute what :func:`kernels.families.guide.motion.poses` does, correct to a few roundings,
+    for float64 designs only.
 
     Notes
     -----

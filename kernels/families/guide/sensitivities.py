@@ -14,7 +14,7 @@ from kernels.families.guide.motion import poses
 
 @kernel
 def travel_shares(designs: Array, shares: Array) -> None:
-    """The travel as a combination of the two turning angles, (4): s = p1 u - p2 v + q1 C - q2 S + constant.
+    """Compute the travel as a combination of the two turning angles, (4): s = p1 u - p2 v + q1 C - q2 S + constant.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def travel_shares(designs: Array, shares: Array) -> None:
 
 @kernel
 def dev_sensitivities(designs: Array, cos_phi: Array, sin_phi: Array, sensitivities: Array, status: Status) -> None:
-    """Partial derivatives of dev with respect to phi, a, b, c, e, xi, eta, lam, h; (8).
+    """Compute partial derivatives of dev with respect to phi, a, b, c, e, xi, eta, lam, h; (8).
 
     Parameters
     ----------

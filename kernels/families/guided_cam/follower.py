@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.complex_step import arctan2
+from kernels.verdict import pose_status
 
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
@@ -18,7 +19,7 @@ EPS = 2.0**-53
 
 @inline
 def displacement(thread: float, across_z: float, across_x: float) -> float:
-    """S^2 = L^2/4 - Z1^2 - (e - X1)^2 without the cancellation of large squares; (10)."""
+    """Return S^2 = L^2/4 - Z1^2 - (e - X1)^2 without the cancellation of large squares; (10)."""
     half = 0.5 * thread
     off = np.sqrt(across_z * across_z + across_x * across_x)
     return (half - off) * (half + off)  # type: ignore[no-any-return]
@@ -26,25 +27,24 @@ def displacement(thread: float, across_z: float, across_x: float) -> float:
 
 @inline
 def reaches(square: float, thread: float) -> int:
-    """Status of a squared displacement: within the rounding of L^2/4 it is zero, the thread just as long as its way."""
-    tolerance = EPS * thread * thread
-    if not math.isfinite(square):
-        return st.INVALID_INPUT
-    if not thread > 0.0 or square < -tolerance:
-        return st.NOT_ASSEMBLED
-    return st.OK if square > tolerance else st.DEAD_POINT
+    """Return the status of a squared displacement:
+    within the rounding of L^2/4 it is zero, the thread just as long as its way.
+    """
+    code = pose_status(math.isfinite(square), square, EPS * thread * thread, None)
+    return st.NOT_ASSEMBLED if code != st.INVALID_INPUT and not thread > 0.0 else code
 
 
 @inline
 def follow(s: float, thread: float, first: float, second: float) -> tuple[float, float]:
-    """S' and S'' from L, L', L''; (11), (12)."""
+    """Return S' and S'' from L, L', L''; (11), (12)."""
     ds = thread * first / (4.0 * s)
     return ds, (0.25 * (first * first + thread * second) - ds * ds) / s
 
 
 @kernel
 def follower(data: Array, status: Status, S: Array | None, dS: Array | None, d2S: Array | None) -> None:
-    """Displacement of the follower and its derivatives from the length of thread; (10) to (12) of docs/takeup.md.
+    """Compute the displacement of the follower and its derivatives from the length of thread;
+    (10) to (12) of docs/takeup.md.
 
     Parameters
     ----------
@@ -75,14 +75,15 @@ def follower(data: Array, status: Status, S: Array | None, dS: Array | None, d2S
 
 @inline
 def jam_angle(mu1: float, mu2: float) -> float:
-    """Pressure angle at which the follower jams: 90 deg - arctan mu1 - arctan mu2; (13)."""
+    """Return the pressure angle at which the follower jams: 90 deg - arctan mu1 - arctan mu2; (13)."""
     # one arctangent of the sum's tangent: it goes on below 0 where mu1 mu2 > 1 and subtracts nothing from 90 deg
     return arctan2(1.0 - mu1 * mu2, mu1 + mu2)  # type: ignore[no-any-return]
 
 
 @kernel
 def jam_angles(friction: Array, angle: Array, tan_half: Array) -> None:
-    """Permissible pressure angle of the follower and the tangent of its half; (13), (14) of docs/takeup.md.
+    """Compute the permissible pressure angle of the follower and the tangent of its half;
+    (13), (14) of docs/takeup.md.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class Reduced(NamedTuple):
 
 @inline
 def law(designs: Array, i: int, u: float, v: float) -> tuple[float, float, float]:
-    """P and its first two derivatives for u = cos(phi), v = sin(phi); (9)."""
+    """Return P and its first two derivatives for u = cos(phi), v = sin(phi); (9)."""
     zero = 0.0 * (designs[i, FIRST] + u)
     value, first, second = zero, zero, zero
     # Cosines and sines of the multiples by recursion.
@@ -76,7 +76,7 @@ def lowest(designs: Array, i: int) -> tuple[float, float]:
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Constants of one design; one of them, the least displacement, needs a search over the whole turn."""
+    """Return constants of one design; one of them, the least displacement, needs a search over the whole turn."""
     size = 0.0
     for k in range(COLUMNS):
         if k != 5 and k != 6:  # the coefficients of friction are no lengths
@@ -114,7 +114,7 @@ def poses(
     curvature: Array | None,
     profile: Array | None,
 ) -> None:
-    """Thread law, follower and profile of the cam; (9) to (17) of docs/takeup.md.
+    """Compute the thread law, follower and profile of the cam; (9) to (17) of docs/takeup.md.
 
     Parameters
     ----------

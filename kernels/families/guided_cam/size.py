@@ -21,7 +21,7 @@ STEPS = 60  # halvings of two looks' distance, which is 2^-5: the place is then 
 
 @kernel
 def least_radius(designs: Array, status: Status, radius: Array, place: Array, angle: Array, displaced: Array) -> None:
-    """Least R0 for which the pressure angle nowhere exceeds the jamming angle; (16) of docs/takeup.md.
+    """Compute the least R0 for which the pressure angle nowhere exceeds the jamming angle; (16) of docs/takeup.md.
 
     Parameters
     ----------

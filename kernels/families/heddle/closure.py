@@ -74,7 +74,7 @@ class Reduced(NamedTuple):
 
 @inline
 def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
-    """Constants of the closure X C + Y S + W = 0 of a four-bar with coupler b; (3)."""
+    """Return constants of the closure X C + Y S + W = 0 of a four-bar with coupler b; (3)."""
     difference = (c - b) * (c + b)
     by = divisor(c)
     k0 = 0.5 * (difference + (a * a + e * e)) / by
@@ -85,7 +85,7 @@ def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
     _, exponent = math.frexp(designs[i, 1].real)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
@@ -117,7 +117,8 @@ def reduce_design(designs: Array, i: int) -> Reduced:
 
 @inline
 def driven(bar: FourBar, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
-    """Direction (C, S) of the driven arm, signed root t, Delta and status for the driving arm along (u, v); (3)-(4).
+    """Return the direction (C, S) of the driven arm, signed root t, Delta and status for the driving arm along (u,
+    v); (3)-(4).
 
     The dead-point band is the rounding error of Delta itself.  At a dead point the position stays defined (t = 0).
     """
@@ -136,7 +137,7 @@ def driven(bar: FourBar, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
 
 @inline
 def driven_rates(bar: FourBar, u: Any, v: Any, cos: Any, sin: Any, t: Any) -> tuple[Any, Any, Any]:
-    """First three derivatives of the driven arm's angle with respect to that of the driving arm; (5)."""
+    """Return the first three derivatives of the driven arm's angle with respect to that of the driving arm; (5)."""
     w = bar.k0 - bar.k2 * u
     turn, near = bar.a * (v * cos - u * sin), bar.a * (u * cos + v * sin)
     g = turn + bar.k2 * v

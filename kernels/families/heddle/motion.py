@@ -15,7 +15,9 @@ from kernels.families.heddle.closure import Array, Reduced, Status, driven, driv
 
 @inline
 def _shaft_lever(r: Reduced, cos_turn: Any, sin_turn: Any, rates: bool) -> tuple[Any, Any, tuple[Any, Any, Any], int]:
-    """Cosine and sine of the shaft lever's angle from mid-stroke, its rates by that of the bell crank, status; (6)."""
+    """Return the cosine and sine of the shaft lever's angle from mid-stroke, its rates by that of the bell crank,
+    status; (6).
+    """
     if r.parallel:
         one = 1.0 + 0.0 * cos_turn
         return cos_turn, sin_turn, (one, 0.0 * one, 0.0 * one), st.OK
@@ -29,7 +31,7 @@ def _shaft_lever(r: Reduced, cos_turn: Any, sin_turn: Any, rates: bool) -> tuple
 
 @inline
 def _chained(outer: tuple[Any, Any, Any], inner: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-    """Three derivatives of a function of a function."""
+    """Return three derivatives of a function of a function."""
     f1, f2, f3 = outer
     g1, g2, g3 = inner
     return f1 * g1, f2 * g1 * g1 + f1 * g2, f3 * g1 * g1 * g1 + 3.0 * f2 * g1 * g2 + f1 * g3
@@ -37,7 +39,9 @@ def _chained(outer: tuple[Any, Any, Any], inner: tuple[Any, Any, Any]) -> tuple[
 
 @inline
 def _lift(r: Reduced, cos: Any, sin: Any, rates: tuple[Any, Any, Any]) -> tuple[Any, Any, Any, Any, bool]:
-    """Lift of the shaft and its three derivatives; false if the heddle rod does not reach the slide; (7)-(9)."""
+    """Return the lift of the shaft and its three derivatives;
+    false if the heddle rod does not reach the slide; (7)-(9).
+    """
     x, y = r.arm * cos, r.arm * sin
     l1, l2, l3 = rates
     y1, y2 = x * l1, x * l2 - y * l1 * l1
@@ -76,7 +80,8 @@ def poses(
     discriminant: Array | None,
     places: Array | None,
 ) -> None:
-    """Bell-crank angle, lift of the shaft and their derivatives with respect to the angle of the cam lever.
+    """Compute the bell-crank angle, lift of the shaft
+    and their derivatives with respect to the angle of the cam lever.
 
     Equations (3)-(9) of docs/heddle.md.
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.complex_step import arctan2, magnitude
+from kernels.verdict import follower_status
 
 Numbers = NDArray[Any]  # float64, or complex128 for exact gradients by the complex step
 Status = NDArray[np.uint8]
@@ -47,7 +48,8 @@ def poses(
     pressure_angle: Numbers | None,
     joints: Numbers | None,
 ) -> None:
-    """Rocker angle, place of the pin on the rocker and their derivatives of every design at its crank angles; (1)-(5).
+    """Compute the rocker angle, place of the pin on the rocker
+    and their derivatives of every design at its crank angles; (1)-(5).
 
     Parameters
     ----------
@@ -78,7 +80,8 @@ def poses(
             x_size = a.real + abs(e.real)
             tolerance = 8.0 * EPS * (abs(x.real) * x_size + a.real * abs(y.real) + h.real * h.real)
             tolerance += 64.0 * EPS * EPS * x_size * x_size
-            code = _code(valid, square.real, delta.real, h.real, tolerance)
+            # with h = 0 the discriminant is r^2, which vanishes only on the rocker axis: there is no dead point
+            code = follower_status(valid, square.real <= tolerance, delta.real, tolerance)
             status[i, j] = code
             root = np.sqrt(delta) if code == st.OK else 0.0 * delta
             assembled = code == st.OK or code == st.DEAD_POINT
@@ -103,19 +106,6 @@ def poses(
                 along, aside = a * (u * c + v * sine), a * (v * c - u * sine)
                 pin = (along, aside, h, per_w)
                 _put_derivatives(dpsi, d2psi, d3psi, ds, d2s, i, j, pin, unit)
-
-
-@inline
-def _code(valid: bool, square: float, delta: float, h: float, tolerance: float) -> int:
-    """Status of a pose from the squared distance of pin and rocker axis and the discriminant, (1)."""
-    if not valid or delta != delta:
-        return st.INVALID_INPUT
-    if square <= tolerance:
-        return st.SINGULAR
-    if delta < -tolerance:
-        return st.NOT_ASSEMBLED
-    # with h = 0 the discriminant is r^2, which vanishes only on the rocker axis: no dead point
-    return st.DEAD_POINT if delta <= tolerance and h != 0.0 else st.OK
 
 
 @inline

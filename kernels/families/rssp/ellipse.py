@@ -10,7 +10,8 @@ from kernels.families.rssp.closure import Array
 
 @kernel
 def pressure_ellipse(designs: Array, ellipse: Array) -> None:
-    """Ellipse that the coupler direction draws in the plane across the slide; see kernels.effects.pressure_extrema.
+    """Compute the ellipse that the coupler direction draws in the plane across the slide;
+    see kernels.effects.pressure_extrema.
 
     ``designs`` (n, 6); ``ellipse`` (n, 7) out: (x_C - x_B)/b and (z_C - z_B)/b as constant, cosine, sine each, and the
     size of the terms that round.

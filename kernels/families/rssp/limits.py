@@ -27,7 +27,7 @@ _MOST_STEPS = 200
 
 @inline
 def _excess(r: Reduced, crank: float, ca: float, sa: float, f: float, s: float) -> tuple[float, float, float]:
-    """E(s), dE/ds and rho for a crank pointing away from the ball (``crank`` = -a) or towards it (+a)."""
+    """Return e(s), dE/ds and rho for a crank pointing away from the ball (``crank`` = -a) or towards it (+a)."""
     x, z = s * ca, s * sa - f
     rho = math.sqrt(r.e * r.e + x * x)
     reach = rho - crank
@@ -38,7 +38,7 @@ def _excess(r: Reduced, crank: float, ca: float, sa: float, f: float, s: float) 
 
 @inline
 def _folded(r: Reduced, ca: float, sa: float, f: float) -> tuple[float, bool]:
-    """Outer root of the convex E_fold on the side of the branch, by Newton's method from outside."""
+    """Return the outer root of the convex E_fold on the side of the branch, by Newton's method from outside."""
     # A product instead of b^2 - (f cos alpha)^2, which would cancel where the two are nearly equal.
     far = (r.b - f * ca) * (r.b + f * ca)
     s = f * sa + r.branch * math.sqrt(max(far, 0.0))
@@ -56,7 +56,9 @@ def _folded(r: Reduced, ca: float, sa: float, f: float) -> tuple[float, bool]:
 
 @inline
 def _extended(r: Reduced, ca: float, sa: float, f: float, folded: float) -> tuple[float, bool]:
-    """Root of E_ext between the folded position and the reach of crank and coupler: Newton kept in the bracket."""
+    """Return the root of E_ext between the folded position and the reach of crank and coupler:
+    Newton kept in the bracket.
+    """
     inner, reach = folded, r.a + r.b
     outer = f * sa + r.branch * math.sqrt(max((reach - f * ca) * (reach + f * ca) - r.e * r.e, 0.0))
     s = outer
@@ -85,7 +87,7 @@ def _extended(r: Reduced, ca: float, sa: float, f: float, folded: float) -> tupl
 
 @inline
 def _turn(angle: float) -> float:
-    """The angle in [0, 2 pi)."""
+    """Return the angle in [0, 2 pi)."""
     return angle + _TWO_PI if angle < 0.0 else angle
 
 
@@ -103,7 +105,7 @@ def limits(
     err_ext: Array,
     err_fold: Array,
 ) -> None:
-    """Both limit positions of every design on its branch.
+    """Compute both limit positions of every design on its branch.
 
     Equations (7)-(10) of docs/rssp.md.
 

@@ -28,7 +28,9 @@ class LeastQ(NamedTuple):
 
 @inline
 def least_q(r: Reduced) -> LeastQ:
-    """The smallest Q over the turn; ``tolerance`` bounds its rounding error (docs/rssp.md, section on rotatability)."""
+    """Return the smallest Q over the turn;
+    ``tolerance`` bounds its rounding error (docs/rssp.md, section on rotatability).
+    """
     lowest = minimum(2.0 * r.a * r.e, 2.0 * r.n0 * r.na, -0.5 * r.ka * r.ka, 0.0)
     u, v = lowest.cos, lowest.sin
     # The coefficients only place the minimum; its value comes from m and n, and its slope there takes off what the
@@ -52,7 +54,7 @@ def margin(
     max_pressure_angle: Array | None,
     phi_min: Array | None,
 ) -> None:
-    """Rotatability, margin and largest pressure angle of every design, exact.
+    """Compute rotatability, margin and largest pressure angle of every design, exact.
 
     Parameters
     ----------

@@ -27,7 +27,8 @@ def poses(
     pressure_angle: Array | None,
     joints: Array | None,
 ) -> None:
-    """Slider displacement, transfer functions, discriminant and pressure angle of every design at its crank angles.
+    """Compute the slider displacement, transfer functions,
+    discriminant and pressure angle of every design at its crank angles.
 
     Equations (1)-(3), (5) and (6) of docs/rssp.md: Q = (b - m)(b + m) - n^2, s = y_B + branch sqrt(Q), cos(pressure
     angle) = sqrt(Q)/b, and the derivatives of Q in the factored form that stays accurate for tiny cranks.

@@ -31,7 +31,8 @@ def precise_poses(
     pressure_angle: Array | None,
     joints: Array | None,
 ) -> None:
-    """As :func:`kernels.families.rssp.motion.poses`, for float64 designs only, correct to a few roundings.
+    """Compute what :func:`kernels.families.rssp.motion.poses` does, correct to a few roundings,
+    for float64 designs only.
 
     Notes
     -----

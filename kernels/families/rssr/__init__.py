@@ -22,3 +22,5 @@ from kernels.families.rssr.motion import poses as poses
 from kernels.families.rssr.precise import PRECISE_COLUMNS as PRECISE_COLUMNS
 from kernels.families.rssr.precise import precise_constants as precise_constants
 from kernels.families.rssr.precise import precise_poses as precise_poses
+from kernels.families.rssr.stage import FORM as FORM
+from kernels.families.rssr.stage import opening as opening

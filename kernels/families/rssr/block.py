@@ -27,7 +27,7 @@ ROWS = 24
 
 @inline
 def new_block() -> Array:
-    """Memory for one block."""
+    """Return memory for one block."""
     return np.empty(ROWS * BLOCK)
 
 
@@ -63,7 +63,7 @@ def load_block(designs: Array, start: int, count: int, at: Array) -> None:
 
 @inline
 def least_delta(count: int, at: Array) -> None:
-    """Smallest Delta of the turn in squared crank units, where it is, and how well it is known.
+    """Compute the smallest Delta of the turn in squared crank units, where it is, and how well it is known.
 
     The bound of the rounding error is from standard error analysis (docs/rssr.md, section 4.2): the numbers of the
     closure carry errors of at most 5 (X), 7 (Y) and 18 (W) units of 2^-53 of their terms, the unit length of (cos, sin)
@@ -88,7 +88,7 @@ def least_delta(count: int, at: Array) -> None:
 
 @inline
 def _evaluate(at: Array, k: int) -> None:
-    """Delta at the minimum next to the place given, and whether that was too far from it."""
+    """Compute the Delta at the minimum next to the place given, and whether that was too far from it."""
     u, v, e, y0, ca = at[k + COS], at[k + SIN], at[k + E], at[k + Y0], at[k + CA]
     k0, k1, k2 = at[k + K0], at[k + K1], at[k + K2]
     # The expanded coefficients only place the minimum; its value comes from X, Y, W themselves, and its slope there
@@ -115,7 +115,8 @@ def _evaluate(at: Array, k: int) -> None:
 
 @inline
 def singularity_distance(count: int, at: Array) -> None:
-    """Into ACROSS: distance [rad] of the nearest singularity of the motion from the real axis, to leading order.
+    """Write the distance [rad] of the nearest singularity of the motion from the real axis, to leading order,
+    into ACROSS.
 
     It sets how finely the motion must be sampled.  Singular are the complex zeros of Delta (its second minimum, where
     there is one, counts too) and those of R = X^2 + Y^2, where the crank pin would lie on the rocker axis: X + i Y = 0

@@ -13,7 +13,7 @@ SWING, PHI0, PHI1, E, F, G, ALPHA = range(7)
 
 
 def recorded() -> Formulas:
-    """The formulas; the limited lengths are crank, rocker, coupler."""
+    """Return the formulas; the limited lengths are crank, rocker, coupler."""
     tape = Tape(INPUTS)
     one = tape.one()
     e, f, g = tape.input(E), tape.input(F), tape.input(G)

@@ -16,7 +16,7 @@ SWING, PHI0, PHI1, PSI_EXT, C, F, ALPHA = range(7)
 
 
 def recorded() -> Formulas:
-    """The formulas; the limited lengths are crank, e, g, coupler.  The angle alpha must not be 0."""
+    """Return the formulas; the limited lengths are crank, e, g, coupler. The angle alpha must not be 0."""
     tape = Tape(INPUTS)
     one = tape.one()
     c, f = tape.input(C), tape.input(F)

@@ -72,7 +72,7 @@ def _take(rows: Rows, count: int, at: Array, form: int, kind: int, theta: float,
 
 @kernel
 def _inputs(p: Problem, centre: Array, half: Array, varied: Array, given: Array, at: Array) -> None:
-    """The inputs of the formulas: coordinates number ``varied[k]`` vary, the others are given."""
+    """Compute the inputs of the formulas: coordinates number ``varied[k]`` vary, the others are given."""
     for j in range(bt.COORDINATES):
         constant(at, j, given[j], given[j])
     for k in range(half.shape[0]):
@@ -86,7 +86,7 @@ def _inputs(p: Problem, centre: Array, half: Array, varied: Array, given: Array,
 
 @inline
 def _limit_rows(p: Problem, f: Formulas, rows: Rows, count: int, at: Array, first: int, last: int) -> int:
-    """The rows of the limits number ``first`` to ``last`` - 1, where there are such."""
+    """Return the rows of the limits number ``first`` to ``last`` - 1, where there are such."""
     for k in range(2 * first, min(2 * last, p.limits.shape[0])):
         if abs(p.limits[k]) < math.inf:
             count = _take(rows, count, at, f.slots[LIMITED + k], LIMITED + k, 0.0, 1.0)
@@ -100,7 +100,9 @@ def _middle(at: Array, form: int) -> float:
 
 @kernel
 def _centre_curve(p: Problem, f: Formulas, at: Array, height: Array, neck: Array) -> None:
-    """Objective with its sign, and Delta/b^2, of the centre design at POSES crank angles; for the choice of rows."""
+    """Compute the objective with its sign, and Delta/b^2, of the centre design at POSES crank angles;
+    for the choice of rows.
+    """
     place = f.slots[bt.CENTRES :]
     a, e, fs, aca = _middle(at, place[0]), _middle(at, place[1]), _middle(at, place[2]), _middle(at, place[3])
     k0, k1, k2, b2 = _middle(at, place[4]), _middle(at, place[5]), _middle(at, place[6]), _middle(at, place[7])
@@ -125,14 +127,14 @@ def _centre_curve(p: Problem, f: Formulas, at: Array, height: Array, neck: Array
 
 @inline
 def _summit(below: float, here: float, above: float) -> float:
-    """Where a parabola through three values one apart has its summit, counted from the middle one."""
+    """Return where a parabola through three values one apart has its summit, counted from the middle one."""
     bend = below - 2.0 * here + above
     return 0.5 * (below - above) / bend if bend < 0.0 else 0.0
 
 
 @inline
 def _next_peak(height: Array, sign: float, used: Flags) -> int:
-    """The highest local maximum of sign * height that was not used; -1 where there is none."""
+    """Return the highest local maximum of sign * height that was not used; -1 where there is none."""
     found = -1
     for i in range(POSES):
         here = sign * height[i]
@@ -152,7 +154,7 @@ def _place_of(height: Array, sign: float, i: int) -> float:
 
 @inline
 def _at_angle(f: Formulas, at: Array, theta: float, half: Array) -> None:
-    """The closure at a crank angle after the extended position.
+    """Compute the closure at a crank angle after the extended position.
 
     :func:`sincos` errs by less than a unit of its last place, so the intervals hold the exact sine and cosine.
     """
@@ -166,7 +168,7 @@ def _at_angle(f: Formulas, at: Array, theta: float, half: Array) -> None:
 def _turn_rows(
     p: Problem, f: Formulas, rows: Rows, count: int, at: Array, half: Array, height: Array, neck: Array, used: Flags
 ) -> int:
-    """Rows of the pressure angle and of the objective, at the peaks of the centre design."""
+    """Return rows of the pressure angle and of the objective, at the peaks of the centre design."""
     _centre_curve(p, f, at, height, neck)
     used[:] = 0
     for _ in range(NECKS):
@@ -193,7 +195,7 @@ def _turn_rows(
 
 @inline
 def _single(rows: Rows, start: int, count: int) -> int:
-    """A row of limits from ``start`` on that is negative on the whole box; -1 where there is none."""
+    """Return a row of limits from ``start`` on that is negative on the whole box; -1 where there is none."""
     found = -1
     for j in range(start, count):
         if not rows.objective[j] and surely_negative(rows.forms, j):
@@ -203,7 +205,7 @@ def _single(rows: Rows, start: int, count: int) -> int:
 
 @inline
 def _doubtful(rows: Rows, count: int, half: Array) -> int:
-    """The row of limits that is nearest to being negative on the whole box, in units of its spread."""
+    """Return the row of limits that is nearest to being negative on the whole box, in units of its spread."""
     found, lowest = -1, math.inf
     for j in range(count):
         if not rows.objective[j]:
@@ -219,7 +221,7 @@ def _doubtful(rows: Rows, count: int, half: Array) -> int:
 
 @inline
 def _lengths(f: Formulas, at: Array, half: Array) -> bool:
-    """The lengths of the designs; false where a divisor may vanish, or the crank."""
+    """Return the lengths of the designs; false where a divisor may vanish, or the crank."""
     if f.slots[bt.SIGN] >= 0:
         sign = 1.0 if at[f.slots[bt.SIGNED], CENTRE] > 0.0 else -1.0  # where it is not known, this part ends anyway
         constant(at, f.slots[bt.SIGN], sign, sign)
@@ -233,7 +235,7 @@ def judge(
     p: Problem, f: Formulas, low: Array, high: Array, varied: Array, given: Array, at: Array, rows: Rows,
     scratch: Array, used: Flags,
 ) -> tuple[int, int, float]:  # fmt: skip
-    """What can be said of one box: outcome, number of rows, and the bound of the objective.
+    """Return what can be said of one box: outcome, number of rows, and the bound of the objective.
 
     The outcome is BOUND, EMPTY or OPEN; ``rows.factors`` combine the rows to what it says.
     """

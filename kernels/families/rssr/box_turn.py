@@ -85,14 +85,14 @@ def turn(tape: Tape, at: Linkage) -> dict[int, Number]:
 
 
 def constant_of_closure(at: Linkage, cos1: Number, sin1: Number) -> Number:
-    """k0, from X C - Y S + W = 0 at the extended position; the linkage's own k0 is not used."""
+    """Return k0, from X C - Y S + W = 0 at the extended position; the linkage's own k0 is not used."""
     w1 = (at.fs + at.ac * at.v1) * sin1 - (at.e - at.a * at.u1) * cos1
     return w1 - (at.k1 * at.v1 - at.k2 * at.u1)
 
 
 def sense(tape: Tape, total: Number, crank: Number, e: Number, fs: Number, ca: Number, u: Number, v: Number,
           x: Number, y: Number) -> Number:  # fmt: skip
-    """T of a limit position with the sign of the branch, times ``total``, for a crank of length crank/total.
+    """Return T of a limit position with the sign of the branch, times ``total``, for a crank of length crank/total.
 
     It is positive where the limit lies on the branch; x, y are the ball's coordinates about the rocker axis.
     """
@@ -100,7 +100,7 @@ def sense(tape: Tape, total: Number, crank: Number, e: Number, fs: Number, ca: N
 
 
 def within(tape: Tape, number: int, value: Number, unit: Number, power: int = 1) -> tuple[Number, Number]:
-    """The rows  value - least^power unit >= 0  and  most^power unit - value >= 0  of a limited length."""
+    """Return the rows value - least^power unit >= 0 and most^power unit - value >= 0 of a limited length."""
     least, most = tape.input(LIMITS + 2 * number), tape.input(LIMITS + 2 * number + 1)
     if power == 2:
         least, most = least.square(), most.square()
@@ -111,7 +111,7 @@ def formulas(
     tape: Tape, at: Linkage, found: dict[int, Number], acceptance: Sequence[Number],
     limits: Sequence[tuple[Number, Number]], early: int, signs: tuple[Number, Number] | None = None,
 ) -> Formulas:  # fmt: skip
-    """The recorded tape with its table of forms.
+    """Return the recorded tape with its table of forms.
 
     Parameters
     ----------

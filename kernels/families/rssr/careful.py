@@ -33,7 +33,8 @@ def rounding(
     v: float,
     height: float,
 ) -> tuple[float, float]:
-    """Relative rounding errors of the transfer function of that order where it is ``height``, and of its slope.
+    """Return the relative rounding errors of the transfer function of that order where it is ``height``,
+    and of its slope.
 
     There are three sources of error.  First, the function is proportional to Delta^(1/2 - order), so a relative error
     of Delta becomes one of the function.  Second, the function is a sum of terms of the size 1, k1, k2 over T, and the
@@ -59,7 +60,7 @@ def rounding(
 
 @inline
 def _gap(phi: float, centre: float) -> float:
-    """Distance of two angles around the circle."""
+    """Return the distance of two angles around the circle."""
     d = abs(phi - centre) % _TURN
     return min(d, _TURN - d)
 
@@ -80,7 +81,8 @@ def careful_maximum(
     rho2: float,
     target: float,
 ) -> tuple[float, float, float, float, bool]:
-    """Largest |d^order psi / dphi^order|, its crank angle, errors of both, and whether two marches agreed.
+    """Return the largest |d^order psi / dphi^order|, its crank angle, errors of both,
+    and whether two marches agreed.
 
     Parameters
     ----------
@@ -145,7 +147,9 @@ def _bracketed(
     f_hi: float,
     target: float,
 ) -> tuple[float, float, float, float]:
-    """Illinois' regula falsi on the derivative, bisecting every third step: |y|, phi, error bounds of both."""
+    """Refine by Illinois' regula falsi on the derivative, bisecting every third step:
+    |y|, phi, error bounds of both.
+    """
     y, mid, bound = 0.0, lo, math.inf
     for step in range(120):
         # One bisection in three: regula falsi alone may creep towards one end of the bracket.

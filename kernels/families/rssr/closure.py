@@ -32,7 +32,7 @@ class Design(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
     unit = unit_scale(designs[i, 2].real)
     a, b, c = designs[i, 0] * unit, designs[i, 1] * unit, designs[i, 2] * unit
     e, f, g = designs[i, 3] * unit, designs[i, 4] * unit, designs[i, 5] * unit
@@ -71,7 +71,7 @@ def place(e: Any, y0: Any, ca: Any, k0: Any, k1: Any, k2: Any, u: Any, v: Any) -
 def closure_terms(
     e: float, y0: float, ca: float, k0: float, k1: float, k2: float, u: float, v: float
 ) -> tuple[float, ...]:
-    """X, Y, W of the closure alone, for margins, limit positions, error estimates and enclosures.
+    """Return X, Y, W of the closure alone, for margins, limit positions, error estimates and enclosures.
 
     W is summed in another order than in :func:`place`.  The order decides its last bit and with it that of every
     margin, so both are kept.

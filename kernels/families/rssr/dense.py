@@ -34,7 +34,8 @@ def dense_maxima(
     at: Indices | None = None,
     values: Array | None = None,
 ) -> None:
-    """Largest |psi'|, |psi''|, |psi'''| over a grid of crank angles, and the smallest Delta; the sweep's hot loop.
+    """Compute the largest |psi'|, |psi''|, |psi'''| over a grid of crank angles, and the smallest Delta;
+    the sweep's hot loop.
 
     Parameters
     ----------

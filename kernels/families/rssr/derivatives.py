@@ -76,6 +76,16 @@ def jerk(to: Rocker, at: Place, first: First, second: Second) -> Any:
     return (first.g_ph + by_p + 3.0 * q * (second.g_phps - at.w * p)) * to.per_t
 
 
+@inline
+def snap(to: Rocker, at: Place, first: First, second: Second, j: Any) -> Any:
+    """The fourth transfer function, with its own sign, from the third, ``j``."""
+    p, q, t, w = -first.p, -second.q, to.t, at.w
+    g_phphps, g_phpsps, g_phps = at.u * to.s - at.hv * to.c, first.w_ph - first.g_ph, second.g_phps
+    by_p = p * (-4.0 * g_phps + p * (6.0 * (at.w1 - second.g_phph) - p * (4.0 * g_phps + w * p)))
+    by_q = q * (6.0 * g_phphps + p * (12.0 * g_phpsps - 6.0 * t * p) + 3.0 * w * q)
+    return (second.g_phph - by_p - by_q - 4.0 * (g_phps + w * p) * j) * to.per_t
+
+
 place_fused = inline_fused(place)
 rocker_fused = inline_fused(rocker)
 velocity_fused = inline_fused(velocity)
@@ -99,12 +109,8 @@ def follower(
     first = velocity(k1, k2, to, at)
     second = acceleration(to, at, first)
     j = jerk(to, at, first, second)
-    p, q, w = -first.p, -second.q, at.w
-    g_phphps, g_phpsps, g_phps = at.u * to.s - at.hv * to.c, first.w_ph - first.g_ph, second.g_phps
-    by_p = p * (-4.0 * g_phps + p * (6.0 * (at.w1 - second.g_phph) - p * (4.0 * g_phps + w * p)))
-    by_q = q * (6.0 * g_phphps + p * (12.0 * g_phpsps - 6.0 * t * p) + 3.0 * w * q)
-    k = (second.g_phph - by_p - by_q - 4.0 * (g_phps + w * p) * j) * to.per_t
-    return p, q, j, k
+    k = snap(to, at, first, second, j)
+    return -first.p, -second.q, j, k
 
 
 @inline

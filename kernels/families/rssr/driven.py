@@ -25,7 +25,7 @@ SIZE = 12 * WIDTH
 
 @inline
 def _crank(at: Array, phi: float, reach: float) -> None:
-    """Cosine and sine of the first crank's angle."""
+    """Compute the cosine and sine of the first crank's angle."""
     v, u = sincos(phi)
     trigonometric(at, COS, reach, u, -v, -u, 0.0, 0.0, 0.0, 0.0, 6.0 * EPS)
     trigonometric(at, SIN, reach, v, u, -v, 0.0, 0.0, 0.0, 0.0, 6.0 * EPS)
@@ -33,7 +33,9 @@ def _crank(at: Array, phi: float, reach: float) -> None:
 
 @kernel
 def _rocker(at: Array, r: Reduced) -> bool:
-    """Cosine and sine of the rocker from those of its crank, (2*); the errors of the constants are those of 4.2."""
+    """Return the cosine and sine of the rocker from those of its crank, (2*);
+    the errors of the constants are those of 4.2.
+    """
     u, v = size(at, COS), size(at, SIN)
     combine(at, r.e, -1.0, COS, 0.0, COS, 4.0 * EPS * abs(r.e), X)
     combine(at, r.y0, r.ca, SIN, 0.0, SIN, 6.0 * EPS * (abs(r.y0) + abs(r.ca) * v), Y)
@@ -62,7 +64,9 @@ def _rocker(at: Array, r: Reduced) -> bool:
 def enclose_travel(
     at: Array, stages: Stages, couplings: Array, shares: Array, i: int, phi: float, reach: float
 ) -> bool:
-    """The travel of design i, without its constant, on |z| <= reach into X; false if it cannot be enclosed."""
+    """Enclose the travel of design i, without its constant, on |z| <= reach in X;
+    return false if it cannot be enclosed.
+    """
     _crank(at, phi, reach)
     for k in range(stages.shape[0]):
         if k > 0:

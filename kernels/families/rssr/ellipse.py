@@ -9,7 +9,7 @@ from kernels.sincos import sincos
 
 @kernel
 def pressure_ellipse(designs: Array, ellipse: Array) -> None:
-    """Radial and axial component of the coupler's unit vector as functions of the crank angle.
+    """Compute the radial and axial component of the coupler's unit vector as functions of the crank angle.
 
     t_rho = (A3 + 2 c^2)/(2 b c) and t_k = (z_C - z_B)/b are of first degree in cos(phi), sin(phi) and need no rocker
     angle; sin^2(pressure angle) = t_rho^2 + t_k^2.

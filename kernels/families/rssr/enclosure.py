@@ -19,7 +19,8 @@ SIZE = 7 * WIDTH
 
 @kernel
 def enclose(at: Array, r: Reduced, u: float, v: float, reach: float) -> bool:
-    """Velocity of the mirrored mechanism on |z| <= reach <= 1 into VELOCITY; false if it cannot be enclosed.
+    """Enclose the velocity of the mirrored mechanism on |z| <= reach <= 1 in VELOCITY;
+    return false if it cannot be enclosed.
 
     The exact motion of the given doubles is enclosed: X, Y, W are off by at most 5, 7, 18 eps of the magnitudes that
     make them up (docs/rssr.md, section 4.2), their derivatives by less; the errors below are those times the sizes of

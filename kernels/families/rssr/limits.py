@@ -46,7 +46,7 @@ _TINY_SWING = 0.25  # below, the half-swing identity is more accurate than the d
 
 @inline
 def _ball(at: Array, k: int, phi: float) -> tuple[float, float, float, float, float, float]:
-    """In units of the crank at phi: eta, xi, d eta/d phi along the motion, sin psi, cos psi, T."""
+    """Return eta, xi, d eta/d phi along the motion, sin psi, cos psi and T at phi, in units of the crank."""
     e, y0, ca, k0, k1, k2, c = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + ROCKER]
     u, v = math.cos(phi), math.sin(phi)
     x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
@@ -60,7 +60,7 @@ def _ball(at: Array, k: int, phi: float) -> tuple[float, float, float, float, fl
 
 @inline
 def _root(at: Array, k: int, lo: float, hi: float, rising: bool) -> float:
-    """Zero of eta in a bracket: Newton, bisection where it would leave the bracket or does not gain."""
+    """Return the zero of eta in a bracket: Newton, bisection where it would leave the bracket or does not gain."""
     phi, before = 0.5 * (lo + hi), hi - lo
     for _ in range(100):
         eta, _, slope, _, _, _ = _ball(at, k, phi)
@@ -81,7 +81,7 @@ def _root(at: Array, k: int, lo: float, hi: float, rising: bool) -> float:
 
 @inline
 def _rocker_turns(at: Array, k: int) -> bool:
-    """Whether the closure is solvable for phi at every psi: then the rocker has no limit positions; (6*)."""
+    """Return whether the closure is solvable for phi at every psi: then the rocker has no limit positions; (6*)."""
     e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
     m = minimum(2.0 * (k2 - e * k0), 2.0 * (y0 * k0 - k1 * ca), 0.5 * (1.0 - e * e - ca * ca + y0 * y0), e * y0)
     least: float = m.value + (k1 * k1 + k2 * k2 - k0 * k0) + 0.5 * (1.0 - e * e + ca * ca - y0 * y0)
@@ -108,7 +108,7 @@ def _turning_points(at: Array, k: int, n: int, begin: Array) -> int:
 
 @inline
 def _mark_turning_points(count: int, at: Array, cos: Array, sin: Array, marks: Array) -> None:
-    """Signs of psi' at FEWEST angles, all designs of the block side by side, as sums of powers of two."""
+    """Compute signs of psi' at FEWEST angles, all designs of the block side by side, as sums of powers of two."""
     for k in range(count):
         marks[k] = 0.0
     # A sum of powers of two instead of a set of bits: it stays in float64, so the loop over designs vectorises.
@@ -123,7 +123,7 @@ def _mark_turning_points(count: int, at: Array, cos: Array, sin: Array, marks: A
 
 @inline
 def _unmark(marks: float, begin: Array) -> int:
-    """As :func:`_turning_points` from the signs of :func:`_mark_turning_points`."""
+    """Return what :func:`_turning_points` does, from the signs of :func:`_mark_turning_points`."""
     signs, found = int(marks), 0
     changes = signs ^ ((signs >> 1) | ((signs & 1) << (FEWEST - 1)))  # bit i: between sample i and i + 1
     i = 0
@@ -138,14 +138,14 @@ def _unmark(marks: float, begin: Array) -> int:
 
 @inline
 def _wrapped(angle: float) -> float:
-    """The angle of an arctangent in [0, 2 pi)."""
+    """Return the angle of an arctangent in [0, 2 pi)."""
     turned = angle + TURN if angle < 0.0 else 0.0 + angle
     return turned if turned < TURN else 0.0
 
 
 @inline
 def _swing(at: Array, k: int, s1: float, c1: float, s2: float, c2: float, rho: float) -> tuple[float, float, float]:
-    """Signed swing of the mirrored mechanism, always negative, and two parts of its error.
+    """Return the signed swing of the mirrored mechanism, always negative, and two parts of its error.
 
     The second number is the factor by which errors of the two angles enter the swing, the third the rounding error of
     the swing's own formula.  ``rho`` is the sum of the two distances of the ball from the crank axis.  The half-swing

@@ -34,7 +34,9 @@ from kernels.verdict import turning_status
 
 @inline
 def _angle(at: Array, k: int) -> float:
-    """Pressure angle at the least Delta; an arctangent, because an arccosine loses half the digits of a small angle."""
+    """Return the pressure angle at the least Delta;
+    an arctangent, because an arccosine loses half the digits of a small angle.
+    """
     u, v = at[k + COS], at[k + SIN]
     radial = at[k + ROCKER] - (at[k + K0] + at[k + K1] * v - at[k + K2] * u)
     axial = at[k + Z0] - at[k + SA] * v
@@ -51,7 +53,7 @@ def margin(
     phi_min: Array | None,
     error: Array | None,
 ) -> None:
-    """Rotatability, margin and largest pressure angle of every design, exact.
+    """Compute rotatability, margin and largest pressure angle of every design, exact.
 
     Parameters
     ----------

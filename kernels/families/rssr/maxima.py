@@ -74,7 +74,9 @@ _EXPONENT = np.array([0, 0, 1, 13, 2, 16, 14, 6, 3, 8, 17, 12, 15, 5, 7, 11, 4, 
 
 
 def sampling_tables() -> tuple[Array, Array]:
-    """Cosines and sines of N equally spaced angles for N = 16, 32, ... 1024; those of N start at position N - 16."""
+    """Return cosines and sines of N equally spaced angles for N = 16, 32, ...
+    1024; those of N start at position N - 16.
+    """
     phi = np.concatenate([np.arange(n) * (2.0 * np.pi / n) for n in (16 << k for k in range(7))])
     return np.cos(phi), np.sin(phi)
 
@@ -83,7 +85,7 @@ def sampling_tables() -> tuple[Array, Array]:
 def _sample(
     at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, first: Array | None, second: Array | None
 ) -> None:
-    """Magnitudes at n equally spaced angles into size[1 ... n], closed periodically."""
+    """Compute magnitudes at n equally spaced angles into size[1 ... n], closed periodically."""
     e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
     begin = n - FEWEST
     for i in range(n):
@@ -96,7 +98,9 @@ def _sample(
 def _sample_block(
     count: int, at: Array, cos: Array, sin: Array, size: Array, first: Array | None, second: Array | None
 ) -> None:
-    """As :func:`_sample` with FEWEST angles, for all designs of a block: angle i of design k at (i + 1) BLOCK + k."""
+    """Sample as :func:`_sample` does with FEWEST angles, all designs of a block:
+    angle i of design k at (i + 1) BLOCK + k.
+    """
     for i in range(FEWEST):
         u, v, row = cos[i], sin[i], (1 + i) * BLOCK
         for k in range(count):
@@ -109,7 +113,7 @@ def _sample_block(
 
 @inline
 def _mark_peaks(count: int, size: Array) -> None:
-    """For the samples of :func:`_sample_block`: the set of local maxima of at least 60 %, as a sum of powers of two."""
+    """Mark the local maxima of at least 60 % among the samples of :func:`_sample_block`, as a sum of powers of two."""
     for k in range(count):
         size[_FLOOR + k], size[_MARKS + k] = 0.0, 0.0
     for i in range(1, FEWEST + 1):
@@ -158,7 +162,7 @@ def _list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, 
 
 @inline
 def _careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float, float, float, float], bool]:
-    """The maximum by marching, and whether it was found; all nan if not."""
+    """Find the maximum by marching; return whether it was found, and nan if not."""
     u, v = at[k + COS], at[k + SIN]
     c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2] + 1e-300
     here = point(c1, s1, c2, s2, u, v)
@@ -222,7 +226,7 @@ def _keep_what_turns(start: int, count: int, at: Array, who: Counts, status: Sta
 
 @inline
 def _highest(begin: int, end: int, m: Array) -> tuple[float, float, float, float]:
-    """Height, place and the errors of both of the highest refined maximum of a design."""
+    """Return the height, place and the errors of both of the highest refined maximum of a design."""
     best, winner = 0.0, 0
     for peak in range(begin, end):
         winner = peak if m[peak + HEIGHT] > best else winner
@@ -245,7 +249,8 @@ def true_maxima(
     max_abs_d2psi: Array | None,
     max_abs_d3psi: Array | None,
 ) -> None:
-    """Largest magnitude of one transfer function over the whole turn, where it is, and an estimate of its error.
+    """Compute the largest magnitude of one transfer function over the whole turn, where it is,
+    and an estimate of its error.
 
     Parameters
     ----------

@@ -42,7 +42,8 @@ def poses(
     pressure_angle: Numbers | None,
     joints: Joints | None,
 ) -> None:
-    """Position, transfer functions, discriminant, pressure angle and joints of every design at its crank angles.
+    """Compute the position, transfer functions, discriminant,
+    pressure angle and joints of every design at its crank angles.
 
     Equations (2*), (3)-(5) and (13) of docs/rssr.md; joints in the fixed frame of its section 1.
 

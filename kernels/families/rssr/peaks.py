@@ -36,7 +36,7 @@ _LEVEL = 1e-10  # a fall by less than this share of the height counts as none
 
 @inline
 def new_list() -> Array:
-    """Room for the maxima of a block."""
+    """Return room for the maxima of a block."""
     return np.empty(_ROWS * CAPACITY)
 
 
@@ -54,7 +54,7 @@ def append(
 
 @inline
 def _jet(m: Array, i: int, first: Array | None, second: Array | None) -> tuple[float, float, float]:
-    """The wanted transfer function and its next two derivatives at a maximum of the list."""
+    """Return the wanted transfer function and its next two derivatives at a maximum of the list."""
     e, y0, ca, k0, k1, k2 = m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2]
     u, v = m[i + _U], m[i + _V]
     p, q, j, k = follower(e, y0, ca, k0, k1, k2, u, v)
@@ -84,7 +84,7 @@ def begin_at_vertex(count: int, m: Array) -> None:
 
 @inline
 def refine(begin: int, end: int, m: Array, rounds: int, first: Array | None, second: Array | None) -> None:
-    """Newton steps to the zero of the next derivative, uphill where it is not concave; all maxima side by side."""
+    """Take Newton steps to the zero of the next derivative, uphill where it is not concave; all maxima side by side."""
     for _ in range(rounds):
         for i in range(begin, end):
             y, dy, d2y = _jet(m, i, first, second)
@@ -102,7 +102,9 @@ def refine(begin: int, end: int, m: Array, rounds: int, first: Array | None, sec
 def finish(
     begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None
 ) -> None:
-    """Peak of the parabola through the last point, what it adds as an error estimate, and the rounding error."""
+    """Compute the peak of the parabola through the last point, what it adds as an error estimate,
+    and the rounding error.
+    """
     for i in range(begin, end):
         y, dy, d2y = _jet(m, i, first, second)
         step = -dy / d2y
@@ -142,7 +144,9 @@ def finish(
 def settle(
     begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None
 ) -> float:
-    """More steps for the maxima not trusted yet; the largest error estimate of all, infinite if one still is not."""
+    """Take more steps for the maxima not trusted yet;
+    return the largest error estimate of all, infinite if one still is not.
+    """
     worst = 0.0
     for i in range(begin, end):
         if not m[i + ERROR] < math.inf:

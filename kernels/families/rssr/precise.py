@@ -35,7 +35,7 @@ def _put(at: Array, column: int, k: int, x: Twofold) -> None:
 
 @inline
 def _reduce(at: Array, k: int) -> None:
-    """The constants of one design of the block in place of its parameters, which are the first eight rows."""
+    """Compute the constants of one design of the block in place of its parameters, which are the first eight rows."""
     a, b, c, e = at[k], at[_ROW + k], at[2 * _ROW + k], at[3 * _ROW + k]
     f, g, alpha, branch = at[4 * _ROW + k], at[5 * _ROW + k], at[6 * _ROW + k], at[7 * _ROW + k]
     r = reduce_scaled(a, b, c, e, f, g, alpha, branch)
@@ -66,7 +66,7 @@ def _reduce(at: Array, k: int) -> None:
 
 @kernel
 def precise_constants(designs: Array, out: Array) -> None:
-    """The numbers of :class:`Reduced` in twice the working precision.
+    """Compute the numbers of :class:`Reduced` in twice the working precision.
 
     Parameters
     ----------
@@ -109,7 +109,8 @@ def precise_poses(
     pressure_angle: Array | None,
     joints: Joints | None,
 ) -> None:
-    """As :func:`kernels.families.rssr.motion.poses`, for float64 designs only, correct to a few roundings.
+    """Compute what :func:`kernels.families.rssr.motion.poses` does, correct to a few roundings,
+    for float64 designs only.
 
     Parameters
     ----------

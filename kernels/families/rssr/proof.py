@@ -33,7 +33,7 @@ class Leaves(NamedTuple):
 def _record(
     leaves: Leaves, count: int, low: Array, high: Array, outcome: int, bound: float, rows: Rows, used: int
 ) -> int:
-    """One more leaf, with the rows that prove it."""
+    """Return one more leaf, with the rows that prove it."""
     leaves.low[count], leaves.high[count] = low, high
     leaves.outcome[count], leaves.bound[count] = outcome, bound
     leaves.kinds[count], leaves.theta[count], leaves.factors[count] = -1, 0.0, 0.0
@@ -48,7 +48,7 @@ def _record(
 
 @inline
 def _to_halve(low: Array, high: Array, whole: Array, smallest: float, loose: Array) -> int:
-    """The variable whose width costs the bound most, of those that are not too narrow; -1 where all are.
+    """Return the variable whose width costs the bound most, of those that are not too narrow; -1 where all are.
 
     Where nothing is known of the costs it is the one of the widest share.
     """

@@ -22,7 +22,7 @@ Singles: TypeAlias = NDArray[np.float32]
 
 @kernel_fused
 def dense_acceleration_single(designs: Array, cos_phi: Singles, sin_phi: Singles, max_abs_d2psi: Singles) -> None:
-    """Largest |psi''| over a grid of crank angles, in float32.
+    """Compute the largest |psi''| over a grid of crank angles, in float32.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from kernels.families.slotted.closure import Numbers, Status
 
 @kernel
 def crank_of_phi0(phi0: Numbers, e: Numbers, f: Numbers, alpha: Numbers, status: Status, a: Numbers) -> None:
-    """Crank length a = cos(phi0/2) hypot(e, f tan(alpha)) of the fork slot with s = 0.
+    """Compute the crank length a = cos(phi0/2) hypot(e, f tan(alpha)) of the fork slot with s = 0.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from kernels.vectors import Vector, add, dot, mix, turned
 
 @inline
 def _second_crank(r: Reduced, u: float, v: float) -> Path:
-    """Ball of crank 2 from the common point Os of both axes, (2)."""
+    """Return the ball of crank 2 from the common point Os of both axes, (2)."""
     u2, v2 = u * r.cos_offset - v * r.sin_offset, v * r.cos_offset + u * r.sin_offset
     radial = mix(r.a2 * u2, r.first, r.a2 * v2, r.second)
     tangential = mix(-r.a2 * v2, r.first, r.a2 * u2, r.second)
@@ -27,13 +27,13 @@ def _second_crank(r: Reduced, u: float, v: float) -> Path:
 
 @inline
 def _in_triad(r: Reduced, a: Vector, lift: float) -> Vector:
-    """Components in the triad of the looper's axis, from a height along it."""
+    """Return components in the triad of the looper's axis, from a height along it."""
     return dot(a, r.radial), dot(a, r.across), dot(a, r.axis) - lift
 
 
 @inline
 def _seen_from_carrier(r: Reduced, carrier: Swung, path: Path) -> Path:
-    """The driving ball in the looper's frame, which the carrier takes along, (3)."""
+    """Return the driving ball in the looper's frame, which the carrier takes along, (3)."""
     # turned back by the carrier's angle: minus the sine and minus all derivatives
     m, m1, m2, m3 = rotated(carrier.cos, -carrier.sin, -carrier.first, -carrier.second, -carrier.third, path)
     return _in_triad(r, m, r.along), _in_triad(r, m1, 0.0), _in_triad(r, m2, 0.0), _in_triad(r, m3, 0.0)
@@ -41,7 +41,7 @@ def _seen_from_carrier(r: Reduced, carrier: Swung, path: Path) -> Path:
 
 @inline
 def _carried(r: Reduced, carrier: Swung, looper: Swung, fixed: Vector) -> Path:
-    """A point fixed to the looper, from Os in fixed axes, with its derivatives, (5)."""
+    """Return a point fixed to the looper, from Os in fixed axes, with its derivatives, (5)."""
     none = (0.0 * fixed[0], 0.0 * fixed[0], 0.0 * fixed[0])
     # the point rests in the looper: its derivatives there are zeros of the design's own type
     path = (fixed, none, none, none)
@@ -72,7 +72,7 @@ def poses(
     magnitudes: Numbers | None,
     joints: Numbers | None,
 ) -> None:
-    """Carrier, looper and working point with derivatives, of every design at its crank angles.
+    """Compute the carrier, looper and working point with derivatives, of every design at its crank angles.
 
     Equations (1)-(6) of docs/spherical_looper.md.
 

@@ -25,7 +25,8 @@ def poses(
     jerk: Numbers | None,
     joints: Numbers | None,
 ) -> None:
-    """Rod between crank pin and block, and the working point, with derivatives, of every design and crank angle.
+    """Compute the rod between crank pin and block, and the working point, with derivatives,
+    of every design and crank angle.
 
     Equations (1)-(4) of docs/swivel.md.
 

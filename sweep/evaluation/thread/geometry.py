@@ -105,7 +105,8 @@ def wrap(table: Table) -> pd.DataFrame:
 
 
 def feed(table: Table) -> pd.DataFrame:
-    """Length of the thread over a point of any link, and its derivatives from those of the point; (2) to (4).
+    """Return the length of the thread over a point of any link, and its derivatives from those of the point;
+    (2) to (4).
 
     Parameters
     ----------
@@ -138,7 +139,8 @@ def feed(table: Table) -> pd.DataFrame:
 
 
 def eyelet(table: Table) -> pd.DataFrame:
-    """Eyelet on a crank against a wanted P: motion, thread, weighted difference (27) of the source; (5) to (8).
+    """Return the eyelet on a crank against a wanted P: motion, thread, weighted difference (27) of the source;
+    (5) to (8).
 
     Parameters
     ----------
@@ -177,7 +179,8 @@ def eyelet(table: Table) -> pd.DataFrame:
 
 
 def follower(table: Table) -> pd.DataFrame:
-    """Follower of a guided cam from the length of the thread, and the pressure angle at which it jams; (10) to (14).
+    """Return the follower of a guided cam from the length of the thread, and the pressure angle at which it jams;
+    (10) to (14).
 
     Parameters
     ----------
@@ -208,7 +211,8 @@ def follower(table: Table) -> pd.DataFrame:
 
 
 def free_cam(table: Table) -> pd.DataFrame:
-    """Thread over the bare edge of a turning cam: where it lies without friction, and between which points it sticks.
+    """Return the thread over the bare edge of a turning cam:
+    where it lies without friction, and between which points it sticks.
 
     Equations (18) to (25).
 

@@ -35,20 +35,20 @@ class Sheet:
 
 
 def columns_of(sheet: Parametrised, table: Table) -> dict[str, Array]:
-    """The checked columns by name, each (n,) and contiguous; a header such as ``wrap [deg]`` says its unit."""
+    """Return the checked columns by name, each (n,) and contiguous; a header such as ``wrap [deg]`` says its unit."""
     matrix, _ = design_matrix(sheet, in_radians(sheet, table))
     return {name: np.ascontiguousarray(matrix[:, k]) for k, name in enumerate(sheet.parameter_names)}
 
 
 def side_by_side(columns: Mapping[str, Array], names: tuple[str, ...]) -> Array:
-    """Some columns as a matrix (n, len(names))."""
+    """Return some columns as a matrix (n, len(names))."""
     return np.ascontiguousarray(np.column_stack([columns[name] for name in names]))
 
 
 def frame(
     table: Table, columns: Mapping[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]], units: Mapping[str, str]
 ) -> pd.DataFrame:
-    """A DataFrame of columns (n,) or (n, 1) with the index of the table it answers.
+    """Return a DataFrame of columns (n,) or (n, 1) with the index of the table it answers.
 
     A key of ``units`` is a unit, its value the columns that have it, separated by blanks.
     """

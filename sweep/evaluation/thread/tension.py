@@ -52,7 +52,7 @@ _CAPSTAN = Sheet(
 
 
 def contour(table: Table) -> pd.DataFrame:
-    """Tension of a thread behind one contour, with the parts of it; equations (1) to (3).
+    """Return the tension of a thread behind one contour, with the parts of it; equations (1) to (3).
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def contour(table: Table) -> pd.DataFrame:
 
 
 def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> pd.DataFrame:
-    """Tension along a thread that passes several contours in sequence, at one pose or at many.
+    """Return the tension along a thread that passes several contours in sequence, at one pose or at many.
 
     The tension behind one contour is the tension in front of the next.
 
@@ -149,7 +149,8 @@ def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> 
 
 
 def least_tension_radius(table: Table) -> pd.DataFrame:
-    """Radius of the contour behind which the tension is least, whatever the wrap angle and the tension; (4).
+    """Return the radius of the contour behind which the tension is least,
+    whatever the wrap angle and the tension; (4).
 
     Parameters
     ----------
@@ -181,7 +182,8 @@ def least_tension_radius(table: Table) -> pd.DataFrame:
 
 
 def speed(table: Table) -> pd.DataFrame:
-    """Tension behind the disc tensioner over its value at the reference speed, for a speed of the thread; (7).
+    """Return the tension behind the disc tensioner over its value at the reference speed,
+    for a speed of the thread; (7).
 
     Parameters
     ----------
@@ -218,7 +220,7 @@ def speed(table: Table) -> pd.DataFrame:
 
 
 def capstan(table: Table) -> pd.DataFrame:
-    """Tension behind an eyelet by Euler's law, and the force of the thread on the eyelet; (5), (6).
+    """Return the tension behind an eyelet by Euler's law, and the force of the thread on the eyelet; (5), (6).
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ def check(reading: Reading) -> None:
 
 
 def accuracy_table(accuracy: Accuracy) -> dict[str, Any]:
-    """[accuracy] as a study file has it."""
+    """Return [accuracy] as a study file has it."""
     table = {
         "target": accuracy.target,
         "samples": accuracy.samples,

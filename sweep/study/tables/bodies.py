@@ -65,13 +65,15 @@ def check(reading: Reading) -> None:
 
 
 def home(family: Family, name: str) -> str:
-    """The table that an input of an effect belongs to; the crank's speed is given in [scene] or swept in [design]."""
+    """Return the table that an input of an effect belongs to;
+    the crank's speed is given in [scene] or swept in [design].
+    """
     plain = plain_name(family, name)
     return "loads" if plain in LOADS else "design" if plain in OF_SCENE else "bodies"
 
 
 def plain_name(family: Family, name: str) -> str:
-    """The name of an effect's input without member and stage."""
+    """Return the name of an effect's input without member and stage."""
     if isinstance(family, Machine):
         member, own = family.split(name) or (None, name)
         return plain_name(member.family, own) if member is not None else name

@@ -43,7 +43,9 @@ def check(reading: Reading) -> None:
 
 
 def _tables(reading: Reading) -> dict[str, str]:
-    """Where inputs of effects stand, or should stand; a name that is left out belongs to [design]."""
+    """Return the tables in which inputs of effects stand, or should stand;
+    a name that is left out belongs to [design].
+    """
     bare, full, found = reading.mechanism, reading.family, reading.get(Besides).tables
     added = [name for name in full.parameter_names if name not in bare.parameter_names]
     homes = {name: home(bare, name) for name in added}

@@ -14,7 +14,7 @@ def read(reading: Reading) -> None:
 
 
 def check(reading: Reading) -> None:
-    """The limits: those of prescribed outputs, then those of the table."""
+    """Check the limits: those of prescribed outputs, then those of the table."""
     bounds, prescribed = reading.raw.get("limits", {}), reading.get(Prescribed).entries
     for name in [name for name in bounds if name in prescribed]:
         reading.faults.value(("limits", name), bounds[name], "nothing here: [locus] prescribes it")

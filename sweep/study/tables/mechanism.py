@@ -38,7 +38,7 @@ def read(reading: Reading) -> None:
 
 
 def demand(reading: Reading) -> None:
-    """End here where there is no mechanism: nothing else can be checked."""
+    """Raise an error where there is no mechanism: nothing else can be checked."""
     if reading.bare is None:
         raise StudyError(str(reading.path), reading.faults.lines)
 
@@ -55,7 +55,7 @@ def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults
 
 
 def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> Family | None:
-    """The mechanism, or None with a fault for each unknown name, or for a chain that cannot be.
+    """Return the mechanism, or None with a fault for each unknown name, or for a chain that cannot be.
 
     A misspelt family is a fault, but the rest is checked against the nearest one, so that no second round is needed.
     """

@@ -17,7 +17,7 @@ def read(reading: Reading) -> None:
 
 
 def read_values(reading: Reading) -> None:
-    """Time budget and share of unseen basins; with them the settings."""
+    """Read the time budget and the share of unseen basins; with them make the settings."""
     search = reading.get(OptimiseSection)
     settings = OptimiseSettings(
         starts=search.starts,

@@ -19,7 +19,7 @@ def read_budget(reading: Reading) -> None:
 
 
 def read_amounts(reading: Reading) -> None:
-    """Disk and time of [budget]."""
+    """Read disk and time of [budget]."""
     budget = reading.get(BudgetSection)
     disk = reading.quantity(budget.disk, "B", ("budget", "disk"))
     seconds = reading.quantity(budget.time, "s", ("budget", "time"))

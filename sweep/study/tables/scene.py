@@ -30,7 +30,7 @@ def read(reading: Reading) -> None:
 
 
 def read_values(reading: Reading) -> None:
-    """Speed and window."""
+    """Read speed and window."""
     scene = reading.get(SceneSection)
     reading.fields["speed"] = reading.quantity(scene.speed, "rad/s", ("scene", "speed"))
     reading.fields["window"] = _window(scene, reading.faults)
@@ -59,7 +59,9 @@ def extend(reading: Reading) -> None:
 
 
 def collect(reading: Reading) -> None:
-    """All design outputs that are computed: wanted, prescribed, limited, to be made small, or set against that."""
+    """Collect all design outputs that are computed:
+    wanted, prescribed, limited, to be made small, or set against that.
+    """
     wanted = [*expanded(reading.mechanism, reading.get(SceneSection).want), *reading.get(Prescribed).entries]
     wanted += [limit.output for limit in reading.fields["limits"]]
     goal, front = _goal(reading), reading.fields["pareto"]
@@ -70,7 +72,9 @@ def collect(reading: Reading) -> None:
 
 
 def speeds(family: Family, speed: float) -> dict[str, float]:
-    """What scene.speed gives where an effect asks for the speed of a crank: a member turns ratio times as fast."""
+    """Return what scene.speed gives where an effect asks for the speed of a crank:
+    a member turns ratio times as fast.
+    """
     if isinstance(family, Machine):
         ratios = {m.name: abs(m.ratio) for m in family.members}
         return {p: speed * ratios[parts(p).member] for p in family.parameter_names if parts(p).stem == "speed"}

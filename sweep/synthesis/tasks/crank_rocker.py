@@ -21,7 +21,7 @@ _EXACT = Accuracy(target=1e-10)
 
 @lru_cache(maxsize=8)
 def turn(poses: int = POSES) -> Angles:
-    """Equidistant crank angles of one turn, (1, poses)."""
+    """Return the equidistant crank angles of one turn, (1, poses)."""
     phi: Array = np.arange(poses, dtype=np.float64)[None, :] * (2.0 * np.pi / poses)
     return Angles.of(phi)
 
@@ -29,7 +29,9 @@ def turn(poses: int = POSES) -> Angles:
 def designs_on_locus(
     swing: Array, phi0: Array, phi1: Array, e: Array, f: Array, g: Array, alpha: Array
 ) -> tuple[Array, Array]:
-    """Design matrix (n, 8) and rocker angle psi1 (n,) of the extended position; nan where a test (i)-(iii) fails."""
+    """Return the design matrix (n, 8) and rocker angle psi1 (n,) of the extended position;
+    nan where a test (i)-(iii) fails.
+    """
     columns = np.broadcast_arrays(swing, phi0, phi1, e, f, g, alpha)
     requirements = np.column_stack(columns).astype(np.float64)
     n = len(requirements)
@@ -49,7 +51,7 @@ class LocusPoint:
 
     @classmethod
     def of(cls, swing: Array, phi0: Array, phi1: Array, e: float, g: float | Array, alpha: float | Array) -> LocusPoint:
-        """The points at crank angles phi1."""
+        """Return the points at crank angles phi1."""
         columns = np.broadcast_arrays(swing, phi0, phi1, e, 0.0, g, alpha)
         requirements = np.column_stack(columns).astype(np.float64)
         points = np.empty((len(requirements), 4))
@@ -57,18 +59,18 @@ class LocusPoint:
         return cls(*points.T)
 
     def turned(self, angle: Array) -> tuple[Array, Array]:
-        """X, Y after the rocker has turned by the angle."""
+        """Return X, Y after the rocker has turned by the angle."""
         c, s = np.cos(angle), np.sin(angle)
         return self.x * c - self.y * s, self.x * s + self.y * c
 
 
 def motion(designs: Array, angles: Angles, *wanted: str) -> Columns:
-    """Pose outputs of crank-rockers, nan where there is no mechanism."""
+    """Return pose outputs of crank-rockers, nan where there is no mechanism."""
     return RSSR.poses(designs, angles, frozenset(wanted))
 
 
 def least_cos2(designs: Array) -> Array:
-    """Smallest cos^2 of the pressure angle over the turn, exact; nan where there is no mechanism."""
+    """Return the smallest cos^2 of the pressure angle over the turn, exact; nan where there is no mechanism."""
     whole = np.full(len(designs), np.nan)
     alive = np.isfinite(designs).all(axis=1)
     found = design_outputs(RSSR, designs[alive], ["margin"], _EXACT)
@@ -77,13 +79,13 @@ def least_cos2(designs: Array) -> Array:
 
 
 def pressure_limit(designs: Array, largest: float) -> Array:
-    """Slack of the limit on the pressure angle, cos^2 - cos^2[largest]; pi/2 asks for a full turn only."""
+    """Return the slack of the limit on the pressure angle, cos^2 - cos^2[largest]; pi/2 asks for a full turn only."""
     slack: Array = least_cos2(designs) - np.cos(largest) ** 2
     return slack
 
 
 def named(designs: Array, suffix: str = "") -> dict[str, Array]:
-    """The design matrix as columns."""
+    """Return the design matrix as columns."""
     return {f"{name}{suffix}": column for name, column in zip(RSSR.parameter_names, designs.T, strict=True)}
 
 
@@ -91,7 +93,7 @@ Bounds = Mapping[str, tuple[float, float]]
 
 
 def size_limits(columns: Mapping[str, Array], bounds: Bounds) -> list[Array]:
-    """Slacks of the bounds on lengths, lower then upper each, in units of the range.
+    """Return slacks of the bounds on lengths, lower then upper each, in units of the range.
 
     Raises
     ------
@@ -107,5 +109,5 @@ def size_limits(columns: Mapping[str, Array], bounds: Bounds) -> list[Array]:
 
 
 def size_names(bounds: Bounds) -> tuple[str, ...]:
-    """Names of the limits of `size_limits`."""
+    """Return names of the limits of `size_limits`."""
     return tuple(f"{name} {side}" for name in bounds for side in ("not below", "not above"))

@@ -25,7 +25,7 @@ from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 @dataclass(frozen=True)
 class EngineeringMethod:
-    """Given swing, phi0, e, g, alpha; to be found: the place phi1 on the locus and the offset f of the crank plane.
+    """Swing, phi0, e, g, alpha are given; the place phi1 on the locus and the offset f of the crank plane are unknown.
 
     Parameters
     ----------

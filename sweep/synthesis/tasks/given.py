@@ -57,7 +57,7 @@ RULES: dict[str, Rule] = {
 
 
 def check_given(task: DataclassInstance) -> None:
-    """Every field of a task that is given and has a rule; None is "not given".
+    """Check every field of a task that is given and has a rule; None is "not given".
 
     Raises
     ------

@@ -38,17 +38,17 @@ class _Scaled:
         self.periodic = np.array([u.periodic for u in problem.unknowns])
 
     def real(self, z: Array) -> Array:
-        """Unknowns of points of the unit box."""
+        """Return unknowns of points of the unit box."""
         x: Array = self.low + self.span * np.where(self.periodic, z % 1.0, z)
         return x
 
     def rows(self, z: Array) -> _Value:
-        """Values of points (n, k)."""
+        """Return values of points (n, k)."""
         found = self.problem.evaluate(self.real(np.atleast_2d(z)))
         return _Value(found.equations, found.limits, found.curve)
 
     def with_gradient(self, z: Array) -> tuple[_Value, _Value]:
-        """Values at z and their derivatives, (k, ...) each; one-sided where a neighbour has no mechanism."""
+        """Return values at z and their derivatives, (k, ...) each; one-sided where a neighbour has no mechanism."""
         k = z.size
         steps = STEP * np.eye(k)
         both = self.rows(np.vstack([z[None, :], z + steps, z - steps]))
@@ -64,7 +64,7 @@ class _Scaled:
 
 
 def solve(problem: Problem, *, candidates: int = 4096, starts: int = 6, seed: int = 0) -> list[Solution]:
-    """Mechanisms that do a task, the best first.
+    """Return mechanisms that do a task, the best first.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def _refined(scaled: _Scaled, z: Array) -> Array:
 
 
 def _restored(scaled: _Scaled, z: Array) -> Array:
-    """Equations and violated limits brought to zero: least squares, then Gauss-Newton steps of least length."""
+    """Bring equations and violated limits to zero: by least squares, then by Gauss-Newton steps of least length."""
     from scipy.optimize import least_squares
 
     if _violation(scaled.rows(z))[0] <= 0.0:
@@ -198,7 +198,7 @@ def _restored(scaled: _Scaled, z: Array) -> Array:
 
 
 def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], radius: float) -> Array:
-    """SLSQP on the epigraph: t and the unknowns, t bounding the ``used`` poses, at most ``radius`` away."""
+    """Run SLSQP on the epigraph: t and the unknowns, t bounding the ``used`` poses, at most ``radius`` away."""
     from scipy.optimize import minimize
 
     if not top > 0.0:

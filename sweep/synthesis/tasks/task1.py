@@ -17,7 +17,7 @@ from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 @dataclass(frozen=True)
 class Task1:
-    """To be found: phi1 and f.  The first position gives f, it is linear in it; a second one is an equation for phi1.
+    """The unknowns are phi1 and f.  The first position gives f, in which it is linear, a second an equation for phi1.
 
     Parameters
     ----------

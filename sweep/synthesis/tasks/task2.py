@@ -17,7 +17,7 @@ from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 @dataclass(frozen=True)
 class Task2:
-    """To be found: swing, phi0, phi1 and f; closure at the two positions and at both limits are the equations.
+    """The unknowns are swing, phi0, phi1 and f; closure at the two positions and at both limits are the equations.
 
     The limits hold by the locus, the first position by f, the second one is left as an equation; the two degrees of
     freedom that remain, four with g and alpha, go to the objective.  Only ratios of lengths matter: e sets the scale.

@@ -48,7 +48,7 @@ class Setting(NamedTuple):
 
 @dataclass(frozen=True)
 class Task3:
-    """To be found: phi1, f, and for every further setting the value of the one dimension that differs.
+    """The unknowns are phi1, f, and for every further setting the value of the one dimension that differs.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class Task3:
 
 
 def _missed(designs: Array, setting: Setting) -> list[Array]:
-    """By how much designs miss what a setting asks for; nan where there is no mechanism."""
+    """Return by how much designs miss what a setting asks for; nan where there is no mechanism."""
     alive = np.flatnonzero(np.isfinite(designs).all(axis=1))
     found = design_outputs(RSSR, designs[alive], list(setting.asked), _EXACT)
     missed = []
@@ -156,7 +156,8 @@ def _missed(designs: Array, setting: Setting) -> list[Array]:
 
 
 def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
-    """Which dimension of a crank-rocker adjusts what: derivatives of swing and phi0, by implicit differentiation.
+    """Return which dimension of a crank-rocker adjusts what:
+    derivatives of swing and phi0, by implicit differentiation.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from sweep.synthesis.tasks.engineering import EngineeringMethod
 
 @dataclass(frozen=True)
 class Task4(EngineeringMethod):
-    """The engineering method in the plane: alpha = 0, f = g; to be found is phi1 alone.
+    """The engineering method in the plane: alpha = 0, f = g; the only unknown is phi1.
 
     Give swing, phi0 and the frame e; the objective "pressure_angle" is the classical question for the best
     transmission, "acceleration" that for the smoothest motion.

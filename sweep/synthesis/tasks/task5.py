@@ -40,7 +40,8 @@ class Slot(NamedTuple):
 
 
 def slot(a2: Array, e2: Array, t: Array) -> Slot:
-    """The planar slotted link: pin at radius a2 on the rocker, pivot at distance e2, t the angle between them.
+    """Return the planar slotted link: pin at radius a2 on the rocker, pivot at distance e2,
+    t the angle between them.
 
     Equation (17) of docs/tasks.md, which is the fork slot of docs/slotted.md.  ``a2``, ``e2`` : (n,), their signs are
     equal and without effect; ``t`` : (n, m).
@@ -55,7 +56,7 @@ def slot(a2: Array, e2: Array, t: Array) -> Slot:
 
 @dataclass(frozen=True)
 class Task5:
-    """To be found: phi1 and f of stage 1, the angle t1 and the ratio e2/a2 of the slotted link; a2 follows from rho0.
+    """The unknowns are phi1 and f of stage 1, angle t1 and ratio e2/a2 of the slotted link; a2 follows from rho0.
 
     Parameters
     ----------

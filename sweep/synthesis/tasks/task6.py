@@ -20,7 +20,7 @@ GUIDE = family("guide")
 
 @dataclass(frozen=True)
 class Task6:
-    """To be found: shape and placing of a guiding four-bar whose coupler point goes from J1 to J2 along given tangents.
+    """The unknowns are shape and place of a guiding four-bar whose coupler point goes from J1 to J2 on given tangents.
 
     Size, direction and place of the four-bar follow from J1 and J2 (they are similarity transformations), so the
     unknowns are its proportions and the crank angle at J1; the two tangents are the equations.

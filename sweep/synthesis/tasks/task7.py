@@ -21,7 +21,7 @@ RSSP = family("rssp")
 
 @dataclass(frozen=True)
 class Task7:
-    """To be found: a2, b2, e2 and the angle of the second crank; stroke and both accelerations are the equations.
+    """The unknowns are a2, b2, e2 and the angle of the second crank; stroke and both accelerations are the equations.
 
     At a limit of stage 1 its velocity vanishes, so the output's acceleration there is psi'' S', and S' = w/psi''.
 

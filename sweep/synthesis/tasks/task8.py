@@ -31,7 +31,7 @@ WINDOW = 33  # poses of the dwell; the deviation is largest at its ends, but thi
 
 @dataclass(frozen=True)
 class Task8:
-    """To be found: phi1 and f of the crank-rocker, proportions of the slider-crank; its size follows from the stroke.
+    """The unknowns are phi1 and f of the crank-rocker, proportions of the slider-crank; its size is that of the stroke.
 
     Both stages stand in a limit position at the same time, the first in its extended one: velocity, acceleration and
     jerk vanish there, and the slider moves by psi''^2 S'' dphi^4/8 to leading order.
@@ -131,7 +131,7 @@ class Task8:
         return Candidates(np.empty((n, 0)), limits, np.asarray(motion["d2s"], np.float64), results)
 
     def _deviation(self, designs: Array, phi1: Array, psi1: Array, theta: Array, lengths: Array) -> Array:
-        """Largest distance from the dwell position during the dwell."""
+        """Return the largest distance from the dwell position during the dwell."""
         window = np.linspace(-0.5 * self.dwell, 0.5 * self.dwell, WINDOW)
         law = RSSR.poses(designs, Angles.of(phi1[:, None] + window), frozenset(("psi",)))
         turned = np.asarray(law["psi"], np.float64) - psi1[:, None]

@@ -1,0 +1,85 @@
+"""How motion, and its rounding errors, pass from one stage to the next; equation numbers of docs/chain.md."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from kernels._jit import inline
+from kernels.series.form import STRIDE, Turned
+from kernels.sincos import sincos
+
+NUMBERS = 3  # of a link
+
+
+class Link(NamedTuple):
+    """Coupling of a stage to the one before it: sense, cosine and sine of the angle between the two links."""
+
+    kappa: Any
+    cos: Any
+    sin: Any
+
+
+class Input(NamedTuple):
+    """Input angle of a stage: cosine, sine, derivatives by the crank angle of the chain."""
+
+    u: Any
+    v: Any
+    t1: Any
+    t2: Any
+    t3: Any
+    t4: Any
+
+
+@inline
+def link_of(designs: Any, i: int, column: int) -> Link:
+    """The coupling whose kappa and offset stand in this column and the next; kappa is nan if one of them is refused."""
+    kappa, offset = designs[i, column], designs[i, column + 1]
+    sine, cosine = sincos(offset)
+    return Link(kappa if (kappa * kappa == 1.0) & (abs(offset) < 1e5) else math.nan, cosine, sine)
+
+
+@inline
+def put_link(at: Any, place: int, link: Link) -> None:
+    """Write a link into rows of `STRIDE` numbers."""
+    at[place], at[place + STRIDE], at[place + 2 * STRIDE] = link.kappa, link.cos, link.sin
+
+
+@inline
+def get_link(at: Any, place: int) -> Link:
+    """Read what :func:`put_link` wrote."""
+    return Link(at[place], at[place + STRIDE], at[place + 2 * STRIDE])
+
+
+@inline
+def enter(link: Link, m: Turned) -> Input:
+    """The input angle of the next stage from the output angle of this one; (1)."""
+    k = link.kappa
+    s = k * m.sin
+    u, v = m.cos * link.cos - s * link.sin, s * link.cos + m.cos * link.sin
+    return Input(u, v, k * m.d1, k * m.d2, k * m.d3, k * m.d4)
+
+
+@inline
+def through(t: Input, y1: Any, y2: Any, y3: Any, y4: Any) -> tuple[Any, Any, Any, Any]:
+    """Derivatives by the crank angle of the chain from those by the input angle of a stage; (22) to order four."""
+    t1, t2, square = t.t1, t.t2, t.t1 * t.t1
+    second = t2 * y1 + square * y2
+    third = t.t3 * y1 + t1 * (3.0 * t2 * y2 + square * y3)
+    fourth = t.t4 * y1 + (4.0 * t1 * t.t3 + 3.0 * t2 * t2) * y2 + square * (6.0 * t2 * y3 + square * y4)
+    return t1 * y1, second, third, fourth
+
+
+@inline
+def blurred_through(
+    t: Input, b0: Any, b1: Any, b2: Any, y1: Any, y2: Any, y3: Any, e0: Any, e1: Any, e2: Any
+) -> tuple[Any, Any, Any]:
+    """Errors of a function of the input angle and its first two derivatives, to first order.
+
+    ``b0``, ``b1``, ``b2`` are the errors of the input angle and its derivatives, ``e0``, ``e1``, ``e2`` those of the
+    function and its derivatives y1, y2, y3 by the input angle at an exact one.
+    """
+    square = t.t1 * t.t1
+    first = abs(t.t1) * e1 + abs(y1) * b1 + abs(t.t1 * y2) * b0
+    second = abs(t.t2) * e1 + square * e2 + abs(y1) * b2 + 2.0 * abs(t.t1 * y2) * b1
+    return e0 + abs(y1) * b0, first, second + b0 * (abs(t.t2 * y2) + square * abs(y3))

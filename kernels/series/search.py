@@ -1,0 +1,205 @@
+"""True extrema of a chain over the turn, refined between samples: the generated kernel (docs/extrema.md).
+
+Per design: samples that resolve the curve (`kernels.series.look`); every local maximum of at least 60 % of the best is
+refined, vectorised over the maxima of a block of designs (`kernels.series.peaks`).  What is not trusted, or what
+rounding may have changed by more than 2^-14 of the target, is left to precise poses.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels._jit import generated, inline
+from kernels.reduce import largest
+from kernels.series.chain import Chained
+from kernels.series.curves import MARGIN, Curve, curve
+from kernels.series.form import STRIDE, Helper
+from kernels.series.look import FEWEST, GUARD_ROW, MOST, OPEN, PER_SINGULARITY, TURN, looker
+from kernels.series.peaks import (
+    BLOCK,
+    CAPACITY,
+    CONSTANTS,
+    ERROR,
+    HEIGHT,
+    LAST,
+    MOST_PEAKS,
+    MOVED,
+    REACH,
+    ROUNDING,
+    SCALE,
+    START,
+    WIDTH,
+    A,
+    B,
+    C,
+    append,
+    begin_at_vertex,
+    finisher,
+    refiner,
+)
+
+Array: TypeAlias = NDArray[np.float64]
+Status: TypeAlias = NDArray[np.uint8]
+
+SHARE = 0.6  # a peak below this share of the best sample is not refined
+PLAIN = 2.0**-14  # of the target: larger rounding errors are left to precise poses
+RIVALS = 1e-3  # of the scale: peaks lower by no more may turn out the highest where rounding has moved them
+SETTLING = 8  # more steps for a maximum that is not trusted after the usual ones
+MORE = 4  # times as many samples for a design of which a maximum is not trusted even so
+ROUNDED, UNTRUSTED = 254, 253  # instead of a status; the first see `find_extrema`
+VALUE, PHI, VALUE_ERROR, PHI_ERROR, SCALE_ROW, SPACING = range(6)
+CHUNK = 8  # samples whose peaks are looked for together
+
+
+@lru_cache(maxsize=64)
+def find_extrema(chain: Chained, order: int) -> Helper:
+    """The kernel ``find(designs, opening, distance, cos, sin, made_of, mode, target, status, found)`` of a chain.
+
+    It finds one extremum over the turn of a curve of `kernels.series.curves`, of that order or the `MARGIN`.
+
+    Its arguments: designs (n, P); opening (n,), OK where the first stage turns, NOT_ROTATABLE where it does not;
+    distance (n,) [rad] of its nearest singularity from the real axis; `sampling_tables`; made_of (n, 3), the numbers a,
+    b, c of the curve; mode: 0 for the largest magnitude, +1 for the largest value, -1 for the least; target: relative
+    error wanted, of the magnitude or of the curve's range.  Then out: status (n,), and found (6, n) with the rows
+    VALUE; PHI, its crank angle in [0, 2 pi); estimates of the errors of both; SCALE, what the target is relative to;
+    SPACING of the samples [rad].
+
+    The status is OK; ROUNDED, where rounding may have moved a single highest peak by more than its share of the target;
+    NOT_ROTATABLE, where a stage does not reach; OPEN, where nothing is decided.  With the last two the others are nan.
+    """
+    of = curve(chain, order)
+    get, rows = chain.record.get, CONSTANTS + chain.record.numbers * STRIDE
+    guards_size, allowed = max(of.guarded, 1) * GUARD_ROW, 1.0 if order == MARGIN else PLAIN
+    enlist, refine, finish = _enlister(chain, of), refiner(of, get), finisher(of, get)
+
+    def find(
+        designs: Array, opening: Status, distance: Array, cos: Array, sin: Array, made_of: Array, mode: int,
+        target: float, status: Status, found: Array,
+    ) -> None:  # fmt: skip
+        m, values, guards = np.zeros(rows), np.empty(MOST + 4), np.empty(guards_size)
+        first = np.empty(BLOCK + 1, np.int64)
+        rounds = 2 if target > 1e-4 else 3
+        for start in range(0, designs.shape[0], BLOCK):
+            number, count = min(BLOCK, designs.shape[0] - start), 0
+            for k in range(number):
+                i = start + k
+                first[k] = count
+                status[i] = st.NOT_ROTATABLE if opening[i] == st.NOT_ROTATABLE else OPEN
+                rho = distance[i]
+                if opening[i] == st.OK and rho * MOST >= PER_SINGULARITY:
+                    count, status[i] = enlist(designs, i, rho, cos, sin, made_of, mode, m, count, values, guards)
+            first[number] = count
+            padded = (count + 7) & ~7  # whole vectors; what stands in the surplus is never read
+            begin_at_vertex(padded, m)
+            refine(0, padded, m, rounds)
+            finish(0, padded, m, target)
+            for k in range(number):
+                if status[start + k] != st.OK:
+                    continue
+                for peak in range(first[k], first[k + 1]):
+                    if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
+                        refine(peak, peak + 1, m, SETTLING)
+                        finish(peak, peak + 1, m, target)
+                status[start + k] = _decide(first[k], first[k + 1], m, mode, allowed * target, start + k, found)
+            # Now the list is free for those, one by one, whose tops were not single ones between their samples.
+            for i in range(start, start + number):
+                rho = PER_SINGULARITY / (FEWEST * MORE)
+                while status[i] == UNTRUSTED and rho * MOST >= PER_SINGULARITY:
+                    count, status[i] = enlist(
+                        designs, i, min(rho, distance[i]), cos, sin, made_of, mode, m, 0, values, guards
+                    )
+                    begin_at_vertex(count, m)
+                    refine(0, count, m, rounds + SETTLING)
+                    finish(0, count, m, target)
+                    if status[i] == st.OK:
+                        status[i] = _decide(0, count, m, mode, allowed * target, i, found)
+                    rho /= MORE
+                status[i] = OPEN if status[i] == UNTRUSTED else status[i]
+                if status[i] != st.OK and status[i] != ROUNDED:
+                    found[:, i] = math.nan
+
+    return generated(f"find_{of.name}", find)
+
+
+@inline
+def _decide(begin: int, end: int, m: Array, mode: int, rounding: float, i: int, found: Array) -> int:
+    """Write the highest maximum of design i; OK, ROUNDED, UNTRUSTED, or OPEN where rounding hides which is highest."""
+    winner = begin
+    for peak in range(begin, end):
+        if not m[peak + ERROR] < math.inf:
+            return UNTRUSTED
+        winner = peak if m[peak + HEIGHT] > m[winner + HEIGHT] else winner
+    height, blur, scale = m[winner + HEIGHT], m[winner + ROUNDING], m[winner + SCALE]
+    code = st.OK if blur <= rounding * scale else ROUNDED
+    if code == ROUNDED:
+        for peak in range(begin, end):
+            if peak != winner and m[peak + HEIGHT] + m[peak + ROUNDING] >= height - blur - RIVALS * scale:
+                return OPEN
+    found[VALUE, i] = -height if mode < 0 else height
+    place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
+    found[PHI, i] = place - TURN * np.floor(place / TURN)
+    found[VALUE_ERROR, i], found[PHI_ERROR, i] = m[winner + ERROR] + blur, m[winner + REACH]
+    found[SCALE_ROW, i], found[SPACING, i] = scale, m[winner + WIDTH]
+    return code
+
+
+def _enlister(chain: Chained, of: Curve) -> Helper:
+    """Sample a design and append its local maxima to the list: the list's new length, and a status."""
+    constants, put, doubts, look = chain.record.constants, chain.record.put, chain.record.doubts, looker(of)
+    last = chain.stages - 1
+
+    def enlist(
+        designs: Array, i: int, distance: float, cos: Array, sin: Array, made_of: Array, mode: int, m: Array,
+        count: int, values: Array, guards: Array,
+    ) -> tuple[int, int]:  # fmt: skip
+        k: Any = constants(designs, i)
+        limits: Any = doubts(k)
+        if not limits[last] < math.inf:
+            return count, OPEN
+        a, b, c = made_of[i, 0], made_of[i, 1], made_of[i, 2]
+        n = FEWEST
+        while n * distance < PER_SINGULARITY:
+            n *= 2
+        n, most, least, code = look(k, a, b, c, n, cos, sin, mode, limits, values, guards)
+        if code != st.OK:
+            return count, code
+        scale = max(most, -least) if mode == 0 else most - least
+        # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
+        up, down = (1.0, -1.0) if mode == 0 else (1.0 * mode, 1.0 * mode)
+        floor = SHARE * scale if mode == 0 else (most if mode > 0 else -least) - (1.0 - SHARE) * scale
+        length, width = count, TURN / n
+        for chunk in range(2, n + 2, CHUNK):
+            if not _has_peak(chunk, values, up, down, floor):
+                continue
+            for j in range(chunk, chunk + CHUNK):
+                sign = up if values[j] >= 0.0 else down
+                left, z, right = sign * values[j - 1], sign * values[j], sign * values[j + 1]
+                if (z >= floor) & (z > left) & (z >= right):
+                    if length - count == MOST_PEAKS or length == CAPACITY:
+                        return count, OPEN
+                    here = n - FEWEST + j - 2
+                    append(m, length, cos[here], sin[here], width, (j - 2) * width, left, z, right, sign, scale)
+                    m[length + A], m[length + B], m[length + C] = a, b, c
+                    put(m, length + CONSTANTS, k)
+                    length += 1
+        return length, st.OK if length > count else OPEN
+
+    return generated(f"enlist_{of.name}", enlist)
+
+
+@inline
+def _has_peak(chunk: int, values: Array, up: float, down: float, floor: float) -> bool:
+    """Whether one of the next samples is a local maximum that counts; without a branch, so that it is a few vectors."""
+    found = 0.0
+    for j in range(chunk, chunk + CHUNK):
+        sign = up if values[j] >= 0.0 else down
+        z = sign * values[j]
+        peak = (z >= floor) & (z > sign * values[j - 1]) & (z >= sign * values[j + 1])
+        found = largest(found, 1.0 if peak else 0.0)
+    return found > 0.0

@@ -1,0 +1,191 @@
+"""Extrema over the turn of chains whose stages are fused into one kernel (:mod:`kernels.series`); docs/extrema.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import cast
+
+import numpy as np
+
+from kernels import series
+from kernels import status as st
+from kernels.series.curves import MARGIN
+from sweep.families.base import Array, Family
+from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries
+from sweep.families.chain import Chain
+from sweep.reductions.refine import EPS, SHRINK, Peaks, confirmed
+from sweep.reductions.request import Extremum, Request
+from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, pose_columns, turn
+
+sampling_tables = lru_cache(series.sampling_tables)
+
+
+@dataclass(frozen=True)
+class FusedCurve:
+    """A curve over the crank angle of a fused chain.
+
+    Parameters
+    ----------
+    family, request : the chain, and what is asked of it
+    forms : what the stages that the curve needs are fused by
+    order : of the derivative, or the margin's
+    made_of : the numbers of the curve, from the last stage's designs
+    scale : by which the kernel's values are multiplied, from the chain's designs; None for 1
+    """
+
+    family: Chain
+    request: Request
+    forms: tuple[InSeries, ...]
+    order: int
+    made_of: DesignMap
+    scale: DesignMap | None = None
+
+    def extremum(self, designs: Array, target: float) -> tuple[Extremum, Status, Mask]:
+        """What is requested, of every design.
+
+        Parameters
+        ----------
+        designs : (n, P) matrix of the whole chain
+        target : relative accuracy
+
+        Returns
+        -------
+        extremum : nan where the status is not OK or nothing is decided
+        status : (n,) OK or NOT_ROTATABLE
+        undecided : (n,) where a slower search is to be asked
+        """
+        n, designs = len(designs), np.ascontiguousarray(designs)
+        opening, distance = np.empty(n, np.uint8), np.empty(n)
+        opens, stage = self.forms[0].opening, self.family.stages[len(self.forms) - 1]
+        assert opens is not None
+        opens(designs, opening, distance)
+        made_of = np.ascontiguousarray(self.made_of(stage.designs(designs)))
+        status, found = np.empty(n, np.uint8), np.empty((6, n))
+        series.find_extrema(_chained(self.forms), self.order)(
+            designs, opening, distance, *sampling_tables(), made_of, self.request.mode, target, status, found
+        )
+        value, phi, err, err_phi, scale, spacing = found
+        if self.scale is not None:
+            factor = self.scale(designs)
+            value, err, scale = value * factor, err * factor, scale * factor
+        extremum = Extremum(value, phi, err, err_phi)
+        rounded = np.flatnonzero(status == series.ROUNDED)
+        if rounded.size:
+            self._confirm(designs, extremum, rounded, target * scale[rounded], spacing[rounded])
+        undecided = status == series.OPEN
+        # A discriminant is known also where the links do not reach, which is for the slower search to say.
+        if self.order == MARGIN:
+            undecided |= status == st.NOT_ROTATABLE
+        return extremum, np.where(undecided | (status == series.ROUNDED), st.OK, status).astype(np.uint8), undecided
+
+    def _confirm(self, designs: Array, found: Extremum, rows: Index, tolerance: Array, spacing: Array) -> None:
+        """Replace extrema that rounding may have moved too far by what precise poses say, in place."""
+        precise, pose, mode = self.family.precise(), self.request.pose, self.request.mode
+        sign = np.ones(rows.size)
+        if mode == 0:
+            there, _ = pose_columns(precise, designs[rows], found.phi[rows, None], [pose])
+            sign = np.where(there[pose][:, 0] < 0.0, -1.0, 1.0)
+        elif mode == -1:
+            sign = -sign
+        height = np.abs(found.value[rows]) if mode == 0 else mode * found.value[rows]
+        blur = found.err[rows]
+
+        def sample(active: Index, phi: Array) -> Array:
+            poses, _ = pose_columns(precise, designs[rows[active]], phi, [pose])
+            return sign[active, None] * poses[pose]
+
+        peaks = Peaks(found.phi[rows], height, found.err_phi[rows], blur, height, spacing, SHRINK * spacing)
+        peaks = confirmed(sample, peaks, tolerance, np.full(rows.size, np.inf), blur)
+        found.value[rows] = -peaks.height if mode == -1 else peaks.height
+        found.phi[rows], found.err_phi[rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
+        found.err[rows] = peaks.err_height + self._behind(precise, designs[rows], peaks.phi) * np.abs(peaks.height)
+
+    def _behind(self, precise: Family, designs: Array, phi: Array) -> Array:
+        """Share of a value by which the rounded input angles of the later stages' precise poses may change it."""
+        loops = [loop for loop in self.family.every(Assembly) if int(loop.stage) in range(2, len(self.forms) + 1)]
+        poses, _ = pose_columns(precise, designs, phi[:, None], [loop.discriminant for loop in loops])
+        amplified = np.ones(len(designs))
+        for loop in loops:
+            amplified += np.abs(loop.scale(designs) / poses[loop.discriminant][:, 0])
+        return 4.0 * EPS * amplified
+
+
+def curve_of(family: Family, request: Request, anywhere: bool) -> FusedCurve | None:
+    """The fused curve of what is requested; None where there is none.
+
+    ``anywhere`` as of `sweep.reductions.extrema.true_extrema`: then the least discriminant of a later stage.
+    """
+    forms = _forms(family)
+    if forms is None:
+        return None
+    chain = cast(Chain, family)
+    if anywhere:
+        return _least_discriminant(chain, forms, request)
+    output, last = chain.pose_output[request.pose], chain.stages[-1]
+    if output.stage not in ("", str(last.number)):
+        return None
+    # Derivatives that carry the number of their stage are not with respect to the crank angle of the chain.
+    curve: Curve | None = forms[-1].curves.get(output.base)
+    if curve is None or (output.stage and curve.order > 0):
+        return None
+    return FusedCurve(chain, request, forms, curve.order, curve.made_of)
+
+
+def _least_discriminant(family: Chain, forms: tuple[InSeries, ...], request: Request) -> FusedCurve | None:
+    if request.mode != -1:
+        return None
+    loop = next((loop for loop in family.every(Assembly) if loop.discriminant == request.pose), None)
+    number = int(loop.stage) if loop is not None and loop.stage else 1
+    if loop is None or number == 1:
+        return None
+    return FusedCurve(family, request, forms[:number], MARGIN, _nothing, loop.scale)
+
+
+def _nothing(designs: Array) -> Array:
+    return np.zeros((len(designs), 3))
+
+
+def sampled_maxima(family: Family, designs: Array, requests: tuple[Request, ...], samples: int) -> dict[Request, Array]:
+    """Largest magnitudes on a grid of equidistant crank angles, of those requests that a fused chain serves at once.
+
+    Each is (n,), nan where a discriminant on the grid is not surely positive: what the status is, poses say.
+    """
+    forms = _forms(family)
+    wanted = {} if forms is None else {r: name for r in requests if (name := _component(family, forms, r)) is not None}
+    if forms is None or not wanted:
+        return {}
+    angles, n = turn(samples), len(designs)
+    components = ("x1", "x2", "x3", "y0", "y1", "y2")
+    out = {name: np.empty(n) if name in wanted.values() else None for name in components}
+    least = np.empty((n, len(forms)))
+    series.dense_maxima(_chained(forms))(
+        np.ascontiguousarray(designs), angles.cos[0], angles.sin[0], least, *out.values()
+    )
+    unsure = ~np.all(least > 0.0, axis=1)
+    found = {}
+    for request, name in wanted.items():
+        most = out[name]
+        assert most is not None
+        found[request] = np.where(unsure, np.nan, most)
+    return found
+
+
+def _component(family: Family, forms: tuple[InSeries, ...], request: Request) -> str | None:
+    output = family.pose_output[request.pose]
+    plain = request.mode == 0 and not request.place and not request.windowed and not output.stage
+    return forms[-1].components.get(output.base) if plain else None
+
+
+def _forms(family: Family) -> tuple[InSeries, ...] | None:
+    """What the stages of a chain are fused by; None for any other family, and for poses of higher precision."""
+    if not isinstance(family, Chain) or family.poses is family.precise_poses:
+        return None
+    forms = [stage.family.find(InSeries) for stage in family.stages]
+    known = tuple(form for form in forms if form is not None)
+    fits = len(known) == len(forms) and known[0].opening is not None
+    return known if fits and all(form.form.turn is not None for form in known[:-1]) else None
+
+
+def _chained(forms: tuple[InSeries, ...]) -> series.Chained:
+    return series.chained(tuple(form.form for form in forms))
