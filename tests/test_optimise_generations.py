@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
@@ -11,7 +12,9 @@ import pytest
 import sweep
 from sweep.optimise import generations
 from sweep.optimise.abreast import Abreast
+from sweep.optimise.filling import kinds
 from sweep.optimise.generations import Bred, bred
+from sweep.optimise.globally import proportion_starts
 from sweep.optimise.linear import Elimination, elimination
 from sweep.optimise.pose_rows import UNKNOWNS, PoseRows
 from sweep.optimise.starts import drawn
@@ -125,6 +128,22 @@ def test_populations_are_those_of_their_seed_and_number(monkeypatch: pytest.Monk
     np.testing.assert_allclose(found["stroke"].abs()[good], 24.5, rtol=0.02)
     assert (first.designs[:, names.index("a2")][good] >= 8.0 * 0.98).all()
     assert not bred(linear, SIGNS, 2, 5, stop=lambda: True)
+
+
+def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    small(monkeypatch)
+    study = record(8.0, starts=4, seed=3, finalists=None)
+    assert study.optimise is not None
+    known = drawn(study, 1, 3)
+    begun = proportion_starts(study, study.optimise, problem_of(study, known), known[:0], np.empty(0), lambda: False, 1)
+    found = bred(eliminated(8.0), kinds(study, begun.problem, known[:0]), 2, 3)
+    assert begun.origins is not None and begun.origins[:2] == (0, 1) and len(begun.starts) == 4
+    np.testing.assert_array_equal(begun.starts[:2], [one.designs[0] for one in found])
+    worth = {one.designs[k].tobytes(): one.worth[k] for one in found for k in range(len(one.worth))}
+    values = sorted(worth[start.tobytes()] for start in begun.starts[2:])
+    assert all(high > low * 1.001 for low, high in itertools.pairwise(values))
+    inside = begun.problem.scaled(begun.starts)
+    assert ((inside >= -1e-9) & (inside <= 1.0 + 1e-9)).all(axis=1).sum() >= 3
 
 
 @pytest.mark.long
