@@ -3,8 +3,9 @@
 For given proportions the motion of a guided coupler point is linear in two complex numbers and an offset
 (docs/guide.md), so the least largest acceleration with a straightness and a stroke prescribed is a linear program:
 
-    minimise t + price v   subject to   |g_j x| <= t,   |d_j x| <= bound_j + v,   e_j x >= need_j,   v >= 0
+    minimise t + price v   subject to   |g_j x| <= t,   -below_j - v <= d_j x <= above_j + v,   e_j x >= need_j,
 
+and v >= 0.
 It is solved by the revised simplex method on the dual, which has as many rows as the primal has unknowns.
 """
 
@@ -50,7 +51,7 @@ def _row(number: int, g: Array, d: Array, e: Array, bound: Array, need: Array, f
         for k in range(UNKNOWNS):
             row[k] = sign * d[j, k]
         row[UNKNOWNS + 1] = 1.0
-        return -float(bound[j])
+        return -float(bound[0 if sign > 0.0 else 1, j])
     number -= 2 * md
     if number < me:
         for k in range(UNKNOWNS):
@@ -121,9 +122,10 @@ def _most_violated(
         value = 0.0
         for k in range(UNKNOWNS):
             value += d[j, k] * z[k]
-        if abs(value) - bound[j] - v > worst:
-            worst = abs(value) - bound[j] - v
-            entering = 2 * mg + (j if value < 0.0 else md + j)
+        low, high = -value - bound[0, j] - v, value - bound[1, j] - v
+        if max(low, high) > worst:
+            worst = max(low, high)
+            entering = 2 * mg + (j if low > high else md + j)
     for j in range(e.shape[0]):
         value = need[j]
         for k in range(UNKNOWNS):
@@ -168,10 +170,11 @@ def minimax(
     Parameters
     ----------
     g : (n, mg, 5) rows whose largest magnitude is to be small
-    d : (n, md, 5) rows whose magnitude is at most ``bound``, or more at a price
+    d : (n, md, 5) rows that stay between the bounds, or miss them at a price
     e : (n, me, 5) rows that reach at least ``need``
-    bound, need : (n, md) and (n, me) in the units of their rows; the largest need is positive, the others are not
-        negative; a negative bound is missed by so much, at the price
+    bound : (n, 2, md) in the units of their rows, how far these may go below zero and above it; infinite where they
+        may go anywhere, and a negative bound is missed by so much, at the price
+    need : (n, me) in the units of their rows; the largest is positive, the others are not negative
     price : of a unit of v in units of t
     x : (n, 5) out, the unknowns; nan where the status is not OK
     largest, missed : (n,) out, t and v

@@ -30,7 +30,7 @@ def problems(count: int, poses: int = 32, seed: int = 0) -> tuple[np.ndarray, np
 
 def solved(g: np.ndarray, d: np.ndarray, e: np.ndarray, bound: float | np.ndarray = BOUND) -> tuple[np.ndarray, ...]:
     n = len(g)
-    bounds, needs = np.broadcast_to(bound, d.shape[:2]).copy(), np.broadcast_to(NEED, (n, 2)).copy()
+    bounds, needs = np.broadcast_to(bound, (n, 2, d.shape[1])).copy(), np.broadcast_to(NEED, (n, 2)).copy()
     x, t, v, status = np.empty((n, 5)), np.empty(n), np.empty(n), np.empty(n, np.uint8)
     minimax(g, d, e, bounds, needs, PRICE, x, t, v, status)
     return x, t, v, status
@@ -45,7 +45,8 @@ def theirs(g: np.ndarray, d: np.ndarray, e: np.ndarray, bound: float | np.ndarra
             np.hstack([d, nil, -own]), np.hstack([-d, nil, -own]), np.hstack([-e, np.zeros((2, 2))]),
         ]
     )  # fmt: skip
-    b = np.concatenate([np.zeros(2 * len(g)), *[np.broadcast_to(bound, len(d))] * 2, -NEED])
+    below, above = np.minimum(np.broadcast_to(bound, (2, len(d))), 1e6)  # HiGHS refuses infinite ones
+    b = np.concatenate([np.zeros(2 * len(g)), above, below, -NEED])
     free = [(None, None)] * 5 + [(0, None)] * 2
     return float(linprog(np.array([0, 0, 0, 0, 0, 1, PRICE]), A_ub=a, b_ub=b, bounds=free).fun)
 
@@ -69,6 +70,18 @@ def test_every_row_may_have_a_bound_of_its_own_and_a_negative_one_is_missed_at_t
     assert (status == st.OK).all() and (v >= 0.01).all()
     for i in range(len(g)):
         assert t[i] + PRICE * v[i] == pytest.approx(theirs(g[i], d[i], e[i], bound), rel=1e-6)
+
+
+def test_rows_may_go_further_to_one_side_than_to_the_other_or_anywhere() -> None:
+    g, d, e = problems(6)
+    bound = np.stack([np.linspace(0.0, 2.0, d.shape[1]), np.linspace(1.0, 0.01, d.shape[1])])
+    bound[0, 3:9], bound[1, 20:] = np.inf, np.inf
+    x, t, v, status = solved(g, d, e, bound)
+    assert (status == st.OK).all()
+    for i in range(len(g)):
+        assert t[i] + PRICE * v[i] == pytest.approx(theirs(g[i], d[i], e[i], bound), rel=1e-6)
+        value = d[i] @ x[i]
+        assert (value <= bound[1] + v[i] + 1e-9).all() and (value >= -bound[0] - v[i] - 1e-9).all()
 
 
 def test_rows_of_the_deviation_may_be_none() -> None:

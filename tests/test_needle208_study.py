@@ -47,9 +47,12 @@ def test_stage_1_is_judged_before_anything_is_fitted():
     assert stops[1:3] == [("swing1",), ("fit",)]
 
 
-@pytest.mark.parametrize("found", ["optimum", "record"])
+STUDIES = {"optimum": lambda: load_study(FOLDER), "record": record, "record_8mm": lambda: record(8.0)}
+
+
+@pytest.mark.parametrize("found", STUDIES)
 def test_accepted_optimum_has_the_accepted_figures_and_keeps_every_limit(found):
-    study, design = (load_study(FOLDER) if found == "optimum" else record()), EXPECTED[found]["design"]
+    study, design = STUDIES[found](), EXPECTED[found]["design"]
     row = outputs_of(design, [limit.output for limit in study.output_limits])
     for name, value in EXPECTED[found]["outputs"].items():
         assert row[name] == pytest.approx(value, rel=EXPECTED["relative_tolerance"])

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from sweep.families import family
 from sweep.optimise import Problem, optimum
-from sweep.optimise import proportions
+from sweep.optimise import generations, proportions
 from sweep.optimise.evolution import evolved
 from sweep.optimise.linear import elimination
 from sweep.optimise.starts import drawn
@@ -30,7 +30,10 @@ print(evolved(valley, np.full((3, 5), 0.3), 0.1, 60, np.random.default_rng(1))[0
 proportions.SAMPLED, proportions.GENERATIONS = 1 << 13, 5
 study = load_study(Path("studies/needle208"))
 linear = elimination(problem_of(study, drawn(study, 1, 208)))
-print(proportions.from_proportions(linear, [{"branch1": 1.0, "branch2": 1.0, "kappa2": 1.0}], 2, 7).tobytes().hex())
+signs = [{"branch1": 1.0, "branch2": 1.0, "kappa2": 1.0}]
+print(proportions.from_proportions(linear, signs, 2, 7).tobytes().hex())
+generations.SAMPLED, generations.FIRST, generations.LATER, generations.GENERATIONS = 1 << 13, 6, 4, 1
+print(generations.bred(linear, signs, 1, 7)[0].designs.tobytes().hex())
 """
 # What numpy and OpenBLAS would choose on other processors: a search that asked them would end at other bits.
 OTHERS = [
@@ -52,6 +55,6 @@ def answer(choice: dict[str, str]) -> str:
 
 def test_search_ends_at_the_same_bits_with_any_kernel_of_the_library() -> None:
     known = answer({})
-    assert len(known.splitlines()) == 5
+    assert len(known.splitlines()) == 6
     for choice in OTHERS:
         assert answer(choice) == known, choice

@@ -61,6 +61,6 @@ def test_starts_are_filled_up_to_the_number_asked_with_both_signs(tmp_path: Path
     (tmp_path / "study.toml").write_text(NARROW.replace("starts = 20", "starts = 8"))
     study = load_study(tmp_path)
     folder = run(replace(study, optimise=None, objective=study.objective), tmp_path / "designs", jobs=1)
-    _, problem, starts = problem_and_starts(study, folder)
+    _, (problem, starts, _) = problem_and_starts(study, folder)
     assert len(starts) == 8
     assert set(starts[:, problem.family.parameter_names.index("branch")]) == {-1.0, 1.0}

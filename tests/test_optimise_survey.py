@@ -50,6 +50,16 @@ def test_unseen_share_is_the_larger_of_good_turing_and_boender_rinnooy_kan() -> 
     assert survey(bowl(), starts(12), singles, ASKED, "starts").unseen == pytest.approx(4 / 12)
 
 
+def test_of_a_global_search_the_best_end_counts_alone() -> None:
+    values = [1.0, 1.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    ends = [result(k, x) for k, x in enumerate(values)]
+    # Three searches, all of which ended in the best basin; their other ends, and a start of the sweep, do not count.
+    found = survey(bowl(), starts(7), ends, ASKED, "starts", (0, 1, 2, 0, 1, 2, -1))
+    assert (found.basins, found.best, found.starts) == (1, 3, 7) and found.unseen == pytest.approx(2 / 6)
+    twice = survey(bowl(), starts(7), ends, ASKED, "starts", (0, 0, 0, 1, 1, 1, -1))
+    assert (twice.basins, twice.best) == (2, 1) and twice.unseen == 1.0
+
+
 def test_starts_beside_each_other_count_once() -> None:
     close = np.repeat(starts(1), 12, axis=0) + np.linspace(0.0, 1e-3, 12)[:, None] * [1, 1, 0, 0]
     ends = [result(k, 1.0) for k in range(12)]

@@ -78,7 +78,7 @@ def front_study(
         return path
     many = front.steps
     say("front", front.taken, many, "steps")
-    _, problem, _ = problem_and_starts(study, place)
+    problem = problem_and_starts(study, place)[1].problem
     starts = _starts(study, settings, problem, place)
     kept, begin = front, time.monotonic()
     for best in advance(problem, settings, front, starts, stop, jobs):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.filling import kinds
+from sweep.optimise.generations import bred
 from sweep.optimise.linear import NEEDED, Elimination, elimination
 from sweep.optimise.problem import Problem
 from sweep.optimise.proportions import from_proportions, widened
@@ -21,6 +22,18 @@ if TYPE_CHECKING:
 
 SWEPT = 6  # of so many starts one comes from the sweep where there is a global search
 OTHER_SEED = 1000  # further on, for samples of their own
+ANOTHER = 1e-3  # share of a value by which that of another basin differs
+
+
+class Begun(NamedTuple):
+    """The problem with bounds that hold its starts, the starts (k, P), and the global search each comes from.
+
+    ``origins`` (k,) are -1 for starts of the sweep, None where there was no global search.
+    """
+
+    problem: Problem
+    starts: Array
+    origins: tuple[int, ...] | None = None
 
 
 def proportion_starts(
@@ -32,13 +45,12 @@ def proportion_starts(
     stop: Callable[[], bool],
     jobs: int,
     say: Say = unsaid,
-) -> tuple[Problem, Array]:
-    """Return the problem with bounds that hold the starts, and the starts:
-    a few of the sweep, then of the global search.
+) -> Begun:
+    """Return the best end of every population, other good ends, and a few designs of the sweep as starts.
 
     Parameters
     ----------
-    study, settings, problem : what is searched
+    study, settings, problem : what is searched; there is one population for two starts asked
     known, merit : designs (k, P) of the sweep, and what they are worth (k,), empty where none is feasible
     stop : true ends the global search early
     jobs : processes; the starts do not depend on it
@@ -52,12 +64,27 @@ def proportion_starts(
     linear = _linear(study, problem)
     count = settings.starts
     own = diverse(problem, known, merit, count // SWEPT, ALIKE) if len(merit) else known[:0]
-    found = from_proportions(linear, kinds(study, problem, own), count - len(own), settings.seed, stop, jobs, say)
-    starts = np.concatenate([own, found])
+    signs = kinds(study, problem, own)
+    populations = bred(linear, signs, max(1, count // 2), settings.seed, stop, jobs, say)
+    first = [(k, found.designs[0]) for k, found in enumerate(populations) if len(found.designs)]
+    met = [float(found.worth[0]) for found in populations if len(found.worth)]
+    others = sorted(
+        (float(worth), k, row)
+        for k, found in enumerate(populations)
+        for row, worth in enumerate(found.worth[1:], start=1)
+    )
+    for worth, k, row in others:
+        if len(first) >= count - len(own):
+            break
+        if all(abs(worth - value) > ANOTHER * abs(value) for value in met):
+            first.append((k, populations[k].designs[row]))
+            met.append(worth)
+    found = np.array([design for _, design in first]).reshape(-1, known.shape[1])
+    starts = np.concatenate([found, own])
     if not len(starts):
         allowed = "proportions with which the mechanism turns"
         raise InputError("design space", study.space.count, allowed, str(study.path))
-    return _holding(study, problem, found), starts
+    return Begun(_holding(study, problem, found), starts, tuple([k for k, _ in first] + [-1] * len(own)))
 
 
 def insensitive(

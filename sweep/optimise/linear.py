@@ -92,13 +92,8 @@ class Elimination:
         -------
         designs (n, P), the objective with what a too large deviation costs (n,), and whether there is a solution (n,).
         """
-        base = designs.copy()
-        base[:, [self.column(name) for name in self.guide.fitted]] = 0.0
-        motion = self._motion(base)
-        bound = 1e3 * self.stroke if self.bound is None else self.bound
-        price = EXCESS * self.stroke / bound
-        bounds, need = np.full(motion.across.shape[:2], bound), np.full(len(designs), self.stroke)
-        least = self._least_scale(base)
+        motion, bounds, need, least, price = self._posed(designs)
+        bound = float(bounds.max(initial=0.0))
         x, t, v = _minimised(motion, bounds, need, least, price)
         out = self._finished(designs, x)
         if self.sigma is not None and self.bound is not None:
@@ -112,6 +107,20 @@ class Elimination:
             v = np.maximum(off.max(axis=1), 0.0)
             t = t * (1.0 + np.maximum(need + along - (motion.ends * x).sum(axis=1), 0.0) / self.stroke)
         return out, t + price * v, np.isfinite(t + v) & np.isfinite(out).all(axis=1)
+
+    def unknowns(self, designs: Array) -> Array:
+        """The best z1, z2 and h (n, 5) of designs as they are drawn, nan where there is no solution."""
+        x, t, _ = _minimised(*self._posed(designs))
+        return np.asarray(np.where(np.isfinite(t)[:, None], x, np.nan), np.float64)
+
+    def _posed(self, designs: Array) -> tuple[_Motion, Array, Array, Array, float]:
+        """The linear programs of designs: motion, bounds, needs, least scales and the price of a missed bound."""
+        base = designs.copy()
+        base[:, [self.column(name) for name in self.guide.fitted]] = 0.0
+        motion = self._motion(base)
+        bound = 1e3 * self.stroke if self.bound is None else self.bound
+        bounds, need = np.full(motion.across.shape[:2], bound), np.full(len(designs), self.stroke)
+        return motion, bounds, need, self._least_scale(base), EXCESS * self.stroke / bound
 
     def _motion(self, base: Array) -> _Motion:
         """What is linear in the unknowns, of designs without point and line."""
@@ -152,10 +161,10 @@ class Elimination:
         lam = np.array([math.atan2(-y, x) for x, y in x[:, :2]])
         out[:, along] = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * grown
         out[:, aside] = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * grown
-        out[:, offset], out[:, line] = x[:, 4], self._turned(lam)
+        out[:, offset], out[:, line] = x[:, 4], self.turned(lam)
         return out
 
-    def _turned(self, lam: Array) -> Array:
+    def turned(self, lam: Array) -> Array:
         """The direction as an angle within its bounds, if one of its turns is."""
         name = f"{self.guide.direction}{self.last}"
         if name not in self.problem.variables:
@@ -212,11 +221,11 @@ def _minimised(motion: _Motion, bounds: Array, need: Array, least: Array, price:
     rows, needs = np.zeros((n, 2, 5)), np.zeros((n, 2))
     rows[:, 0], needs[:, 0] = motion.ends, need
     x, t, v = np.empty((n, 5)), np.empty(n), np.empty(n)
-    own = np.arange(n)
+    own, both = np.arange(n), np.repeat(bounds[:, None, :], 2, axis=1)
     for _ in range(DIRECTIONS):
         some, value, missed = np.empty((len(own), 5)), np.empty(len(own)), np.empty(len(own))
         status = np.empty(len(own), np.uint8)
-        minimax(motion.wanted[own], motion.across[own], rows[own], bounds[own], needs[own], price,
+        minimax(motion.wanted[own], motion.across[own], rows[own], both[own], needs[own], price,
                 some, value, missed, status)  # fmt: skip
         x[own], t[own], v[own] = some, np.where(status == st.OK, value, np.nan), missed
         scale = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)

@@ -31,10 +31,11 @@ class Proportions:
     """Places between 0 and 1 for what is not linear, and the designs that belong to them.
 
     Lengths of the guide stand on a logarithmic scale against its crank, which is the unit.  Instead of the offset
-    between the stages the middle of the guide's input angles is varied, so that it stays while stage 1 changes.
+    between the stages the middle of the guide's input angles is varied, so that it stays while stage 1 changes.  With
+    ``grown`` the lengths of stage 1 that cannot vanish stand on such a scale too.
     """
 
-    def __init__(self, linear: Elimination, signs: dict[str, float]) -> None:
+    def __init__(self, linear: Elimination, signs: dict[str, float], grown: bool = False) -> None:
         problem = linear.problem
         self.linear, names = linear, problem.family.parameter_names
         number = linear.last
@@ -53,13 +54,22 @@ class Proportions:
                 self.low[k] = shortest / problem.upper[unit]
                 self.high[k] /= max(problem.lower[unit], problem.upper[unit] * SHORT)
                 self.log[k] = True
+            elif grown and units[name].unit == "length" and self.low[k] > 0.0:
+                self.log[k] = True
         self.columns = [names.index(name) for name in linear.free]
         self.base[names.index(linear.links[0])] = 1.0
         self.offset = names.index(f"offset{number}") if f"offset{number}" in linear.free else -1
         self.driver = stages_of(problem.family)[0].family
 
     def designs(self, places: Array) -> Array:
-        """Return designs (k, P) at places (k, n), with the point, line and scale still to be found."""
+        """Designs (k, P) at places (k, n), with the point, line and scale still to be found."""
+        designs = self.placed(places)
+        if self.offset >= 0:
+            designs[:, self.offset] -= self.middles(designs)
+        return designs
+
+    def placed(self, places: Array) -> Array:
+        """The same with the offset between the stages itself at its place."""
         values: Array = self.low + places * (self.high - self.low)
         low, wide = self.low[self.log], np.array([math.log(x) for x in self.high[self.log] / self.low[self.log]])
         # numpy's exponential depends on the processor, that of the C library does not
@@ -67,12 +77,14 @@ class Proportions:
         values[:, self.log] = low * np.reshape(grown, (len(places), -1))
         designs = np.repeat(self.base[None, :], len(places), axis=0)
         designs[:, self.columns] = values
-        if self.offset >= 0:
-            upstream = np.ascontiguousarray(designs[:, : len(self.driver.parameters)])
-            found = design_outputs(self.driver, upstream, ("psi_ext", "swing"), MIDDLE)
-            middle = np.asarray(found["psi_ext"], np.float64) + 0.5 * np.asarray(found["swing"], np.float64)
-            designs[:, self.offset] -= np.nan_to_num(middle)
         return designs
+
+    def middles(self, designs: Array) -> Array:
+        """Middle of the guide's input angles (k,) for an offset of zero, which only stage 1 decides; 0 without one."""
+        upstream = np.ascontiguousarray(designs[:, : len(self.driver.parameters)])
+        found = design_outputs(self.driver, upstream, ("psi_ext", "swing"), MIDDLE)
+        middle = np.asarray(found["psi_ext"], np.float64) + 0.5 * np.asarray(found["swing"], np.float64)
+        return np.asarray(np.nan_to_num(middle), np.float64)
 
     def merit(self, places: Array) -> Array:
         """Return the least objective for these proportions, plus what missed limits cost (k,)."""
@@ -104,7 +116,7 @@ class _Group:
         order = np.argsort(worth, kind="stable")
         designs, worth = merit(self.linear, own.designs(place[order]))
         known = np.isfinite(designs).all(axis=1) & (worth < STUCK)
-        return _turned_into(self.linear.problem, designs[known]), worth[known]
+        return turned_into(self.linear.problem, designs[known]), worth[known]
 
 
 def from_proportions(
@@ -148,8 +160,8 @@ def from_proportions(
     return np.asarray(designs[spread(0.3 * place, kind, count)], np.float64)
 
 
-def _turned_into(problem: Problem, designs: Array) -> Array:
-    """Return designs whose angles lie within their bounds, by whole turns."""
+def turned_into(problem: Problem, designs: Array) -> Array:
+    """The designs whose angles lie within their bounds, by whole turns."""
     out = designs.copy()
     for k, name in enumerate(problem.variables):
         column = problem.family.parameter_names.index(name)

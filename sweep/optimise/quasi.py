@@ -63,7 +63,7 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
         moved = there - x
         x, t = there, t + share * float(step[-1])
         change = times(weights, jacobian[:, :-1] - trail.jacobian(x)[:, :-1])
-        curvature = _learnt(curvature, moved, change)
+        curvature = learnt(curvature, moved, change)
     return x, t
 
 
@@ -72,7 +72,7 @@ def _missed(form: Form, rows: Array) -> float:
     return float(np.maximum(np.where(form.equal, np.abs(rows), -rows), 0.0).max(initial=0.0))
 
 
-def _learnt(curvature: Array, moved: Array, change: Array) -> Array:
+def learnt(curvature: Array, moved: Array, change: Array) -> Array:
     """BFGS update, damped so that the curvature stays positive."""
     along = times(curvature, moved)
     known, seen = float((moved * along).sum()), float((moved * change).sum())

@@ -53,6 +53,7 @@ def explore(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
     tell: Tell | None = None,
+    origins: Sequence[int] | None = None,
 ) -> tuple[list[Result], Survey]:
     """Return the smallest objective under the limits from one start after the other,
     until enough is known of the basins.
@@ -68,6 +69,7 @@ def explore(
         design so far
     jobs : processes the starts are spread over, once the search turns out to be long; results do not depend on it
     tell : called with the number of starts that are done and the most there will be
+    origins : see :func:`sweep.optimise.survey.survey`; with them all starts are searched
 
     Returns
     -------
@@ -91,7 +93,7 @@ def explore(
         def asked() -> bool:
             return time.monotonic() >= end or bool(own) or (stop is not None and stop())
 
-        results, ended = _first(problem, starts, settings, asked, jobs, tell)
+        results, ended = _first(problem, starts, settings, asked, jobs, tell, origins is None)
         if settings.finalists is not None and ended == "starts":
             results, whole = _final(problem, starts, results, settings, asked, jobs)
             ended = "starts" if whole else "time"
@@ -101,7 +103,7 @@ def explore(
             signal.raise_signal(signal.SIGTERM)
     if ended == "time" and (own.signal_number is not None or any(r.ended == "interrupted" for r in results)):
         ended = "interrupted"
-    return ranked(results), survey(problem, starts, results, settings, ended)
+    return ranked(results), survey(problem, starts, results, settings, ended, origins)
 
 
 def _first(
@@ -111,8 +113,12 @@ def _first(
     asked: Callable[[], bool],
     jobs: int,
     tell: Tell | None,
+    early: bool,
 ) -> tuple[list[Result], str]:
-    """Return results of the starts in batches, or of their first heat where there are finalists; and what ended it."""
+    """Results of the starts in batches, or of their first heat where there are finalists; and what ended it.
+
+    ``early``: the search ends as soon as enough is known.
+    """
     results: list[Result] = []
     heat = settings if settings.finalists is None else replace(settings, looks=min(TRIAL, settings.looks))
     numbers = list(range(len(starts)))
@@ -124,7 +130,7 @@ def _first(
         last = batch[-1] == numbers[-1]
         if _cut(results, first + len(batch)) or (not last and asked()):
             return results, "time"
-        if settings.finalists is None and survey(problem, starts, results, settings, "").enough:
+        if early and settings.finalists is None and survey(problem, starts, results, settings, "").enough:
             return results, "enough"
     return results, "starts"
 

@@ -26,7 +26,7 @@ from sweep.optimise.coordinates import LocusCoordinates
 from sweep.optimise.discrete import listed, with_neighbours
 from sweep.optimise.filling import filled
 from sweep.optimise.form import Program
-from sweep.optimise.globally import insensitive, proportion_starts
+from sweep.optimise.globally import Begun, insensitive, proportion_starts
 from sweep.optimise.model import Model
 from sweep.optimise.problem import Problem
 from sweep.optimise.robust import robust, yields
@@ -148,7 +148,7 @@ def _prescribed(study: Study) -> tuple[Parameter, ...]:
 
 def problem_and_starts(
     study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1, say: Say = unsaid
-) -> tuple[OptimiseSettings, Problem, Array]:
+) -> tuple[OptimiseSettings, Begun]:
     """Return settings, problem and starts:
     the diverse best of the dataset, filled up from samples where they are too few.
 
@@ -156,14 +156,16 @@ def problem_and_starts(
     the study's [task] come before all others.  With ``optimise.global = "proportions"`` five of six starts come from
     the search over proportions instead, in ``jobs`` processes; ``stop`` ends it early.
     """
-    settings, problem, starts = _problem_and_starts(study, folder, stop, jobs, say)
+    settings, begun = _problem_and_starts(study, folder, stop, jobs, say)
     first = of_task(study, settings.starts, settings.seed)
-    return settings, problem, np.concatenate([first, starts])[: max(len(starts), len(first))]
+    count = max(len(begun.starts), len(first))
+    origins = None if begun.origins is None else ((-1,) * len(first) + begun.origins)[:count]
+    return settings, Begun(begun.problem, np.concatenate([first, begun.starts])[:count], origins)
 
 
 def _problem_and_starts(
     study: Study, folder: Path, stop: Callable[[], bool], jobs: int, say: Say
-) -> tuple[OptimiseSettings, Problem, Array]:
+) -> tuple[OptimiseSettings, Begun]:
     if study.optimise is None or study.objective is None:
         raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
     settings = study.optimise
@@ -171,10 +173,11 @@ def _problem_and_starts(
     designs, merit = best_rows(study.family, study.objective.output, folder)
     if settings.globally == "proportions":
         known = designs if len(designs) else drawn(study, count, seed)
-        return settings, *proportion_starts(study, settings, problem_of(study, known), known, merit, stop, jobs, say)
+        return settings, proportion_starts(study, settings, problem_of(study, known), known, merit, stop, jobs, say)
     if len(designs):
         problem = problem_of(study, designs)
-        return settings, problem, filled(study, problem, diverse(problem, designs, merit, count, ALIKE), count, seed)
+        own = diverse(problem, designs, merit, count, ALIKE)
+        return settings, Begun(problem, filled(study, problem, own, count, seed))
     designs = drawn(study, count, seed)
     if not len(designs):
         allowed = "at least one design that [locus] and [fit] can make"
@@ -182,7 +185,7 @@ def _problem_and_starts(
     problem = problem_of(study, designs)
     # Half of them from the space itself: a sample of the problem's variables may miss what [locus] or [fit] makes.
     own = diverse(problem, designs, ranking(problem, designs), -(-count // 2), ALIKE)
-    return settings, problem, filled(study, problem, own, count, seed)
+    return settings, Begun(problem, filled(study, problem, own, count, seed))
 
 
 def optimise_study(
@@ -219,10 +222,10 @@ def optimise_study(
     """
     place = Path(folder)
     brake = Brake(None if study.optimise is None else study.optimise.time_budget, stop)
-    settings, problem, starts = problem_and_starts(study, place, brake, jobs, say)
+    settings, (problem, starts, origins) = problem_and_starts(study, place, brake, jobs, say)
     settings = replace(settings, time_budget=None)  # one brake for all that follows
     results, found = explore(
-        problem, starts, settings, brake, jobs, lambda done, most: say("optimum", done, most, "starts")
+        problem, starts, settings, brake, jobs, lambda done, most: say("optimum", done, most, "starts"), origins
     )
     catalogue = listed(study)
     if catalogue and found.ended not in CUT:

@@ -90,7 +90,12 @@ class Survey:
 
 
 def survey(
-    problem: Problem, starts: Array, results: Sequence[Result], settings: OptimiseSettings, ended: str
+    problem: Problem,
+    starts: Array,
+    results: Sequence[Result],
+    settings: OptimiseSettings,
+    ended: str,
+    origins: Sequence[int] | None = None,
 ) -> Survey:
     """Return what the results of a search tell of it.
 
@@ -101,6 +106,8 @@ def survey(
     results : of those that were begun, in any order
     settings : the number of starts asked, and the share of unseen basins that is allowed
     ended : how the search ended
+    origins : (k,) number of the global search that each start comes from, -1 for none; without them every start stands
+        for itself.  Of one global search the best result counts, and no other: it has chosen its ends itself.
 
     Notes
     -----
@@ -111,13 +118,24 @@ def survey(
     whole = [r for r in results if r.ended not in CUT]
     # What was left after the first heat has not reached the bottom of any basin.
     numbered = with_basins([r for r in whole if r.ended != "left"])
-    met = Counter(r.basin for r in numbered if r.basin)
+    drawn = numbered if origins is None else _best_of_each(numbered, origins)
+    met = Counter(r.basin for r in drawn if r.basin)
     n, w = sum(met.values()), len(met)
-    best = _distinct(problem, starts, [r.start for r in numbered if r.basin == 1])
+    ends = [r.start for r in drawn if r.basin == 1]
+    best = _distinct(problem, starts, ends) if origins is None else len(ends)
     return Survey(
         len(whole), settings.starts, len(starts), w, best, _unseen(n, met), settings.unseen, ended,
         _kinds(problem, starts, numbered),
     )  # fmt: skip
+
+
+def _best_of_each(ranked: Sequence[Result], origins: Sequence[int]) -> list[Result]:
+    """The best result of every global search, of results in the order of their basins."""
+    found: dict[int, Result] = {}
+    for r in ranked:
+        if r.basin and origins[r.start] >= 0:
+            found.setdefault(origins[r.start], r)
+    return list(found.values())
 
 
 def later(found: Survey) -> Survey:

@@ -70,7 +70,7 @@ class OptimiseSettings:
     ``variables`` is "locus" for what [locus] prescribes, "parameters" for the links, None for what suits the study.
     ``unseen`` is the estimated share of unseen basins below which no more starts are made once the best basin was met
     often enough; ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from
-    evolution strategies over what is not linear; ``finalists`` is the number of starts that go on after a first heat,
+    a search over what is not linear; ``finalists`` is the number of starts that go on after a first heat,
     None for all.  ``time_budget`` [s] is an emergency brake: what it stops says so, and no result that was not stopped
     depends on it.  ``prove`` asks for a proof that nothing in the space is better.
     """

@@ -1,0 +1,169 @@
+"""Starts from generations of descents: stages of good mechanisms are put together anew, and descended from again.
+
+A guide that suits one crank-rocker suits others, so the parts of two good mechanisms are a far better beginning than a
+mechanism at random.  Populations know nothing of each other: where several end at the same design, it is no accident.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sweep.families.base import Array
+from sweep.jobs.progress import Say, unsaid
+from sweep.optimise.abreast import Abreast
+from sweep.optimise.certificate import AGREE
+from sweep.optimise.linear import Elimination
+from sweep.optimise.merit import STUCK
+from sweep.optimise.parallel import spread_over
+from sweep.optimise.pose_rows import PoseRows
+from sweep.optimise.proportions import turned_into
+from sweep.optimise.starts import spread
+
+SAMPLED, BLOCK = 1 << 14, 1 << 13  # proportions per combination of signs, two to eight in a hundred of which turn
+FIRST, LATER, GENERATIONS = 200, 80, 10  # descents of the first generation and of each other one; how many others
+HEAT, STEPS = 14, 50  # steps of all descents, and of the better half of them
+PARENTS = 24  # best ends, no two of them alike, from which a generation is made: as many of all signs
+MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations, one of which a child is varied by
+USELESS = 1.3  # times the best value: worse ends are no parents
+
+
+class Bred(NamedTuple):
+    """Ends of a population, no two alike and the best first: designs (k, P), what they are worth (k,), and looks."""
+
+    designs: Array
+    worth: Array
+    looks: int
+
+
+class _End(NamedTuple):
+    worth: float
+    kind: int
+    place: Array
+    design: Array
+
+
+@dataclass(frozen=True)
+class _Population:
+    """Generations from one seed: a task for processes."""
+
+    linear: Elimination
+    signs: tuple[dict[str, float], ...]
+    seed: int
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Bred:
+        """The ends of the population of that number."""
+        rows = [PoseRows(self.linear, choice) for choice in self.signs]
+        rng = np.random.default_rng((self.seed, number))
+        ends: list[_End] = []
+        looks = 0
+        for generation in range(1 + GENERATIONS):
+            if should_stop():
+                break
+            parents = _parents(ends, -(-PARENTS // len(rows)))
+            if generation and not parents:
+                break
+            for kind, own in enumerate(rows):
+                if generation == 0:
+                    places = _sampled(own, rng, -(-FIRST // len(rows)))
+                else:
+                    places = _children(
+                        own, [p for p in parents if p.kind == kind], parents, rng, -(-LATER // len(rows))
+                    )
+                found, spent = _descended(own, kind, places, should_stop)
+                ends, looks = ends + found, looks + spent
+        best = _parents(ends, PARENTS)[:PARENTS]
+        names = self.linear.problem.family.parameter_names
+        designs = np.array([end.design for end in best]).reshape(-1, len(names))
+        return Bred(turned_into(self.linear.problem, designs), np.array([end.worth for end in best]), looks)
+
+
+def _sampled(rows: PoseRows, rng: np.random.Generator, count: int) -> Array:
+    """Places of a Sobol sample that turn: the best that are not alike."""
+    from scipy.stats import qmc
+
+    place = qmc.Sobol(len(rows.own.columns), seed=rng).random(SAMPLED)
+    worth = np.concatenate([rows.own.merit(block) for block in np.split(place, max(1, SAMPLED // BLOCK))])
+    order = np.argsort(worth, kind="stable")
+    order = order[worth[order] < STUCK]
+    return np.asarray(place[order][spread(place[order], np.zeros(len(order), np.intp), count)], np.float64)
+
+
+def _children(
+    rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int
+) -> Array:
+    """Places with stage 1 of one parent and the guide of another, slightly varied.
+
+    Offsets whose bounds lie on both sides of zero alike change their side in every second child: a crank-rocker and
+    its mirror image move alike.
+    """
+    if not own:
+        return np.empty((0, len(rows.own.columns)))
+    drivers = np.array([parents[k].place for k in rng.integers(0, len(parents), count)])
+    places = np.array([own[k].place for k in rng.integers(0, len(own), count)])
+    places[:, rows.driving] = drivers[:, rows.driving]
+    other = (rng.random(count) < 0.5)[:, None] & rows.mirrored[None, :]
+    places = np.where(other, 1.0 - places, places)
+    spread_by = np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)]
+    places = places + spread_by[:, None] * rng.standard_normal(places.shape)
+    return rows.wrapped(places)
+
+
+def _descended(rows: PoseRows, kind: int, places: Array, stop: Callable[[], bool]) -> tuple[list[_End], int]:
+    """Where descents from some places end, the worse half given up after a heat; and how many looks that took."""
+    if not len(places):
+        return [], 0
+    many = Abreast(rows, rows.without_middle(places))
+    many.advance(HEAT, stop)
+    many.keep(np.argsort(many.worth, kind="stable")[: -(-len(places) // 2)])
+    many.advance(STEPS - HEAT, stop)
+    designs, there = rows.designs(many.places, many.x), rows.with_middle(many.places)
+    known = np.flatnonzero(many.worth < STUCK)
+    return [_End(float(many.worth[k]), kind, there[k], designs[k]) for k in known], many.looks
+
+
+def _parents(ends: Sequence[_End], most: int) -> list[_End]:
+    """The best ends, no two of the same signs and value and at most so many of the same signs."""
+    found: list[_End] = []
+    for end in sorted(ends, key=lambda end: end.worth):
+        own = [p for p in found if p.kind == end.kind]
+        alike = any(abs(end.worth - p.worth) <= 2.0 * AGREE * abs(p.worth) for p in own)
+        if not alike and len(own) < most and end.worth < USELESS * (found or [end])[0].worth:
+            found.append(end)
+    return found
+
+
+def bred(
+    linear: Elimination,
+    signs: Sequence[dict[str, float]],
+    populations: int,
+    seed: int,
+    stop: Callable[[], bool] = lambda: False,
+    jobs: int = 1,
+    say: Say = unsaid,
+) -> list[Bred]:
+    """Return the ends of populations that know nothing of each other.
+
+    Parameters
+    ----------
+    linear : the linear part of the problem
+    signs : combinations of the parameters that are not varied
+    populations : how many; each takes 14 000 looks, some 20 s
+    seed : of samples and children
+    stop : true ends the populations where they are
+    jobs : processes; the ends do not depend on it
+    say : called with how many populations have ended, and how many there are
+    """
+    ended = itertools.count(1)
+    say("global search", 0, populations, "populations")
+    return spread_over(
+        _Population(linear, tuple(signs), seed),
+        list(range(populations)),
+        stop,
+        jobs,
+        lambda: say("global search", next(ended), populations, "populations"),
+    )

@@ -1,0 +1,160 @@
+"""Descents at fixed poses, and generations of them: exact gradients, the record from afar, the same bits again."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.optimise import generations
+from sweep.optimise.abreast import Abreast
+from sweep.optimise.filling import kinds
+from sweep.optimise.generations import Bred, bred
+from sweep.optimise.globally import proportion_starts
+from sweep.optimise.linear import Elimination, elimination
+from sweep.optimise.pose_rows import UNKNOWNS, PoseRows
+from sweep.optimise.solve import explore
+from sweep.optimise.starts import drawn
+from sweep.optimise.study import problem_of
+from tests.needle208_record import record
+
+EXPECTED = json.loads((Path(__file__).parents[1] / "studies" / "needle208" / "expected.json").read_text())["record"]
+RECORD = EXPECTED["outputs"]["max_abs_d2s"]
+SIGNS = [{"branch1": 1.0, "branch2": x, "kappa2": 1.0} for x in (1.0, -1.0)]
+SEEN = 2e-3  # 64 poses see the peaks of acceleration to this part of them
+
+
+def eliminated(least: float | None = None) -> Elimination:
+    study = record(least)
+    found = elimination(problem_of(study, drawn(study, 1, 208)))
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def rows() -> PoseRows:
+    return PoseRows(eliminated(), SIGNS[0])
+
+
+def place_of_record(rows: PoseRows) -> np.ndarray:
+    own, design = rows.own, EXPECTED["design"]
+    free = rows.linear.free
+    values = np.array([design[name] / (design["a2"] if name in rows.linear.links else 1.0) for name in free])
+    place = (values - own.low) / (own.high - own.low)
+    log = own.log
+    place[log] = np.log(values[log] / own.low[log]) / np.log(own.high[log] / own.low[log])
+    return np.asarray(rows.wrapped(place[None, :]))
+
+
+def test_record_is_worth_its_acceleration_and_its_rows_hold(rows: PoseRows) -> None:
+    place = place_of_record(rows)
+    x = rows.unknowns(place)
+    assert rows.worth(place, x)[0] == pytest.approx(RECORD, rel=SEEN)
+    names = rows.family.parameter_names
+    design = rows.designs(place, x)[0]
+    for name in ("a2", "xi2", "eta2", "h2"):  # a line the other way round is the same line
+        assert abs(design[names.index(name)]) == pytest.approx(abs(EXPECTED["design"][name]), rel=5e-3)
+
+
+def test_gradients_by_places_and_unknowns_are_those_of_differences(rows: PoseRows) -> None:
+    rng = np.random.default_rng(1)
+    place = np.clip(place_of_record(rows) + 0.003 * rng.standard_normal((3, len(rows.own.columns))), 0.01, 0.99)
+    x = rows.unknowns(place)
+    found, n = rows.rows(place, x), place.shape[1]
+    assert found.slopes.shape == (3, found.values.shape[1], n + UNKNOWNS)
+    np.testing.assert_allclose(found.values, rows.values(place, x), rtol=1e-12, atol=1e-12)
+    varied = np.concatenate([place, x], axis=1)
+    for k in range(n + UNKNOWNS):
+        step = np.zeros(n + UNKNOWNS)
+        step[k] = 1e-6 if k < n else 1e-5
+        up, down = (rows.values(v[:, :n], v[:, n:]) for v in (varied + step, varied - step))
+        slopes = (up - down) / (2.0 * step[k])
+        # Differences are good to the square of the step and to rounding over it.
+        np.testing.assert_allclose(found.slopes[:, :, k], slopes, rtol=1e-5, atol=2e-6 * np.abs(slopes).max() + 1e-9)
+
+
+def test_descents_from_around_the_record_end_at_it(rows: PoseRows) -> None:
+    rng = np.random.default_rng(4)
+    begin = place_of_record(rows)[0] + 0.004 * rng.standard_normal((8, len(rows.own.columns)))
+    many = Abreast(rows, np.clip(begin, 0.0, 1.0))
+    before = many.worth.copy()
+    many.advance(40)
+    reached = many.worth[np.isfinite(before)]
+    # Some begin where the links do not reach, and stay there.
+    assert (before > 1.1 * RECORD).sum() >= 3
+    assert (np.abs(reached / RECORD - 1.0) < SEEN).sum() >= 3
+    assert (many.worth <= before).all()
+
+
+def test_descents_beside_change_nothing_and_descents_can_be_given_up(rows: PoseRows) -> None:
+    rng = np.random.default_rng(4)
+    begin = np.clip(place_of_record(rows)[0] + 0.004 * rng.standard_normal((4, len(rows.own.columns))), 0.0, 1.0)
+    together, alone = Abreast(rows, begin), Abreast(rows, begin[2:3])
+    together.advance(3)
+    together.keep(np.array([2, 0]))
+    together.advance(4)
+    alone.advance(7)
+    np.testing.assert_array_equal(together.places[0], alone.places[0])
+    assert together.worth[0] == alone.worth[0]
+
+
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {"SAMPLED": 1 << 13, "FIRST": 12, "LATER": 6, "GENERATIONS": 1, "HEAT": 4, "STEPS": 8}.items():
+        monkeypatch.setattr(generations, name, value)
+
+
+def same(one: Bred, other: Bred) -> None:
+    np.testing.assert_array_equal(one.designs, other.designs)
+    np.testing.assert_array_equal(one.worth, other.worth)
+    assert one.looks == other.looks
+
+
+def test_populations_are_those_of_their_seed_and_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    small(monkeypatch)
+    linear = eliminated(8.0)
+    first, second = bred(linear, SIGNS, 2, 5)
+    same(bred(linear, SIGNS, 1, 5)[0], first)
+    assert not np.array_equal(first.designs, second.designs)
+    assert (np.diff(first.worth) > 0.0).all() and len(first.worth) >= 4
+    names = linear.problem.family.parameter_names
+    table = {name: first.designs[:, k] for k, name in enumerate(names)}
+    found = sweep.summarise(["rssr", "guide"], table, ["max_abs_d2s", "max_abs_dev", "stroke"], accuracy=1e-6)
+    good = first.worth < 13.0  # the better ones keep their limits, and are worth what they do
+    assert good.any()
+    np.testing.assert_allclose(found["max_abs_d2s"][good], first.worth[good], rtol=0.05)
+    np.testing.assert_allclose(found["stroke"].abs()[good], 24.5, rtol=0.02)
+    assert (first.designs[:, names.index("a2")][good] >= 8.0 * 0.98).all()
+    assert not bred(linear, SIGNS, 2, 5, stop=lambda: True)
+
+
+def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    small(monkeypatch)
+    study = record(8.0, starts=4, seed=3, finalists=None)
+    assert study.optimise is not None
+    known = drawn(study, 1, 3)
+    begun = proportion_starts(study, study.optimise, problem_of(study, known), known[:0], np.empty(0), lambda: False, 1)
+    found = bred(eliminated(8.0), kinds(study, begun.problem, known[:0]), 2, 3)
+    assert begun.origins is not None and begun.origins[:2] == (0, 1) and len(begun.starts) == 4
+    np.testing.assert_array_equal(begun.starts[:2], [one.designs[0] for one in found])
+    worth = {one.designs[k].tobytes(): one.worth[k] for one in found for k in range(len(one.worth))}
+    values = sorted(worth[start.tobytes()] for start in begun.starts[2:])
+    assert all(high > low * 1.001 for low, high in itertools.pairwise(values))
+    inside = begun.problem.scaled(begun.starts)
+    assert ((inside >= -1e-9) & (inside <= 1.0 + 1e-9)).all(axis=1).sum() >= 3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_two_populations_of_any_seed_find_the_record(seed: int) -> None:
+    study = record(seed=seed, starts=4, finalists=None, looks=2000)
+    assert study.optimise is not None
+    known = drawn(study, 1, seed)
+    problem = problem_of(study, known)
+    begun = proportion_starts(study, study.optimise, problem, known[:0], np.empty(0), lambda: False, 2)
+    results, found = explore(begun.problem, begun.starts, study.optimise, None, 2, None, begun.origins)
+    assert results[0].feasible and results[0].objective == pytest.approx(RECORD, rel=1e-6)
+    assert found.best >= 1
