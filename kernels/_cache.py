@@ -46,8 +46,9 @@ PACKAGE = __name__.partition(".")[0]
 PYC_HEADER = 16
 # A .pyc is younger than its source if it was written so much later [ns].
 YOUNGER = 2_000_000_000
-# What reading a file that is not whole raises; numba does not wait for its files to reach the disk.
-DAMAGED = (EOFError,)
+# What reading a file that is not whole raises (numba does not wait for its files to reach the disk), and one that names
+# what this process does not know: an argument's type of a module that only the writer had.
+DAMAGED = (EOFError, ImportError, AttributeError)
 HASH_BYTES = hashlib.sha256().digest_size
 # What a file system answers that has no locks.
 UNLOCKABLE = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOLCK)
@@ -261,7 +262,7 @@ class KernelCache(FunctionCache):
         return sig, codegen.magic_tuple(), hashlib.sha256(code).hexdigest()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled code of one signature, or None; of files that are damaged nothing is kept."""
+        """Return the compiled code of one signature, or None; of files that cannot be read nothing is kept."""
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except DAMAGED:

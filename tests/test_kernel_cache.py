@@ -82,6 +82,19 @@ def test_files_that_end_too_soon_are_made_anew(tree: Path) -> None:
     assert report(tree) == ["2.0", "1", "KernelCache"]
 
 
+def test_an_index_that_names_what_only_its_writer_knew_is_made_anew(tree: Path) -> None:
+    """A named tuple of a module that is not there any more is the type of an argument."""
+    foreign = tree.parent / "foreign.py"
+    foreign.write_text("from typing import NamedTuple\nclass Pair(NamedTuple):\n    low: float\n    high: float\n")
+    (tree / "loop.py").write_text(KERNEL.replace("shifted(x)", "shifted(x[0])"))
+    program = "from kernels.loop import run; from foreign import Pair; print(run(Pair(1.0, 2.0)))"
+    assert report(tree, program) == ["2.0"]
+    foreign.unlink()
+    program = "from kernels.loop import run; print(run((1.0, 2.0)), len(run.stats.cache_hits))"
+    assert report(tree, program) == ["2.0", "0"]
+    assert report(tree, program) == ["2.0", "1"]
+
+
 @pytest.mark.parametrize("kind", ["nbc", "nbi"])
 def test_a_changed_bit_anywhere_in_a_file_is_found_and_the_code_made_anew(tree: Path, kind: str) -> None:
     report(tree)
