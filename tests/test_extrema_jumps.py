@@ -65,7 +65,7 @@ def test_the_mean_of_a_curve_with_jumps_is_found_to_its_target():
 def test_without_brackets_a_jump_is_never_resolved(monkeypatch):
     """Negative control: it is the bracketing that ends the search."""
     monkeypatch.setattr("sweep.reductions.search.BREAKING", 10**9)
-    got, _ = found_and_dense("rssp", "drive_torque_friction", count=1)
+    got, _ = found_and_dense("rssr", "theta3", count=1)
     assert got["status"][0] == st.NOT_CONVERGED
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -88,11 +89,12 @@ def _losses(kind: loads.Follower) -> dict[str, tuple[str, str]]:
 
 def _outputs(kind: loads.Follower) -> tuple[Output, ...]:
     scalars = _COUPLES | _losses(kind)
-    return (
+    found = (
         *force_outputs(kind.name, SUFFIX, _TEXT, EQUATION),
         *(Output(name, unit, text, EQUATION, name == PASSES) for name, (unit, text) in scalars.items()),
         Output("friction_contraction", "1", "rho(L), bound of its rate; below 1 the solution is unique", EQUATION),
     )
+    return tuple(replace(o, kinks=not o.jumps) for o in found)
 
 
 def behind(scene: Scene) -> Columns | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -116,6 +117,10 @@ def _effect(name: str, bare: Effect) -> Effect:
     assert tree is not None
     scalars = {"drive_torque_friction": ("torque", f"torque that drives the cranks{TEXT}")} | _losses(tree)
     supports = {at: ("force", words) for at, (_, _, words) in _supports(tree).items()}
+    found = (
+        *links.vector_outputs(links.vectors(tree.joints, SUFFIX, TEXT), EQUATION),
+        *(Output(n, u, t, EQUATION, n == PASSES) for n, (u, t) in (scalars | supports).items()),
+    )
     return Effect(
         key=FRICTION,
         name=f"{name}_friction",
@@ -124,10 +129,7 @@ def _effect(name: str, bare: Effect) -> Effect:
         formulas=FORMULAS,
         needs=(bare.name,),
         inputs=(*bare.inputs, *(p for joint in tree.joints for p in _of_joint(joint))),
-        outputs=(
-            *links.vector_outputs(links.vectors(tree.joints, SUFFIX, TEXT), EQUATION),
-            *(Output(n, u, t, EQUATION, n == PASSES) for n, (u, t) in (scalars | supports).items()),
-        ),
+        outputs=tuple(replace(o, kinks=not o.jumps) for o in found),
         compute=compute,
         called_for="losses, drive sizing, loads of bearings, a check against jamming",
         negligible="a few passes settle it: joint loads change by less than 1 %",

@@ -71,6 +71,8 @@ class Output:
     wraps : an angle that is known only up to full turns; curves of it are made continuous
     windowed : a deviation, of which only the part inside the window of the stroke counts where a window is given
     stage, own : in a chain the number of the stage that gives it, and its name there
+    kinks : curves of it have kinks or jumps where something reverses, as all with friction: extrema are then searched
+        for panel by panel
     """
 
     name: str
@@ -82,6 +84,7 @@ class Output:
     windowed: bool = False
     stage: str = ""
     own: str = ""
+    kinks: bool = False
 
     @property
     def base(self) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from kernels import status as st
 from sweep.families.base import Array, Family
-from sweep.reductions import fused
+from sweep.reductions import fused, panels
 from sweep.reductions import search as one_search
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
 from sweep.reductions.sampling import Status, blocks
@@ -62,8 +62,11 @@ def true_extrema(
     """
     found: dict[Request, Extremum] = {}
     status = np.zeros(len(designs), np.uint8)
-    left = []
+    left, kinked = [], []
     for request in requests:
+        if not anywhere and panels.has_kinks(family, request):
+            kinked.append(request)
+            continue
         curve = None if locate or request.place or request.windowed else fused.curve_of(family, request, anywhere)
         if curve is None:
             left.append(request)
@@ -75,6 +78,10 @@ def true_extrema(
             for column, values in zip(quick, slow[request], strict=True):
                 column[rows] = values
         found[request], status = quick, np.where(status == st.OK, now, status)
+    if kinked:
+        cut, now = panels.extrema(family, designs, kinked, target, locate)
+        found |= cut
+        status = np.where(status == st.OK, now, status)
     if left:
         slow, now = _searched(family, designs, left, target, locate, anywhere, window)
         found |= slow

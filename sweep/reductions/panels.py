@@ -1,0 +1,350 @@
+"""True extrema of curves with kinks and jumps: panels of a turn, halved wherever the curve may still be highest.
+
+Friction changes its direction where a joint stops turning.  There loads jump or have a kink, and between two such
+places a curve may rise and fall within a hundredth of a radian.  So the turn is cut where the followers reverse, which
+are roots of known functions, and into even panels between.  On each panel a polynomial goes through the poses; a panel
+whose polynomial, and what it may be wrong by, stays below the highest pose is left.  The others are halved until the
+poses of both halves agree with the polynomial before (docs/extrema.md, section 3b).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from kernels import scan
+from kernels import status as st
+from sweep.families.base import Array, Family
+from sweep.numerics.events import sign_changes, with_events
+from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
+from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, blocks, discriminants, pose_columns
+
+PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
+NODES = 8  # poses of a panel, next to both ends too: a jump just inside would be seen by no other
+DENSE = 33  # places at which the highest point of a polynomial is looked for, its ends included
+NEWTON = 4
+TAIL = 3  # last coefficients that tell how wrong a polynomial may be ...
+CAREFUL = 4.0  # ... times this; their sum is a quarter of a jump inside the panel
+LATELY = 0.25  # of what the polynomial before was wrong by: halving takes a kink's share to a half
+# Next to a reversal friction takes its direction from a speed that is all rounding: nearer poses are noise.
+NARROWEST = 1e-11  # width of a panel [rad] that can only hold a jump
+EDGE = 2.0**17  # times EPS of the size: what a curve that rises by six sizes a radian may do in a quarter of that
+CROWD = 48  # panels of one curve beyond which rounding alone is halved
+ALLOWED = 1.0 / 16.0  # of the target: what two successive polynomials may differ by
+AGAIN = 8.0  # times that difference is claimed: poses see a kink between them as low as that
+SLOPE = 2.0 * (NODES - 1) ** 2  # of a polynomial bounded by 1 on a panel of width 1 (Markov)
+EPS = 2.0**-53
+
+
+class Panels(NamedTuple):
+    """Panels of several curves, (k,).
+
+    The curve's row, ends [rad]; coefficients (k, NODES); the highest pose seen on each and its place [rad];
+    by how much poses missed the polynomial of the panel that it is a half of.
+    """
+
+    row: Index
+    low: Array
+    high: Array
+    series: Array
+    peak: Array
+    at: Array
+    missed: Array
+
+    def only(self, which: Index | Mask) -> Panels:
+        """Return some of them."""
+        row, *others = self
+        return Panels(row[which], *(column[which] for column in others))
+
+
+class Top(NamedTuple):
+    """Highest points of k panels: place [rad], value, error of the value, error of the place [rad]."""
+
+    row: Index
+    phi: Array
+    value: Array
+    err: Array
+    err_phi: Array
+
+
+def has_kinks(family: Family, request: Request) -> bool:
+    """Return whether an extremum is to be searched for on panels."""
+    output = family.pose_output[request.pose]
+    return output.kinks and not output.wraps and not request.windowed
+
+
+def extrema(
+    family: Family, designs: Array, requests: Sequence[Request], target: float, locate: bool
+) -> tuple[dict[Request, Extremum], Status]:
+    """Return extrema over one turn of curves with kinks and jumps.
+
+    Parameters
+    ----------
+    family : with its most accurate poses; designs : (n, P)
+    requests : extrema wanted
+    target : relative accuracy; of a place [rad]
+    locate : whether all crank angles are wanted
+
+    Returns
+    -------
+    extrema : values are suprema: beside a jump the limit from its higher side
+    status : (n,) OK; what the poses of the turn say; NOT_CONVERGED where an error exceeds the target, and the rounding
+        of the poses too
+    """
+    n = len(designs)
+    found = {request: Extremum.unknown(n) for request in requests}
+    status: Status = np.zeros(n, np.uint8)
+    for rows in blocks(np.arange(n), 2 * PANELS * NODES, len(requests)):
+        status[rows] = _block(family.precise(), designs, rows, target, found, locate)
+    return found, status
+
+
+def _block(
+    family: Family, designs: Array, rows: Index, target: float, found: dict[Request, Extremum], locate: bool
+) -> Status:
+    """Search the curves of some designs; fill ``found`` and return their status."""
+    guards = discriminants(family)
+    names = list(dict.fromkeys([*(request.pose for request in found), *guards]))
+    row, low, high = _cut(family, designs[rows])
+    poses, each = pose_columns(family, designs[rows[row]], _places(low, high), names)
+    status = _worst(row, each, rows.size)
+    good = status[row] == st.OK
+    if not good.any():
+        return status
+    row, low, high = row[good], low[good], high[good]
+    for request, answer in found.items():
+        values = poses[request.pose][good]
+        panels = _fitted(row, low, high, values, request.mode)
+        top, size = _climbed(family, designs[rows], panels, request, target, locate or request.place)
+        rounding = _rounding(guards, poses, good, row, top, family.precise_poses is not None)
+        late = (top.err > target * size[top.row]) & (top.err > rounding)
+        status[top.row[late]] = np.where(status[top.row[late]] == st.OK, st.NOT_CONVERGED, status[top.row[late]])
+        at = rows[top.row]
+        answer.value[at] = -top.value if request.mode == -1 else top.value
+        answer.phi[at], answer.err[at], answer.err_phi[at] = np.mod(top.phi, TWO_PI), top.err + rounding, top.err_phi
+    return status
+
+
+def _cut(family: Family, designs: Array) -> tuple[Index, Array, Array]:
+    """Return design and ends of the first panels: even ones, cut where followers reverse."""
+    n = len(designs)
+    edges = np.tile(np.linspace(0.0, TWO_PI, PANELS + 1), (n, 1))
+    speeds = reversing(family)
+    if speeds:
+
+        def functions(rows: Index, phi: Array) -> Array:
+            columns, _ = pose_columns(family, designs[rows], phi, speeds)
+            return np.nan_to_num(np.stack([columns[name] for name in speeds], axis=2))
+
+        phi = np.arange(PANELS * NODES) * (TWO_PI / (PANELS * NODES))
+        edges = with_events(edges, *sign_changes(functions, np.tile(phi, (n, 1))))
+    low, high = edges[:, :-1], edges[:, 1:]
+    row, column = np.nonzero(high - low > NARROWEST)
+    return row, low[row, column], high[row, column]
+
+
+def reversing(family: Family) -> tuple[str, ...]:
+    """Return the pose outputs whose zeros cut the turn: the speeds of all positions of the family."""
+    speeds = set(family.derivative_of.values())
+    dear = set(family.dear)
+    return tuple(rate for of, rate in family.derivative_of.items() if of not in speeds and rate not in dear)
+
+
+def _climbed(
+    family: Family, designs: Array, panels: Panels, request: Request, target: float, locate: bool
+) -> tuple[Top, Array]:
+    """Return the highest point of every curve that has panels, and the sizes of these curves."""
+    n = len(designs)
+    best, least = np.full(n, -np.inf), np.full(n, np.inf)
+    np.maximum.at(best, panels.row, panels.peak)
+    np.minimum.at(least, panels.row, _measured(_values(panels.series), request.mode).min(axis=1))
+    size = best if request.mode == 0 else best - least
+    tops: list[Top] = []
+    while panels.row.size:
+        panels = panels.only(_upper(panels, request.mode) >= best[panels.row])
+        crowded = np.bincount(panels.row, minlength=n)[panels.row] > CROWD
+        # Even first panels may all be within the target of each other: a constant.
+        crowded &= panels.high - panels.low < 0.25 * TWO_PI / PANELS
+        tops.append(_given_up(panels.only(crowded), request.mode))
+        panels = panels.only(~crowded)
+        halves, miss = _halved(family, designs, panels, request)
+        np.maximum.at(best, halves.row, halves.peak)
+        tolerance = np.maximum(ALLOWED * target * size, 4.0 * EPS * np.abs(best))[halves.row]
+        narrow = halves.high - halves.low < NARROWEST
+        top = _tops(halves, request.mode, AGAIN * miss)
+        settled = miss <= tolerance
+        if locate:
+            settled &= (top.err_phi <= target) | (miss <= 4.0 * EPS * np.abs(top.value))
+        off = _off(family, designs, halves, top, request, np.flatnonzero(settled & ~narrow))
+        settled &= off <= tolerance
+        at_end = (top.phi <= halves.low) | (top.phi >= halves.high)
+        top.err[:] += AGAIN * off + np.where(at_end, EDGE * EPS * size[halves.row], 0.0)
+        tops += [_only(top, settled & ~narrow), _held(halves.only(narrow), np.repeat(panels.peak, 2)[narrow], size)]
+        panels = halves.only(~settled & ~narrow)
+    return _highest(tops, n), size
+
+
+def _halved(family: Family, designs: Array, panels: Panels, request: Request) -> tuple[Panels, Array]:
+    """Return both halves of each panel, and how far their poses are from its polynomial."""
+    middle = 0.5 * (panels.low + panels.high)
+    low, high = (np.stack(ends, axis=1).ravel() for ends in ((panels.low, middle), (middle, panels.high)))
+    row = np.repeat(panels.row, 2)
+    values = np.empty((row.size, NODES))
+    for some in blocks(np.arange(row.size), NODES):
+        poses, _ = pose_columns(family, designs[row[some]], _places(low[some], high[some]), [request.pose])
+        values[some] = poses[request.pose]
+    nodes, _ = _basis()
+    inner = np.concatenate([0.5 * (nodes - 1.0), 0.5 * (nodes + 1.0)])
+    before = _product(panels.series, _rising(inner))
+    miss = np.abs(values.reshape(-1, 2 * NODES) - before).max(axis=1)
+    halves = _fitted(row, low, high, values, request.mode)
+    # The highest pose seen may stand alone, as one in the very place of a jump: it is kept by the half it lies in.
+    peak, at = np.repeat(panels.peak, 2), np.repeat(panels.at, 2)
+    kept = (peak > halves.peak) & (low <= at) & (at <= high)
+    miss = np.repeat(miss, 2)
+    return halves._replace(peak=np.where(kept, peak, halves.peak), at=np.where(kept, at, halves.at), missed=miss), miss
+
+
+def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Request, which: Index) -> Array:
+    """Return how far poses at some tops are from these: a kink next to an end is seen by no other pose."""
+    off = np.zeros(top.row.size)
+    place = _inside(top.phi, panels.low, panels.high)
+    for some in blocks(which, 1):
+        poses, _ = pose_columns(family, designs[top.row[some]], place[some, None], [request.pose])
+        off[some] = np.abs(_measured(poses[request.pose][:, 0], request.mode) - top.value[some])
+    return off
+
+
+def _tops(panels: Panels, mode: int, err: Array) -> Top:
+    """Return the highest points of the polynomials, whose heights are wrong by ``err`` at most."""
+    dense = np.linspace(-1.0, 1.0, DENSE)
+    heights = _measured(_product(panels.series, _rising(dense)), mode)
+    x, value = dense[heights.argmax(axis=1)], heights.max(axis=1)
+    slope, bend = (np.ascontiguousarray(chebyshev.chebder(panels.series, order, axis=1).T) for order in (1, 2))
+    for _ in range(NEWTON):
+        bow = chebyshev.chebval(x, bend, tensor=False)
+        step = np.divide(chebyshev.chebval(x, slope, tensor=False), bow, out=np.zeros(x.size), where=bow != 0.0)
+        after = np.clip(x - np.clip(step, -2.0 / DENSE, 2.0 / DENSE), -1.0, 1.0)
+        height = _measured(chebyshev.chebval(after, panels.series.T, tensor=False), mode)
+        x, value = np.where(height >= value, after, x), np.maximum(value, height)
+    half = 0.5 * (panels.high - panels.low)
+    # At an end the slope is what holds the place, inside it is the bend.
+    inside, bow = np.abs(x) < 1.0, np.abs(chebyshev.chebval(x, bend, tensor=False))
+    blur = np.divide(SLOPE * err, bow, out=np.full(x.size, 2.0), where=bow > 0.0)
+    err_phi = np.where(inside, half * np.minimum(blur, 2.0), 0.0) + 8.0 * EPS * np.pi
+    return Top(panels.row, 0.5 * (panels.low + panels.high) + half * x, value, err + 4.0 * EPS * np.abs(value), err_phi)
+
+
+def _held(panels: Panels, before: Array, size: Array) -> Top:
+    """Return the highest poses of panels as narrow as crank angles can be told apart; ``before`` they were halved."""
+    err = np.abs(panels.peak - before) + EDGE * EPS * np.maximum(size[panels.row], np.abs(panels.peak))
+    return Top(panels.row, panels.at, panels.peak, err, panels.high - panels.low + 8.0 * EPS * np.pi)
+
+
+def _given_up(panels: Panels, mode: int) -> Top:
+    """Return the highest poses of panels that are no longer halved, and how much higher their polynomials may be."""
+    err = _upper(panels, mode) - panels.peak
+    return Top(panels.row, panels.at, panels.peak, err, panels.high - panels.low)
+
+
+def _highest(tops: list[Top], n: int) -> Top:
+    """Return the highest top of each row; what another one may be higher by is part of its error."""
+    every = Top(*(np.concatenate(parts) for parts in zip(*tops, strict=True)))
+    order = np.lexsort((every.phi, -every.value, every.row))
+    row, first = np.unique(every.row[order], return_index=True)
+    highest = _only(every, order[first])
+    ceiling = np.full(n, -np.inf)
+    np.maximum.at(ceiling, every.row, every.value + every.err)
+    return highest._replace(err=np.maximum(highest.err, ceiling[row] - highest.value))
+
+
+def _only(top: Top, which: Index | Mask) -> Top:
+    row, *others = top
+    return Top(row[which], *(column[which] for column in others))
+
+
+def _upper(panels: Panels, mode: int) -> Array:
+    """Return what a curve does not exceed on a panel, as far as its coefficients tell."""
+    dense = _product(panels.series, _rising(np.linspace(-1.0, 1.0, DENSE)))
+    doubt = CAREFUL * np.abs(panels.series[:, -TAIL:]).sum(axis=1) + LATELY * panels.missed
+    upper: Array = np.maximum(_measured(dense, mode).max(axis=1), panels.peak) + doubt
+    return upper
+
+
+def _rounding(guards: Sequence[str], poses: dict[str, Array], good: Mask, row: Index, top: Top, precise: bool) -> Array:
+    """Return what rounding near a dead point may have moved each height by (as in `sweep.reductions.search`)."""
+    amplified = np.zeros(top.row.size)
+    for name in guards[1:] if precise else guards:
+        values = poses[name][good]
+        largest, least = np.full(row.max(initial=0) + 1, -np.inf), np.full(row.max(initial=0) + 1, np.inf)
+        np.maximum.at(largest, row, values.max(axis=1))
+        np.minimum.at(least, row, values.min(axis=1))
+        amplified += np.divide(largest[top.row], least[top.row], out=np.zeros(top.row.size), where=least[top.row] > 0.0)
+    return 4.0 * EPS * (1.0 + amplified) * np.abs(top.value)
+
+
+def _measured(values: Array, mode: int) -> Array:
+    measured: Array = np.abs(values) if mode == 0 else mode * values
+    return measured
+
+
+@lru_cache
+def _basis() -> tuple[Array, Array]:
+    """Return the nodes on [-1, 1], its ends among them, and the matrix that makes coefficients of values there."""
+    order = np.arange(NODES, dtype=np.float64)
+    nodes: Array = -np.cos(np.pi * order / (NODES - 1))
+    weights = np.where((order == 0) | (order == NODES - 1), 0.5, 1.0)
+    both = weights[:, None] * weights * (2.0 / (NODES - 1))
+    return nodes, both * np.cos(np.pi * np.outer(order, order[::-1]) / (NODES - 1))
+
+
+def _places(low: Array, high: Array) -> Array:
+    """Return the nodes of panels; at the very end the curve may already have jumped, so it is not touched."""
+    nodes, _ = _basis()
+    places = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * nodes
+    return _inside(places, low[:, None], high[:, None])
+
+
+def _inside(phi: Array, low: Array, high: Array) -> Array:
+    return np.clip(phi, low + 0.25 * NARROWEST, high - 0.25 * NARROWEST)
+
+
+def _fitted(row: Index, low: Array, high: Array, values: Array, mode: int) -> Panels:
+    """Return panels with the polynomials through their poses."""
+    measured, every = _measured(values, mode), np.arange(row.size)
+    top = measured.argmax(axis=1)
+    series: Array = _product(values, _basis()[1].T)
+    return Panels(row, low, high, series, measured[every, top], _places(low, high)[every, top], np.zeros(row.size))
+
+
+def _worst(row: Index, each: Status, n: int) -> Status:
+    """Return the gravest status of each design from the poses of its panels."""
+    first = np.searchsorted(row, np.arange(n))
+    count = np.bincount(row, minlength=n)
+    turn = np.zeros((n, int(count.max(initial=0)), NODES), np.uint8)
+    turn[row, np.arange(row.size) - first[row]] = each
+    worst: Status = np.empty(n, np.uint8)
+    scan.worst_status(turn.reshape(n, -1), worst)
+    return DESIGN_STATUS[worst]
+
+
+def _values(series: Array) -> Array:
+    return _product(series, _rising(_basis()[0]))
+
+
+def _rising(x: Array) -> Array:
+    """Return the Chebyshev polynomials at x (m,), lowest order first, (NODES, m)."""
+    found: Array = np.asarray(chebyshev.chebvander(x, NODES - 1).T, np.float64)
+    return found
+
+
+def _product(rows: Array, matrix: Array) -> Array:
+    """Return the matrix product, summed in one order: that of a library depends on how many rows there are."""
+    total: Array = rows[:, 0, None] * matrix[0]
+    for k in range(1, matrix.shape[0]):
+        total += rows[:, k, None] * matrix[k]
+    return total
