@@ -37,7 +37,7 @@ def proven(question, folder, cores=None, settings=None, target=TARGET):
     """The certificate of a question, written into a folder."""
     settings = settings or ProveSettings(0.014, 20_000)
     leaves, judged, cut = explored(
-        question, target, settings, folder / "parts", cores or Cores(Here(), 1, Stop()), lambda _: None
+        question, target, settings, folder / "parts", cores or Cores(Here(), 1, Stop()), lambda *_: None
     )
     proof = concluded(question, leaves, BEST, settings.gap, judged, 0.0, cut)
     write(folder / "_proof.parquet", question, leaves, proof, target, "key")

@@ -84,7 +84,7 @@ def advise(scene: Scene) -> Advice | None:
         square = given["com_rocker_x"] ** 2 + given["com_rocker_y"] ** 2
         inertia = (given["j_rocker_zz"] + inertia * square) / c**2
     off = np.hypot(given["com_coupler_y"], given["com_coupler_z"]) / b
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):  # without a mass the quotient is not used
         share = np.where(given["m_coupler"] > 0.0, given["m_coupler"] / inertia, 0.0)
     return Advice("coupler's mass over the follower's, brought to C, plus its eccentricity", share + off, 0.05)
 
