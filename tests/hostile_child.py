@@ -1,6 +1,7 @@
 """Hostile input in a process of its own, which may not have more than 2 GB and says nothing but what went wrong.
 
-``python -m tests.hostile_child studies|tables FIRST STOP FOLDER`` prints a JSON object as its only line.
+``python -m tests.hostile_child studies|tables|requests FIRST STOP STEP FOLDER`` prints a JSON object as its only line.
+``requests`` are tables without the limit: what they compile, machine code of LLVM, has nothing to do with the input.
 """
 
 from __future__ import annotations
@@ -36,15 +37,16 @@ def table(seed: int, folder: Path) -> str:
 
 def main() -> None:
     """All seeds of a range."""
-    kind, first, stop, place = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4])
+    kind, (first, stop, step), place = sys.argv[1], map(int, sys.argv[2:5]), Path(sys.argv[5])
     # Private memory: the address space of an idle process with its libraries is 2 GB already.
-    resource.setrlimit(resource.RLIMIT_DATA, (MOST_BYTES, MOST_BYTES))
+    if kind != "requests":
+        resource.setrlimit(resource.RLIMIT_DATA, (MOST_BYTES, MOST_BYTES))
     warnings.simplefilter("error")
     ends, wrong = Counter[str](), list[str]()
-    for seed in range(first, stop):
+    for seed in range(first, stop, step):
         folder = place / f"{kind}-{seed}"
         try:
-            end = {"studies": study, "tables": table}[kind](seed, folder)
+            end = {"studies": study, "tables": table, "requests": table}[kind](seed, folder)
         except Exception as error:  # this is what is looked for
             end = f"{type(error).__name__}: {str(error)[:300]}"
         ends[end if end in ("answered", "refused", "large") else "wrong"] += 1
