@@ -149,8 +149,7 @@ def _prescribed(study: Study) -> tuple[Parameter, ...]:
 def problem_and_starts(
     study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1, say: Say = unsaid
 ) -> tuple[OptimiseSettings, Begun]:
-    """Return settings, problem and starts:
-    the diverse best of the dataset, filled up from samples where they are too few.
+    """Return settings, problem and starts: the diverse best of the dataset, filled up from samples if too few.
 
     Where no row of the dataset is feasible, the first starts are the best of random designs.  The mechanisms that do
     the study's [task] come before all others.  With ``optimise.global = "proportions"`` five of six starts come from
