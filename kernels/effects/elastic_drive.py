@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline, kernel
-from kernels.effects.elasticity import LINEAR, PHASE_STEP, RESOLVED
+from kernels.effects.elasticity import LINEAR, PHASE_STEP, RESOLVED, solve_band
 from kernels.periodic import coefficients, series, tail
 
 Array = NDArray[np.float64]
@@ -65,34 +65,7 @@ def driven_solution(bc: Array, bs: Array, cc: Array, cs: Array, c: Array, s: Arr
                 entry = _harmonic(bc, bs, step) * complex(0.0, float(m - step)) + _harmonic(cc, cs, step)
                 band[row, w - step] = entry
         band[row, w] -= m * m
-    for column in range(size):
-        low, right = min(column + w, size - 1), min(column + 2 * w, size - 1)
-        pivot, best = column, -1.0
-        for row in range(column, low + 1):
-            entry = band[row, column - row + w]
-            square = entry.real * entry.real + entry.imag * entry.imag
-            if square > best:
-                pivot, best = row, square
-        if pivot != column:
-            for k in range(column, right + 1):
-                here, there = k - column + w, k - pivot + w
-                band[column, here], band[pivot, there] = band[pivot, there], band[column, here]
-            x[column], x[pivot] = x[pivot], x[column]
-        per = band[column, w].conjugate() * (1.0 / best)
-        band[column, w] = per
-        for row in range(column + 1, low + 1):
-            factor = band[row, column - row + w] * per
-            for k in range(column + 1, right + 1):
-                band[row, k - row + w] -= factor * band[column, k - column + w]
-            x[row] -= factor * x[column]
-    for back in range(size):
-        row = size - 1 - back
-        for k in range(row + 1, min(row + 2 * w, size - 1) + 1):
-            x[row] -= band[row, k - row + w] * x[k]
-        x[row] *= band[row, w]
-    for k in range(order + 1):
-        value = x[order + k]
-        c[k], s[k] = (2.0 * value.real, -2.0 * value.imag) if k > 0 else (value.real, 0.0)
+    solve_band(band, x, w, c, s)
 
 
 @kernel

@@ -157,6 +157,16 @@ def periodic_solution(qc: Array, qs: Array, stiffness: float, damping: float, c:
                 # The band starts w columns left of the diagonal and has room for the rows that pivoting brings up.
                 band[row, w - step] = q * complex(stiffness, damping * (m - 0.5 * step))
         band[row, w] -= m * m
+    solve_band(band, x, w, c, s)
+
+
+@kernel
+def solve_band(band: NDArray[np.complex128], x: NDArray[np.complex128], w: int, c: Array, s: Array) -> None:
+    """Solve a banded system for the harmonics -K..K of eta, by elimination with row pivoting; write its series.
+
+    ``band`` (2 K + 1, 3 w + 1) has the diagonal in column w; it and the right side ``x`` are used up.
+    """
+    order, size = c.size - 1, x.size
     for column in range(size):
         low, right = min(column + w, size - 1), min(column + 2 * w, size - 1)
         pivot, best = column, -1.0
