@@ -15,12 +15,12 @@ from kernels.families.rssr.joints import joints as joints
 from kernels.families.rssr.limits import LIMIT_NAMES as LIMIT_NAMES
 from kernels.families.rssr.limits import limits as limits
 from kernels.families.rssr.margin import margin as margin
-from kernels.families.rssr.maxima import sampling_tables as sampling_tables
 from kernels.families.rssr.maxima import true_maxima as true_maxima
 from kernels.families.rssr.motion import Joints as Joints
 from kernels.families.rssr.motion import poses as poses
 from kernels.families.rssr.precise import PRECISE_COLUMNS as PRECISE_COLUMNS
 from kernels.families.rssr.precise import precise_constants as precise_constants
 from kernels.families.rssr.precise import precise_poses as precise_poses
+from kernels.families.rssr.sampling import sampling_tables as sampling_tables
 from kernels.families.rssr.stage import FORM as FORM
 from kernels.families.rssr.stage import opening as opening

@@ -42,122 +42,38 @@ from kernels.families.rssr.block import (
 )
 from kernels.families.rssr.careful import careful_maximum
 from kernels.families.rssr.closure import Array, Status
-from kernels.families.rssr.derivatives import follower
 from kernels.families.rssr.peaks import (
     ERROR,
     HEIGHT,
     LAST,
-    MOST_PEAKS,
     MOVED,
     REACH,
     ROUNDING,
     START,
     TURN,
-    append,
     begin_at_vertex,
     finish,
     new_list,
     refine,
     settle,
 )
-from kernels.reduce import largest
+from kernels.families.rssr.sampling import (
+    FEWEST,
+    GRID_SIZE,
+    MARKS,
+    MOST,
+    list_marked,
+    list_peaks,
+    mark_peaks,
+    sample,
+    sample_block,
+)
 from kernels.trigpoly import far_minimum, point
 from kernels.verdict import turning_status
 
 Counts = NDArray[np.int64]
-FEWEST, MOST = 16, 1024
 _NONE = (math.nan, math.nan, math.nan, math.nan)
 _NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # what the search needs of a design
-_FLOOR, _MARKS = (FEWEST + 2) * BLOCK, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
-# Powers of two below 2^18 leave different remainders modulo 19, so a table turns 2^k into k without a loop.
-_EXPONENT = np.array([0, 0, 1, 13, 2, 16, 14, 6, 3, 8, 17, 12, 15, 5, 7, 11, 4, 10, 9])  # k of 2^k modulo 19
-
-
-def sampling_tables() -> tuple[Array, Array]:
-    """Return cosines and sines of N equally spaced angles for N = 16, 32, ...
-    1024; those of N start at position N - 16.
-    """
-    phi = np.concatenate([np.arange(n) * (2.0 * np.pi / n) for n in (16 << k for k in range(7))])
-    return np.cos(phi), np.sin(phi)
-
-
-@inline
-def _sample(
-    at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, first: Array | None, second: Array | None
-) -> None:
-    """Compute magnitudes at n equally spaced angles into size[1 ... n], closed periodically."""
-    e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
-    begin = n - FEWEST
-    for i in range(n):
-        p, q, j, _ = follower(e, y0, ca, k0, k1, k2, cos[begin + i], sin[begin + i])
-        size[1 + i] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
-    size[0], size[n + 1] = size[n], size[1]
-
-
-@inline
-def _sample_block(
-    count: int, at: Array, cos: Array, sin: Array, size: Array, first: Array | None, second: Array | None
-) -> None:
-    """Sample as :func:`_sample` does with FEWEST angles, all designs of a block:
-    angle i of design k at (i + 1) BLOCK + k.
-    """
-    for i in range(FEWEST):
-        u, v, row = cos[i], sin[i], (1 + i) * BLOCK
-        for k in range(count):
-            e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
-            p, q, j, _ = follower(e, y0, ca, k0, k1, k2, u, v)
-            size[row + k] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
-    for k in range(count):
-        size[k], size[(FEWEST + 1) * BLOCK + k] = size[FEWEST * BLOCK + k], size[BLOCK + k]
-
-
-@inline
-def _mark_peaks(count: int, size: Array) -> None:
-    """Mark the local maxima of at least 60 % among the samples of :func:`_sample_block`, as a sum of powers of two."""
-    for k in range(count):
-        size[_FLOOR + k], size[_MARKS + k] = 0.0, 0.0
-    for i in range(1, FEWEST + 1):
-        for k in range(count):
-            size[_FLOOR + k] = largest(size[_FLOOR + k], 0.6 * size[i * BLOCK + k])
-    mark = 1.0
-    for i in range(1, FEWEST + 1):
-        for k in range(count):
-            y, before, after = size[i * BLOCK + k], size[(i - 1) * BLOCK + k], size[(i + 1) * BLOCK + k]
-            peak = (y >= size[_FLOOR + k]) & (y > before) & (y >= after)
-            size[_MARKS + k] += mark if peak else 0.0
-        mark *= 2.0
-
-
-@inline
-def _list_marked(at: Array, k: int, cos: Array, sin: Array, size: Array, m: Array, count: int) -> int:
-    """Append the marked local maxima of design k to the list; returns its new length."""
-    marks = int(size[_MARKS + k])
-    while marks != 0:
-        # The lowest bit that is set.
-        lowest = marks & -marks
-        i = _EXPONENT[lowest % 19]
-        here = (i + 1) * BLOCK + k
-        append(at, k, cos[i], sin[i], size[here - BLOCK], size[here], size[here + BLOCK], FEWEST, i, m, count)
-        marks ^= lowest
-        count += 1
-    return count
-
-
-@inline
-def _list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, m: Array, count: int) -> int:
-    """Append the local maxima among the samples of one design by :func:`_sample`; none if there are too many."""
-    most = 0.0
-    for i in range(n):
-        most = largest(most, size[i])
-    floor, length = 0.6 * most, count
-    for i in range(1, n + 1):
-        if (size[i] >= floor) & (size[i] > size[i - 1]) & (size[i] >= size[i + 1]):
-            if length - count == MOST_PEAKS:
-                return count
-            here = n - FEWEST + i - 1
-            append(at, k, cos[here], sin[here], size[i - 1], size[i], size[i + 1], n, i - 1, m, length)
-            length += 1
-    return length
 
 
 @inline
@@ -227,10 +143,13 @@ def _keep_what_turns(start: int, count: int, at: Array, who: Counts, status: Sta
 @inline
 def _highest(begin: int, end: int, m: Array) -> tuple[float, float, float, float]:
     """Return the height, place and the errors of both of the highest refined maximum of a design."""
-    best, winner = 0.0, 0
-    for peak in range(begin, end):
+    # The first and the last without a loop: few designs have more, and the processor guesses that rightly.
+    best, winner = max(m[begin + HEIGHT], 0.0), begin
+    for peak in range(begin + 1, end - 1):
         winner = peak if m[peak + HEIGHT] > best else winner
         best = max(best, m[peak + HEIGHT])
+    winner = end - 1 if m[end - 1 + HEIGHT] > best else winner
+    best = max(best, m[end - 1 + HEIGHT])
     place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
     return best, place, m[winner + ERROR] + best * m[winner + ROUNDING], m[winner + REACH]
 
@@ -272,7 +191,7 @@ def true_maxima(
     # The parabola at the end is one more; the one maximum in hundreds that is not settled then gets another three.
     rounds = (2 if order == 1 else 3) - (1 if target > 1e-4 else 0)
     at, who = new_block(), np.empty(BLOCK, np.int64)
-    m, size, grid = new_list(), np.empty(MOST + 2), np.empty((FEWEST + 4) * BLOCK)
+    m, size, grid = new_list(), np.empty(MOST + 2), np.empty(GRID_SIZE)
     first_peak = np.empty(BLOCK + 1, np.int64)
     for start in range(0, designs.shape[0], BLOCK):
         count = min(BLOCK, designs.shape[0] - start)
@@ -283,8 +202,8 @@ def true_maxima(
             _put(i, _NONE, phi, error, phi_error, max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
         padded = (block + 7) & ~7  # whole vectors; what stands in the surplus is never read
         singularity_distance(padded, at)
-        _sample_block(padded, at, cos, sin, grid, max_abs_dpsi, max_abs_d2psi)
-        _mark_peaks(padded, grid)
+        sample_block(padded, at, cos, sin, grid, max_abs_dpsi, max_abs_d2psi)
+        mark_peaks(padded, grid)
         count = 0
         for i in range(block):
             first_peak[i] = count
@@ -294,10 +213,11 @@ def true_maxima(
             while n * at[i + ACROSS] < per_rho:
                 n *= 2
             if n == FEWEST:
-                count = _list_marked(at, i, cos, sin, grid, m, count)
+                marks = int(grid[MARKS + i])
+                count = list_marked(marks, at, i, cos, sin, grid[i:], BLOCK, n, 0, m, count)
             else:
-                _sample(at, i, cos, sin, n, size, max_abs_dpsi, max_abs_d2psi)
-                count = _list_peaks(at, i, cos, sin, n, size, m, count)
+                sample(at, i, cos, sin, n, size, max_abs_dpsi, max_abs_d2psi)
+                count = list_peaks(at, i, cos, sin, n, size, m, count)
         first_peak[block] = count
         padded = (count + 7) & ~7
         begin_at_vertex(padded, m)
@@ -305,8 +225,8 @@ def true_maxima(
         finish(0, padded, m, order, target, max_abs_dpsi, max_abs_d2psi)
         for i in range(block):
             begin, end = first_peak[i], first_peak[i + 1]
-            worst = 0.0 if end > begin else math.inf
-            for peak in range(begin, end):
+            worst = max(m[begin + ERROR], m[end - 1 + ERROR]) if end > begin else math.inf
+            for peak in range(begin + 1, end - 1):
                 worst = max(worst, m[peak + ERROR])
             if end > begin and not worst < math.inf:
                 worst = settle(begin, end, m, order, target, max_abs_dpsi, max_abs_d2psi)

@@ -1,0 +1,157 @@
+"""Samples of the search for true maxima, and the local maxima among them (docs/rssr.md, section 6).
+
+Most designs need no more than 16 samples.  Those of a block of designs are computed side by side, and their local
+maxima are marked side by side; a design that needs more samples is taken by itself.  Sets of samples are bits of one
+integer, so that what is listed costs no loop over the samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels._jit import inline
+from kernels.bits import lowest_bit
+from kernels.families.rssr.block import BLOCK, CA, K0, K1, K2, Y0, E
+from kernels.families.rssr.closure import Array
+from kernels.families.rssr.derivatives import follower
+from kernels.families.rssr.peaks import MOST_PEAKS, append
+from kernels.reduce import largest
+
+FEWEST, MOST = 16, 1024
+_FLOOR, MARKS = (FEWEST + 2) * BLOCK, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
+GRID_SIZE = (FEWEST + 4) * BLOCK
+
+
+def sampling_tables() -> tuple[Array, Array]:
+    """Return cosines and sines of N equally spaced angles for N = 16, 32, ...
+    1024; those of N start at position N - 16.
+    """
+    phi = np.concatenate([np.arange(n) * (2.0 * np.pi / n) for n in (16 << k for k in range(7))])
+    return np.cos(phi), np.sin(phi)
+
+
+@inline
+def sample(
+    at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, first: Array | None, second: Array | None
+) -> None:
+    """Compute magnitudes at n equally spaced angles into size[1 ... n], closed periodically."""
+    e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
+    # Slices, because an index that the compiler does not know to be positive makes it gather: twice the time.
+    u, v, out = cos[n - FEWEST : 2 * n - FEWEST], sin[n - FEWEST : 2 * n - FEWEST], size[1 : n + 1]
+    for i in range(n):
+        p, q, j, _ = follower(e, y0, ca, k0, k1, k2, u[i], v[i])
+        out[i] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
+    size[0], size[n + 1] = size[n], size[1]
+
+
+@inline
+def sample_block(
+    count: int, at: Array, cos: Array, sin: Array, size: Array, first: Array | None, second: Array | None
+) -> None:
+    """Sample as :func:`sample` does with FEWEST angles, all designs of a block:
+    angle i of design k at (i + 1) BLOCK + k.
+    """
+    for i in range(FEWEST):
+        u, v, row = cos[i], sin[i], (1 + i) * BLOCK
+        for k in range(count):
+            e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
+            p, q, j, _ = follower(e, y0, ca, k0, k1, k2, u, v)
+            size[row + k] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
+    for k in range(count):
+        size[k], size[(FEWEST + 1) * BLOCK + k] = size[FEWEST * BLOCK + k], size[BLOCK + k]
+
+
+@inline
+def mark_peaks(count: int, size: Array) -> None:
+    """Mark the local maxima of at least 60 % among the samples of :func:`sample_block`, as a sum of powers of two."""
+    for k in range(count):
+        size[_FLOOR + k], size[MARKS + k] = 0.0, 0.0
+    for i in range(1, FEWEST + 1):
+        for k in range(count):
+            size[_FLOOR + k] = largest(size[_FLOOR + k], 0.6 * size[i * BLOCK + k])
+    mark = 1.0
+    for i in range(1, FEWEST + 1):
+        for k in range(count):
+            y, before, after = size[i * BLOCK + k], size[(i - 1) * BLOCK + k], size[(i + 1) * BLOCK + k]
+            peak = (y >= size[_FLOOR + k]) & (y > before) & (y >= after)
+            size[MARKS + k] += mark if peak else 0.0
+        mark *= 2.0
+
+
+@inline
+def _append_lowest(
+    marks: int,
+    at: Array,
+    k: int,
+    u: Array,
+    v: Array,
+    size: Array,
+    stride: int,
+    n: int,
+    begin: int,
+    m: Array,
+    count: int,
+) -> None:
+    """Append the lowest bit of ``marks``, as of :func:`list_marked`; something meaningless where there is none."""
+    i = lowest_bit(marks) & 63  # never negative, which spares a check of every index
+    before = i * stride
+    here, after = before + stride, before + 2 * stride
+    append(at, k, u[i], v[i], size[before], size[here], size[after], n, begin + i, m, count)
+
+
+@inline
+def list_marked(
+    marks: int,
+    at: Array,
+    k: int,
+    u: Array,
+    v: Array,
+    size: Array,
+    stride: int,
+    n: int,
+    begin: int,
+    m: Array,
+    count: int,
+) -> int:
+    """Append the local maxima of design k that are bits of ``marks`` to the list; returns its new length.
+
+    Bit i stands for sample ``begin`` + i of n at the angle (u[i], v[i]); the samples of the design stand ``stride``
+    apart in ``size``, the one before bit 0 first.
+    """
+    # Nearly all designs have one such maximum or two.  Two are written in any case, without a branch that the
+    # processor could guess wrong; what is too many the next design writes over.
+    for _ in range(2):
+        _append_lowest(marks, at, k, u, v, size, stride, n, begin, m, count)
+        count += 1 if marks != 0 else 0
+        marks &= marks - 1
+    while marks != 0:
+        _append_lowest(marks, at, k, u, v, size, stride, n, begin, m, count)
+        count += 1
+        marks &= marks - 1
+    return count
+
+
+@inline
+def _marks(width: int, floor: float, size: Array) -> int:
+    """Return the local maxima of at least ``floor`` among the samples size[1 ... width], as bits."""
+    before, here, after, marks = size[:width], size[1 : width + 1], size[2 : width + 2], 0
+    for i in range(width):
+        peak = (here[i] >= floor) & (here[i] > before[i]) & (here[i] >= after[i])
+        marks |= (1 << i) if peak else 0
+    return marks
+
+
+@inline
+def list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, m: Array, count: int) -> int:
+    """Append the local maxima among the samples of one design by :func:`sample`; none if there are too many."""
+    most = 0.0
+    for i in range(n):
+        most = largest(most, size[i])
+    length, width = count, min(n, 64)
+    for begin in range(0, n, width):
+        part = size[begin : begin + width + 2]
+        u, v = cos[n - FEWEST + begin :], sin[n - FEWEST + begin :]
+        length = list_marked(_marks(width, 0.6 * most, part), at, k, u, v, part, 1, n, begin, m, length)
+        if length - count > MOST_PEAKS:
+            return count
+    return length
