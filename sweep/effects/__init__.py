@@ -19,6 +19,7 @@ from sweep.effects.placing import Placed, stages_of
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work
 from sweep.families.chain import Chain
+from sweep.families.derived import of_family
 from sweep.families.members import Machine
 from sweep.families.relations import Reading
 from sweep.numerics.curves import Curve
@@ -82,6 +83,7 @@ def effect(name: str) -> Effect:
     return entry
 
 
+@of_family
 def applicable(family: Family) -> tuple[Placed, ...]:
     """Return effects that can be asked of a family or of the stages of a chain, in the order of the register.
 
@@ -106,7 +108,15 @@ def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
     in the order of the register.
     """
     names = {about for name in wanted for about in reduced(name, family.domain)}  # max_abs_force_d asks for force_d
+    if names.isdisjoint(_effect_names(family)):
+        return ()
     return tuple(p for p in applicable(family) if not names.isdisjoint(o.name for o in p.outputs))
+
+
+@of_family
+def _effect_names(family: Family) -> frozenset[str]:
+    """Return names of the outputs of all effects that can be asked of a family."""
+    return frozenset(o.name for placed in applicable(family) for o in placed.outputs)
 
 
 def _carriers(family: Family, placed: Placed) -> list[Placed]:

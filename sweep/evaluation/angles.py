@@ -128,7 +128,9 @@ def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
         found = np.abs(numbers(values, name, "column"))
     except InputError:
         return  # whoever reads it says so, with the right row
-    if found.size == 0 or not (largest := float(np.max(found, initial=0.0, where=np.isfinite(found)))) > MOST:
+    if found.size == 0 or np.max(found) <= MOST:
+        return  # the usual case, in one pass
+    if not (largest := float(np.max(found, initial=0.0, where=np.isfinite(found)))) > MOST:
         return
     if turns_on and not reads_as_degrees(largest):
         return

@@ -38,6 +38,6 @@ def explained(columns: Columns, names: Iterable[str]) -> Columns:
             continue
         status[missing & (status == OK)] = INVALID_INPUT
         for key in (name, error_of(name)):
-            if key in columns:
+            if key in columns and not np.isnan(columns[key][missing]).all():
                 changed[key] = np.where(missing, np.nan, columns[key])
     return columns | changed | {"status": status}

@@ -170,7 +170,7 @@ def design_outputs(
     """
     _check_window(window)
     family = on_closed_turn(family)
-    n = len(designs)
+    designs, n = np.ascontiguousarray(designs), len(designs)
     status = np.zeros(n, np.uint8)
     columns: Columns = {}
     ways = routes(family, wanted, accuracy)
@@ -182,8 +182,9 @@ def design_outputs(
         assert route.run is not None
         # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
         alive = np.flatnonzero(GOES_ON[status])
+        of_these = designs if alive.size == n else designs[alive]
         with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
-            found = route.run(designs[alive], accuracy, window)
+            found = route.run(of_these, accuracy, window)
         for name in route.outputs:
             for key in (name, error_of(name)) if accuracy.target is not None else (name,):
                 columns[key] = _spread(found[key], alive, n)

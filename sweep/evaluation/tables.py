@@ -139,8 +139,11 @@ def _parameter_column(family: Parametrised, p: Parameter, table: Table, keys: di
             p.name, "missing", f"a column with the {p.text}; found {present}{guess}", f"table of {family.name}"
         )
     values = np.broadcast_to(_column(table, keys, p.name), rows)
-    _refuse(~np.isfinite(values), values, p.name, "a finite number")
-    if p.sign:
+    # Least and largest tell in two passes whether anything is to be refused: nan makes both of them nan.
+    least, largest = (values.min(), values.max()) if rows else (1.0, 1.0)
+    if not np.isfinite(least) or not np.isfinite(largest):
+        _refuse(~np.isfinite(values), values, p.name, "a finite number")
+    if p.sign and (least <= 0.0 if p.positive else least < 0.0):
         _refuse(values <= 0.0 if p.positive else values < 0.0, values, p.name, f"a {p.sign} {p.unit}")
     if p.choices is not None:
         _refuse(np.logical_and.reduce([values != x for x in p.choices]), values, p.name, p.choice)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import Literal, NamedTuple, TypeAlias, TypeVar
+from typing import Any, Literal, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -230,6 +230,11 @@ class Family:
     def every(self, kind: type[Capability]) -> tuple[Capability, ...]:
         """Return all capabilities of a type: a chain has one of each stage."""
         return tuple(found for found in self.capabilities if isinstance(found, kind))
+
+    @cached_property
+    def derived(self) -> dict[object, Any]:
+        """What follows from this family alone, by the function that found it: see :mod:`sweep.families.derived`."""
+        return {}
 
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:

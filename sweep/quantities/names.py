@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import NamedTuple
 
 
@@ -14,6 +15,7 @@ class Parts(NamedTuple):
     stage: str
 
 
+@lru_cache(maxsize=4096)
 def parts(name: str) -> Parts:
     """Take a name apart.
 

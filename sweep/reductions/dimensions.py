@@ -19,6 +19,7 @@ from sweep.costs import nanoseconds
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work
 from sweep.families.capabilities import Dimensions, Skeleton
 from sweep.families.chain import Chain
+from sweep.families.derived import of_family
 from sweep.families.members import Machine
 
 Piece: TypeAlias = Callable[[Any], Any]
@@ -81,6 +82,7 @@ def _of_columns(piece: Piece, columns: NDArray[np.intp], designs: Any) -> Any:
     return piece(designs[:, columns])
 
 
+@of_family
 def sizes(family: Family) -> dict[str, Size]:
     """Return all sizes of a family by name: of the whole, of every member, and of every stage."""
     groups: dict[tuple[str, str], list[_Part]] = {}

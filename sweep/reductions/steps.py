@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from sweep.costs import nanoseconds
 from sweep.families.base import Accuracy, Family, Output, Step
 from sweep.families.chain import Chain, Stage
+from sweep.families.derived import of_family
 from sweep.quantities.names import at_stage
 from sweep.quantities.reduction import reduction_of
 from sweep.reductions.dimensions import dimension_step
@@ -14,6 +15,7 @@ from sweep.reductions.size import size_step
 from sweep.reductions.travel import certified_travel
 
 
+@of_family
 def steps_of(family: Family) -> tuple[Step, ...]:
     """Return the family's own routes, and those that are made for it here."""
     made = (size_step(family), dimension_step(family), certified_travel(family))
