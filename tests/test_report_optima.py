@@ -138,6 +138,17 @@ def test_histogram_marks_what_misses_the_limit() -> None:
     assert [line.get_xdata()[0] for line in axes.lines] == [pytest.approx(11.99)]
 
 
+def test_histogram_of_a_mechanism_that_only_has_to_turn_is_that_of_its_margin() -> None:
+    """A yes or no has no scatter: what decides it is shown."""
+    found = made(data_of(row("optimum", 0.5), limits={"rotatable": True}))
+    margin = sweep.summarise("rssr", BEST, "margin")["margin"][0]
+    assert found.histogram.shown.name == "margin"
+    assert found.histogram.low is None, "too far away to be drawn"
+    assert found.share == found.histogram.within == 1.0
+    assert found.histogram.edges[0] < margin < found.histogram.edges[-1] and (found.histogram.shares > 0.0).sum() > 10
+    assert sum(cost.spread for cost in found.costs) == pytest.approx(1.0, abs=0.1)  # near enough linear
+
+
 def test_histogram_of_any_output_is_to_be_had() -> None:
     data = data_of(row("optimum", 0.5))
     np.testing.assert_array_equal(histogram(data, "least_link").shares, made(data).histogram.shares)

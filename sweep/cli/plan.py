@@ -7,10 +7,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sweep.cli.listing import aligned, main_outputs
+from sweep.families.members import Machine
 from sweep.quantities.names import without_minus
 
 if TYPE_CHECKING:
     from sweep.engine.estimate import Estimate
+    from sweep.families.base import Family
     from sweep.study import Study
     from sweep.study.space import Axis
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 # Poses per design that the shares of the effects are counted at, and designs that their rules are tried on.
 POSES = 100.0
 ADVISED = 64
+NAMED = 24  # outputs that are not computed
 
 
 def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]) -> list[str]:
@@ -30,7 +33,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     others : what other accuracies would take [s], in words
     """
     lines = [f"{study.name}: {study.title}" if study.title else study.name]
-    lines += [f"mechanism {study.family.name} ({study.family.title})"]
+    lines += _mechanism(study.family)
     if study.speed is not None:
         lines += [f"speed {study.speed * 30.0 / math.pi:g} rpm ({study.speed:.6g} rad/s)"]
     kind = "every combination" if study.space.kind == "product" else "Sobol sample"
@@ -40,8 +43,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     lines += _computed(study)
     lines += _before_and_between(study)
     lines += _effects(study)
-    left = [name for name in main_outputs(study.family) if name not in study.want]
-    lines += ["", "will not be computed, because nothing asks for it", f"  {', '.join(left)}"]
+    lines += _left_out(study)
     if study.objective is not None:
         large = without_minus(study.objective.output)
         lines += ["", f"to be made large: {large}" if large else f"to be made small: {study.objective.output}"]
@@ -65,6 +67,22 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     return lines
 
 
+def _mechanism(family: Family) -> list[str]:
+    if not isinstance(family, Machine):
+        return [f"mechanism {family.name} ({family.title})"]
+    rows = [(m.name, m.family.name, m.family.title) for m in family.members]
+    return [f"machine of {len(rows)} {'member' if len(rows) == 1 else 'members'}", *aligned(rows)]
+
+
+def _left_out(study: Study) -> list[str]:
+    left = [name for name in main_outputs(study.family) if name not in study.want]
+    if not left:
+        return []
+    more = len(left) - NAMED
+    text = ", ".join(left[:NAMED]) + (f" and {more} more, see sweep families" if more > 0 else "")
+    return ["", "will not be computed, because nothing asks for it", f"  {text}"]
+
+
 def _computed(study: Study) -> list[str]:
     """Return the routes of the sweep in their order, with their cost, outputs and limits."""
     from sweep.chunks.cascade import ordered_routes
@@ -82,7 +100,7 @@ def _computed(study: Study) -> list[str]:
         [
             (
                 f"{k}. {route.name}",
-                f"{route.ns_per_design:.3g} ns per design",
+                f"{duration(1e-9 * route.ns_per_design)} per design",
                 ", ".join(name + (f" ({limits[name]})" if name in limits else "") for name in route.outputs),
             )
             for k, route in enumerate(found, 1)
@@ -160,7 +178,8 @@ def _effects(study: Study) -> list[str]:
         lines += aligned(tree(bare, study.want, POSES))
     lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(out)}"]
     looked_at, tried = feasible_designs(study, ADVISED)
-    which = f"by {len(looked_at)} designs within all limits, of {tried} tried"
+    number = "1 design" if len(looked_at) == 1 else f"{len(looked_at)} designs"
+    which = f"by {number} within all limits, of {tried} tried"
     if not len(looked_at):
         looked_at = spread_designs(study, ADVISED)
         which = f"by {len(looked_at)} designs spread over the space: none of {tried} tried keeps all limits"
@@ -199,6 +218,9 @@ def size(count: float) -> str:
 
 def duration(seconds: float) -> str:
     """Return a time, in words."""
+    for below, unit in ((1e-6, "ns"), (1e-3, "us"), (1.0, "ms")):
+        if 0.0 < seconds < below:
+            return f"{float(f'{seconds / below * 1e3:.3g}'):g} {unit}"
     if seconds < 120.0:
         return f"{seconds:.2g} s"
     return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"

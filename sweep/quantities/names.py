@@ -105,6 +105,15 @@ def is_flag(name: str) -> bool:
     return stem(name) == "rotatable"
 
 
+def judged_by(name: str) -> str:
+    """Return the number whose sign decides a yes or no; the name itself where it is one already.
+
+    >>> judged_by("needle.rotatable2")
+    'needle.margin2'
+    """
+    return name.replace("rotatable", "margin") if is_flag(name) else name
+
+
 def by_magnitude(name: str) -> bool:
     """Return whether limits and objectives compare the magnitude of a design output:
     its sign tells the assembly mode.

@@ -244,7 +244,7 @@ def _margin(family: Family, name: str) -> Quantity | None:
     if stage:
         text = f"stage {stage}: {text}"
     elif len(loops) > 1:
-        text = f"{text}; of all stages the weakest"
+        text = f"{text}; of the stage where it is worst"
     return Quantity(Output(name, unit, text), "margin", base, stage=stage)
 
 

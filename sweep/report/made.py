@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import numpy as np
 from sweep.chunks.cascade import compared, meets
 from sweep.evaluation.summaries import design_outputs
 from sweep.optimise.tolerance import deviating, touched
+from sweep.quantities.names import is_flag, judged_by
 from sweep.reductions import catalogue
 from sweep.report.dataset import Dataset
 from sweep.report.quantities import Quantity, number, quantity
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 SAMPLES = 8192  # as the optimiser's yield: the same mechanisms, the same share
 SINGLE = 1024  # for what each dimension costs
 BINS = 41
+FAR = 2.0  # spreads of what is made from which on a bound is not drawn: it would make one bar of them
 TELLING = 0.002  # a share of mechanisms below which a dimension costs nothing that 1024 of them could tell
 
 
@@ -53,7 +56,10 @@ class Cost:
 
 @dataclass(frozen=True)
 class Histogram:
-    """An output over what is made: edges and shares of its bins in the unit shown, and the bounds of its limit."""
+    """An output over what is made: edges and shares of its bins in the unit shown, and the bounds of its limit.
+
+    A bound that is far from all that is made is None here, as one that is not asked for; ``within`` counts it.
+    """
 
     shown: Quantity
     edges: Array
@@ -75,7 +81,7 @@ class Made:
 def made(data: Dataset) -> Made | None:
     """Make the optimum many times; None without tolerances, an optimum, or a limit that leaves room."""
     study, row = data.study, data.optimum
-    limits = [x for x in study.output_limits if x.minimum is None or x.minimum != x.maximum]
+    limits = [_scattering(x) for x in study.output_limits if x.minimum is None or x.minimum != x.maximum]
     if study.tolerance is None or study.optimise is None or row is None or not limits:
         return None
     design = np.array([float(row[name]) for name in study.family.parameter_names])
@@ -114,6 +120,11 @@ def histogram(data: Dataset, output: str) -> Histogram | None:
     return _histogram(data, limit, compared(output, np.asarray(values, np.float64)))
 
 
+def _scattering(limit: Limit) -> Limit:
+    """Return the same limit on the number that decides it: a yes or no has no scatter that could be shown."""
+    return Limit(judged_by(limit.output), 0.0, None) if is_flag(limit.output) else limit
+
+
 def _kept(
     study: Study, limits: list[Limit], designs: Array
 ) -> tuple[dict[str, NDArray[np.generic]], NDArray[np.bool_]]:
@@ -150,8 +161,11 @@ def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
 def _histogram(data: Dataset, limit: Limit, values: Array) -> Histogram:
     shown = quantity(limit.output, catalogue.output(data.study.family, limit.output).unit)
     known = values[np.isfinite(values)] * shown.factor
+    low, high = np.percentile(known, (0.1, 99.9)) if known.size else (0.0, 1.0)
+    far = FAR * (high - low) or math.inf
     bounds = [None if x is None else x * shown.factor for x in (limit.minimum, limit.maximum)]
-    ends = [*(np.percentile(known, (0.1, 99.9)) if known.size else (0.0, 1.0)), *(x for x in bounds if x is not None)]
+    bounds = [x if x is not None and low - far <= x <= high + far else None for x in bounds]
+    ends = [low, high, *(x for x in bounds if x is not None)]
     low, high = min(ends), max(ends)
     room = 0.03 * (high - low) or 1e-9 * max(abs(high), 1.0)
     low, high = low - room, high + room

@@ -119,9 +119,13 @@ def tolerance(data: Dataset) -> Figure | None:
     return spread_figure(spread, tolerance_words(data))
 
 
+SEEN = 0.005  # of the longest bar: shorter ones are no wider than a line
+
+
 def sensitivity(data: Dataset) -> Figure | None:
-    """Draw by how much each dimension changes the objective."""
+    """Draw by how much each dimension changes the objective; what changes it next to nothing is left out."""
     ranked, objective = slopes(data), shown_objective(data)
+    ranked = [slope for slope in ranked if slope.largest > SEEN * ranked[0].largest]
     return slopes_figure(ranked, objective) if ranked and objective is not None else None
 
 

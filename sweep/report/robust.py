@@ -78,6 +78,11 @@ class Slope:
     growing: float
     shrinking: float
 
+    @property
+    def largest(self) -> float:
+        """The larger of both changes, by magnitude."""
+        return max(abs(self.growing), abs(self.shrinking))
+
 
 def slope_rows(data: Dataset) -> list[SlopeRow]:
     """Return dimensions by how much they change the objective, the most telling first."""
@@ -104,7 +109,7 @@ def slopes(data: Dataset) -> list[Slope]:
         share = -share if without_minus(data.study.objective.output) else share  # shown as what is made large
         up, down = (share * x for x in (row["growing"], -row["shrinking"]))
         ranked.append(Slope(name, step_words, up, down))
-    return sorted(ranked, key=lambda slope: -max(abs(slope.growing), abs(slope.shrinking)))
+    return sorted(ranked, key=lambda slope: -slope.largest)
 
 
 def _percent(value: float) -> str:

@@ -14,7 +14,7 @@ class Lines {
     const marks = data.designs.map((design) => numbersOf(design.values));
     this.ends = data.axes.map((_, axis) => this.endsOf(axis, marks));
     const scroll = host.querySelector(".scroll");
-    this.frame = svg("svg", { viewBox: `0 0 ${this.wide} ${ROOM.high}`, style: `min-width: ${0.62 * this.wide}px` }, scroll);
+    this.frame = svg("svg", { viewBox: `0 0 ${this.wide} ${ROOM.high}`, style: `min-width: ${0.62 * this.wide}px; max-width: ${1.35 * this.wide}px` }, scroll);
     this.said = host.querySelector("output");
     this.table = host.querySelector("tbody");
     const group = svg("g", { class: "all" }, this.frame);
