@@ -12,9 +12,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import inline, kernel
+from kernels.bits import lowest_bit
 from kernels.families.rssr.block import (
     BLOCK,
     BRANCH,
@@ -41,6 +43,10 @@ from kernels.verdict import turning_status
 LIMIT_NAMES = ("psi_ext", "psi_fold", "phi_ext", "phi_fold", "swing", "phi0", "stroke_ratio")
 TURN = 2.0 * math.pi
 FEWEST, MOST = 32, 8192  # samples of the sign of eta
+Counts = NDArray[np.int64]
+# Of a root: its bracket, where it is so far, the length of the last step, the sign of eta's slope.
+_LO, _HI, _PHI, _BEFORE, _RISING = (k * 2 * BLOCK for k in range(5))
+_ROOT_ROWS = 5
 _TINY_SWING = 0.25  # below, the half-swing identity is more accurate than the difference of two angles
 
 
@@ -59,24 +65,38 @@ def _ball(at: Array, k: int, phi: float) -> tuple[float, float, float, float, fl
 
 
 @inline
-def _root(at: Array, k: int, lo: float, hi: float, rising: bool) -> float:
-    """Return the zero of eta in a bracket: Newton, bisection where it would leave the bracket or does not gain."""
-    phi, before = 0.5 * (lo + hi), hi - lo
+def _list_root(begin: float, width: float, roots: Array, i: int) -> None:
+    """Put the zero of eta between the samples ``begin`` and ``begin`` + 1 at place i of ``roots``."""
+    lo, hi = begin * width, (begin + 1.0) * width
+    roots[i + _LO], roots[i + _HI], roots[i + _PHI], roots[i + _BEFORE] = lo, hi, 0.5 * (lo + hi), hi - lo
+
+
+@inline
+def _solve(at: Array, active: Counts, count: int, roots: Array) -> None:
+    """Find the zeros of eta in their brackets: Newton, bisection where it would leave the bracket or does not gain.
+
+    Every round takes one step of all roots that are left, numbers ``active[:count]``; root i is of design i // 2.  The
+    steps of different roots do not wait for each other, so a round costs far less than its steps one after the other.
+    """
     for _ in range(100):
-        eta, _, slope, _, _, _ = _ball(at, k, phi)
-        if (eta > 0.0) == rising:
-            hi = phi
-        else:
-            lo = phi
-        # A step that leaves the bracket, or is not clearly shorter than the one before, is replaced by bisection.
-        step = -eta / slope
-        if not (lo <= phi + step <= hi and abs(step) <= 0.6 * before):
-            step = 0.5 * (lo + hi) - phi
-        before = abs(step)
-        phi += step
-        if before <= 4.0 * EPS * max(1.0, abs(phi)):
+        left = 0
+        for j in range(count):
+            i = active[j]
+            lo, hi, phi, before = roots[i + _LO], roots[i + _HI], roots[i + _PHI], roots[i + _BEFORE]
+            eta, _, slope, _, _, _ = _ball(at, i >> 1, phi)
+            above = (eta > 0.0) == (roots[i + _RISING] > 0.0)
+            lo, hi = (lo if above else phi), (phi if above else hi)
+            # A step that leaves the bracket, or is not clearly shorter than the one before, is replaced by bisection.
+            step = -eta / slope
+            gains = (lo <= phi + step) & (phi + step <= hi) & (abs(step) <= 0.6 * before)
+            step = step if gains else 0.5 * (lo + hi) - phi
+            phi += step
+            roots[i + _LO], roots[i + _HI], roots[i + _PHI], roots[i + _BEFORE] = lo, hi, phi, abs(step)
+            active[left] = i
+            left += 0 if abs(step) <= 4.0 * EPS * max(1.0, abs(phi)) else 1
+        count = left
+        if count == 0:
             break
-    return phi
 
 
 @inline
@@ -124,16 +144,14 @@ def _mark_turning_points(count: int, at: Array, cos: Array, sin: Array, marks: A
 @inline
 def _unmark(marks: float, begin: Array) -> int:
     """Return what :func:`_turning_points` does, from the signs of :func:`_mark_turning_points`."""
-    signs, found = int(marks), 0
+    signs = int(marks)
     changes = signs ^ ((signs >> 1) | ((signs & 1) << (FEWEST - 1)))  # bit i: between sample i and i + 1
-    i = 0
-    while changes != 0 and found < 3:
-        if changes & 1:
-            begin[found] = i
-            found += 1
-        changes >>= 1
-        i += 1
-    return found
+    begin[0] = lowest_bit(changes)
+    found = 1 if changes != 0 else 0
+    changes &= changes - 1
+    begin[1] = lowest_bit(changes)
+    found += 1 if changes != 0 else 0
+    return found + (1 if changes & (changes - 1) != 0 else 0)
 
 
 @inline
@@ -186,6 +204,7 @@ def limits(designs: Array, status: Status, out: Array, error: Array | None) -> N
     Where the status is not OK all are nan.  Largest error over the 122 oracle rows: 2.5 x 2^-53 x max(cond, |y|).
     """
     at, marks, begin = new_block(), np.empty(BLOCK), np.empty(3)
+    who, active, roots = np.empty(BLOCK, np.int64), np.empty(2 * BLOCK, np.int64), np.empty(_ROOT_ROWS * 2 * BLOCK)
     cos, sin = np.empty(FEWEST), np.empty(FEWEST)
     for i in range(FEWEST):
         cos[i], sin[i] = math.cos(i * (TURN / FEWEST)), math.sin(i * (TURN / FEWEST))
@@ -194,6 +213,7 @@ def limits(designs: Array, status: Status, out: Array, error: Array | None) -> N
         load_block(designs, start, count, at)
         least_delta(count, at)
         _mark_turning_points(count, at, cos, sin, marks)
+        listed = 0
         for k in range(count):
             i = start + k
             for column in range(7):
@@ -210,17 +230,29 @@ def limits(designs: Array, status: Status, out: Array, error: Array | None) -> N
             while found != 2 and n < MOST:
                 n *= 4
                 found = _turning_points(at, k, n, begin)
-            if found != 2 or not _fill(at, k, n, begin, out[i], error[i] if error is not None else None):
+            if found != 2:
+                status[i] = st.NOT_CONVERGED
+                continue
+            _list_root(begin[0], TURN / n, roots, 2 * k)
+            _list_root(begin[1], TURN / n, roots, 2 * k + 1)
+            who[listed] = k
+            listed += 1
+        for j in range(listed):
+            i = 2 * who[j]
+            rises = _ball(at, who[j], roots[i + _LO])[0] <= 0.0
+            roots[i + _RISING], roots[i + 1 + _RISING] = (1.0, -1.0) if rises else (-1.0, 1.0)
+            active[2 * j], active[2 * j + 1] = i, i + 1
+        _solve(at, active, 2 * listed, roots)
+        for j in range(listed):
+            k, i = who[j], start + who[j]
+            phi1, phi2 = roots[2 * k + _PHI], roots[2 * k + 1 + _PHI]
+            if not _fill(at, k, phi1, phi2, out[i], error[i] if error is not None else None):
                 status[i] = st.NOT_CONVERGED
 
 
 @inline
-def _fill(at: Array, k: int, n: int, begin: Array, out: Array, error: Array | None) -> bool:
-    """Refine the two turning points and write the seven outputs; false if they are not one extended, one folded."""
-    width = TURN / n
-    p_start = _ball(at, k, begin[0] * width)[0]
-    phi1 = _root(at, k, begin[0] * width, (begin[0] + 1.0) * width, p_start <= 0.0)
-    phi2 = _root(at, k, begin[1] * width, (begin[1] + 1.0) * width, p_start > 0.0)
+def _fill(at: Array, k: int, phi1: float, phi2: float, out: Array, error: Array | None) -> bool:
+    """Write the seven outputs from the two turning points; false if they are not one extended, one folded."""
     _, xi1, _, s1, c1, t1 = _ball(at, k, phi1)
     _, xi2, _, s2, c2, t2 = _ball(at, k, phi2)
     if xi1 < 0.0:  # the first one is the folded position: exchange
