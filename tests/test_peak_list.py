@@ -31,7 +31,7 @@ def _listed_of_block(at, cos, sin, size, lengths, m):
     mark_peaks(BLOCK, size)
     count = 0
     for k in range(BLOCK):
-        count = list_marked(int(size[MARKS + k]), at, k, cos, sin, size[k:], BLOCK, FEWEST, 0, m, count)
+        count = list_marked(int(size[MARKS + k]), at, k, cos, sin, size, k, BLOCK, FEWEST, 0, m, count)
         lengths[k] = count
 
 

@@ -214,7 +214,7 @@ def true_maxima(
                 n *= 2
             if n == FEWEST:
                 marks = int(grid[MARKS + i])
-                count = list_marked(marks, at, i, cos, sin, grid[i:], BLOCK, n, 0, m, count)
+                count = list_marked(marks, at, i, cos, sin, grid, i, BLOCK, n, 0, m, count)
             else:
                 sample(at, i, cos, sin, n, size, max_abs_dpsi, max_abs_d2psi)
                 count = list_peaks(at, i, cos, sin, n, size, m, count)

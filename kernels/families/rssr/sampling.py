@@ -20,6 +20,9 @@ from kernels.reduce import largest
 FEWEST, MOST = 16, 1024
 _FLOOR, MARKS = (FEWEST + 2) * BLOCK, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
 GRID_SIZE = (FEWEST + 4) * BLOCK
+# Numbers below 2048 and "and" this are themselves, and the compiler sees that they are not negative.  Otherwise it
+# would handle indices that count from the end, and gather samples one by one: twice the time.
+_NEVER_NEGATIVE = 2047
 
 
 def sampling_tables() -> tuple[Array, Array]:
@@ -36,11 +39,10 @@ def sample(
 ) -> None:
     """Compute magnitudes at n equally spaced angles into size[1 ... n], closed periodically."""
     e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
-    # Slices, because an index that the compiler does not know to be positive makes it gather: twice the time.
-    u, v, out = cos[n - FEWEST : 2 * n - FEWEST], sin[n - FEWEST : 2 * n - FEWEST], size[1 : n + 1]
+    begin = (n - FEWEST) & _NEVER_NEGATIVE
     for i in range(n):
-        p, q, j, _ = follower(e, y0, ca, k0, k1, k2, u[i], v[i])
-        out[i] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
+        p, q, j, _ = follower(e, y0, ca, k0, k1, k2, cos[begin + i], sin[begin + i])
+        size[1 + i] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
     size[0], size[n + 1] = size[n], size[1]
 
 
@@ -80,63 +82,47 @@ def mark_peaks(count: int, size: Array) -> None:
 
 @inline
 def _append_lowest(
-    marks: int,
-    at: Array,
-    k: int,
-    u: Array,
-    v: Array,
-    size: Array,
-    stride: int,
-    n: int,
-    begin: int,
-    m: Array,
-    count: int,
-) -> None:
+    marks: int, at: Array, k: int, cos: Array, sin: Array, size: Array, first: int, stride: int, n: int, begin: int,
+    m: Array, count: int,
+) -> None:  # fmt: skip
     """Append the lowest bit of ``marks``, as of :func:`list_marked`; something meaningless where there is none."""
-    i = lowest_bit(marks) & 63  # never negative, which spares a check of every index
-    before = i * stride
-    here, after = before + stride, before + 2 * stride
-    append(at, k, u[i], v[i], size[before], size[here], size[after], n, begin + i, m, count)
+    i = lowest_bit(marks) & 63
+    angle = (n - FEWEST + begin + i) & _NEVER_NEGATIVE
+    before = (first + i * stride) & _NEVER_NEGATIVE
+    left, peak, right = size[before], size[before + stride], size[before + 2 * stride]
+    append(at, k, cos[angle], sin[angle], left, peak, right, n, begin + i, m, count & _NEVER_NEGATIVE)
 
 
 @inline
 def list_marked(
-    marks: int,
-    at: Array,
-    k: int,
-    u: Array,
-    v: Array,
-    size: Array,
-    stride: int,
-    n: int,
-    begin: int,
-    m: Array,
-    count: int,
-) -> int:
+    marks: int, at: Array, k: int, cos: Array, sin: Array, size: Array, first: int, stride: int, n: int, begin: int,
+    m: Array, count: int,
+) -> int:  # fmt: skip
     """Append the local maxima of design k that are bits of ``marks`` to the list; returns its new length.
 
-    Bit i stands for sample ``begin`` + i of n at the angle (u[i], v[i]); the samples of the design stand ``stride``
-    apart in ``size``, the one before bit 0 first.
+    Bit i stands for sample ``begin`` + i of n; the samples of the design stand ``stride`` apart in ``size``, the one
+    before bit 0 at ``first``.
     """
     # Nearly all designs have one such maximum or two.  Two are written in any case, without a branch that the
     # processor could guess wrong; what is too many the next design writes over.
     for _ in range(2):
-        _append_lowest(marks, at, k, u, v, size, stride, n, begin, m, count)
+        _append_lowest(marks, at, k, cos, sin, size, first, stride, n, begin, m, count)
         count += 1 if marks != 0 else 0
         marks &= marks - 1
     while marks != 0:
-        _append_lowest(marks, at, k, u, v, size, stride, n, begin, m, count)
+        _append_lowest(marks, at, k, cos, sin, size, first, stride, n, begin, m, count)
         count += 1
         marks &= marks - 1
     return count
 
 
 @inline
-def _marks(width: int, floor: float, size: Array) -> int:
-    """Return the local maxima of at least ``floor`` among the samples size[1 ... width], as bits."""
-    before, here, after, marks = size[:width], size[1 : width + 1], size[2 : width + 2], 0
+def _marks(begin: int, width: int, floor: float, size: Array) -> int:
+    """Return the local maxima of at least ``floor`` among ``width`` samples from ``begin`` on, as bits."""
+    begin, marks = begin & _NEVER_NEGATIVE, 0
     for i in range(width):
-        peak = (here[i] >= floor) & (here[i] > before[i]) & (here[i] >= after[i])
+        y = size[begin + i + 1]
+        peak = (y >= floor) & (y > size[begin + i]) & (y >= size[begin + i + 2])
         marks |= (1 << i) if peak else 0
     return marks
 
@@ -149,9 +135,8 @@ def list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, m
         most = largest(most, size[i])
     length, width = count, min(n, 64)
     for begin in range(0, n, width):
-        part = size[begin : begin + width + 2]
-        u, v = cos[n - FEWEST + begin :], sin[n - FEWEST + begin :]
-        length = list_marked(_marks(width, 0.6 * most, part), at, k, u, v, part, 1, n, begin, m, length)
+        marks = _marks(begin, width, 0.6 * most, size)
+        length = list_marked(marks, at, k, cos, sin, size, begin, 1, n, begin, m, length)
         if length - count > MOST_PEAKS:
             return count
     return length
