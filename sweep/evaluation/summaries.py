@@ -183,7 +183,7 @@ def design_outputs(
         # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
         alive = np.flatnonzero(GOES_ON[status])
         with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
-            found = route.run(designs[alive], accuracy, window)
+            found = route.run(designs if alive.size == n else designs[alive], accuracy, window)
         for name in route.outputs:
             for key in (name, error_of(name)) if accuracy.target is not None else (name,):
                 columns[key] = _spread(found[key], alive, n)
