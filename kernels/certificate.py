@@ -21,10 +21,16 @@ a motion that float64 knows badly then gets a wide bound, and the cells do not b
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
 from kernels._jit import inline, kernel
 from kernels.enclosure import EPS, GUARD, ORDER, Array, ceiling, derivative, remainders
 
+Status: TypeAlias = NDArray[np.uint8]
 (MODE, CENTRE, REACH, EDGE, END, BEST, PLACE, NOISE, UPPER, TARGET, LEFT, BARREN, HERE, THERE) = range(14)
 STATE = 14
 CLIMB, COVER, MARCH, DONE = 0.0, 1.0, 2.0, 3.0
@@ -55,13 +61,33 @@ def judge(state: Array, encloses: bool, at: Array, jet: int, order: int, y: Arra
     at, jet : the jet whose derivative of that ``order`` is the curve
     y : (ORDER + 1,) scratch
     """
-    state[LEFT] -= 1.0
-    share, noise, tail = SHARE * OVERLAP + SLACK / state[REACH], 0.0, 0.0
+    share, noise, tail = share_of(state), 0.0, 0.0
     if encloses:
         derivative(at, jet, order, state[REACH], y)
         noise, tail = remainders(at, jet, order, state[REACH], share)
-        encloses = noise + tail < math.inf  # false for nan
-    if not encloses:
+    decide(state, encloses, y, order, share, noise, tail)
+
+
+@inline
+def share_of(state: Array) -> float:
+    """Half the width of a cell in reaches of its jet, with what cells overlap by."""
+    share: float = SHARE * OVERLAP + SLACK / state[REACH]
+    return share
+
+
+@kernel
+def decide(state: Array, encloses: bool, y: Array, order: int, share: float, noise: float, tail: float) -> None:
+    """Decide about the cell that the state asked for, and ask for the next one.
+
+    Parameters
+    ----------
+    state, encloses, order : as of :func:`judge`
+    y : coefficients of the curve in z/reach, the derivative of that order
+    share : of :func:`share_of`
+    noise, tail : bounds of its remainders on |z| <= share reach
+    """
+    state[LEFT] -= 1.0
+    if not (encloses and noise + tail < math.inf):  # false for nan
         _shorter(state, 0.4)
     elif state[MODE] != CLIMB or _climbed(state, y, noise):
         if state[MODE] == COVER:  # the same place with less reach has less noise
@@ -69,6 +95,21 @@ def judge(state: Array, encloses: bool, at: Array, jet: int, order: int, y: Arra
         _close(state, y, ORDER + 1 - order, share, noise, tail)
     if state[MODE] != DONE and not state[LEFT] > 0.0:
         state[MODE], state[UPPER] = DONE, math.inf
+
+
+@inline
+def conclude(
+    state: Array, i: int, most: int, status: Status, maximum: Array, phi: Array, error: Array, cells: Array
+) -> None:  # fmt: skip
+    """Write what the walk of design i has proven; the arguments are those of the kernels that certify."""
+    least, bound = (state[BEST] - state[NOISE]) / GUARD, state[UPPER]
+    cells[i] = most - state[LEFT]
+    if not bound < math.inf:
+        status[i], error[i] = st.NOT_CONVERGED, math.nan
+        return
+    if not least <= maximum[i] <= bound:
+        maximum[i], phi[i] = state[BEST], state[PLACE] - TURN * math.floor(state[PLACE] / TURN)
+    error[i] = max(bound - maximum[i], maximum[i] - least) * GUARD
 
 
 @inline

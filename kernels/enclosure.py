@@ -13,64 +13,34 @@ The processor's rounding mode is left at nearest: every operation adds to ``nois
 are sums and products of non-negative numbers only, and the factor GUARD covers their own rounding.  An operation whose
 numbers overflow or become nan reports failure; it never returns an enclosure.
 
-All jets lie in one plain array, WIDTH numbers each, and functions take the offsets of their operands in it.
+The rules themselves are in :mod:`kernels.jets`.  Here the jets of one design lie in one plain array, WIDTH numbers
+each, and functions take the offsets of their operands in it.
 """
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-from numpy.typing import NDArray
-
 from kernels._jit import inline, kernel
+from kernels.jets import (
+    EPS,
+    GUARD,
+    NOISE,
+    NORM,
+    ORDER,
+    REST,
+    SIZE,
+    TABLE,
+    TAIL,
+    WIDTH,
+    Array,
+    get,
+    product,
+    put,
+    reciprocal,
+    root_of,
+    sum_of,
+)
 
-Array = NDArray[np.float64]
-EPS = 2.0**-53
-ORDER = 6
-NORM, NOISE, TAIL, WIDTH = ORDER + 1, ORDER + 2, ORDER + 3, ORDER + 4
-GUARD = 1.0 + 2.0**-46  # no rule takes more than a hundred roundings to make a bound
-LARGEST_LEFT = 0.5  # 1 would do, but remainders would be many times larger than with a slightly shorter reach
-_DOT = (ORDER + 5) * EPS  # rounding of a sum of up to ORDER + 1 products, divided or multiplied once more
-
-
-def _trigonometric_table() -> tuple[Array, Array, Array]:
-    """Tabulate the Taylor coefficients of 1, s, m, s m, m^2, s m^2, m^3 with s = sin z and m = 1 - cos z.
-
-    Returns the coefficients up to ORDER, then per function the sum of the magnitudes of all coefficients, and of those
-    beyond ORDER.
-    """
-    harmonics = (  # of sin z, sin 2z, sin 3z or of cos z, cos 2z, cos 3z; the constants of the even ones cancel
-        (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (1.0, -0.5, 0.0), (-2.0, 0.5, 0.0), (1.25, -1.0, 0.25), (-3.75, 1.5, -0.25),
-    )  # fmt: skip
-    table = np.zeros((7, 40))
-    table[0, 0] = 1.0
-    for i, (one, two, three) in enumerate(harmonics, start=1):
-        for k in range(1 if i % 2 else 2, 40, 2):
-            # Whole numbers, so exact: one + two 2^k + three 3^k.
-            total = int(4 * one) + int(4 * two) * 2**k + int(4 * three) * 3**k
-            table[i, k] = (-1) ** (k // 2) * total / (4 * math.factorial(k))
-    sizes = np.abs(table)
-    return table[:, : ORDER + 1].copy(), sizes.sum(axis=1) * GUARD, sizes[:, ORDER + 1 :].sum(axis=1) * GUARD
-
-
-_TABLE, _SIZE, _REST = _trigonometric_table()
-
-
-@inline
-def settle(at: Array, j: int) -> None:
-    """Write the size of a jet's polynomial, which all bounds are made of, behind its coefficients."""
-    total = 0.0
-    for k in range(ORDER + 1):
-        total += abs(at[j + k])
-    at[j + NORM] = total * GUARD
-
-
-@inline
-def size(at: Array, j: int) -> float:
-    """Bound the magnitude of a jet's function on its disc."""
-    bound: float = (at[j + NORM] + at[j + NOISE] + at[j + TAIL]) * GUARD
-    return bound
+__all__ = ["EPS", "GUARD", "NOISE", "NORM", "ORDER", "TAIL", "WIDTH", "Array"]
 
 
 @kernel
@@ -84,129 +54,52 @@ def trigonometric(
     """
     at[out] = c0
     power = reach
+    total = abs(c0)
     for k in range(1, ORDER + 1):
         if k % 2 == 1:
-            at[out + k] = power * (c1 * _TABLE[1, k] + c3 * _TABLE[3, k] + c5 * _TABLE[5, k])
+            at[out + k] = power * (c1 * TABLE[1, k] + c3 * TABLE[3, k] + c5 * TABLE[5, k])
         else:
-            at[out + k] = power * (c2 * _TABLE[2, k] + c4 * _TABLE[4, k] + c6 * _TABLE[6, k])
+            at[out + k] = power * (c2 * TABLE[2, k] + c4 * TABLE[4, k] + c6 * TABLE[6, k])
+        total += abs(at[out + k])
         power *= reach
-    settle(at, out)
-    odd = reach * (abs(c1) * _SIZE[1] + reach * reach * (abs(c3) * _SIZE[3] + reach * reach * abs(c5) * _SIZE[5]))
-    even = abs(c2) * _SIZE[2] + reach * reach * (abs(c4) * _SIZE[4] + reach * reach * abs(c6) * _SIZE[6])
+    at[out + NORM] = total * GUARD
+    odd = reach * (abs(c1) * SIZE[1] + reach * reach * (abs(c3) * SIZE[3] + reach * reach * abs(c5) * SIZE[5]))
+    even = abs(c2) * SIZE[2] + reach * reach * (abs(c4) * SIZE[4] + reach * reach * abs(c6) * SIZE[6])
     whole = odd + reach * reach * even
     # power = reach^(ORDER + 1) and the table's entries are rounded too.
     at[out + NOISE] = (error + (ORDER + 8) * EPS * whole) * GUARD
-    rest = abs(c1) * _REST[1] + abs(c2) * _REST[2] + abs(c3) * _REST[3]
-    rest += abs(c4) * _REST[4] + abs(c5) * _REST[5] + abs(c6) * _REST[6]
+    rest = abs(c1) * REST[1] + abs(c2) * REST[2] + abs(c3) * REST[3]
+    rest += abs(c4) * REST[4] + abs(c5) * REST[5] + abs(c6) * REST[6]
     at[out + TAIL] = rest * power * (1.0 + 2.0**-30)
 
 
 @inline
 def add(at: Array, a: int, b: int, out: int) -> None:
     """Enclose the sum a + b; ``out`` may be a or b."""
-    noise, tail = at[a + NOISE] + at[b + NOISE], at[a + TAIL] + at[b + TAIL]
-    noise += EPS * (at[a + NORM] + at[b + NORM])
-    for k in range(ORDER + 1):
-        at[out + k] = at[a + k] + at[b + k]
-    settle(at, out)
-    at[out + NOISE], at[out + TAIL] = noise * GUARD, tail * GUARD
-
-
-@kernel
-def combine(at: Array, c: float, p: float, a: int, q: float, b: int, error: float, out: int) -> None:
-    """Enclose c + p a + q b; ``error`` bounds what the errors of c, p, q make of it; ``out`` may be a or b."""
-    noise = abs(p) * at[a + NOISE] + abs(q) * at[b + NOISE] + error
-    noise += 3.0 * EPS * (abs(c) + abs(p) * at[a + NORM] + abs(q) * at[b + NORM])
-    tail = abs(p) * at[a + TAIL] + abs(q) * at[b + TAIL]
-    for k in range(ORDER + 1):
-        at[out + k] = p * at[a + k] + q * at[b + k]
-    at[out] += c
-    settle(at, out)
-    at[out + NOISE], at[out + TAIL] = noise * GUARD, tail * GUARD
-
-
-@inline
-def beyond(at: Array, a: int, b: int) -> float:
-    """Bound the size of those terms of the product of two polynomials whose degree is beyond ORDER."""
-    total, last = 0.0, 0.0
-    for i in range(1, ORDER + 1):
-        last += abs(at[b + ORDER + 1 - i])
-        total += abs(at[a + i]) * last
-    return total * GUARD
+    put(at, out, 1, sum_of(get(at, a, 1), get(at, b, 1)))
 
 
 @kernel
 def multiply(at: Array, a: int, b: int, out: int) -> None:
-    """Enclose the product a b; ``out`` must be neither a nor b."""
-    for n in range(ORDER + 1):
-        total = at[a] * at[b + n]
-        for i in range(1, n + 1):
-            total += at[a + i] * at[b + n - i]
-        at[out + n] = total
-    settle(at, out)
-    na, nb, ra, rb, ta, tb = at[a + NORM], at[b + NORM], at[a + NOISE], at[b + NOISE], at[a + TAIL], at[b + TAIL]
-    at[out + NOISE] = (_DOT * na * nb + na * rb + ra * (nb + rb)) * GUARD
-    at[out + TAIL] = (beyond(at, a, b) + ta * (nb + rb + tb) + tb * (na + ra)) * GUARD
+    """Enclose the product a b; ``out`` may be a or b."""
+    put(at, out, 1, product(get(at, a, 1), get(at, b, 1)))
 
 
 @kernel
 def inverse(at: Array, a: int, out: int) -> bool:
-    """Enclose 1/a; the result is false if that is impossible, as where a may have a zero on the disc.
-
-    The recurrence makes the product of both polynomials equal to 1 up to x^ORDER, but for the rounding of its sums.  So
-    d, the size of 1 - a out, is small.  Where d < 1, 1/a = out (1 + r), and the size of r is at most d/(1 - d).
-    """
-    first = 1.0 / at[a]
-    at[out] = first
-    for n in range(1, ORDER + 1):
-        total = at[a + 1] * at[out + n - 1]
-        for i in range(2, n + 1):
-            total += at[a + i] * at[out + n - i]
-        at[out + n] = -total * first
-    settle(at, out)
-    norm = at[out + NORM]
-    noise = (_DOT * at[a + NORM] + at[a + NOISE]) * norm
-    tail = beyond(at, a, out) + at[a + TAIL] * norm
-    left = (noise + tail) * GUARD
-    scale = norm / (1.0 - left) * GUARD
-    at[out + NOISE], at[out + TAIL] = noise * scale, tail * scale
-    return bool(left < LARGEST_LEFT)  # false for nan
+    """Enclose 1/a; the result is false if that is impossible."""
+    jet, good = reciprocal(get(at, a, 1))
+    put(at, out, 1, jet)
+    return bool(good)
 
 
 @kernel
 def root(at: Array, a: int, out: int, per: int) -> bool:
-    """Enclose the positive square root of a and its inverse; the result is false if that is impossible.
-
-    Let t be the polynomial of the root, so that a = t^2 (1 + q) with q = (a - t^2)/t^2.  If the size of q is small
-    enough, the power series of sqrt(1 + q) and of its inverse bound both remainders.
-    """
-    if not at[a] > 0.0:
-        return False
-    first = math.sqrt(at[a])
-    at[out] = first
-    half = 0.5 / first
-    for n in range(1, ORDER + 1):
-        total = at[a + n]
-        for i in range(1, n):
-            total -= at[out + i] * at[out + n - i]
-        at[out + n] = total * half
-    settle(at, out)
-    at[out + NOISE], at[out + TAIL] = 0.0, 0.0
-    norm = at[out + NORM]
-    noise = _DOT * (at[a + NORM] + 2.0 * norm * norm) + at[a + NOISE]
-    tail = beyond(at, out, out) + at[a + TAIL]
-    if not inverse(at, out, per):
-        return False
-    bound = size(at, per)
-    q = (noise + tail) * bound * bound * GUARD
-    if not q < LARGEST_LEFT:
-        return False
-    s = math.sqrt(1.0 - q)
-    by_root, by_inverse = bound / (1.0 + s) * GUARD, bound * bound * bound / (s * (1.0 + s)) * GUARD
-    at[out + NOISE], at[out + TAIL] = noise * by_root, tail * by_root
-    at[per + NOISE] = (at[per + NOISE] + noise * by_inverse) * GUARD
-    at[per + TAIL] = (at[per + TAIL] + tail * by_inverse) * GUARD
-    return True
+    """Enclose the positive square root of a and its inverse; the result is false if that is impossible."""
+    jet, inverse_of_it, good = root_of(get(at, a, 1))
+    put(at, out, 1, jet)
+    put(at, per, 1, inverse_of_it)
+    return bool(good)
 
 
 @inline

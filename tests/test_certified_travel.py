@@ -10,6 +10,7 @@ import sweep
 from kernels import enclosure as en
 from kernels import status as st
 from kernels._jit import kernel
+from kernels.abreast import LANES, differentiate
 from kernels.families import guide, rssr
 from kernels.families.rssr import driven
 from sweep.families import family
@@ -22,15 +23,20 @@ from tests.turn_designs import GUIDE, NEEDLE, guided_four_bars, needle_drives
 DOUBLE = family(["rssr", "rssr", "guide"])
 
 
-@kernel
-def enclose(stages, couplings, shares, i, phi, reach, at):
-    return driven.enclose_travel(at, stages, couplings, shares, i, phi, reach)
+USED = 5  # lanes; the design that is looked at has others beside it
 
 
 @kernel
-def derivative(at, order, reach, share, y):
-    en.derivative(at, driven.X, order, reach, y)
-    return en.remainders(at, driven.X, order, reach, share)
+def enclose(stages, couplings, shares, i, lane, phi, reach, numbers, jets, travel, good):
+    for k in range(USED):
+        driven.load(k, numbers, stages, couplings, shares, (i + k - lane) % shares.shape[0])
+    driven.enclose_travel(USED, stages.shape[0], numbers, jets, phi, reach, travel, good)
+
+
+@kernel
+def of_one(jet, order, reach, share, y):
+    en.derivative(jet, 0, order, reach, y)
+    return en.remainders(jet, 0, order, reach, share)
 
 
 def double_drives(n, seed):
@@ -80,20 +86,34 @@ def misses(name, narrow=1.0):
     _, _, rockers, couplings, last = MAKERS[name]
     designs, *_ = rotating(name, {"guide": 40, "rssr+guide": 120, "rssr+rssr+guide": 600}[name], 5)
     stages, joined, shares = parts(designs, rockers, couplings, last)
-    at, y, generator = np.empty(driven.SIZE), np.empty(en.ORDER + 1), np.random.default_rng(3)
+    numbers = np.empty(len(stages) * driven.STAGE + driven.SHARES * LANES)
+    jets, travel, y = np.empty((10, en.WIDTH * LANES)), np.empty(en.WIDTH * LANES), np.empty((en.ORDER + 1, LANES))
+    phis, reaches, good, bounds, share = (
+        np.zeros(LANES),
+        np.full(LANES, 0.3),
+        np.empty(LANES),
+        np.empty((4, LANES)),
+        0.67,
+    )
+    shares_of_reach = np.full(LANES, share)
+    generator = np.random.default_rng(3)
     wrong = total = 0
     with mp.workdps(50):
         for i in range(min(20, len(designs))):
-            phi, reach, share = generator.uniform(0.0, 2.0 * np.pi), generator.choice([1.0, 0.4, 0.05]), 0.67
-            while not enclose(stages, joined, shares, i, phi, reach, at):
+            lane, phi, reach = i % USED, generator.uniform(0.0, 2.0 * np.pi), generator.choice([1.0, 0.4, 0.05])
+            good[lane] = 0.0
+            while not good[lane]:
+                phis[lane], reaches[lane] = phi, reach
+                enclose(stages, joined, shares, i, lane, phis, reaches, numbers, jets, travel, good)
                 reach *= 0.5
+            reach = reaches[lane]
             x = mp.mpf(float(generator.uniform(-share, share)))
-            travel = exact_travel(designs[i], rockers, couplings, last)
+            exact_curve = exact_travel(designs[i], rockers, couplings, last)
             for order in (1, 2, 3):
-                noise, tail = derivative(at, order, reach, share, y)
-                exact = mp.diff(travel, mp.mpf(phi) + x * reach, order, h=mp.mpf(10) ** -12 * reach)
-                close = sum(mp.mpf(float(c)) * x**k for k, c in enumerate(y[: en.ORDER + 1 - order]))
-                wrong += abs(exact - close) > narrow * (noise + tail)
+                differentiate(USED, travel, order, reaches, shares_of_reach, y.reshape(-1), bounds.reshape(-1))
+                exact = mp.diff(exact_curve, mp.mpf(phi) + x * reach, order, h=mp.mpf(10) ** -12 * reach)
+                close = sum(mp.mpf(float(c)) * x**k for k, c in enumerate(y[: en.ORDER + 1 - order, lane]))
+                wrong += abs(exact - close) > narrow * (bounds[0, lane] + bounds[1, lane])
                 total += 1
     return wrong, total
 
@@ -121,6 +141,40 @@ def test_any_beginning_ends_at_the_searched_maximum(name):
     assert (status == st.OK).all()
     assert (np.abs(claim - value) <= err + error).all()
     assert (error < 1e-5 * claim).all()
+
+
+def test_a_proof_does_not_depend_on_the_designs_beside_it():
+    designs, value, phi, _ = rotating("rssr+guide", 300, 21)
+    _, _, rockers, couplings, last = MAKERS["rssr+guide"]
+    n = len(designs)
+    assert n > LANES  # so that lanes change hands
+    together = [np.zeros(n, np.uint8), value.copy(), phi.copy(), np.full(n, np.nan), np.empty(n)]
+    together[0][::7] = st.NOT_ROTATABLE
+    alone = [column.copy() for column in together]
+    rssr.certify_travel(*parts(designs, rockers, couplings, last), 2, 1e-8, 1000, *together)
+    for i in range(n):
+        one = [column[i : i + 1] for column in alone]
+        rssr.certify_travel(*parts(designs[i : i + 1], rockers, couplings, last), 2, 1e-8, 1000, *one)
+    for beside, single in zip(together, alone, strict=True):
+        np.testing.assert_array_equal(beside, single)
+    assert (together[4][::7] == 0.0).all() and np.isnan(together[3][::7]).all()
+    assert (np.delete(together[4], np.s_[::7]) > 3).all()
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 3])
+def test_derivatives_abreast_are_those_of_a_jet_alone(order):
+    generator = np.random.default_rng(order)
+    jets, reach = generator.uniform(-1.0, 1.0, (en.WIDTH, LANES)), generator.uniform(0.01, 1.0, LANES)
+    jets[en.NOISE :] = np.abs(jets[en.NOISE :])
+    share, y, bounds = generator.uniform(0.1, 0.75, LANES), np.empty((en.ORDER + 1, LANES)), np.empty((4, LANES))
+    differentiate(LANES, jets.reshape(-1), order, reach, share, y.reshape(-1), bounds.reshape(-1))
+    for lane in range(LANES):
+        expected = np.empty(en.ORDER + 1)
+        noise, tail = of_one(jets[:, lane].copy(), order, reach[lane], share[lane], expected)
+        count = en.ORDER + 1 - order
+        # A dozen roundings lie between the two ways to multiply.
+        np.testing.assert_allclose(y[:count, lane], expected[:count], rtol=16 * en.EPS)
+        np.testing.assert_allclose(bounds[:2, lane], [noise, tail], rtol=64 * en.EPS)
 
 
 def test_compiled_equals_plain():

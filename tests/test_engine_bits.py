@@ -13,7 +13,8 @@ import pytest
 import sweep.chunks.plan
 from kernels import status as codes
 from sweep.chunks.cascade import Batch, Cascade, Level, levels, meets
-from sweep.chunks.chunk import compute_chunk, output_columns, parameter_matrix
+from sweep.chunks.chunk import compute_chunk, output_columns
+from sweep.chunks.parameters import Parameters, parameter_matrix
 from sweep.chunks.plan import make_plan
 from sweep.dataset.store import beside, is_complete, load, read_plan, read_runs
 from sweep.engine.run import run
@@ -23,6 +24,8 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Array, Columns
 from sweep.study import Limit, OutputSettings, Study, load_study
 from tests.engine_study import CHUNK, SMALL_CHUNKS, chunk_bytes, write_study
+
+ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(autouse=True)
@@ -214,6 +217,39 @@ def test_chunk_in_pieces_equals_chunk_at_once(study: Study) -> None:
     pieces = [compute_chunk(study, 1000, 7001), compute_chunk(study, 7001, 7001), compute_chunk(study, 7001, 12000)]
     for name, column in whole.columns.items():
         np.testing.assert_array_equal(np.concatenate([piece.columns[name] for piece in pieces]), column, name)
+
+
+@pytest.mark.parametrize("known_swing", [True, False])
+def test_feasible_rows_have_the_bits_of_those_whose_parameters_were_all_made_at_once(
+    monkeypatch: pytest.MonkeyPatch, known_swing: bool
+) -> None:
+    """Of a chain with a fit only survivors get all their parameters, and the fit the swing that a limit has tested."""
+    needle = load_study(ROOT / "studies" / "needle208")
+    every = compute_chunk(replace(needle, output=OutputSettings("all")), 5000, 45000)
+    if not known_swing:
+        monkeypatch.setattr("sweep.chunks.cascade.driving_outputs", lambda family: ())
+    feasible = compute_chunk(needle, 5000, 45000)
+    assert feasible.missed_by_limit == every.missed_by_limit
+    good = every.columns["status"] == codes.OK
+    assert good.sum() > 20
+    for name, column in feasible.columns.items():
+        assert column.tobytes() == every.columns[name][good].tobytes(), name
+
+
+def test_a_bad_value_of_a_space_is_refused_before_it_is_met(study: Study) -> None:
+    """Parameters made late are not looked at one by one: the ends of their axes are."""
+    needle = load_study(ROOT / "studies" / "needle208", smoke=True)
+    assert Parameters.of(needle, 8).leading == 8
+    assert Parameters.of(needle, None).leading == Parameters.of(study, None).leading + 11 == 19
+    axes = tuple(replace(axis, low=-1.0) if axis.name == "b2" else axis for axis in needle.space.axes)
+    bad = replace(needle, space=replace(needle.space, axes=axes))
+    assert Parameters.of(bad, 8).leading == 19
+    with pytest.raises(InputError, match="b2"):
+        compute_chunk(bad, 0, bad.space.count)
+    signs = tuple(
+        replace(axis, values=np.array([1.0, 0.5])) if axis.name == "branch2" else axis for axis in needle.space.axes
+    )
+    assert Parameters.of(replace(needle, space=replace(needle.space, axes=signs)), 8).leading == 19
 
 
 def test_chunk_outside_the_space_is_refused(study: Study) -> None:

@@ -148,6 +148,30 @@ def test_scrambled_points_keep_one_point_in_each_cell(seed: int) -> None:
         assert sorted(boxes) == list(range(2**10))
 
 
+@pytest.mark.parametrize(("start", "stop"), [(0, 5000), (1023, 2049), (2**21 - 700, 2**21 + 700), (7, 8), (9, 9)])
+def test_points_of_a_slice_are_those_of_its_numbers_one_by_one(start: int, stop: int) -> None:
+    sequence = Sobol(9, 11)
+    index = np.arange(start, stop)
+    expected = np.array([sequence.at(index[k : k + 1])[:, 0] for k in range(index.size)]).reshape(-1, 9).T
+    np.testing.assert_array_equal(sequence.points(start, stop), expected)
+    np.testing.assert_array_equal(sequence.at(index[::-1])[:, ::-1], expected)
+    np.testing.assert_array_equal(sequence.points(start, stop, [6, 2]), expected[[6, 2]])
+    np.testing.assert_array_equal(sequence.at(index, [8]), expected[[8]])
+
+
+@QUICK
+@given(spaces(), st.data())
+def test_some_columns_of_some_designs_have_the_bits_of_the_whole(space: DesignSpace, data: st.DataObject) -> None:
+    whole = space.columns(0, space.count)
+    names = data.draw(st.lists(st.sampled_from("abcdefg"), unique=True))
+    index = np.array(data.draw(st.lists(st.integers(0, space.count - 1), max_size=20)), np.int64)
+    first, some = space.columns(0, space.count, names), space.columns_at(index, names)
+    assert list(first) == list(some) == names
+    for name in names:
+        assert first[name].tobytes() == whole[name].tobytes()
+        assert some[name].tobytes() == whole[name][index].tobytes()
+
+
 def test_seeds_give_different_points_and_the_same_seed_the_same() -> None:
     assert (Sobol(3, 1).points(0, 64) == Sobol(3, 1).points(0, 64)).all()
     assert (Sobol(3, 1).points(0, 64) != Sobol(3, 2).points(0, 64)).all()

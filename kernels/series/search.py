@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import generated, inline
-from kernels.reduce import largest
 from kernels.series.chain import Chained
 from kernels.series.curves import MARGIN, Curve, curve
 from kernels.series.form import STRIDE, Helper
@@ -54,7 +53,9 @@ SETTLING = 8  # more steps for a maximum that is not trusted after the usual one
 MORE = 4  # times as many samples for a design of which a maximum is not trusted even so
 ROUNDED, UNTRUSTED = 254, 253  # instead of a status; the first see `find_extrema`
 VALUE, PHI, VALUE_ERROR, PHI_ERROR, SCALE_ROW, SPACING = range(6)
-CHUNK = 8  # samples whose peaks are looked for together
+CHUNK = 32  # samples whose peaks are looked for together
+_PRIME = 37  # the powers of two up to 2^31 leave different remainders: so a bit gives its place
+_PLACE = np.array([next((k for k in range(CHUNK) if 2**k % _PRIME == r), -1) for r in range(_PRIME)])
 
 
 @lru_cache(maxsize=64)
@@ -175,31 +176,33 @@ def _enlister(chain: Chained, of: Curve) -> Helper:
         floor = SHARE * scale if mode == 0 else (most if mode > 0 else -least) - (1.0 - SHARE) * scale
         length, width = count, TURN / n
         for chunk in range(2, n + 2, CHUNK):
-            if not _has_peak(chunk, values, up, down, floor):
-                continue
-            for j in range(chunk, chunk + CHUNK):
+            peaks = _peaks(chunk, values, up, down, floor)
+            while peaks != 0:
+                lowest = peaks & -peaks
+                j = chunk + _PLACE[lowest % _PRIME]
+                peaks ^= lowest
                 sign = up if values[j] >= 0.0 else down
                 left, z, right = sign * values[j - 1], sign * values[j], sign * values[j + 1]
-                if (z >= floor) & (z > left) & (z >= right):
-                    if length - count == MOST_PEAKS or length == CAPACITY:
-                        return count, OPEN
-                    here = n - FEWEST + j - 2
-                    append(m, length, cos[here], sin[here], width, (j - 2) * width, left, z, right, sign, scale)
-                    m[length + A], m[length + B], m[length + C] = a, b, c
-                    put(m, length + CONSTANTS, k)
-                    length += 1
+                if length - count == MOST_PEAKS or length == CAPACITY:
+                    return count, OPEN
+                here = n - FEWEST + j - 2
+                append(m, length, cos[here], sin[here], width, (j - 2) * width, left, z, right, sign, scale)
+                m[length + A], m[length + B], m[length + C] = a, b, c
+                put(m, length + CONSTANTS, k)
+                length += 1
         return length, st.OK if length > count else OPEN
 
     return generated(f"enlist_{of.name}", enlist)
 
 
 @inline
-def _has_peak(chunk: int, values: Array, up: float, down: float, floor: float) -> bool:
-    """Whether one of the next samples is a local maximum that counts; without a branch, so that it is a few vectors."""
-    found = 0.0
-    for j in range(chunk, chunk + CHUNK):
-        sign = up if values[j] >= 0.0 else down
-        z = sign * values[j]
-        peak = (z >= floor) & (z > sign * values[j - 1]) & (z >= sign * values[j + 1])
-        found = largest(found, 1.0 if peak else 0.0)
-    return found > 0.0
+def _peaks(chunk: int, values: Array, up: float, down: float, floor: float) -> int:
+    """Local maxima that count among the next samples, one bit each; without a branch, so that it is vector code."""
+    found = 0
+    for j in range(CHUNK):
+        y = values[chunk + j]
+        sign = up if y >= 0.0 else down
+        z = sign * y
+        peak = (z >= floor) & (z > sign * values[chunk + j - 1]) & (z >= sign * values[chunk + j + 1])
+        found |= (1 << j) if peak else 0
+    return found

@@ -9,20 +9,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as codes
+from sweep.chunks.parameters import completed
 from sweep.costs import nanoseconds
 from sweep.effects import called_for
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array, Columns
 from sweep.families.chain import stages_of
 from sweep.quantities.names import by_magnitude, error_of, parts
-from sweep.synthesis.fit import fit_line
+from sweep.synthesis.fit import driving_outputs, fit_line
 
 if TYPE_CHECKING:
     from sweep.study import Limit, Study
@@ -49,10 +50,21 @@ class Dropped(Exception):
 
 @dataclass(frozen=True)
 class Level:
-    """One level of the cascade with its cost: a route; where it is None, the fit and the limits on parameters."""
+    """One level of the cascade with its cost: a route; where it is None, the fit and the limits on parameters.
+
+    ``columns`` says how many of the first columns of the design matrix it needs; None for all.  ``further`` are outputs
+    that the route gives beside its own at no cost, for a level behind it.
+    """
 
     route: Route | None
     ns_per_design: float
+    columns: int | None = None
+    further: tuple[str, ...] = ()
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs that the level is there for."""
+        return () if self.route is None else self.route.outputs
 
     @property
     def batch(self) -> int:
@@ -111,21 +123,24 @@ class Cascade:
     study: Study
     keep: bool = True
     should_stop: Callable[[], bool] = lambda: False
+    levels: tuple[Level, ...] = field(init=False)
     reached: list[int] = field(init=False)
     counts: NDArray[np.int64] = field(init=False)
     missed: Counter[str] = field(init=False)
 
     def __post_init__(self) -> None:
-        self._levels = levels(self.study)
-        self._waiting: list[list[Batch]] = [[] for _ in self._levels]
+        self.levels = levels(self.study)
+        self._waiting: list[list[Batch]] = [[] for _ in self.levels]
         self._left: list[Batch] = []
         self._go_on = np.isin(np.arange(256), (codes.OK, *PARTIAL) if self.study.output.keep == "all" else (codes.OK,))
-        self.reached = [0] * len(self._levels)
+        self.reached = [0] * len(self.levels)
         self.counts = np.zeros(256, np.int64)
         self.missed = Counter()
 
     def feed(self, index: NDArray[np.int64], designs: Array, status: NDArray[np.uint8]) -> None:
-        """Send designs (k, P) in; those that are not OK (k,) leave at once."""
+        """Send designs in, with all parameters (k, P) or as many as the first level needs;
+        those that are not OK (k,) leave at once.
+        """
         self._sort(Batch(index, designs, {}, status), status == codes.OK, 0)
         self._work(0, whole=False)
 
@@ -138,7 +153,7 @@ class Cascade:
             in the order of the index; the named outputs, nan where not computed; status 0 for designs that meet every
             limit, LIMIT_EXCEEDED for those that miss one, otherwise the status of the kernel that could not answer.
         """
-        for number in range(len(self._levels)):
+        for number in range(len(self.levels)):
             self._work(number, whole=True)
         left, width = self._left, len(self.study.family.parameters)
         index = np.concatenate([np.empty(0, np.int64), *(batch.index for batch in left)])
@@ -157,9 +172,9 @@ class Cascade:
 
     def _work(self, number: int, whole: bool) -> None:
         """Work on what waits at a level and at those behind it: on full batches only, or on everything."""
-        if number == len(self._levels):
+        if number == len(self.levels):
             return
-        level, waiting = self._levels[number], self._waiting[number]
+        level, waiting = self.levels[number], self._waiting[number]
         count = sum(batch.index.size for batch in waiting)
         if not count or (count < level.batch and not whole):
             return
@@ -171,14 +186,21 @@ class Cascade:
                 raise Dropped
             part = together.only(slice(low, min(low + level.batch, end)))
             self.reached[number] += part.index.size
-            done, goes_on = self._fitted(part) if level.route is None else self._computed(level.route, part)
+            if level.columns is None or level.columns > part.designs.shape[1]:
+                part = self._completed(part)
+            done, goes_on = self._fitted(part) if level.route is None else self._computed(level, part)
             self._sort(done, goes_on, number + 1)
             self._work(number + 1, whole=False)
 
-    def _computed(self, route: Route, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
-        """Add the outputs of a route to a batch, and say which of its designs go on."""
+    def _completed(self, batch: Batch) -> Batch:
+        """Give the designs of a batch all their parameters."""
+        designs = completed(self.study, batch.index, batch.designs)
+        return batch if designs is batch.designs else replace(batch, designs=designs)
+
+    def _computed(self, level: Level, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
+        """Add the outputs of a level to a batch, and say which of its designs go on."""
         study = self.study
-        found = self._found(route, batch)
+        found = self._found(level, batch)
         status = np.where(batch.status == codes.OK, found["status"], batch.status)
         for limit in study.tested_limits:
             if limit.output in found:
@@ -186,16 +208,19 @@ class Cascade:
         more = {name: np.asarray(values, np.float64) for name, values in found.items() if name != "status"}
         return Batch(batch.index, batch.designs, batch.outputs | more, status), self._go_on[status]
 
-    def _found(self, route: Route, batch: Batch) -> Mapping[str, NDArray[Any]]:
-        """Return outputs of a route with their error estimates, and ``status``."""
-        return design_outputs(self.study.family, batch.designs, route.outputs, self.study.accuracy, self.study.window)
+    def _found(self, level: Level, batch: Batch) -> Mapping[str, NDArray[Any]]:
+        """Return outputs of a level with their error estimates, and ``status``."""
+        study, outputs = self.study, (*level.outputs, *level.further)
+        return design_outputs(study.family, batch.designs, outputs, study.accuracy, study.window)
 
     def _fitted(self, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
         """Fit the parameters of a batch, and say which of its designs keep the limits on parameters."""
         study, designs, status = self.study, batch.designs, batch.status.copy()
         goes_on = np.ones(status.size, np.bool_)
         if study.fit is not None:
-            designs, fate = fit_line(study.family, designs, study.fit, study.window)
+            swing = [batch.outputs[name] for name in driving_outputs(study.family) if name in batch.outputs]
+            known = (swing[0], swing[1]) if len(swing) == 2 and bool(np.all(status == codes.OK)) else None
+            designs, fate = fit_line(study.family, designs, study.fit, study.window, known)
             status[:] = fate
             goes_on = fate == codes.OK
         for limit in study.parameter_limits:
@@ -210,16 +235,18 @@ class Cascade:
 
     def _sort(self, batch: Batch, goes_on: NDArray[np.bool_], number: int) -> None:
         """Let the designs that go on wait at the next level, if there is one; the others leave."""
-        if number == len(self._levels):
+        if number == len(self.levels):
             goes_on = np.zeros(batch.index.size, np.bool_)
         elif goes_on.any():
             self._waiting[number].append(batch if goes_on.all() else batch.only(goes_on))
         leaves = ~goes_on
-        self.counts += np.bincount(batch.status[leaves], minlength=self.counts.size)
+        # Most leave: those that stay are fewer to look at.
+        self.counts += np.bincount(batch.status, minlength=self.counts.size)
+        self.counts -= np.bincount(batch.status[goes_on], minlength=self.counts.size)
         if not self.keep:
             leaves &= batch.status == codes.OK
         if leaves.any():
-            self._left.append(batch if leaves.all() else batch.only(leaves))
+            self._left.append(self._completed(batch if leaves.all() else batch.only(leaves)))
 
 
 @dataclass
@@ -233,9 +260,9 @@ class Recalled(Cascade):
 
     known: Columns = field(default_factory=dict)
 
-    def _found(self, route: Route, batch: Batch) -> Mapping[str, NDArray[Any]]:
+    def _found(self, level: Level, batch: Batch) -> Mapping[str, NDArray[Any]]:
         rows = np.searchsorted(self.known["design"], batch.index)
-        names = [name for out in route.outputs for name in (out, error_of(out)) if name in self.known]
+        names = [name for out in level.outputs for name in (out, error_of(out)) if name in self.known]
         return {name: self.known[name][rows] for name in names} | {"status": np.zeros(batch.index.size, np.uint8)}
 
 
@@ -243,11 +270,18 @@ def levels(study: Study) -> tuple[Level, ...]:
     """Return the levels of a study: its routes in the order of `Work`;
     those that need fitted parameters come after [fit].
     """
-    found = [Level(route, route.ns_per_design) for route in ordered_routes(study)]
+    found = [_level(study, route) for route in ordered_routes(study)]
     if study.fit is not None or study.parameter_limits:
-        before = sum(_before_fit(study, route) for route in ordered_routes(study))
+        before = sum(_before_fit(study, level.route) for level in found if level.route is not None)
         found.insert(before, Level(None, nanoseconds("work", "fit") if study.fit is not None else 0.0))
     return tuple(found)
+
+
+def _level(study: Study, route: Route) -> Level:
+    """Return the level of a route; what gives one of the outputs that the fit needs gives the other too."""
+    needed = driving_outputs(study.family) if study.fit is not None else ()
+    further = tuple(name for name in needed if name not in route.outputs) if set(needed) & set(route.outputs) else ()
+    return Level(route, route.ns_per_design, route.columns, further)
 
 
 def ordered_routes(study: Study) -> tuple[Route, ...]:

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.status import OK
 from sweep.chunks.cascade import BLOCK, Batch, Cascade, Recalled, levels
-from sweep.costs import nanoseconds
+from sweep.chunks.parameters import Parameters, parameter_matrix
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
-from sweep.evaluation.tables import design_matrix
-from sweep.families.base import Array, Columns
+from sweep.families.base import Columns
 from sweep.quantities.names import error_of, is_flag
 from sweep.reductions.steps import is_proven
 from sweep.synthesis.fit import fit_line
@@ -49,35 +47,6 @@ def output_columns(study: Study) -> dict[str, str]:
         if study.accuracy.target is not None and not is_flag(name):
             columns[error_of(name)] = "float64" if is_proven(study.family, name, study.accuracy) else "float32"
     return columns
-
-
-def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
-    """Return the checked (n, P) design matrix of the designs start, ..., stop - 1 of the study's space,
-    and their status (n,).
-
-    The status is OK unless [locus] found no mechanism for a design; its links are nan then.
-    """
-    columns = study.space.columns(start, stop)
-    if study.locus is None:
-        matrix, _ = design_matrix(study.family, columns)
-        return matrix, np.zeros(len(matrix), np.uint8)
-    made, status = study.locus.links(columns)
-    # What has no mechanism is marked, not refused.
-    given = {name: values for name, values in columns.items() if name in study.family.parameter_names}
-    matrix, _ = design_matrix(study.family, given | {name: np.ones(stop - start) for name in made})
-    for name, values in made.items():
-        matrix[:, study.family.parameter_names.index(name)] = values
-    return matrix, status
-
-
-def parameter_ns(study: Study) -> float:
-    """Return the estimated cost of the parameters of a design [ns]."""
-    own = nanoseconds("work", "parameter") * len(study.family.parameters)
-    own += nanoseconds("work", "locus") if study.locus is not None else 0.0
-    if study.space.kind == "product":
-        return own + nanoseconds("work", "axis of a lattice") * len(study.space.axes)
-    plain, log = nanoseconds("work", "axis of a sample"), nanoseconds("work", "axis of a sample, log")
-    return own + sum(log if axis.scale == "log" else plain for axis in study.space.axes)
 
 
 def warm(study: Study, tell: Callable[[int, int], None] = lambda done, total: None) -> None:
@@ -135,19 +104,21 @@ def compute_chunk(
         raise InputError("designs", f"{start}:{stop}", f"a range inside 0:{study.space.count}", f"study {study.name}")
     keep = study.output.keep == "all"
     cascades = [Cascade(study, keep, should_stop)]
+    parameters = Parameters.of(study, cascades[0].levels[0].columns)
     designs_known = np.empty(0, np.int64)
     if known is not None:
         within = known["status"] == OK
         designs_known = known["design"][within]
-        cascades.append(Recalled(study, keep, should_stop, {name: values[within] for name, values in known.items()}))
+        recalled = {name: values[within] for name, values in known.items()}
+        cascades.append(Recalled(study, keep, should_stop, recalled))
     for low in range(start, stop, BLOCK):
         index = np.arange(low, min(low + BLOCK, stop))
-        matrix, status = parameter_matrix(study, low, low + index.size)
+        matrix, status = parameters.first(low, low + index.size)
         if known is None:
             cascades[0].feed(index, matrix, status)
             continue
-        recalled = np.isin(index, designs_known)
-        for cascade, mine in zip(cascades, (~recalled, recalled), strict=True):
+        old = np.isin(index, designs_known)
+        for cascade, mine in zip(cascades, (~old, old), strict=True):
             if mine.any():
                 cascade.feed(index[mine], matrix[mine], status[mine])
     return _result(study, cascades)

@@ -14,7 +14,8 @@ import numpy as np
 
 from kernels.status import OK
 from sweep.chunks.cascade import BLOCK, CALL_SECONDS, Cascade, levels
-from sweep.chunks.chunk import output_columns, parameter_matrix, parameter_ns
+from sweep.chunks.chunk import output_columns
+from sweep.chunks.parameters import parameter_matrix, parameter_ns
 from sweep.evaluation.summaries import output
 from sweep.families.base import Array, Unit
 from sweep.quantities.names import is_error, without_error

@@ -73,7 +73,7 @@ def _parameter_faults(rows: pd.DataFrame, own: Mapping[str, Any], study: Study) 
     """Return parameters that are not those of the design space;
     what [fit] sets or scales is left to the recomputing.
     """
-    from sweep.chunks.chunk import parameter_matrix
+    from sweep.chunks.parameters import parameter_matrix
 
     matrix, _ = parameter_matrix(study, own["start"], own["stop"])
     at = rows["design"].to_numpy() - own["start"]

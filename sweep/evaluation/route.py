@@ -26,6 +26,7 @@ class Route:
     run : ``run(designs, accuracy, window)`` gives the outputs, perhaps their ``err_``, and ``status``, each (n,)
     general : which general reduction it is; "" for a family's own step or an effect
     order : kind of work, and its place among routes of that kind
+    columns : how many of the first columns of the design matrix ``run`` looks at; None for all
     """
 
     name: str
@@ -34,3 +35,4 @@ class Route:
     run: RunFunction | None = None
     general: Group | Literal[""] = ""
     order: tuple[Work, int] = (Work.SEARCH, 0)
+    columns: int | None = None

@@ -85,7 +85,7 @@ def _own(family: Family, step: Step, stage: Stage | None, outputs: tuple[str, ..
     owner = stage.family if stage else family
     place = [own.name for own in steps_of(owner)].index(step.name)
     run, cost = partial(_run_step, family, step, stage, outputs), step_ns(owner, step, accuracy)
-    return Route(name, outputs, cost, run, order=(step.work, place))
+    return Route(name, outputs, cost, run, order=(step.work, place), columns=stage.columns.stop if stage else None)
 
 
 def _general(family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:

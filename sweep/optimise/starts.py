@@ -110,7 +110,7 @@ def drawn(study: Study, count: int, seed: int) -> Array:
     """Return designs of a study's space at random, finished by its [locus] and [fit]:
     for datasets without feasible rows.
     """
-    from sweep.chunks.chunk import parameter_matrix
+    from sweep.chunks.parameters import parameter_matrix
     from sweep.synthesis.fit import fit_line
 
     length = min(64, study.space.count)

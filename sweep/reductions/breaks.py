@@ -14,8 +14,8 @@ import numpy as np
 from sweep.families.base import Array
 from sweep.reductions.sampling import TWO_PI, Index, Mask
 
-Curve: TypeAlias = Callable[[Array], Array]
-"""Values (k,) of the k curves at angles (k,)."""
+Curve: TypeAlias = Callable[[Array, Index], Array]
+"""Values (j,) of some curves at angles (j,), one each; the curves by their numbers (j,)."""
 
 MOST = 32  # jumps of a turn; a curve with more is not resolved
 STEP = 1.0 / 60.0  # of the curve's size; smaller steps are left to the samples
@@ -66,14 +66,25 @@ def near_jumps(between: Mask, row: Index, column: Index) -> Mask:
     return found
 
 
-def search(curve: Curve, measured: Curve, column: Index, samples: int) -> Arcs:
+def level(values: Array, mode: int, share: float) -> Array:
+    """Return what a peak of each row of samples must reach to be looked at: of a magnitude this share of the largest,
+    of values this share of their range.
+    """
+    height = np.abs(values) if mode == 0 else mode * values
+    most: Array = height.max(axis=1)
+    return most * share if mode == 0 else most - (1.0 - share) * (most - height.min(axis=1))
+
+
+def search(curve: Curve, measured: Curve, column: Index, samples: int, least: Array) -> Arcs:
     """Return the highest measured values on the arcs that end and begin at jumps.
 
     Parameters
     ----------
-    curve : the curves that jump;  measured : what is to be large there (magnitude, value or its negative)
+    curve : the curves that jump;  measured : what is to be large there (magnitude, value or its negative); both by the
+        places (j,) and the numbers (j,) of the jumps
     column : (k,) sample before each jump
     samples : per turn
+    least : (k,) of :func:`level`: arcs of which neither ends nor two places between them reach it have no top searched
 
     Notes
     -----
@@ -83,22 +94,43 @@ def search(curve: Curve, measured: Curve, column: Index, samples: int) -> Arcs:
     spacing = TWO_PI / samples
     start = np.multiply(column, spacing, dtype=np.float64)
     low, high = start.copy(), start + spacing
-    at_low, at_high = curve(low), curve(high)
+    every = np.arange(column.size)
+    at_low, at_high = curve(low, every), curve(high, every)
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        value = curve(middle)
+        value = curve(middle, every)
         left = np.abs(value - at_low) < np.abs(at_high - value)
         low, at_low = np.where(left, middle, low), np.where(left, value, at_low)
         high, at_high = np.where(left, high, middle), np.where(left, at_high, value)
-    before = _section(measured, start - (BESIDE - 1) * spacing, low)
-    after = _section(measured, high, start + BESIDE * spacing)
+    before = _section(measured, start - (BESIDE - 1) * spacing, low, least)
+    after = _section(measured, high, start + BESIDE * spacing, least)
     return Arcs(*(np.concatenate(pair) for pair in zip(before, after, strict=True)))
 
 
-def _section(measured: Curve, low: Array, high: Array) -> Arcs:
-    ends = [(phi, measured(phi)) for phi in (low, high)]
+def _section(measured: Curve, low: Array, high: Array, least: Array) -> Arcs:
+    every = np.arange(low.size)
     inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    at_inner, at_outer = measured(inner), measured(outer)
+    known = [(phi, measured(phi, every)) for phi in (low, high, inner, outer)]
+    phi, best = known[0]
+    for place, value in known[1:]:
+        better = value > best
+        phi, best = np.where(better, place, phi), np.where(better, value, best)
+    which = np.flatnonzero(best >= least)
+    err = 8.0 * EPS * np.abs(best)
+    if which.size:
+        part = (x[which] for x in (low, high, inner, outer, known[2][1], known[3][1]))
+        place, value, gap = _golden(lambda at: measured(at, which), *part)
+        better = value > best[which]
+        phi[which], best[which] = np.where(better, place, phi[which]), np.where(better, value, best[which])
+        err[which] = gap + 8.0 * EPS * np.abs(best[which])
+    return Arcs(phi, best, err)
+
+
+def _golden(
+    measured: Callable[[Array], Array], low: Array, high: Array, inner: Array, outer: Array, at_inner: Array,
+    at_outer: Array,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Return places and values of the tops between two places, and what the last section leaves of them."""
     for _ in range(SECTIONS):
         left = at_inner > at_outer
         low, high = np.where(left, low, inner), np.where(left, outer, high)
@@ -106,8 +138,5 @@ def _section(measured: Curve, low: Array, high: Array) -> Arcs:
         value = measured(middle)
         inner, outer = np.where(left, middle, outer), np.where(left, inner, middle)
         at_inner, at_outer = np.where(left, value, at_outer), np.where(left, at_inner, value)
-    phi, best = inner, at_inner
-    for place, value in (*ends, (outer, at_outer)):
-        better = value > best
-        phi, best = np.where(better, place, phi), np.where(better, value, best)
-    return Arcs(phi, best, np.abs(at_inner - at_outer) + 8.0 * EPS * np.abs(best))
+    first = at_inner >= at_outer
+    return np.where(first, inner, outer), np.where(first, at_inner, at_outer), np.abs(at_inner - at_outer)

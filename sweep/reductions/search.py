@@ -11,7 +11,7 @@ from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly
-from sweep.reductions.breaks import jumps, near_jumps, search
+from sweep.reductions.breaks import jumps, level, near_jumps, search
 from sweep.reductions.refine import EPS, SHRINK, Peaks, Sampler, confirmed, first_peaks, polish_places, sharpen
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
 from sweep.reductions.sampling import (
@@ -115,7 +115,9 @@ class Search:
             if self.window is not None and request.windowed:
                 row, found = self._within_window(rows, columns, request, row, found, resolved[number])
             elif request in breaks:
-                row, found = self._beside_jumps(rows, samples, request, row, found, breaks[request], resolved[number])
+                floor = level(columns[request.pose], request.mode, SHARE)
+                between = breaks[request] & resolved[number][:, None]
+                row, found = self._beside_jumps(rows, samples, request, row, found, between, floor)
             moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[request]
             again = moved & resolved[number]
             needed[number, again] = np.maximum(needed[number, again], 2 * samples)
@@ -286,22 +288,21 @@ class Search:
         return np.concatenate([row[inside], edge.row]), peaks.only(inside).joined(added)
 
     def _beside_jumps(
-        self, rows: Index, samples: int, request: Request, row: Index, peaks: Peaks, between: Mask, resolved: Mask
+        self, rows: Index, samples: int, request: Request, row: Index, peaks: Peaks, between: Mask, floor: Array
     ) -> tuple[Index, Peaks]:
         """Add the highest points of the arcs that end at a jump."""
-        at, column = np.nonzero(between & resolved[:, None])
+        at, column = np.nonzero(between)
         if not at.size:
             return row, peaks
 
-        def curve(phi: Array) -> Array:
-            return pose_columns(self.family, self.designs[rows[at]], phi[:, None], [request.pose])[0][request.pose][
-                :, 0
-            ]
+        def curve(phi: Array, which: Index) -> Array:
+            designs = self.designs[rows[at[which]]]
+            return pose_columns(self.family, designs, phi[:, None], [request.pose])[0][request.pose][:, 0]
 
-        def measured(phi: Array) -> Array:
-            return np.abs(curve(phi)) if request.mode == 0 else request.mode * curve(phi)
+        def measured(phi: Array, which: Index) -> Array:
+            return np.abs(curve(phi, which)) if request.mode == 0 else request.mode * curve(phi, which)
 
-        arcs = search(curve, measured, column, samples)
+        arcs = search(curve, measured, column, samples, floor[at])
         wide, none = np.full(arcs.phi.size, TWO_PI / samples), np.zeros(arcs.phi.size)
         added = Peaks(arcs.phi, arcs.value, wide, arcs.err, arcs.value, none, none)
         return np.concatenate([row, at, at]), peaks.joined(added)

@@ -66,7 +66,9 @@ def _proven(
     assert guided is not None
     shares = guided.shares(stages[-1].designs(designs))
     names = [name for name in orders if wanted & {f"max_abs_{name}", f"phi_max_abs_{name}"}]
-    found, searched = true_extrema(family, designs, [Request(name, 0) for name in names], accuracy.target, locate=True)
+    locate = any(f"phi_max_abs_{name}" in wanted for name in names)
+    requests = [Request(name, 0) for name in names]
+    found, searched = true_extrema(family, designs, requests, accuracy.target, locate=locate)
     columns: Columns = {"status": searched.copy()}
     for name in names:
         peak, status, error = found[Request(name, 0)], searched.copy(), np.full(n, np.nan)

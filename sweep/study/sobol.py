@@ -7,6 +7,8 @@ sequence with scipy's bit for bit.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +17,7 @@ from sweep.families.base import Array
 BITS = 52
 INDEX_BITS = 40
 _TABLE_BITS = 10
+_RUN = 2**_TABLE_BITS
 
 # Primitive polynomial (leading and last coefficient included) and first direction integers of each dimension:
 # S. Joe and F. Y. Kuo, Constructing Sobol sequences with better two-dimensional projections, SIAM J. Sci. Comput. 30
@@ -84,27 +87,47 @@ class Sobol:
                 directions = [_mix(v, raw) for v in directions]
                 self._shift[k] = raw[BITS] >> (64 - BITS)
             tables.append(_xor_tables(directions))
-        self._tables = np.array(tables, np.uint64).reshape(dimensions, INDEX_BITS // _TABLE_BITS, 2**_TABLE_BITS)
+        self._tables = np.array(tables, np.uint64).reshape(dimensions, INDEX_BITS // _TABLE_BITS, _RUN)
+        low = np.arange(2 * _RUN)
+        # The digit above the lowest ones changes the highest of their Gray code.
+        self._first_runs = self._tables[:, 0, (low ^ (low >> 1)) & (_RUN - 1)].reshape(dimensions, 2, _RUN)
 
-    def points(self, start: int, stop: int) -> Array:
-        """Return points start to stop - 1, one row per dimension."""
-        index = np.arange(start, stop, dtype=np.int64)
+    def points(self, start: int, stop: int, which: Sequence[int] | None = None) -> Array:
+        """Return points start to stop - 1, one row per dimension; with ``which`` of those dimensions only."""
+        if stop - start < _RUN:
+            return self.at(np.arange(start, stop, dtype=np.int64), which)
+        # Numbers that differ in the lowest digits alone make a run.  Their Gray codes are those of the first run, or of
+        # the second, with other high digits.
+        runs = np.arange(start // _RUN, (stop - 1) // _RUN + 1)
+        high, low = runs ^ (runs >> 1), start % _RUN
+        chosen = range(len(self._shift)) if which is None else which
+        out = np.empty((len(chosen), stop - start))
+        for row, k in zip(out, chosen, strict=True):
+            x = self._first_runs[k, runs & 1]
+            x ^= self._upper(k, high)[:, None]
+            row[:] = x.reshape(-1)[low : low + row.size]
+        return self._scaled(out)
+
+    def at(self, index: NDArray[np.int64], which: Sequence[int] | None = None) -> Array:
+        """Return the points of these numbers, in any order, with the same bits as `points`."""
         gray = index ^ (index >> 1)
-        digits: list[int | NDArray[np.int64]] = []
-        for part in range(self._tables.shape[1]):
-            low = part * _TABLE_BITS
-            group = (gray >> low) & (2**_TABLE_BITS - 1)
-            # Of a short slice the upper digits are all the same: one number instead of a column.
-            same = start >> low == (stop - 1) >> low and stop > start
-            digits.append(int(group[0]) if same else group)
-        out = np.empty((len(self._shift), index.size))
-        for k, tables in enumerate(self._tables):
-            x = np.full(index.size, self._shift[k])
-            for table, group in zip(tables, digits, strict=True):
-                x ^= table[group]
-            out[k] = x
-            out[k] += self._centre
-            out[k] *= 2.0**-BITS
+        first, high = gray & (_RUN - 1), gray >> _TABLE_BITS
+        chosen = range(len(self._shift)) if which is None else which
+        out = np.empty((len(chosen), index.size))
+        for row, k in zip(out, chosen, strict=True):
+            row[:] = self._upper(k, high) ^ self._tables[k, 0, first]
+        return self._scaled(out)
+
+    def _upper(self, k: int, high: NDArray[np.int64]) -> NDArray[np.uint64]:
+        """Return what the shift of dimension k and all digits of a Gray code but the lowest make of it."""
+        x = np.full(high.size, self._shift[k])
+        for part, table in enumerate(self._tables[k, 1:]):
+            x ^= table[(high >> (part * _TABLE_BITS)) & (_RUN - 1)]
+        return x
+
+    def _scaled(self, out: Array) -> Array:
+        out += self._centre
+        out *= 2.0**-BITS
         return out
 
 
@@ -135,7 +158,7 @@ def _mix(direction: int, raw: list[int]) -> int:
 
 def _xor_tables(directions: list[int]) -> NDArray[np.uint64]:
     """Return for every group of index digits the exclusive or of the direction numbers of each combination."""
-    tables = np.zeros((INDEX_BITS // _TABLE_BITS, 2**_TABLE_BITS), np.uint64)
+    tables = np.zeros((INDEX_BITS // _TABLE_BITS, _RUN), np.uint64)
     for j, direction in enumerate(directions):
         part, bit = divmod(j, _TABLE_BITS)
         half = 1 << bit

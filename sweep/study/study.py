@@ -207,7 +207,7 @@ class Study:
         """The mechanism: a family, a chain or a machine, with the effects that what is wanted calls for."""
         return extended(self.bare, self.want, self.curves)
 
-    @property
+    @cached_property
     def bare(self) -> Family:
         """The mechanism without effects."""
         return find_family(self.mechanism)

@@ -19,12 +19,15 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Family
 from sweep.families.capabilities import GuidedPoint
-from sweep.families.chain import Chain, stages_of
+from sweep.families.chain import Chain, driven_guide, stages_of
+from sweep.reductions.steps import applying_step
 
 # The deviation is a smooth function of the input: 48 Chebyshev points of a swing miss 1e-4 of its extremes, 256 of a
 # whole turn 4e-4 at most (48: up to 2e-2), which is far below what the optimiser moves afterwards.
 SWING_SAMPLES, TURN_SAMPLES = 48, 256
 SWING_ACCURACY = Accuracy(target=1e-6)
+SWING = ("psi_ext", "swing")
+BLOCK = 8192  # positions worked on together: their fifteen or so arrays (64 kB each) stay in the caches
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,11 @@ class LineFit:
 
 
 def fit_line(
-    family: Family, designs: Array, fit: LineFit, window: tuple[float, float] | None
+    family: Family,
+    designs: Array,
+    fit: LineFit,
+    window: tuple[float, float] | None,
+    driven: tuple[Array, Array] | None = None,
 ) -> tuple[Array, NDArray[np.uint8]]:
     """Fit coupler point, line and scale of every design.
 
@@ -60,6 +67,7 @@ def fit_line(
     designs : (n, P) design matrix; the fitted columns are not read, except lam (see :class:`LineFit`)
     fit : what to aim at
     window : working part as fractions of the stroke from its smallest s; None is the whole stroke
+    driven : the `driving_outputs` of every design, each (n,), if they are known; all must be numbers
 
     Returns
     -------
@@ -76,31 +84,61 @@ def fit_line(
     column = {name: k for k, name in enumerate(family.parameter_names)}
     fitted = designs.copy()
     guide = family.stages[-1].family if isinstance(family, Chain) else family
-    angles, status = _input_angles(family, designs)
+    start, swing, status = _driven(family, designs) if driven is None else (*driven, np.zeros(len(designs), np.uint8))
+    share = _shares(TURN_SAMPLES if guide is family else SWING_SAMPLES)
     alive = np.flatnonzero(status == codes.OK)
-    if alive.size == 0:
-        return fitted, status
-    own = fitted[np.ix_(alive, np.array([column[f"{name}{suffix}"] for name in guide.parameter_names]))]
-    wanted = frozenset({"x_b", "y_b", "x_c", "y_c"})
-    pins = guide.poses(np.ascontiguousarray(own), Angles.of(angles[alive]), wanted)
-    missing = pins["status"] != codes.OK
-    parts = [np.where(missing, np.nan, pins[name].astype(np.float64)) for name in ("x_b", "y_b", "x_c", "y_c")]
-    values = {name: np.ascontiguousarray(own[:, guide.parameter_names.index(name)]) for name in guided.fitted}
-    along, across, direction, offset = values.values()
-    deviation, travel, found = np.empty(alive.size), np.empty(alive.size), np.empty(alive.size, np.uint8)
+    own = np.array([column[f"{name}{suffix}"] for name in guide.parameter_names])
+    set_here = np.array([column[f"{name}{suffix}"] for name in guided.fitted])
+    scaled = np.array([column[f"{name}{suffix}"] for name in guided.scaled])
     limits = np.array(window or (0.0, 1.0), dtype=np.float64)
+    rows = max(1, BLOCK // share.size)
+    for begin in range(0, alive.size, rows):
+        some = alive[begin : begin + rows]
+        angles = _input_angles(family, designs[some], start[some, None] + swing[some, None] * share)
+        matrix = np.ascontiguousarray(fitted[np.ix_(some, own)])
+        values, travel, status[some] = _fitted(guide, guided, matrix, angles, fit, limits)
+        fitted[np.ix_(some, set_here)] = values.T
+        if fit.stroke is not None:
+            fitted[np.ix_(some, scaled)] *= (fit.stroke / travel)[:, None]
+    return fitted, status
+
+
+def _fitted(
+    guide: Family, guided: GuidedPoint, own: Array, angles: Array, fit: LineFit, limits: Array
+) -> tuple[Array, Array, NDArray[np.uint8]]:
+    """Return the fitted parameters (4, n), the travel (n,) and the status of guides at their input angles (n, m)."""
+    names = ("x_b", "y_b", "x_c", "y_c")
+    pins = guide.poses(own, Angles.of(angles), frozenset(names))
+    parts = [np.asarray(pins[name], np.float64) for name in names]
+    missing = pins["status"] != codes.OK
+    if missing.any():
+        for part in parts:
+            part[missing] = np.nan
+    values = np.array([own[:, guide.parameter_names.index(name)] for name in guided.fitted])
+    along, across, direction, offset = values
+    deviation, travel, found = np.empty(len(own)), np.empty(len(own)), np.empty(len(own), np.uint8)
     line_fit(
         parts[0], parts[1], parts[2], parts[3], limits, direction, fit.free_direction,
         along, across, offset, deviation, travel, found,
     )  # fmt: skip
-    status[alive] = found
-    for name in guided.fitted:
-        fitted[alive, column[f"{name}{suffix}"]] = values[name]
-    if fit.stroke is not None:
-        factor = fit.stroke / travel
-        for name in guided.scaled:
-            fitted[alive, column[f"{name}{suffix}"]] *= factor
-    return fitted, status
+    return values, travel, found
+
+
+def driving_outputs(family: Family) -> tuple[str, ...]:
+    """Return names of the chain's outputs that say how the guide is driven, if a sweep that has them may hand them on.
+
+    They must be those that `fit_line` finds itself, to the last bit: so there are none unless one own step of the first
+    of two stages gives both, whatever the accuracy.
+    """
+    both = driven_guide(family)
+    if both is None:
+        return ()
+    step = applying_step(both[0].family, SWING[0], SWING_ACCURACY)
+    if step is None or not {o.name for o in step[0].provides} >= set(SWING):
+        return ()
+    # A step that serves a grid too looks at no accuracy.
+    exact = step[0].applies(Accuracy(samples=SWING_SAMPLES))
+    return tuple(f"{name}{both[0].number}" for name in SWING) if exact else ()
 
 
 def _guided(family: Family) -> tuple[GuidedPoint, str]:
@@ -112,20 +150,29 @@ def _guided(family: Family) -> tuple[GuidedPoint, str]:
     raise InputError("fit", family.name, "a guide, or a chain that ends in one", "mechanism")
 
 
-def _input_angles(family: Family, designs: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """Return input angles of the guide over its swing or turn, Chebyshev points, (n, m),
-    and the status of what drives it.
-    """
-    samples = SWING_SAMPLES if isinstance(family, Chain) else TURN_SAMPLES
-    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))
+def _driven(family: Family, designs: Array) -> tuple[Array, Array, NDArray[np.uint8]]:
+    """Return where the angle that drives the guide starts, how far it goes, each (n,), and the status of its drive."""
+    n = len(designs)
     if not isinstance(family, Chain):
-        return np.tile(2.0 * np.pi * share, (len(designs), 1)), np.zeros(len(designs), np.uint8)
-    last = family.stages[-1]
+        return np.zeros(n), np.full(n, 2.0 * np.pi), np.zeros(n, np.uint8)
     upstream = find_family([stage.family.name for stage in family.stages[:-1]])
     driving = np.ascontiguousarray(designs[:, : len(upstream.parameters)])
-    found = design_outputs(upstream, driving, ("psi_ext", "swing"), SWING_ACCURACY)
+    found = design_outputs(upstream, driving, SWING, SWING_ACCURACY)
     start, swing = found["psi_ext"].astype(np.float64), found["swing"].astype(np.float64)
-    psi = start[:, None] + swing[:, None] * share
+    return start, swing, found["status"].astype(np.uint8)
+
+
+def _input_angles(family: Family, designs: Array, driving: Array) -> Array:
+    """Return input angles of the guide (n, m) from those of what drives it."""
+    if not isinstance(family, Chain):
+        return driving
+    last = family.stages[-1]
     assert last.kappa is not None and last.offset is not None
-    angles = designs[:, last.kappa, None] * psi + designs[:, last.offset, None]
-    return angles, found["status"].astype(np.uint8)
+    angles: Array = designs[:, last.kappa, None] * driving + designs[:, last.offset, None]
+    return angles
+
+
+def _shares(samples: int) -> Array:
+    """Return Chebyshev points from 0 to 1."""
+    share: Array = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))
+    return share

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from kernels import status as st
 from kernels._jit import kernel
-from kernels.certificate import BEST, CENTRE, DONE, LEFT, MODE, NOISE, PLACE, REACH, STATE, TURN, UPPER, begin, judge
-from kernels.enclosure import GUARD, ORDER
+from kernels.certificate import CENTRE, DONE, MODE, REACH, STATE, begin, conclude, judge
+from kernels.enclosure import ORDER
 from kernels.families.rssr.closure import Array, Status, reduce_design
 from kernels.families.rssr.enclosure import SIZE, VELOCITY, enclose
 from kernels.sincos import sincos
@@ -44,11 +42,4 @@ def certify_maxima(
             sine, cosine = sincos(state[CENTRE])
             encloses = enclose(at, r, cosine, sine, state[REACH])
             judge(state, encloses, at, VELOCITY, order - 1, y)
-        least, bound = (state[BEST] - state[NOISE]) / GUARD, state[UPPER]
-        cells[i] = most - state[LEFT]
-        if not bound < math.inf:
-            status[i], error[i] = st.NOT_CONVERGED, math.nan
-            continue
-        if not least <= maximum[i] <= bound:
-            maximum[i], phi[i] = state[BEST], state[PLACE] - TURN * math.floor(state[PLACE] / TURN)
-        error[i] = max(bound - maximum[i], maximum[i] - least) * GUARD
+        conclude(state, i, most, status, maximum, phi, error, cells)

@@ -1,0 +1,114 @@
+"""Parameters of the designs of a chunk: of all at first those that the first outputs need, the others of survivors.
+
+Of a chain only one design in some thirty survives the limits on its first stage, and making parameters takes as long as
+these limits; so what the first stage does not need is made later, by the numbers of the designs that are left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.costs import nanoseconds
+from sweep.errors import InputError
+from sweep.evaluation.tables import design_matrix
+from sweep.families.base import Array
+
+if TYPE_CHECKING:
+    from sweep.study import Study
+
+
+def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
+    """Return the checked (n, P) design matrix of the designs start, ..., stop - 1 of the study's space,
+    and their status (n,).
+
+    The status is OK unless [locus] found no mechanism for a design; its links are nan then.
+    """
+    columns = study.space.columns(start, stop)
+    if study.locus is None:
+        matrix, _ = design_matrix(study.family, columns)
+        return matrix, np.zeros(len(matrix), np.uint8)
+    made, status = study.locus.links(columns)
+    # What has no mechanism is marked, not refused.
+    given = {name: values for name, values in columns.items() if name in study.family.parameter_names}
+    matrix, _ = design_matrix(study.family, given | {name: np.ones(stop - start) for name in made})
+    for name, values in made.items():
+        matrix[:, study.family.parameter_names.index(name)] = values
+    return matrix, status
+
+
+def parameter_ns(study: Study) -> float:
+    """Return the estimated cost of the parameters of a design [ns]."""
+    own = nanoseconds("work", "parameter") * len(study.family.parameters)
+    own += nanoseconds("work", "locus") if study.locus is not None else 0.0
+    if study.space.kind == "product":
+        return own + nanoseconds("work", "axis of a lattice") * len(study.space.axes)
+    plain, log = nanoseconds("work", "axis of a sample"), nanoseconds("work", "axis of a sample, log")
+    return own + sum(log if axis.scale == "log" else plain for axis in study.space.axes)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Makes the parameters of a study's designs; their bits do not depend on when they are made.
+
+    Parameters
+    ----------
+    study : the question
+    leading : how many columns of the design matrix `first` makes
+    """
+
+    study: Study
+    leading: int
+
+    @classmethod
+    def of(cls, study: Study, needed: int | None) -> Parameters:
+        """Return what makes the first ``needed`` columns at first (None: all); all of them where rows are kept anyway,
+        where [locus] makes some from others, and where a value may be refused, with the place where it stands.
+        """
+        whole = len(study.family.parameters)
+        early = needed is not None and study.output.keep != "all" and study.locus is None and _is_valid(study)
+        return cls(study, needed if needed is not None and early else whole)
+
+    def first(self, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
+        """Return the leading columns of the designs start to stop - 1, (n, leading), and their status (n,)."""
+        names = self.study.family.parameter_names
+        if self.leading == len(names):
+            return parameter_matrix(self.study, start, stop)
+        columns = self.study.space.columns(start, stop, names[: self.leading])
+        return _beside(columns.values(), stop - start), np.zeros(stop - start, np.uint8)
+
+
+def completed(study: Study, index: NDArray[np.int64], designs: Array) -> Array:
+    """Return all columns (k, P) of designs by their numbers (k,), from the first few of them."""
+    names = study.family.parameter_names[designs.shape[1] :]
+    if not names:
+        return designs
+    return _beside([*designs.T, *study.space.columns_at(index, names).values()], index.size)
+
+
+def _beside(columns: Iterable[Array], n: int) -> Array:
+    columns = list(columns)
+    matrix = np.empty((n, len(columns)))
+    for k, column in enumerate(columns):
+        matrix[:, k] = column
+    return matrix
+
+
+def _is_valid(study: Study) -> bool:
+    """Return whether no design of the space can have a bad value: values stand between the ends of their axes."""
+    space, family = study.space, study.family
+    if space.names != family.parameter_names:
+        return False
+    axes = {axis.name: axis for axis in space.axes}
+    for axis, choices in ((axes[p.name], p.choices) for p in family.parameters if p.name in axes):
+        if choices is not None and (axis.values is None or not np.isin(axis.values, choices).all()):
+            return False
+    try:
+        design_matrix(family, {name: space.bounds.get(name, space.fixed.get(name)) for name in space.names})
+    except InputError:
+        return False
+    return True
