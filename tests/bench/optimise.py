@@ -1,4 +1,4 @@
-"""Random specifications of a spatial crank-rocker, three seeds each, against a larger search."""
+"""Random specifications of a spatial crank-rocker, three seeds each, against differential evolution."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ from sweep.optimise.candidates import BLOCK, ranking
 from sweep.optimise.certificate import AGREE, Result
 from sweep.optimise.descent import KKT
 from sweep.study import Limit, OptimiseSettings
+from tests.bench.differential import differential
 
-STARTS, LARGER, SEED = 24, 4, 1971
+STARTS, SEED = 24, 1971
 COUNT, SEEDS = 60, 3
 CPU = 6.0  # seconds of processor time of the slowest seed of a specification
 RSSR = family("rssr")
@@ -61,11 +62,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One specification: the results of every seed, that of the larger search, CPU time of each seed and of all [s]."""
+    """One specification: results of every seed, and from differential evolution; CPU time of each seed, of all [s]."""
 
     problem: Problem
     found: tuple[list[Result], ...]
-    larger: Result
+    evolved: list[Result]
     cpu: tuple[float, ...]
     whole: float
 
@@ -77,7 +78,7 @@ class Outcome:
     @property
     def best(self) -> Result:
         """The best answer of all."""
-        return min((*(results[0] for results in self.found), self.larger), key=_order)
+        return min((*(results[0] for results in self.found), *self.evolved[:1]), key=_order)
 
     @property
     def gap(self) -> float:
@@ -128,14 +129,14 @@ def specifications(seed: int) -> Iterator[Problem]:
         yield Problem(RSSR, NAMES, lower, upper, {}, "max_abs_d2psi", limits)
 
 
-def solve(problem: Problem, starts: int, seed: int, jobs: int = 1, unseen: float = 0.02) -> list[Result]:
+def solve(problem: Problem, starts: int, seed: int) -> list[Result]:
     """Results of a search from at most so many starts, both branches, the best first."""
-    settings = OptimiseSettings(starts=starts, seed=seed, unseen=unseen)
-    return optimum(problem, [{"branch": 1.0}, {"branch": -1.0}], settings, jobs=jobs)
+    settings = OptimiseSettings(starts=starts, seed=seed)
+    return optimum(problem, [{"branch": 1.0}, {"branch": -1.0}], settings)
 
 
 def measure(
-    count: int, larger: int = LARGER, starts: int = STARTS, seed: int = SEED, seeds: int = SEEDS, first: int = 0
+    count: int, starts: int = STARTS, seed: int = SEED, seeds: int = SEEDS, first: int = 0
 ) -> Iterator[Outcome]:
     """Outcomes of ``count`` specifications from number ``first`` on, one after the other."""
     solve(next(specifications(seed + 1)), 1, 0)  # compiles
@@ -144,10 +145,9 @@ def measure(
         for k in range(seeds):
             found.append(solve(problem, starts, number + 10_000 * k))
             times.append(time.process_time())
-        # The larger search has another sample, of so many times the size, and ends when its starts do.
-        other = solve(problem, starts * larger, number + 1000, unseen=0.0)[0]
+        evolved = differential(on_locus(problem), number)
         spent = tuple(end - begin for begin, end in pairwise(times))
-        yield Outcome(problem, tuple(found), other, spent, time.process_time() - times[0])
+        yield Outcome(problem, tuple(found), evolved, spent, time.process_time() - times[0])
 
 
 def _order(result: Result) -> tuple[bool, float]:
@@ -178,14 +178,14 @@ def candidate_cost(count: int = 1 << 20) -> dict[str, float]:
     return costs
 
 
-def page(rows: Sequence[Row], larger: int, seed: int) -> str:
+def page(rows: Sequence[Row], seed: int) -> str:
     """The table and which marks are met, as markdown."""
     n, cost = len(rows), candidate_cost()
-    command = "make bench-optimise" if (larger, seed) == (LARGER, SEED) else "python -m tests.bench.optimise"
+    command = "make bench-optimise" if seed == SEED else "python -m tests.bench.optimise"
     times = sorted(cpu for row in rows for cpu in row.cpu)
     searches, optima = sum(row.searches for row in rows), sum(row.optima for row in rows)
     met = {
-        f"every seed within {AGREE:g} of the best value of all and of a search {larger} times larger": (
+        f"every seed within {AGREE:g} of the best value of all and of differential evolution": (
             sum(row.missed == 0 for row in rows), n
         ),
         f"KKT residual at most {KKT:g}": (sum(row.residual <= KKT for row in rows), n),
@@ -236,13 +236,12 @@ def main() -> None:
     """Print the page, or write it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=COUNT)
-    parser.add_argument("--larger", type=int, default=LARGER)
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--out", type=Path, help="file to write, such as docs/optimise-marks.md")
     parser.add_argument("--keep", type=Path, help="file of the rows so far: a run with the same options goes on there")
     options = parser.parse_args()
     rows = kept(options.keep)
-    for outcome in measure(options.count - len(rows), options.larger, seed=options.seed, first=len(rows)):
+    for outcome in measure(options.count - len(rows), seed=options.seed, first=len(rows)):
         rows.append(outcome.row)
         if options.keep is not None:
             with options.keep.open("a", encoding="utf-8") as file:
@@ -250,7 +249,7 @@ def main() -> None:
         row = rows[-1]
         text = f"best better by {row.gap:.1e}, {row.missed} seeds missed, {row.optima} of {row.searches} starts settled"
         print(f"{len(rows)} of {options.count}: {text}, CPU {row.whole:.1f} s", flush=True)
-    text = page(rows, options.larger, options.seed)
+    text = page(rows, options.seed)
     if options.out is None:
         print(text)
     else:
