@@ -123,7 +123,7 @@ bench-extrema: $(VENV)/ready  ## errors and times of the search for true extrema
 bench-scene: $(VENV)/ready  ## all effects on 10^5 designs x 360 angles: rate, its parts, memory; about 5 minutes
 	$(BIN)/python -m tests.bench.effects
 
-bench-optimise: $(VENV)/ready  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 15 minutes
+bench-optimise: $(VENV)/ready  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 10 minutes of processor time
 	$(BIN)/python -m tests.bench.optimise --out docs/optimise-marks.md
 
 # The moving picture of the report: three.js with its licence, what is used of it, in one file that pages carry.

@@ -1,16 +1,19 @@
-"""A requirement whose best design lies in a narrow basin, asked as a study whose sweep leaves almost nothing."""
+"""A requirement whose best design lies in a narrow basin: a study whose sweep leaves almost nothing, and a sample."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from sweep.engine.run import run
+from sweep.families import family
+from sweep.optimise import Problem, optimum
 from sweep.optimise.study import problem_and_starts, read_survey
-from sweep.study import load_study
+from sweep.study import Limit, OptimiseSettings, load_study
 
 NARROW = """
 [study]
@@ -55,6 +58,19 @@ def test_narrow_basin_is_found_though_the_sweep_leaves_few_rows(tmp_path: Path, 
     assert table["status"][0] == 0 and table["kkt_residual"][0] <= 1e-6
     found = read_survey(folder.parent / "_optimum.parquet")
     assert found is not None and found.starts == 20 and found.basins >= 2
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_narrow_basin_is_found_from_a_sample(seed: int) -> None:
+    low = np.array([6.365291, 25.554871, 18.030126, 1.440830, -18.151863, -13.541649, 0.467321])
+    high = np.array([38.508389, 115.152444, 36.204620, 39.058706, 18.151863, 13.541649, 1.397788])
+    swing, phi0, pressure = np.radians([98.7068371, 159.4038222, 55.7816103]).tolist()
+    limits = (Limit("swing", swing, swing), Limit("phi0", phi0, phi0), Limit("max_pressure_angle", None, pressure))
+    names = ("a", "b", "c", "e", "f", "g", "alpha")
+    problem = Problem(family("rssr"), names, low, high, {}, "max_abs_d2psi", limits)
+    found = optimum(problem, [{"branch": 1.0}, {"branch": -1.0}], OptimiseSettings(starts=12, seed=seed))[0]
+    assert found.objective == pytest.approx(BEST, rel=5e-6)
+    assert found.status == 0 and found.kkt_residual <= 1e-6
 
 
 def test_starts_are_filled_up_to_the_number_asked_with_both_signs(tmp_path: Path) -> None:

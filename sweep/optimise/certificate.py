@@ -14,6 +14,7 @@ from sweep.optimise.dense import non_negative, times
 from sweep.optimise.rows import Form, Label
 
 ACTIVE = 1e-6  # a row within this of its bound (scaled) may carry a multiplier
+EDGE = 1e-10  # a variable within this of its bound, as a fraction of the bounds, may carry a multiplier
 AGREE = 1e-4  # starts whose objective is within this of the best agree
 
 CAVEAT = (
@@ -51,7 +52,7 @@ def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, with
     """
     n = len(fractions)
     active = np.flatnonzero((rows <= within) | form.equal)
-    lower, upper = np.flatnonzero(fractions <= 1e-10), np.flatnonzero(fractions >= 1.0 - 1e-10)
+    lower, upper = np.flatnonzero(fractions <= EDGE), np.flatnonzero(fractions >= 1.0 - EDGE)
     if not np.isfinite(jacobian[active]).all():
         return Multipliers(np.zeros(len(rows)), np.zeros(n), np.zeros(n, np.bool_), math.nan)
     full = np.column_stack([jacobian[active], form.slack[active]]).T

@@ -11,6 +11,8 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.optimise import newton, quasi
+from sweep.optimise.certificate import ACTIVE
+from sweep.optimise.eliminate import in_parameters
 from sweep.optimise.form import Program
 from sweep.optimise.model import FEASIBLE, Model, State
 from sweep.optimise.points import STATIC, Points
@@ -19,7 +21,9 @@ from sweep.optimise.rows import Form
 
 ROUNDS, CYCLES = 60, 3
 NEWTON = 240  # rounds of Newton steps: along a narrow curved valley hundreds are needed, and each gains
+SOON = 30  # of these on a locus, before the parameters are tried: near its singular places they creep
 KKT = 1e-6  # residual of a converged result
+DEARER = 10.0  # violations become so many times where a search comes to rest outside of its limits
 DWINDLING = 1e-9  # gain of a round from which a fulfilled condition of optimality ends the search
 REMEMBERED = 48  # extrema of refused designs that stay among the rows: the next long step would meet them again
 NEAR_ANGLE = 0.1  # a followed point reaches this far by itself [rad]
@@ -54,15 +58,39 @@ class Descent:
             if not self.best.feasible:
                 self._restore()
             if math.isfinite(self.best.objective) and self.best.violation < NEAR:
-                for _ in range(CYCLES):
-                    self._rounds(quasi.propose, relaxed=False, enough=1e-4, rounds=8)
-                    self._rounds(newton.propose, relaxed=False, enough=1e-13, rounds=NEWTON)
-                    if self.model.certificate(self.best).residual <= KKT:
-                        break
+                self._settle()
                 self.best = newton.polish(self.model, newton.repair(self.model, self.best))
             if self._verified():
                 break
         return self.best
+
+    def _settle(self) -> None:
+        """Make the objective small until the conditions of optimality hold; on a locus that is slow, go on without."""
+        other = in_parameters(self.model.problem, self.best.design)
+        for _ in range(CYCLES):
+            self._rounds(quasi.propose, relaxed=False, enough=1e-4, rounds=8)
+            self._rounds(newton.propose, relaxed=False, enough=1e-13, rounds=NEWTON if other is None else SOON)
+            if self.model.certificate(self.best).residual <= KKT:
+                break
+            if self.best.violation > ACTIVE:
+                self.model.price *= DEARER
+            elif other is not None:
+                self._detour(other)
+                other = None
+
+    def _detour(self, other: Problem) -> None:
+        """Search from the present design in other coordinates, and come back with what is found there."""
+        model = self.model
+        there = Descent(other, Program(other), self.best.design, model.stop, model.allowed - model.looks)
+        try:
+            there.run()
+        finally:
+            model.looks += there.model.looks
+            fractions = model.problem.scaled(there.best.design[None, :])[0]
+            if np.isfinite(fractions).all():
+                new = model.uncounted(np.clip(fractions, 0.0, 1.0))
+                if new.merit(model.price) < self.best.merit(model.price):
+                    self.best = new
 
     def _restore(self) -> None:
         """Find the smallest relaxation of the limits: zero where a feasible design is near."""

@@ -1,4 +1,6 @@
-"""Equations for limit positions eliminated: the same problem in coordinates in which they hold by construction."""
+"""Equations for limit positions eliminated: the same problem in coordinates in which they hold by construction; and
+back again, for the places where these coordinates are bad ones.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sweep.families.base import Array
 from sweep.families.capabilities import LimitLocus
 from sweep.families.chain import Chain, stages_of
 from sweep.optimise.coordinates import LocusCoordinates
@@ -16,6 +19,8 @@ from sweep.synthesis.prescription import OnLocus
 
 # The place on the locus is an angle without ends: a search that begins within one turn may leave it on either side.
 PLACE_BOUNDS = (-math.pi, 3.0 * math.pi)
+WHOLE_TURN = 2.0 * math.pi * (1.0 - 1e-9)
+SHORTEST = 0.1  # of its present length is a link without a lower limit
 
 
 def on_locus(problem: Problem) -> Problem:
@@ -61,6 +66,59 @@ def on_locus(problem: Problem) -> Problem:
         limits=(*(limit for limit in problem.limits if limit.output not in wanted), *links),
         coordinates=coordinates,
     )
+
+
+def in_parameters(problem: Problem, design: Array) -> Problem | None:
+    """Return a problem on the locus in the parameters themselves.
+
+    What the locus holds becomes limits, equations where it is fixed, and the links that follow become variables.
+    None where the problem is in the parameters anyway, where the place on the locus is not free, and where limits
+    leave a link no room.
+
+    Parameters
+    ----------
+    problem : as of :func:`on_locus`, or of a study with [locus]
+    design : (P,) where the search stands; links without limits may grow and shrink by the longest of its links
+    """
+    from sweep.study import Limit
+
+    coordinates = problem.coordinates
+    if not isinstance(coordinates, LocusCoordinates):
+        return None
+    held, places = coordinates.given[:2], coordinates.given[2:]  # swing or stroke and phi0; where on the locus
+    bounds = {n: (float(x), float(y)) for n, x, y in zip(problem.variables, problem.lower, problem.upper, strict=True)}
+    if any(n not in bounds or (n in coordinates.periodic and np.ptp(bounds[n]) < WHOLE_TURN) for n in places):
+        return None
+    ends = {name: bounds[name] for name in problem.variables if name not in coordinates.given}
+    ends |= {name: _around(problem, design, coordinates.made, name) for name in coordinates.made}
+    if any(low > high for low, high in ends.values()):
+        return None
+    varied = {name: (low, high) for name, (low, high) in ends.items() if low < high}
+    known = {name: (float(x), float(x)) for name, x in problem.fixed.items()} | bounds
+    fixed = {name: x for name, x in problem.fixed.items() if name not in held}
+    return replace(
+        problem,
+        variables=tuple(varied),
+        lower=np.array([low for low, _ in varied.values()]),
+        upper=np.array([high for _, high in varied.values()]),
+        fixed=fixed | {name: low for name, (low, high) in ends.items() if low == high},
+        limits=(
+            *(limit for limit in problem.limits if limit.output not in coordinates.made),
+            *(Limit(name, *known[name]) for name in held),
+        ),
+        coordinates=None,
+    )
+
+
+def _around(problem: Problem, design: Array, links: tuple[str, ...], name: str) -> tuple[float, float]:
+    """Return the bounds of a link that follows: its limits; where it has none, some way about the present design."""
+    names = problem.family.parameter_names
+    reach = float(np.abs([design[names.index(link)] for link in links]).max())
+    here, parameter = float(design[names.index(name)]), problem.family.parameters[names.index(name)]
+    limits = [limit for limit in problem.limits if limit.output == name]
+    least = SHORTEST * here if parameter.positive else here - reach
+    low = max((x.minimum for x in limits if x.minimum is not None), default=least)
+    return low, min((x.maximum for x in limits if x.maximum is not None), default=here + reach)
 
 
 def _directions(

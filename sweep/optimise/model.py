@@ -101,6 +101,10 @@ class Model:
     def state(self, fractions: Array, samples: int | None = None) -> State:
         """Return the true extrema of a design, looked for on ``samples`` poses and refined."""
         self.check()
+        return self.uncounted(fractions, samples)
+
+    def uncounted(self, fractions: Array, samples: int | None = None) -> State:
+        """Return what :meth:`state` does, of a design that was looked at before, whoever wants to stop."""
         design = self.design(fractions)
         points, turns = self.curves.scan(design, samples or self.samples)
         form = self.program.lay_out(self.curves, design, points, turns, self.scale)

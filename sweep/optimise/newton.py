@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.families.base import Array
-from sweep.optimise.certificate import ACTIVE, Multipliers, multipliers
+from sweep.optimise.certificate import ACTIVE, EDGE, Multipliers, multipliers
 from sweep.optimise.dense import least_squares, split, symmetric, times
 from sweep.optimise.model import FEASIBLE, Model, State
 from sweep.optimise.points import Index
@@ -136,8 +136,14 @@ def repair(model: Model, state: State) -> State:
         close = limits & ((c <= ACTIVE) | state.form.equal)
         wanted = np.where(state.form.equal, -c, np.maximum(-c, 0.0))[close]
         jacobian = np.nan_to_num(model.jacobian(state.fractions, state.form, state.form.points))[close]
-        step = least_squares(jacobian, wanted, 1e-12)
-        new = model.state(np.clip(state.fractions + step, 0.0, 1.0))
+        # A variable that left its bound by a hair would lose its multiplier: those at bounds move only if they must.
+        inside = (state.fractions > EDGE) & (state.fractions < 1.0 - EDGE)
+        new = state
+        for free in (inside, np.ones_like(inside)):
+            step = np.where(free, least_squares(jacobian * free, wanted, 1e-12), 0.0)
+            new = model.state(np.clip(state.fractions + step, 0.0, 1.0))
+            if new.violation < state.violation:
+                break
         if not new.violation < state.violation:
             break
         state = new
