@@ -18,6 +18,7 @@ The classes derive from numba's at the places that numba has for it: dispatcher,
 from __future__ import annotations
 
 import operator
+import sys
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -146,16 +147,23 @@ class _PartCompiler(_KernelCompiler):
 class Kernel(CPUDispatcher):
     """A function that Python and other kernels call; one set of machine code per set of types."""
 
-    def __init__(self, function: Callable[..., Any], targetoptions: dict[str, Any], compiler: Any = _KernelCompiler):
-        super().__init__(function, targetoptions=targetoptions, pipeline_class=compiler)
+    compiler: type[_KernelCompiler] = _KernelCompiler
+
+    def __init__(self, py_func: Callable[..., Any], locals: Any = None, targetoptions: dict[str, Any] | None = None):
+        super().__init__(py_func, locals, targetoptions, self.compiler)
+
+    def __reduce__(self) -> Any:
+        """By its name where it has one: numba would send the source, and the process that gets it compile it anew."""
+        home = sys.modules.get(self.py_func.__module__)
+        name = self.py_func.__name__
+        return name if getattr(home, name, None) is self else super().__reduce__()
 
 
 class Part(Kernel):
     """A function that kernels call.  For a call from Python, as tests have them, it is compiled once more."""
 
-    def __init__(self, function: Callable[..., Any], targetoptions: dict[str, Any]):
-        super().__init__(function, targetoptions, _PartCompiler)
-        self._callable: Kernel | None = None
+    compiler = _PartCompiler
+    _callable: Any = None  # the kernel for calls from Python
 
     def add_overload(self, cres: Any) -> None:
         """Take compiled code in for callers among the kernels; for Python there is nothing to call."""
@@ -164,8 +172,8 @@ class Part(Kernel):
     def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
         if self._callable is None:
             options = {key: value for key, value in self.targetoptions.items() if key != "no_cpython_wrapper"}
-            self._callable = Kernel(self.py_func, options)
-        return self._callable._compile_for_args(*args, **kws)  # type: ignore[attr-defined]
+            self._callable = Kernel(self.py_func, None, options)
+        return self._callable._compile_for_args(*args, **kws)
 
 
 def rebuilt_part(target: Any, payload: tuple[Any, ...]) -> Any:

@@ -29,7 +29,7 @@ def _compiled(function: F, kind: type[Kernel], fastmath: bool | set[str] = False
     # them in every other kernel, so the last bits of a result would depend on what was computed before it.
     said = {"nopython": True, "boundscheck": None, "nogil": True, "error_model": "numpy", "fastmath": fastmath}
     # Nothing calls kernels from C.
-    return cast(F, kept(kind(function, said | {"no_cfunc_wrapper": True} | options)))
+    return cast(F, kept(kind(function, None, said | {"no_cfunc_wrapper": True} | options)))
 
 
 def kernel(function: F) -> F:
