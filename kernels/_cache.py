@@ -39,6 +39,8 @@ import platformdirs
 from filelock import FileLock
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 
+from kernels._compiler import PART, rebuilt_part
+
 SOURCES = Path(__file__).resolve().parent
 PACKAGE = __name__.partition(".")[0]
 
@@ -202,6 +204,11 @@ def _locked() -> Iterator[None]:
 
 class _Form(CompileResultCacheImpl):
     _locator_classes = [_Place]  # noqa: RUF012 (as numba has it)
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        if payload[0][1] == PART:
+            return rebuilt_part(target_context, payload)
+        return super().rebuild(target_context, payload)  # type: ignore[no-untyped-call]
 
 
 class _Checked(IndexDataCacheFile):

@@ -18,27 +18,28 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any, TypeVar, cast
 
-import numba
-
 from kernels._cache import kept
+from kernels._compiler import Kernel, Part
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _compiled(function: F, fastmath: bool | set[str] = False, **options: Any) -> F:
+def _compiled(function: F, kind: type[Kernel], fastmath: bool | set[str] = False, **options: Any) -> F:
     # Flags must be said: a helper without them takes those of the kernel that happens to be compiled first, and keeps
     # them in every other kernel, so the last bits of a result would depend on what was computed before it.
-    return cast(F, kept(numba.njit(nogil=True, error_model="numpy", fastmath=fastmath, **options)(function)))
+    said = {"nopython": True, "boundscheck": None, "nogil": True, "error_model": "numpy", "fastmath": fastmath}
+    # Nothing calls kernels from C.
+    return cast(F, kept(kind(function, None, said | {"no_cfunc_wrapper": True} | options)))
 
 
 def kernel(function: F) -> F:
     """Compile ``function`` to machine code at its first call; kept on disk."""
-    return _compiled(function)
+    return _compiled(function, Kernel)
 
 
 def kernel_fused(function: F) -> F:
     """As :func:`kernel`, for the dense sweep loops: products and sums may be contracted."""
-    return _compiled(function, fastmath={"contract"})
+    return _compiled(function, Kernel, fastmath={"contract"})
 
 
 def inline(function: F) -> F:
@@ -47,7 +48,7 @@ def inline(function: F) -> F:
     Helpers are kept on disk too: a kernel that is compiled for another set of wanted outputs then finds them, which
     was measured to take a quarter of the time.
     """
-    return _compiled(function, forceinline=True, no_cfunc_wrapper=True)
+    return _compiled(function, Part, forceinline=True, no_cpython_wrapper=True)
 
 
 def inline_fused(helper: F) -> F:
@@ -61,7 +62,7 @@ def inline_fused(helper: F) -> F:
     name = f"{source.__name__}_fused"
     copy = FunctionType(source.__code__, source.__globals__, name, source.__defaults__, source.__closure__)
     copy.__qualname__, copy.__module__ = name, source.__module__
-    return cast(F, _compiled(copy, forceinline=True, no_cfunc_wrapper=True, fastmath={"contract"}))
+    return cast(F, _compiled(copy, Part, forceinline=True, no_cpython_wrapper=True, fastmath={"contract"}))
 
 
 def generated(name: str, function: F) -> F:
@@ -70,12 +71,12 @@ def generated(name: str, function: F) -> F:
     ``name`` stands for everything that the function closes over, stages, numbers and other generated functions: its
     machine code is kept under that name, so no two may have the same.
     """
-    return _compiled(_named(name, function))
+    return _compiled(_named(name, function), Kernel)
 
 
 def generated_inline(name: str, function: F) -> F:
     """As :func:`inline`, for a function that a generator made; ``name`` as of :func:`generated`."""
-    return _compiled(_named(name, function), forceinline=True, no_cfunc_wrapper=True)
+    return _compiled(_named(name, function), Part, forceinline=True, no_cpython_wrapper=True)
 
 
 def _named(name: str, function: F) -> F:

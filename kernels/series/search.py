@@ -87,7 +87,8 @@ def find_extrema(chain: Chained, order: int) -> Helper:
         first = np.empty(BLOCK + 1, np.int64)
         rounds = 2 if target > 1e-4 else 3
         for start in range(0, designs.shape[0], BLOCK):
-            number, count = min(BLOCK, designs.shape[0] - start), 0
+            first[0] = 0  # with a literal the helpers would be compiled once more
+            number, count = min(BLOCK, designs.shape[0] - start), first[0]
             for k in range(number):
                 i = start + k
                 first[k] = count
@@ -113,13 +114,13 @@ def find_extrema(chain: Chained, order: int) -> Helper:
                 rho = PER_SINGULARITY / (FEWEST * MORE)
                 while status[i] == UNTRUSTED and rho * MOST >= PER_SINGULARITY:
                     count, status[i] = enlist(
-                        designs, i, min(rho, distance[i]), cos, sin, made_of, mode, m, 0, values, guards
+                        designs, i, min(rho, distance[i]), cos, sin, made_of, mode, m, first[0], values, guards
                     )
                     begin_at_vertex(count, m)
                     refine(0, count, m, rounds + SETTLING)
                     finish(0, count, m, target)
                     if status[i] == st.OK:
-                        status[i] = _decide(0, count, m, mode, allowed * target, i, found)
+                        status[i] = _decide(first[0], count, m, mode, allowed * target, i, found)
                     rho /= MORE
                 status[i] = OPEN if status[i] == UNTRUSTED else status[i]
                 if status[i] != st.OK and status[i] != ROUNDED:
