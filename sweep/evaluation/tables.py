@@ -140,8 +140,7 @@ def _parameter_column(family: Parametrised, p: Parameter, table: Table, keys: di
         )
     values = np.broadcast_to(_column(table, keys, p.name), rows)
     _refuse(~np.isfinite(values), values, p.name, "a finite number")
-    if p.sign:
-        _refuse(values <= 0.0 if p.positive else values < 0.0, values, p.name, f"a {p.sign} {p.unit}")
+    _refuse(p.wrong_sign(values), values, p.name, f"a {p.sign} {p.unit}")
     if p.choices is not None:
         _refuse(np.logical_and.reduce([values != x for x in p.choices]), values, p.name, p.choice)
     return values
