@@ -12,6 +12,7 @@ import pytest
 from studies.accuracy import effect_prices, prices, reference, subjects, witness
 from studies.accuracy.effect_witness import Effected, known_of
 from studies.accuracy.regions import Region, margins
+from studies.accuracy.scene_prices import SCENES
 from sweep.effects import NAMES as EFFECTS
 from sweep.effects import effect, extended
 from sweep.families import NAMES, family
@@ -41,6 +42,11 @@ def test_page_of_effects_has_a_row_and_a_reference_for(name):
     (row,) = (line for line in words.split("\n") if line.startswith(f"| `{name}` |"))
     judged, outputs = row.split("|")[2].split(" of ")
     assert 0 < int(judged) <= int(outputs)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_page_of_effects_has_a_row_for_loads_over_the_turn_and_the_thread_of_a_machine(name):
+    assert f"\n| `{name}` | `{SCENES[name][0]}` |" in (DOCS / "effects.md").read_text()
 
 
 def test_measure_is_the_second_derivative_that_the_register_names():
@@ -165,9 +171,19 @@ def test_no_effect_is_priced_where_it_has_nothing_to_do(name):
         assert all(given.given(p.name).all() for p in given_inputs if p.name == "tip_x")
 
 
-@pytest.mark.parametrize("name", ["speed_fluctuation", "dynamic_elasticity", "bearing_life", "slider_elasticity"])
-def test_effects_agree_with_their_references(name):
-    (row,) = (r for r in effect_prices.prices_of(name, effected(name), smoke=True) if r["method"] == prices.REFINED)
+JUDGED = ["speed_fluctuation", "dynamic_elasticity", "bearing_life", "slider_elasticity", "swivel_rolling_bearings"]
+
+
+@pytest.mark.parametrize("name", [*JUDGED, *SCENES])
+def test_effects_and_scenes_agree_with_their_references(name):
+    if name in SCENES:
+        on, scene = SCENES[name]
+        given, wanted = scene(1)
+    else:
+        given = effected(name)
+        on, wanted = given.bare.name, effect_prices.outputs_of(name, given.bare)
+    found = effect_prices.prices_of(name, on, given, wanted, smoke=True)
+    (row,) = (r for r in found if r["method"] == prices.REFINED)
     assert row["judged"] == row["outputs"] and row["exceeded"] == 0
     # Even sums over kinks know four digits less than smooth ones.
     assert row["largest_error"] < 1e-5

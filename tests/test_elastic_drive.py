@@ -18,6 +18,7 @@ from kernels.effects.elasticity import largest_multiplier, periodic_solution
 from sweep.effects import extended
 from sweep.effects.driven import driven_side
 from sweep.effects.placing import first_scene
+from sweep.errors import InputError
 from sweep.families import family
 from sweep.families.base import Angles
 from tests.reference.momentum import derivative
@@ -203,3 +204,11 @@ def test_compiled_general_equation_equals_plain_python():
     driven_solution.py_func(*args, *two)
     np.testing.assert_allclose(one, two, rtol=1e-14)  # complex division is not the same in both
     assert driven_multiplier(*args) == pytest.approx(driven_multiplier.py_func(*args), rel=1e-14)
+
+
+@pytest.mark.parametrize("name", ["lag2", "max_abs_lag2", "floquet2", "max_abs_lag_dynamic2"])
+def test_an_elastic_coupler_behind_the_first_stage_is_refused_by_name(name):
+    """Its crank goes to and fro: the linear equation is one of an even crank."""
+    first, second = ({f"{p}{k}": x for p, x in family(n).example.items()} for k, n in enumerate(("rssr", "guide"), 1))
+    with pytest.raises(InputError, match="at the first stage of a chain only"):
+        sweep.summarise(["rssr", "guide"], first | second, [name])

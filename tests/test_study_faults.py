@@ -84,7 +84,7 @@ FAULTS = {
     "speed without unit": ('"7000 rpm"', "7000", ["scene.speed = 7000", "7000 rpm"]),
     "speed in strokes": ('"7000 rpm"', '"7000 1/min"', ["scene.speed = '7000 1/min'", "rpm"]),
     "speed misspelt": ('"7000 rpm"', '"7000 rpmm"', ["scene.speed", "did you mean 'rpm'?"]),
-    "speed of zero": ('"7000 rpm"', '"0 rpm"', ["scene.speed = '0 rpm'", "positive"]),
+    "speed of zero": ('"7000 rpm"', '"0 rpm"', ["scene.speed = '0 rpm'", "non-zero"]),
     "wanted output unknown": ('"swing"', '"swign"', ["scene.want[1] = 'swign'", "did you mean 'swing'?"]),
     "wanted output no text": ('"swing"', "3", ["scene.want[1] = 3", "names of design outputs"]),
     "window over one": ('speed = "7000 rpm"', "window = { from = 0, to = 1.5 }", ["scene.window.to = 1.5", "fraction"]),

@@ -64,6 +64,32 @@ def test_speed_ratio_passes_through_the_reported_points():
     assert fast == pytest.approx(1.16, rel=1e-14)
 
 
+@pytest.mark.parametrize("target", [1e-3, 1e-9])
+def test_largest_speed_ratio_over_the_turn_is_that_of_the_fastest_thread_and_the_least_is_not_claimed(target):
+    table = {
+        "a": [20.0, 15.0, 24.0],
+        "e": 30.0,
+        "f": 10.0,
+        "alpha": 0.5,
+        "Z1": -30.0,
+        "Z2": 40.0,
+        "P_h": 60.0,
+        "speed": 520.0,
+    }
+    names = ["max_speed_ratio", "min_speed_ratio", "max_abs_thread_speed"]
+    found = sweep.summarise("eyelet", table, names[:1], accuracy=target)
+    assert (found.status == st.OK).all()
+    fastest = sweep.summarise("eyelet", table, names[2:], accuracy=1e-12).max_abs_thread_speed
+    share, exponent = sweep.effects.effect("thread_speed").inputs[2:]
+    exact = 1.0 + share.default * ((fastest / 1230.0) ** exponent.default - 1.0)
+    # the fastest thread is known to 1e-12
+    assert (np.abs(found.max_speed_ratio - exact) <= found.err_max_speed_ratio + 1e-12).all()
+    least = sweep.summarise("eyelet", table, names[1:2], accuracy=target)
+    # a thread at rest: a cusp that no pose reaches, so the number is not sure and its error says by how much
+    assert (least.status == st.NOT_CONVERGED).all()
+    assert (least.min_speed_ratio - (1.0 - share.default) <= least.err_min_speed_ratio).all()
+
+
 def test_speed_ratio_of_a_thread_at_rest_is_what_does_not_depend_on_speed():
     with pytest.warns(sweep.thread.MeasuredRangeWarning):
         got = sweep.thread.speed({"v": [0.0, -1.23]})["ratio_to_ref"]

@@ -98,8 +98,16 @@ def sliding_criteria(s: Sliding, moment: float, cos1: float, sin1: float, axial:
     arm = s.c * cos1 - s.mu * (0.5 * s.kj * s.d * (pi1 + pi2) / span + s.rt * abs(axial))
     force = moment / arm
     r1, r2, x = force * pi1 / span, force * pi2 / span, force * axial
-    p3 = 4.0 * abs(x) / (math.pi * (s.d0 - s.d) * (s.d0 + s.d))
-    return Criteria(pi1, pi2, arm, force, r1, r2, x, r1 / (s.d * s.l1), r2 / (s.d * s.l2), p3)
+    p1, p2, p3 = mean_pressures(r1, r2, x, s.d, s.l1, s.l2, s.d0)
+    return Criteria(pi1, pi2, arm, force, r1, r2, x, p1, p2, p3)
+
+
+@inline
+def mean_pressures(
+    r1: float, r2: float, axial: float, d: float, l1: float, l2: float, d0: float
+) -> tuple[float, float, float]:
+    """Return mean pressures of two journals, diameter ``d``, lengths ``l1`` and ``l2``, of a collar up to ``d0``."""
+    return r1 / (d * l1), r2 / (d * l2), 4.0 * abs(axial) / (math.pi * (d0 - d) * (d0 + d))
 
 
 @kernel

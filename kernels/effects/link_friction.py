@@ -21,6 +21,8 @@ from kernels.effects.link_loads import (
     FREEDOM,
     GUIDE,
     KIND,
+    LINE,
+    LINES,
     ROD,
     SHAFT,
     WRENCH,
@@ -86,6 +88,14 @@ def direction(
     slip = (0.0, 0.0, 0.0)
     if joint[KIND] == GUIDE or joint[KIND] == CONTACT:
         slip = _moved(velocity_at(one, place), velocity_at(two, place))
+        # What the joint does not allow is rounding: next to a reversal it would be seen as a share of the sliding.
+        if joint[KIND] == GUIDE:
+            along = vector(links.axes[i, k, joint[FREEDOM]])
+            slip = scale(dot(slip, along), along)
+        else:
+            for which in range(joint[LINE], joint[LINE] + joint[LINES]):
+                across = vector(links.lines[i, k, which, 3:])
+                slip = mix(1.0, slip, -dot(slip, across), across)
     force, couple = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     mu = -sense * data[MU]
     if joint[KIND] == SHAFT or joint[KIND] == GUIDE:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from studies.accuracy import costs, digits, oracle
 from studies.accuracy.diagrams import position_table, work_table
-from studies.accuracy.effect_prices import effect_prices
+from studies.accuracy.effect_prices import PRICED, effect_prices
 from studies.accuracy.exact import exact_table
 from studies.accuracy.figures import draw
 from studies.accuracy.machine import description
@@ -20,6 +23,7 @@ from studies.accuracy.price_figures import draw_prices
 from studies.accuracy.prices import family_prices
 from studies.accuracy.regions import regions
 from studies.accuracy.whole import whole_study
+from sweep.effects import NAMES
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = ROOT / "tests" / "oracle"
@@ -34,11 +38,18 @@ def main() -> None:
     parser.add_argument(
         "--pages", action="store_true", help="measure nothing: pages anew from the tables in the folder"
     )
+    parser.add_argument("--effects", nargs="*", metavar="NAME", default=None,
+                        help="measure these rows of the price list of effects alone, without names those that the "
+                        "folder has no row of; everything else is kept")  # fmt: skip
     arguments = parser.parse_args()
     smoke: bool = arguments.smoke
     out: Path = arguments.out or ROOT / "results" / ("smoke/accuracy" if smoke else "accuracy")
-    if arguments.pages:
+    if arguments.pages or arguments.effects is not None:
         found = Measured.read(out)
+        if arguments.effects is not None:
+            for name in arguments.effects or missing(found):
+                found = with_effect(found, name)
+                found.write(out)
     else:
         found = measured(smoke, out)
         found.write(out)
@@ -97,6 +108,22 @@ def measured(smoke: bool, out: Path) -> Measured:
         ],
         **others(out),
     )
+
+
+def missing(found: Measured) -> list[str]:
+    """Return what the price list of effects has no row of yet."""
+    return [name for name in PRICED if name not in set(found.effects["effect"])]
+
+
+def with_effect(found: Measured, name: str) -> Measured:
+    """Return the tables with one row of the price list measured now; its times alone are those of sweep/costs.toml."""
+    import pandas as pd
+
+    kept = found.effects[found.effects["effect"].isin(set(PRICED) - {name})]
+    effects = pd.concat([kept, effect_prices(found.smoke, [name])], ignore_index=True)
+    effects = effects.iloc[np.argsort([PRICED.index(one) for one in effects["effect"]], kind="stable")]
+    outputs = costs.with_effects(found.outputs, [name] if name in NAMES else [])
+    return replace(found, effects=effects.reset_index(drop=True), outputs=outputs)
 
 
 def publish(found: Measured, out: Path) -> None:

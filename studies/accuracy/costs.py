@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -68,6 +69,21 @@ def output_costs(designs: Array, smoke: bool) -> pd.DataFrame:
     position = float(frame.loc[frame["what"] == "psi", "nanoseconds"].iloc[0])
     frame["times_position"] = frame["nanoseconds"] / np.where(frame["per"] == "pose", position, POSES * position)
     return frame
+
+
+def with_effects(table: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
+    """Return the table of :func:`output_costs` with these effects as sweep/costs.toml has them, behind the others."""
+    import pandas as pd
+
+    whole = table["what"].str.partition(":")[0].isin(names) & (table["kind"] == "effect")
+    found = [effects.Cost(name, "all", "pose", ns) for name in names if (ns := effect(name).ns_per_pose)]
+    found += [effects.Cost(name, "all", "design", ns) for name in names if (ns := effect(name).ns_per_design)]
+    rows = pd.DataFrame([_effect(cost) for cost in found])
+    position = float(table.loc[table["what"] == "psi", "nanoseconds"].iloc[0])
+    if len(rows):
+        poses = np.where(rows["per"] == "pose", position, POSES * position)
+        rows["times_position"] = rows["nanoseconds"] / poses
+    return pd.concat([table[~whole], rows], ignore_index=True)
 
 
 def _effect(cost: effects.Cost) -> dict[str, object]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from kernels import status as st
 from studies.accuracy.effect_witness import Effected, known_of
+from studies.accuracy.scene_prices import SCENES
 from studies.accuracy.timing import per_design
 from studies.accuracy.witness import Known
 from sweep.effects import NAMES, effect, extended
@@ -26,21 +27,33 @@ if TYPE_CHECKING:
 SAMPLES, TARGETS = (90, 360, 3600), (1e-3, 1e-6, 1e-9)
 SMOKE_SAMPLES, SMOKE_TARGETS, SMOKE_EVERY = (360,), (1e-6,), 8
 GRID, REFINED = "grid", "accuracy="
-DEAR, DEAR_POSE = 5e6, 1e3  # ns per design and per pose
+DEAR, DEAR_POSE, DEAREST = 5e6, 1e3, 5e7  # ns per design and per pose; per design
 MASS, ARM, MIXED = 1e-4, 0.4, ("xy", "xz", "yz")  # of bodies without inputs [t]; share of an ordinary length
 MANY, FEW = 8, 2
 ROUNDING = 1e-14  # what two ways to one number may differ by beyond what they say of themselves
 
 
-def effect_prices(smoke: bool) -> pd.DataFrame:
-    """Return one row per effect of the register and accuracy, each on the first family that it serves."""
+PRICED = (*NAMES, *SCENES)
+
+
+def effect_prices(smoke: bool, names: Sequence[str] | None = None) -> pd.DataFrame:
+    """Return one row per effect of the register and accuracy, each on the first family that it serves, and the rows of
+    the scenes beside them; of ``names`` alone if they are given.
+    """
     import pandas as pd
 
     rows: list[dict[str, object]] = []
-    for name in NAMES[:: SMOKE_EVERY if smoke else 1]:
+    for name in PRICED[:: SMOKE_EVERY if smoke else 1] if names is None else names:
+        if name in SCENES:
+            on, scene = SCENES[name]
+            rows += prices_of(name, on, *scene(FEW if smoke else MANY), smoke)
+            continue
         bare = family(effect(name).families[0])
-        full = extended(bare, outputs_of(name, bare))
-        rows += prices_of(name, Effected(bare, full, loaded(bare, full, count(name, smoke))), smoke)
+        wanted = outputs_of(name, bare)
+        full = extended(bare, wanted)
+        given = Effected(bare, full, loaded(bare, full, count(name, smoke)))
+        rows += prices_of(name, bare.name, given, wanted, smoke)
+        print(f"        {name}", flush=True)  # noqa: T201
     return pd.DataFrame(rows)
 
 
@@ -70,6 +83,8 @@ def loaded(bare: Family, full: Family, designs: int) -> Array:
 
 def count(name: str, smoke: bool) -> int:
     """Return on how many designs an effect is measured."""
+    if effect(name).ns_per_design > DEAREST:
+        return 1
     dear = effect(name).ns_per_design > DEAR or effect(name).ns_per_pose > DEAR_POSE
     return FEW if smoke or dear else MANY
 
@@ -85,13 +100,14 @@ def outputs_of(name: str, bare: Family) -> tuple[str, ...]:
     return tuple(o.name for o in whole.outputs if not o.jumps and not o.name.startswith(f"{bare.domain.name}_"))
 
 
-def prices_of(name: str, given: Effected, smoke: bool = False) -> list[dict[str, object]]:
-    """Return rows of one effect."""
-    wanted = outputs_of(name, given.bare)
+def prices_of(
+    name: str, on: str, given: Effected, wanted: tuple[str, ...], smoke: bool = False
+) -> list[dict[str, object]]:
+    """Return rows of one effect or scene, and of the outputs that it stands for."""
     known, words = known_of(name, given, wanted)
     head: dict[str, object] = {
         "effect": name,
-        "family": given.bare.name,
+        "family": on,
         "outputs": len(wanted),
         "judged": sum(output in known for output in wanted),
         "designs": len(given.designs),
@@ -105,7 +121,7 @@ def prices_of(name: str, given: Effected, smoke: bool = False) -> list[dict[str,
 
 def _methods(name: str, smoke: bool) -> Sequence[tuple[str, float, Accuracy]]:
     samples, targets = (SMOKE_SAMPLES, SMOKE_TARGETS) if smoke else (SAMPLES, TARGETS)
-    if effect(name).whole_turn:
+    if name in NAMES and effect(name).whole_turn:
         samples = samples[:1]  # it chooses its own
     return [
         *((GRID, float(n), Accuracy(samples=n)) for n in samples),

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from studies.accuracy.witness import Known, extreme
-from sweep.effects import effect, extended
+from sweep.effects import NAMES, effect, extended
 from sweep.families.base import Array, Family
 from sweep.reductions.sampling import TWO_PI, pose_columns
 
@@ -64,7 +64,7 @@ Witness: TypeAlias = Callable[[Effected, int], dict[str, Array]]
 
 def known_of(name: str, given: Effected, wanted: tuple[str, ...]) -> tuple[dict[str, Known], str]:
     """Return what is known of an effect's outputs by other means, and in words by which."""
-    entry = WITNESSES.get(name.removeprefix("slider_"))
+    entry = WITNESSES.get(kind_of(name)) if name in NAMES else None
     found, words = {}, ""
     if entry is not None:
         witness, samples, words = entry
@@ -74,10 +74,16 @@ def known_of(name: str, given: Effected, wanted: tuple[str, ...]) -> tuple[dict[
             output: Known(value, DOUBT * np.abs(value) * max(np.abs(one[output] / value - 1.0).max() for one in coarse))
             for output, value in fine.items()
         }
-    if effect(name).whole_turn:
+    if name in NAMES and effect(name).whole_turn:
         return found, words
     sampled = of_samples(given, tuple(output for output in wanted if output not in found))
     return found | sampled, "; ".join(filter(None, (words, FINER if sampled else "")))
+
+
+def kind_of(name: str) -> str:
+    """Return the name of an effect without that of a slider, or of the family with a tree of links that it is for."""
+    entry = effect(name)
+    return name.removeprefix("slider_" if entry.tree is None else f"{entry.families[0]}_")
 
 
 def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
@@ -99,19 +105,60 @@ def pressure(given: Effected, samples: int) -> dict[str, Array]:
 
 
 def bearing_life(given: Effected, samples: int) -> dict[str, Array]:
-    """Return mean loads and lives by even sums over very many poses, whatever kinks there are."""
-    velocity = given.bare.derivative_of[given.bare.position]
-    first, second, way = given.poses(("equivalent_load_d1", "equivalent_load_d2", velocity), samples)
-    exponent, way = given.given("life_exponent"), np.abs(way)
+    """Return mean loads and lives of the rocker's bearings by even sums over very many poses, kinks or none."""
+    return _lives(given, samples, "d", "", given.bare.derivative_of[given.bare.position])
+
+
+# By the name of a shaft whose angle in its bearings is a pose output: that output, and the turns it makes itself in
+# a turn of the crank that the output does not show; cranks turn evenly.
+_ANGLES = {"d": ("psi", 0.0), "d1": ("psi", 0.0), "os": ("chi", 0.0), "b": ("theta", -1.0), "h": ("beta", 0.0)}
+
+
+def bearings_of_shafts(given: Effected, samples: int) -> dict[str, Array]:
+    """Return the same of every shaft of a tree of links."""
+    found: dict[str, Array] = {}
+    for name in given.full.parameter_names:  # those of the rocker alone, a massless estimate, have no shaft's name
+        shaft = name.removeprefix("dynamic_capacity_")
+        if shaft != name:
+            found |= _lives(given, samples, shaft, f"_{shaft}", shaft)
+    return found
+
+
+def _lives(given: Effected, samples: int, shaft: str, tail: str, turning: str) -> dict[str, Array]:
+    pair = f"equivalent_load_{shaft}1", f"equivalent_load_{shaft}2"
+    first, second = given.poses(pair, samples)
+    if not tail:
+        way = np.abs(given.poses((turning,), samples)[0])
+    elif shaft in _ANGLES:
+        angle, more = _ANGLES[shaft]
+        turned = np.unwrap(given.poses((angle,), samples)[0], axis=1)
+        way = np.abs(_slope(turned) + more)
+    else:
+        way = np.ones(first.shape)
+    exponent = given.given(f"life_exponent{tail}")
     travel = TWO_PI * way.mean(axis=1)
     found: dict[str, Array] = {}
     for k, load in (("1", first), ("2", second)):
         size = load.max(axis=1)
         power = ((load / size[:, None]) ** exponent[:, None] * way).mean(axis=1) * TWO_PI / travel
         mean = size * power ** (1.0 / exponent)
-        turns = 1e6 * (given.given("dynamic_capacity") / mean) ** exponent
-        found |= {f"mean_load_d{k}": mean, f"life_d{k}": turns * TWO_PI**2 / (travel * given.given("speed"))}
+        turns = 1e6 * (given.given(f"dynamic_capacity{tail}") / mean) ** exponent
+        found |= {
+            f"mean_load_{shaft}{k}": mean, f"life_{shaft}{k}": turns * TWO_PI**2 / (travel * given.given("speed"))
+        }  # fmt: skip
     return found
+
+
+def _slope(angle: Array) -> Array:
+    """Return the derivative of an angle that grows by full turns, by differences of sixth order."""
+    turns = np.rint((angle[:, -1] - angle[:, 0]) / TWO_PI)
+    step = TWO_PI / angle.shape[1]
+    swing = angle - turns[:, None] * np.arange(angle.shape[1]) * step
+    found = np.zeros(angle.shape)
+    for k, weight in enumerate((3 / 4, -3 / 20, 1 / 60), 1):
+        found += weight / step * (np.roll(swing, -k, axis=1) - np.roll(swing, k, axis=1))
+    slope: Array = found + turns[:, None]
+    return slope
 
 
 def speed(given: Effected, samples: int) -> dict[str, Array]:
@@ -224,6 +271,7 @@ FINER = "poses on ever narrower grids"
 WITNESSES: Mapping[str, tuple[Witness, int, str]] = {
     "pressure_extrema": (pressure, 0, "the angle on ever narrower grids"),
     "bearing_life": (bearing_life, MANY, f"even sums over {MANY} poses"),
+    "rolling_bearings": (bearings_of_shafts, MANY, f"even sums over {MANY} poses"),
     "speed_fluctuation": (speed, SAMPLES, f"energy summed over {SAMPLES} poses, level by halving"),
     "speed_fluctuation_friction": (
         speed_with_friction, SAMPLES, f"energy summed over {SAMPLES} poses, friction at the speed it makes",
@@ -232,4 +280,4 @@ WITNESSES: Mapping[str, tuple[Witness, int, str]] = {
         elastic, SAMPLES, f"differences of eighth order over {SAMPLES} poses; Liouville's formula",
     ),
 }  # fmt: skip
-"""By the name of the effect without the kind of its follower: the witness, its poses, and in words what it does."""
+"""By the name of the effect without its family or kind of follower: the witness, its poses, in words what it does."""

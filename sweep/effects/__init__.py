@@ -51,21 +51,22 @@ _ENTRIES = {
     "slider_dynamic_elasticity": ("elasticity", "SLIDER_DYNAMIC"),
     "tool": ("tool", "EFFECT"),
     "tip_tool": ("tool", "TIP"),
-    "five_link_loads": ("links", "FIVE_LINK"),
-    "slotted_loads": ("links", "SLOTTED"),
-    "swivel_loads": ("links", "SWIVEL"),
-    "spherical_looper_loads": ("links", "SPHERICAL_LOOPER"),
-    "cylindrical_looper_loads": ("links", "CYLINDRICAL_LOOPER"),
-    "five_link_friction": ("link_friction", "FIVE_LINK"),
-    "slotted_friction": ("link_friction", "SLOTTED"),
-    "swivel_friction": ("link_friction", "SWIVEL"),
-    "spherical_looper_friction": ("link_friction", "SPHERICAL_LOOPER"),
-    "cylindrical_looper_friction": ("link_friction", "CYLINDRICAL_LOOPER"),
     "thread_contour": ("thread", "CONTOUR"),
     "thread_speed": ("thread", "SPEED"),
     "capstan": ("thread", "CAPSTAN"),
 }
-NAMES = tuple(_ENTRIES)
+# Of the effects of every family with a tree of links: module, and the function of the family's name that makes it.
+_OF_TREES = {
+    "loads": ("links", "loads_of"),
+    "friction": ("link_friction", "friction_of"),
+    "sliding_bearings": ("link_bearings", "sliding_of"),
+    "rolling_bearings": ("link_bearings", "rolling_of"),
+    "speed_fluctuation": ("speed", "of_tree"),
+    "speed_fluctuation_friction": ("speed_friction", "of_tree"),
+}
+_TREES = ("five_link", "slotted", "swivel", "spherical_looper", "cylindrical_looper")
+_MADE = {f"{tree}_{kind}": (tree, *made) for kind, made in _OF_TREES.items() for tree in _TREES}
+NAMES = (*_ENTRIES, *_MADE)
 
 # In the stages behind the first, speed and acceleration are those of the first stage's crank.
 _FIRST_ONLY = ("speed", "speed_change")
@@ -78,9 +79,22 @@ _INPUT_NAMES: dict[tuple[tuple[str, str], ...], frozenset[str]] = {}
 @lru_cache
 def effect(name: str) -> Effect:
     """Return the register's entry of that name."""
+    if name in _MADE:
+        tree, module, function = _MADE[name]
+        made: Effect = getattr(import_module(f"sweep.effects.{module}"), function)(tree)
+        return made
     module, constant = _ENTRIES[name]
     entry: Effect = getattr(import_module(f"sweep.effects.{module}"), constant)
     return entry
+
+
+def serving(family: Family) -> tuple[Effect, ...]:
+    """Return the effects that a family has what they require for, in the order of the register.
+
+    Entries of other families' trees of links are not made for it.
+    """
+    found = (effect(name) for name in NAMES if name not in _MADE or _MADE[name][0] == family.name)
+    return tuple(entry for entry in found if entry.serves(family))
 
 
 @of_family
@@ -93,8 +107,8 @@ def applicable(family: Family) -> tuple[Placed, ...]:
     found = [
         Placed(entry, k, number, k == len(stages) - 1)
         for k, (stage, number) in enumerate(stages)
-        for entry in map(effect, NAMES)
-        if entry.serves(stage) and not (k > 0 and entry.even_crank)
+        for entry in serving(stage)
+        if not (k > 0 and entry.even_crank)
     ]
     return tuple(
         p
@@ -110,7 +124,8 @@ def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
     names = {about for name in wanted for about in reduced(name, family.domain)}  # max_abs_force_d asks for force_d
     if names.isdisjoint(_effect_names(family)):
         return ()
-    return tuple(p for p in applicable(family) if not names.isdisjoint(o.name for o in p.outputs))
+    found = (p for p in applicable(family) if not names.isdisjoint(o.name for o in p.outputs))
+    return tuple(p.narrowed(names) for p in found)
 
 
 @of_family
@@ -125,8 +140,8 @@ def _carriers(family: Family, placed: Placed) -> list[Placed]:
     return [
         Placed(entry, k, number, False)
         for k, (stage, number) in enumerate(stages)
-        for entry in map(effect, NAMES)
-        if key and k > placed.stage and entry.key == key and entry.serves(stage)
+        for entry in serving(stage)
+        if key and k > placed.stage and entry.key == key
     ]
 
 

@@ -266,8 +266,9 @@ class Effect:
     hangs on the tip of a rocker. ``least`` are pose outputs of which the least value over the turn counts, as a
     life, not the largest (:func:`sweep.effects.wanted.expanded`). ``tree`` is the tree of links of the one family
     that it is for, if it is for one; ``carried_at`` the place of a tool that a family must have, if it must have
-    one. ``advise(scene)`` applies the effect's rule of negligibility to some designs over a turn; None where none
-    turns.
+    one. ``only_for`` are the outputs that need an input, by the input, where not all of them do: it is no input
+    where none of these is wanted. ``advise(scene)`` applies the effect's rule of negligibility to some designs over
+    a turn; None where none turns.
     """
 
     key: str
@@ -293,6 +294,7 @@ class Effect:
     followers: tuple[str, ...] = ("rocker", "slider")
     tree: LinkTree | None = None
     carried_at: int | None = None
+    only_for: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def inputs_of(self, family: Family) -> tuple[Parameter, ...]:
         """Return the inputs, with those of a tool where the family has a place that one can hang on."""

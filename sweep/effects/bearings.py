@@ -73,10 +73,8 @@ PERMISSIBLE = (
     Parameter("permissible_pressure2", "pressure", "permissible mean pressure of journal 2", positive=True),
     Parameter("permissible_pressure3", "pressure", "permissible mean pressure of the collar", positive=True),
 )
-LIFE = (
-    Parameter("required_life", "time", "running time that 90 % of the bearings must reach", positive=True),
-    SPEED,
-)
+REQUIRED_LIFE = Parameter("required_life", "time", "running time that 90 % of the bearings must reach", positive=True)
+LIFE = (REQUIRED_LIFE, SPEED)
 SLIDING_LIMITS = (
     Output("sliding_utilisation", "1", "largest bearing pressure over its permissible value", EQUATION),
     Output("permissible_theta1", "rad", "largest radial pressure angle the sliding bearings permit", EQUATION),
@@ -122,11 +120,13 @@ def _pressures(scene: Scene) -> Array:
     return scene.table(tuple(p.name for p in PERMISSIBLE))
 
 
-def permissible_load(scene: Scene) -> Array:
-    """Return C_dyn (60 n L_h/10^6)^(-1/p) with the turns of the crank, (n, 1)."""
-    given = scene.inputs
-    turns = given["speed"] / (2.0 * np.pi) * given["required_life"]
-    load: Array = given["dynamic_capacity"] * (turns * 1e-6) ** (-1.0 / given["life_exponent"])
+def permissible_load(scene: Scene, tail: str = "") -> Array:
+    """Return C_dyn (60 n L_h/10^6)^(-1/p) with the turns of the crank, (n, 1); ``tail`` ends the inputs' names."""
+    capacity, life, exponent = (
+        scene.inputs[f"{n}{tail}"] for n in ("dynamic_capacity", "required_life", "life_exponent")
+    )
+    turns = np.abs(scene.inputs["speed"]) / (2.0 * np.pi) * life
+    load: Array = capacity * (turns * 1e-6) ** (-1.0 / exponent)
     return load[:, None]
 
 

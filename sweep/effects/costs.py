@@ -42,7 +42,10 @@ INPUTS = {
 
 # Of linkages of a few units of length, by the beginning of an input's name.
 SMALL = {"k": 1.8, "tau": -1.0, "speed": 520.0, "m_tool": 2.5e-5, "tip_x": 2.0, "tool_force_y": -5.0}
-KINDS = {"mu_": 0.05, "radius_": 0.1, "m_": 1e-5}
+KINDS = {
+    "mu_": 0.05, "radius_": 0.1, "m_": 1e-5, "radial_factor_": 0.56, "axial_factor_": 1.5, "e_limit_": 0.3,
+    "dynamic_capacity_": 6000.0, "required_life_": 2e7, "journal_": 0.2, "collar_": 0.4, "permissible_": 1.0,
+}  # fmt: skip
 
 
 class Cost(NamedTuple):

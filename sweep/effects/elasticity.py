@@ -12,7 +12,7 @@ from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status, take
 from sweep.effects.driven import DrivenSide, driven_side, drives_something
 from sweep.effects.handed import INERTIAS, LOADS, behind
 from sweep.effects.loads import SPEED
-from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
+from sweep.effects.turn import at_poses, backwards, on_finer_grids, per_turn, reduction_outputs
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, optional_outputs
 
 EQUATION = "E1 (1), (2), (5), E2 (3)-(5)"
@@ -115,6 +115,8 @@ def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
     quasi_static(p, d2psi, c, reach, data, status, lag, displacement, ratio, _varying(scene, driven))
     if driven is not None and ratio is not None:
         ratio *= np.sqrt(data[:, :1] / (data[:, :1] + driven.inertia))
+    if ratio is not None:
+        np.abs(ratio, out=ratio)  # also where the crank turns backwards
     columns: Columns = {name: out for name, out in zip(_KERNEL_NAMES, outputs, strict=True) if out is not None}
     return columns | {"status": status}
 
@@ -130,13 +132,16 @@ def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
-    """Solve the designs that drive something apart from those that do not, so that no design depends on the others."""
-    loaded = drives_something(grid)
-    if loaded.all() or not loaded.any():
+    """Solve the designs that drive something apart from those that do not, so that no design depends on the others,
+    and those that turn backwards apart.
+    """
+    kind = 2 * drives_something(grid) + (grid.inputs["speed"] < 0.0)
+    kinds = np.unique(kind)
+    if kinds.size == 1:
         return _solved(grid, phi, last)
     found: dict[str, Array] = {}
     status = np.empty(len(grid.designs), np.uint8)
-    for rows in (np.flatnonzero(loaded), np.flatnonzero(~loaded)):
+    for rows in (np.flatnonzero(kind == one) for one in kinds):
         part, codes = _solved(grid.only(rows), np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi), last)
         for name, values in part.items():
             found.setdefault(name, np.empty((len(grid.designs), *values.shape[1:])))[rows] = values
@@ -145,15 +150,27 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
 
 
 def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
-    n = len(grid.designs)
+    """Solve designs that all drive something or all nothing, and all turn in one sense.
+
+    A crank that turns backwards is one that turns forwards in -phi: only so do multipliers below 1 mean stability.
+    """
+    n, back = len(grid.designs), bool((grid.inputs["speed"] < 0.0).any())
     status, floquet = np.empty(n, np.uint8), np.empty(n)
     lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
     p, d2psi, c, reach, data = _arguments(grid)
     driven = driven_side(grid, True)
     if driven is None:
-        steady_state(p, d2psi, c, reach, data, phi, last, status, lag, elongation, floquet, _varying(grid))
+        varying = _varying(grid)
+        if back:
+            data[:, 3] = -data[:, 3]
+            at = phi
+            phi, (p, d2psi) = backwards(at, p, d2psi)
+            varying = None if varying is None else backwards(at, varying)[1][0]
+        steady_state(p, d2psi, c, reach, data, phi, last, status, lag, elongation, floquet, varying)
     else:
         first, zeroth, right = _equation(grid, p, d2psi, data, driven)
+        if back:
+            phi, (p, first, zeroth, right) = backwards(phi, p, -first, zeroth, right)
         driven_steady_state(p, first, zeroth, right, c, reach, phi, last, status, lag, elongation, floquet)
     return {"lag_dynamic": lag, "elongation_dynamic": elongation, "floquet": floquet}, status
 

@@ -27,8 +27,7 @@ def computed(scene: Scene, key: str, wanted: frozenset[str]) -> Columns:
 def inputs_of_loads(family: Family) -> tuple[Parameter, ...]:
     """Return the inputs of the effect that hands back a family's load; none where there is no such effect."""
     register = import_module("sweep.effects")  # it imports the users of this module when they are asked for
-    entries = [register.effect(name) for name in register.NAMES]
-    return tuple(p for e in entries if e.key == LOADS and e.serves(family) for p in e.inputs_of(family))
+    return tuple(p for e in register.serving(family) if e.key == LOADS for p in e.inputs_of(family))
 
 
 def behind(scene: Scene, key: str, wanted: frozenset[str]) -> Columns | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ PASSES = "friction_passes"
 SUPPORTED = ("shaft", "sleeve")
 
 
-def _of_joint(joint: LinkJoint) -> tuple[Parameter, ...]:
+def of_joint(joint: LinkJoint) -> tuple[Parameter, ...]:
     """Return inputs of a joint in the order of the kernel's columns: those that it has."""
     j, text = joint.name, joint.text
     bare = 0.0 if joint.kind in ("contact", "sleeve") else None
@@ -112,7 +112,10 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     return columns | {"status": status}
 
 
-def _effect(name: str, bare: Effect) -> Effect:
+@lru_cache
+def friction_of(name: str) -> Effect:
+    """Return the entry of the friction of a family with a tree of links."""
+    bare = links.loads_of(name)
     tree = bare.tree
     assert tree is not None
     scalars = {"drive_torque_friction": ("torque", f"torque that drives the cranks{TEXT}")} | _losses(tree)
@@ -128,7 +131,7 @@ def _effect(name: str, bare: Effect) -> Effect:
         equation=EQUATION,
         formulas=FORMULAS,
         needs=(bare.name,),
-        inputs=(*bare.inputs, *(p for joint in tree.joints for p in _of_joint(joint))),
+        inputs=(*bare.inputs, *(p for joint in tree.joints for p in of_joint(joint))),
         outputs=tuple(replace(o, kinks=not o.jumps) for o in found),
         compute=compute,
         called_for="losses, drive sizing, loads of bearings, a check against jamming",
@@ -140,10 +143,3 @@ def _effect(name: str, bare: Effect) -> Effect:
             largest, compute=compute, name=PASSES, quantity="most passes of the friction iteration", threshold=4.0
         ),
     )
-
-
-FIVE_LINK = _effect("five_link", links.FIVE_LINK)
-SLOTTED = _effect("slotted", links.SLOTTED)
-SWIVEL = _effect("swivel", links.SWIVEL)
-SPHERICAL_LOOPER = _effect("spherical_looper", links.SPHERICAL_LOOPER)
-CYLINDRICAL_LOOPER = _effect("cylindrical_looper", links.CYLINDRICAL_LOOPER)

@@ -188,6 +188,8 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
         take_over(status, handed_back["status"])
         if inertia is not None:
             inertia += carried(scene, handed_back)
+    if forces is not None:
+        scene.memo["reactions"] = forces.reshape(*shape, 6 * len(tree.joints)), status
     columns = vector_columns(tree, forces, on_frame, wanted)
     if on_tool is not None:
         columns |= _columns({"tool_load": on_tool[:, :, :3]}, wanted)
@@ -213,7 +215,9 @@ def advise(scene: Scene) -> Advice | None:
     return Advice("share of the driving torque's range that is not due to loads", share, 0.1)
 
 
-def _effect(name: str) -> Effect:
+@lru_cache
+def loads_of(name: str) -> Effect:
+    """Return the entry of the loads of a family with a tree of links."""
     found = family(name)
     tree = found.find(LinkTree)
     assert tree is not None
@@ -236,10 +240,3 @@ def _effect(name: str) -> Effect:
         tree=tree,
         advise=advise,
     )
-
-
-FIVE_LINK = _effect("five_link")
-SLOTTED = _effect("slotted")
-SWIVEL = _effect("swivel")
-SPHERICAL_LOOPER = _effect("spherical_looper")
-CYLINDRICAL_LOOPER = _effect("cylindrical_looper")

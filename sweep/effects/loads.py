@@ -54,7 +54,8 @@ GRAVITY = tuple(
     Parameter(f"gravity_{axis}", "acceleration", f"gravity along {axis} of the fixed axes", default=0.0)
     for axis in "xyz"
 )
-SPEED = Parameter("speed", "speed", "speed of the crank (scene.speed of a study)", positive=True)
+SPEED = Parameter("speed", "speed", "speed of the crank (scene.speed of a study); negative: it turns backwards",
+                  not_zero=True)  # fmt: skip
 CHANGE = Parameter("speed_change", "angular_acceleration", "angular acceleration of the crank", default=0.0)
 # Of a tool that moves along a line; without mass and force nothing is computed for it.
 _MASS = Parameter("m_tool", "mass", "mass of the tool, such as a needle bar", default=0.0, not_negative=True)

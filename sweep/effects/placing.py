@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
 
@@ -27,6 +27,25 @@ class Placed:
     def name(self) -> str:
         """Name of the effect with the stage's number."""
         return f"{self.entry.name}{self.number}"
+
+    def narrowed(self, wanted: Iterable[str]) -> Placed:
+        """Return the effect with what the wanted ones of its outputs need: an input for others alone is left out,
+        and so are those others.
+        """
+        only_for, names = self.entry.only_for, {self.own[name] for name in wanted if name in self.own}
+        left = {name for name, outputs in only_for.items() if names.isdisjoint(outputs)}
+        if not left:
+            return self
+        gone = {o for name in left for o in only_for[name]}
+        whole = self.entry.design_result
+        entry = replace(
+            self.entry,
+            inputs=tuple(p for p in self.entry.inputs if p.name not in left),
+            outputs=tuple(o for o in self.entry.outputs if o.name not in gone),
+            design_result=whole and replace(whole, outputs=tuple(o for o in whole.outputs if o.name not in gone)),
+            only_for={name: outputs for name, outputs in only_for.items() if name not in left},
+        )
+        return replace(self, entry=entry)
 
     @property
     def pose_outputs(self) -> tuple[Output, ...]:

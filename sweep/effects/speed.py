@@ -10,9 +10,11 @@ import numpy as np
 
 from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED, speed_fluctuation
-from sweep.effects import kinetostatics, loads
+from sweep.effects import kinetostatics, links, loads
 from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status
-from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
+from sweep.effects.handed import LOADS, computed
+from sweep.effects.turn import at_poses, backwards, on_finer_grids, per_turn, reduction_outputs
+from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
 
 EQUATION = "D4 (1)-(4)"
@@ -25,6 +27,7 @@ FORMULAS = (
     "    omega_mean; its time constant is mean J/motor_slope",
 )
 
+TITLE = "fluctuation of the crank speed at constant mean speed"
 FLYWHEEL = Parameter(
     "flywheel", "inertia", "inertia on the crank shaft besides the links", default=0.0, not_negative=True
 )
@@ -61,8 +64,8 @@ def numbers(suffix: str, text: str) -> tuple[Output, ...]:
     """Return what a turn has one of."""
     return (
         Output(f"unevenness{suffix}", "1", f"(largest - smallest crank speed)/mean{text}", EQUATION),
-        Output(f"fastest{suffix}", "rad/s", f"largest crank speed{text}", EQUATION),
-        Output(f"slowest{suffix}", "rad/s", f"smallest crank speed{text}", EQUATION),
+        Output(f"fastest{suffix}", "rad/s", f"largest magnitude of the crank speed{text}", EQUATION),
+        Output(f"slowest{suffix}", "rad/s", f"smallest magnitude of the crank speed{text}", EQUATION),
     )
 
 
@@ -87,7 +90,13 @@ def _solve(loss: Loss | None, finest: int, grid: Scene, phi: Array, last: bool) 
 def steady(
     inertia: Array, excess: Array, speed: Array, slope: Array | None, phi: Array, coarsest: float
 ) -> tuple[dict[str, Array], Status]:
-    """Return the kernel's numbers, (n,), and curves at phi, (n, m), without a suffix, and the status."""
+    """Return the kernel's numbers, (n,), and curves at phi, (n, m), without a suffix, and the status.
+
+    Numbers are of the magnitude of the speed.  A crank that turns backwards is one that turns forwards in -phi, where
+    the torque that is left over acts the other way.
+    """
+    if (speed < 0.0).any():
+        return _of_both_senses(inertia, excess, speed, slope, phi, coarsest)
     n = len(inertia)
     unevenness, fastest, slowest, energy, missed = (np.empty(n) for _ in range(5))
     crank_speed, acceleration = (np.empty((n, phi.shape[1])) for _ in range(2))
@@ -100,12 +109,30 @@ def steady(
     return found | {"crank_speed": crank_speed, "crank_acceleration": acceleration}, status
 
 
+def _of_both_senses(
+    inertia: Array, excess: Array, speed: Array, slope: Array | None, phi: Array, coarsest: float
+) -> tuple[dict[str, Array], Status]:
+    """Return the same where some cranks turn backwards."""
+    found: dict[str, Array] = {}
+    status = np.empty(len(speed), np.uint8)
+    for rows, sense in ((np.flatnonzero(speed > 0.0), 1.0), (np.flatnonzero(speed < 0.0), -1.0)):
+        at, stored, left = phi[rows] if len(phi) > 1 else phi, inertia[rows], excess[rows]
+        if sense < 0.0:
+            at, (stored, left) = backwards(at, stored, -left)
+        given = None if slope is None else slope[rows]
+        part, status[rows] = steady(stored, left, sense * speed[rows], given, np.ascontiguousarray(at), coarsest)
+        for name, values in part.items():
+            turned = sense if name in ("crank_speed", "crank_acceleration") else 1.0
+            found.setdefault(name, np.empty((len(speed), *values.shape[1:])))[rows] = turned * values
+    return found, status
+
+
 def samples(grid: Scene) -> tuple[Array, Array]:
     """Return the reduced inertia and torque excess J'w^2/2 - M_drive(w, 0): weights and load reduced to the crank."""
     even = grid.inputs | {"speed_change": np.zeros(len(grid.designs))}
     after = tuple(d._replace(inputs=d.inputs | {"speed_change": even["speed_change"]}) for d in grid.after)
     turning = Scene(grid.family, grid.designs, grid.angles, even, after, curves=grid.curves)
-    found = kinetostatics.compute(turning, _NEEDED)
+    found = computed(turning, LOADS, _NEEDED)
     inertia, slope, drive = (np.asarray(found[name], np.float64) for name in _NEEDED_NAMES)
     speed = grid.inputs["speed"][:, None]
     return inertia + grid.inputs["flywheel"][:, None], 0.5 * slope * speed * speed - drive
@@ -158,28 +185,36 @@ def advise(scene: Scene) -> Advice | None:
     return Advice("estimated unevenness of the crank speed", estimate, 0.01)
 
 
-def _effect(kind: loads.Follower) -> Effect:
+def _effect(name: str, title: str, loaded: Effect) -> Effect:
+    """Return the entry of that name for the mechanisms whose loads ``loaded`` gives."""
     return Effect(
         key="D4",
-        name=f"{kind.prefix}speed_fluctuation",
-        title="fluctuation of the crank speed at constant mean speed",
+        name=name,
+        title=title,
         equation=EQUATION,
         formulas=FORMULAS,
-        followers=(kind.name,),
-        needs=(f"{kind.prefix}kinetostatics",),
-        inputs=(*kind.parameters, FLYWHEEL, MOTOR),
-        tool_inputs=loads.TOOLS,
+        followers=loaded.followers,
+        requires=loaded.requires,
+        tree=loaded.tree,
+        needs=(loaded.name,),
+        inputs=(*loaded.inputs, FLYWHEEL, MOTOR),
+        tool_inputs=loaded.tool_inputs,
         outputs=OUTPUTS,
         compute=compute,
         called_for="unevenness of the speed asked for, a light drive",
         negligible="estimated unevenness below 1 %",
         whole_turn=True,
         even_crank=True,
-        takes_load=kinetostatics.KEY,
+        takes_load=LOADS,
         design_result=DesignResult((*_PER_TURN, *reduction_outputs(OUTPUTS)), turn),
         advise=advise,
     )
 
 
-EFFECT = _effect(loads.ROCKER)
-SLIDER = _effect(loads.SLIDER)
+def of_tree(name: str) -> Effect:
+    """Return the entry of a family with a tree of links."""
+    return _effect(f"{name}_speed_fluctuation", f"{TITLE}: {family(name).title}", links.loads_of(name))
+
+
+EFFECT = _effect("speed_fluctuation", TITLE, kinetostatics.EFFECT)
+SLIDER = _effect(f"{loads.SLIDER.prefix}speed_fluctuation", TITLE, kinetostatics.SLIDER)

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from sweep.effects import friction, kinetostatics, loads
+from sweep.effects import friction, link_friction, speed
 from sweep.effects.base import DesignResult, Effect, Scene, Status
+from sweep.effects.handed import FRICTION, LOADS, computed
 from sweep.effects.speed import (
     FLYWHEEL,
     FORMULAS,
@@ -17,6 +18,7 @@ from sweep.effects.speed import (
     LEFT,
     MOTOR,
     OF_CONSTANT_MEAN,
+    TITLE,
     advise,
     compute,
     numbers,
@@ -77,33 +79,34 @@ def _lost(grid: Scene, speed: Array, change: Array, status: Status) -> Array:
     turning = Scene(
         grid.family, grid.designs, grid.angles, grid.inputs, grid.after, curves=grid.curves, uneven=(speed, change)
     )
-    rubbing = friction.compute(turning, frozenset({"drive_torque_friction"}))
-    smooth = kinetostatics.compute(turning, frozenset({"drive_torque"}))
+    rubbing = computed(turning, FRICTION, frozenset({"drive_torque_friction"}))
+    smooth = computed(turning, LOADS, frozenset({"drive_torque"}))
     worst = np.asarray(rubbing["status"], np.uint8).max(axis=1)
     np.copyto(status, worst, where=status == st.OK)
     with_friction = np.asarray(rubbing["drive_torque_friction"], np.float64)
     return with_friction - np.asarray(smooth["drive_torque"], np.float64)
 
 
-def _effect(kind: loads.Follower) -> Effect:
-    rubbing = friction.SLIDER if kind is loads.SLIDER else friction.EFFECT
+def _effect(bare: Effect, rubbing: Effect) -> Effect:
     return Effect(
         key="D4, D2",
-        name=f"{kind.prefix}speed_fluctuation_friction",
-        title="fluctuation of the crank speed at constant mean speed, friction included",
+        name=f"{bare.name}_friction",
+        title=bare.title.replace(TITLE, f"{TITLE}, friction included"),
         equation="D4 (1)-(5)",
         formulas=(*FORMULAS, "(5) friction takes drive_torque_friction - drive_torque, both at omega(phi), eps(phi)"),
-        followers=(kind.name,),
-        needs=(f"{kind.prefix}speed_fluctuation", f"{kind.prefix}friction"),
+        followers=bare.followers,
+        requires=bare.requires,
+        tree=bare.tree,
+        needs=(bare.name, rubbing.name),
         inputs=(*rubbing.inputs, FLYWHEEL, MOTOR),
-        tool_inputs=loads.TOOLS,
+        tool_inputs=bare.tool_inputs,
         outputs=OUTPUTS,
         compute=partial(compute, loss=loss, suffix=SUFFIX),
         called_for="unevenness of a drive whose joints rub",
         negligible="friction takes less than a tenth of the torque",
         whole_turn=True,
         even_crank=True,
-        takes_load=friction.KEY,
+        takes_load=FRICTION,
         design_result=DesignResult(
             (*PER_TURN, *reduction_outputs(OUTPUTS)), partial(turn, loss=loss, suffix=SUFFIX), block=8
         ),
@@ -111,5 +114,10 @@ def _effect(kind: loads.Follower) -> Effect:
     )
 
 
-EFFECT = _effect(loads.ROCKER)
-SLIDER = _effect(loads.SLIDER)
+def of_tree(name: str) -> Effect:
+    """Return the entry of a family with a tree of links."""
+    return _effect(speed.of_tree(name), link_friction.friction_of(name))
+
+
+EFFECT = _effect(speed.EFFECT, friction.EFFECT)
+SLIDER = _effect(speed.SLIDER, friction.SLIDER)

@@ -45,7 +45,9 @@ SPEED_EQUATION = "docs/thread.md (7), (8)"
 SPEED_OUTPUTS = (
     Output("thread_speed", "length/s", "speed at which thread is taken up", SPEED_EQUATION),
     Output("thread_acceleration", "length/s^2", "acceleration at which thread is taken up", SPEED_EQUATION),
-    Output("speed_ratio", "1", "tension at that speed over the tension at the reference speed", SPEED_EQUATION),
+    Output(
+        "speed_ratio", "1", "tension at that speed over the tension at the reference speed", SPEED_EQUATION, kinks=True
+    ),  # steep next to thread at rest, constant beyond the measured range
 )
 CAPSTAN_EQUATION = "docs/thread.md (5), (6)"
 CAPSTAN_OUTPUTS = (

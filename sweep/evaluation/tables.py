@@ -143,8 +143,8 @@ def _parameter_column(family: Parametrised, p: Parameter, table: Table, keys: di
     least, largest = (values.min(), values.max()) if rows else (1.0, 1.0)
     if not np.isfinite(least) or not np.isfinite(largest):
         _refuse(~np.isfinite(values), values, p.name, "a finite number")
-    if p.sign and (least <= 0.0 if p.positive else least < 0.0):
-        _refuse(values <= 0.0 if p.positive else values < 0.0, values, p.name, f"a {p.sign} {p.unit}")
+    if p.sign and (p.not_zero or p.wrong_sign(least)):
+        _refuse(p.wrong_sign(values), values, p.name, f"a {p.sign} {p.unit}")
     if p.choices is not None:
         _refuse(np.logical_and.reduce([values != x for x in p.choices]), values, p.name, p.choice)
     return values

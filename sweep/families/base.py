@@ -47,11 +47,21 @@ class Parameter:
     default: float | None = None
     choices: tuple[float, ...] | None = None
     not_negative: bool = False
+    not_zero: bool = False
 
     @property
     def sign(self) -> str:
         """What its sign may be, in a word; empty if anything."""
-        return "positive" if self.positive else "non-negative" if self.not_negative else ""
+        words = ((self.positive, "positive"), (self.not_negative, "non-negative"), (self.not_zero, "non-zero"))
+        return next((word for holds, word in words if holds), "")
+
+    def wrong_sign(self, values: Array | float) -> NDArray[np.bool_]:
+        """Return which values have a sign that it may not have."""
+        if self.not_zero:
+            return np.asarray(values == 0.0)
+        if not self.sign:
+            return np.zeros(np.shape(values), np.bool_)
+        return np.asarray(values <= 0.0 if self.positive else values < 0.0)
 
     @property
     def choice(self) -> str:

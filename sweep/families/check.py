@@ -65,7 +65,7 @@ def _example(family: Family) -> list[str]:
             faults.append(f"example has {name!r}, which is no parameter")
         elif p.choices is not None and value not in p.choices:
             faults.append(f"example has {name} = {value:g}: give {p.choice}")
-        elif (p.positive and value <= 0.0) or (p.not_negative and value < 0.0):
+        elif p.wrong_sign(value):
             faults.append(f"example has {name} = {value:g}: give a {p.sign} number")
     return faults
 

@@ -10,7 +10,6 @@ poses of both halves agree with the polynomial before (docs/extrema.md, section 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -19,12 +18,12 @@ from numpy.polynomial import chebyshev
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
+from sweep.numerics.chebyshev import NODES, at_nodes, basis, product, rising
 from sweep.numerics.events import sign_changes, with_events
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
 from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, blocks, discriminants, pose_columns
 
 PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
-NODES = 8  # poses of a panel, next to both ends too: a jump just inside would be seen by no other
 DENSE = 33  # places at which the highest point of a polynomial is looked for, its ends included
 NEWTON = 4
 TAIL = 3  # last coefficients that tell how wrong a polynomial may be ...
@@ -161,7 +160,7 @@ def _climbed(
     n = len(designs)
     best, least = np.full(n, -np.inf), np.full(n, np.inf)
     np.maximum.at(best, panels.row, panels.peak)
-    np.minimum.at(least, panels.row, _measured(_values(panels.series), request.mode).min(axis=1))
+    np.minimum.at(least, panels.row, _measured(at_nodes(panels.series), request.mode).min(axis=1))
     size = best if request.mode == 0 else best - least
     tops: list[Top] = []
     while panels.row.size:
@@ -183,7 +182,10 @@ def _climbed(
         settled &= off <= tolerance
         at_end = (top.phi <= halves.low) | (top.phi >= halves.high)
         top.err[:] += AGAIN * off + np.where(at_end, EDGE * EPS * size[halves.row], 0.0)
-        tops += [_only(top, settled & ~narrow), _held(halves.only(narrow), np.repeat(panels.peak, 2)[narrow], size)]
+        ends = halves.only(narrow)
+        held = _held(ends, np.repeat(panels.peak, 2)[narrow], size)
+        held.err[:] += AGAIN * _beside(family, designs, ends, request)
+        tops += [_only(top, settled & ~narrow), held]
         panels = halves.only(~settled & ~narrow)
     return _highest(tops, n), size
 
@@ -197,9 +199,9 @@ def _halved(family: Family, designs: Array, panels: Panels, request: Request) ->
     for some in blocks(np.arange(row.size), NODES):
         poses, _ = pose_columns(family, designs[row[some]], _places(low[some], high[some]), [request.pose])
         values[some] = poses[request.pose]
-    nodes, _ = _basis()
+    nodes, _ = basis()
     inner = np.concatenate([0.5 * (nodes - 1.0), 0.5 * (nodes + 1.0)])
-    before = _product(panels.series, _rising(inner))
+    before = product(panels.series, rising(inner))
     miss = np.abs(values.reshape(-1, 2 * NODES) - before).max(axis=1)
     halves = _fitted(row, low, high, values, request.mode)
     # The highest pose seen may stand alone, as one in the very place of a jump: it is kept by the half it lies in.
@@ -222,7 +224,7 @@ def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Requ
 def _tops(panels: Panels, mode: int, err: Array) -> Top:
     """Return the highest points of the polynomials, whose heights are wrong by ``err`` at most."""
     dense = np.linspace(-1.0, 1.0, DENSE)
-    heights = _measured(_product(panels.series, _rising(dense)), mode)
+    heights = _measured(product(panels.series, rising(dense)), mode)
     x, value = dense[heights.argmax(axis=1)], heights.max(axis=1)
     slope, bend = (np.ascontiguousarray(chebyshev.chebder(panels.series, order, axis=1).T) for order in (1, 2))
     for _ in range(NEWTON):
@@ -243,6 +245,21 @@ def _held(panels: Panels, before: Array, size: Array) -> Top:
     """Return the highest poses of panels as narrow as crank angles can be told apart; ``before`` they were halved."""
     err = np.abs(panels.peak - before) + EDGE * EPS * np.maximum(size[panels.row], np.abs(panels.peak))
     return Top(panels.row, panels.at, panels.peak, err, panels.high - panels.low + 8.0 * EPS * np.pi)
+
+
+def _beside(family: Family, designs: Array, panels: Panels, request: Request) -> Array:
+    """Return how far the highest poses of narrow panels are from poses beside them, on the side where that is less.
+
+    Beside a jump the curve is level on its higher side.  Next to a cusp it goes on rising where no pose can be, by as
+    much again, and a few times that where it rises like a small power of the distance.
+    """
+    off = np.zeros(panels.row.size)
+    for some in blocks(np.arange(panels.row.size), 2):
+        both = panels.at[some, None] + NARROWEST * np.array([-1.0, 1.0])
+        poses, _ = pose_columns(family, designs[panels.row[some]], both, [request.pose])
+        heights = _measured(poses[request.pose], request.mode)
+        off[some] = np.abs(heights - panels.peak[some, None]).min(axis=1)
+    return off
 
 
 def _given_up(panels: Panels, mode: int) -> Top:
@@ -269,7 +286,7 @@ def _only(top: Top, which: Index | Mask) -> Top:
 
 def _upper(panels: Panels, mode: int) -> Array:
     """Return what a curve does not exceed on a panel, as far as its coefficients tell."""
-    dense = _product(panels.series, _rising(np.linspace(-1.0, 1.0, DENSE)))
+    dense = product(panels.series, rising(np.linspace(-1.0, 1.0, DENSE)))
     doubt = CAREFUL * np.abs(panels.series[:, -TAIL:]).sum(axis=1) + LATELY * panels.missed
     upper: Array = np.maximum(_measured(dense, mode).max(axis=1), panels.peak) + doubt
     return upper
@@ -292,19 +309,9 @@ def _measured(values: Array, mode: int) -> Array:
     return measured
 
 
-@lru_cache
-def _basis() -> tuple[Array, Array]:
-    """Return the nodes on [-1, 1], its ends among them, and the matrix that makes coefficients of values there."""
-    order = np.arange(NODES, dtype=np.float64)
-    nodes: Array = -np.cos(np.pi * order / (NODES - 1))
-    weights = np.where((order == 0) | (order == NODES - 1), 0.5, 1.0)
-    both = weights[:, None] * weights * (2.0 / (NODES - 1))
-    return nodes, both * np.cos(np.pi * np.outer(order, order[::-1]) / (NODES - 1))
-
-
 def _places(low: Array, high: Array) -> Array:
     """Return the nodes of panels; at the very end the curve may already have jumped, so it is not touched."""
-    nodes, _ = _basis()
+    nodes, _ = basis()
     places = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * nodes
     return _inside(places, low[:, None], high[:, None])
 
@@ -317,7 +324,7 @@ def _fitted(row: Index, low: Array, high: Array, values: Array, mode: int) -> Pa
     """Return panels with the polynomials through their poses."""
     measured, every = _measured(values, mode), np.arange(row.size)
     top = measured.argmax(axis=1)
-    series: Array = _product(values, _basis()[1].T)
+    series: Array = product(values, basis()[1].T)
     return Panels(row, low, high, series, measured[every, top], _places(low, high)[every, top], np.zeros(row.size))
 
 
@@ -330,21 +337,3 @@ def _worst(row: Index, each: Status, n: int) -> Status:
     worst: Status = np.empty(n, np.uint8)
     scan.worst_status(turn.reshape(n, -1), worst)
     return DESIGN_STATUS[worst]
-
-
-def _values(series: Array) -> Array:
-    return _product(series, _rising(_basis()[0]))
-
-
-def _rising(x: Array) -> Array:
-    """Return the Chebyshev polynomials at x (m,), lowest order first, (NODES, m)."""
-    found: Array = np.asarray(chebyshev.chebvander(x, NODES - 1).T, np.float64)
-    return found
-
-
-def _product(rows: Array, matrix: Array) -> Array:
-    """Return the matrix product, summed in one order: that of a library depends on how many rows there are."""
-    total: Array = rows[:, 0, None] * matrix[0]
-    for k in range(1, matrix.shape[0]):
-        total += rows[:, k, None] * matrix[k]
-    return total

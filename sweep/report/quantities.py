@@ -68,10 +68,10 @@ class Quantity:
         return with_unit(number(stored * self.factor, digits), self.unit)
 
     def at_speed(self, stored: float, speed: float | None, digits: int = 4) -> str:
-        """Return the value at the scene's speed with its unit, or nothing where a speed says nothing."""
+        """Return the value at the size of the scene's speed with its unit, or nothing where a speed says nothing."""
         if speed is None or self.order == 0:
             return ""
-        return with_unit(number(stored * self.speed_scale * speed**self.order, digits), self.speed_unit)
+        return with_unit(number(stored * self.speed_scale * abs(speed) ** self.order, digits), self.speed_unit)
 
 
 def with_unit(text: str, unit: str) -> str:

@@ -238,7 +238,7 @@ def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faul
 
 
 def _checked(p: Parameter, written: float, value: float, key: Key, faults: Faults) -> float:
-    if p.sign and not (value > 0.0 or (value == 0.0 and p.not_negative)):
+    if p.sign and (math.isnan(value) or p.wrong_sign(value)):
         faults.value(key, written, f"a {p.sign} {p.unit} ({p.text})")
     if p.choices is not None and value not in p.choices:
         faults.value(key, written, p.choice)

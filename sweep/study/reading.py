@@ -81,8 +81,8 @@ class Reading:
         raw = self.data[table].get(key) if isinstance(self.data.get(table), dict) else None
         return [(k, name) for k, name in enumerate(raw) if isinstance(name, str)] if isinstance(raw, list) else []
 
-    def quantity(self, text: str | None, internal: str, key: Key) -> float | None:
-        """Return a text such as "7000 rpm" in the internal unit; it must be positive."""
+    def quantity(self, text: str | None, internal: str, key: Key, *, signed: bool = False) -> float | None:
+        """Return a text such as "7000 rpm" in the internal unit; positive, or just not zero if it is ``signed``."""
         if text is None:
             return None
         try:
@@ -91,8 +91,9 @@ class Reading:
         except units.UnitFault as fault:
             self.faults.value(key, text, str(fault))
             return None
-        if not value > 0.0:
-            self.faults.value(key, text, f"a positive number; {units.example(internal)}")
+        if not (abs(value) > 0.0 if signed else value > 0.0):
+            kind = "non-zero" if signed else "positive"
+            self.faults.value(key, text, f"a {kind} number; {units.example(internal)}")
         return value
 
     def share(self, text: str, key: Key) -> float:

@@ -32,7 +32,7 @@ def read(reading: Reading) -> None:
 def read_values(reading: Reading) -> None:
     """Read speed and window."""
     scene = reading.get(SceneSection)
-    reading.fields["speed"] = reading.quantity(scene.speed, "rad/s", ("scene", "speed"))
+    reading.fields["speed"] = reading.quantity(scene.speed, "rad/s", ("scene", "speed"), signed=True)
     reading.fields["window"] = _window(scene, reading.faults)
 
 
@@ -73,10 +73,10 @@ def collect(reading: Reading) -> None:
 
 def speeds(family: Family, speed: float) -> dict[str, float]:
     """Return what scene.speed gives where an effect asks for the speed of a crank:
-    a member turns ratio times as fast.
+    a member turns ratio times as fast, backwards where that is negative.
     """
     if isinstance(family, Machine):
-        ratios = {m.name: abs(m.ratio) for m in family.members}
+        ratios = {m.name: m.ratio for m in family.members}
         return {p: speed * ratios[parts(p).member] for p in family.parameter_names if parts(p).stem == "speed"}
     return {p: speed for p in family.parameter_names if parts(p).stem == "speed"}
 

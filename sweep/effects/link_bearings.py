@@ -1,0 +1,263 @@
+"""B1, B2 for mechanisms of any number of links: sliding and rolling bearings of every shaft under its reactions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from kernels.effects.bearing_life import journal_pressures
+from sweep.effects import link_friction, links
+from sweep.effects.base import DesignResult, Effect, Scene, Status, refuse, take_over
+from sweep.effects.bearings import CATALOGUE, REQUIRED_LIFE, permissible_load, together
+from sweep.effects.handed import FRICTION, LOADS
+from sweep.effects.shaft_life import BLOCK, Shaft, load_outputs, turn_outputs
+from sweep.effects.shaft_life import FORMULAS as LIFE_FORMULAS
+from sweep.effects.shaft_life import per_turn as turn_of_shaft
+from sweep.families import family
+from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, filled
+from sweep.families.link_tree import LinkJoint, LinkTree
+
+EQUATION = "docs/links.md (10)-(13)"
+SLIDING_FORMULAS = (
+    "(10) journals p_k = F_k/(d l_k) with the loads F_k of the supports, friction included; a collar carries the force",
+    "    along the axis: p_3 = 4 |F_axial|/(pi (d0^2 - d^2)); utilisation = largest p over its permissible value",
+)
+ROLLING_FORMULAS = (
+    *LIFE_FORMULAS,
+    "(4) P = K V F if |F_axial| <= e V F else K (X V F + Y |F_axial|); permissible P = C (60 n L_h/10^6)^(-1/p)",
+)
+AXES = "xyz"
+
+
+def shafts(tree: LinkTree) -> tuple[LinkJoint, ...]:
+    """Return the joints that roll in two bearings: those that turn about an axis and do not slide along it."""
+    return tuple(j for j in tree.joints if j.kind == "shaft")
+
+
+def journals(tree: LinkTree) -> tuple[LinkJoint, ...]:
+    """Return the joints that slide in two journals: shafts, and guides, which have no collar."""
+    return tuple(j for j in tree.joints if j.kind in link_friction.SUPPORTED)
+
+
+def _sliding_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
+    """Return dimensions of the journals, of the collar of a shaft, in the order of the kernel's columns."""
+    j, words = joint.name, joint.text
+    found = [Parameter(f"journal_diameter_{j}", "length", f"diameter of both journals: {words}", positive=True)]
+    found += [Parameter(f"journal_length_{j}{k}", "length", f"length of journal {k}: {words}", positive=True)
+              for k in "12"]  # fmt: skip
+    if joint.kind == "shaft":
+        text = f"outer diameter of the thrust collar: {words}"
+        found.append(Parameter(f"collar_diameter_{j}", "length", text, positive=True))
+    return tuple(found)
+
+
+def _pressure_limits(joint: LinkJoint) -> tuple[Parameter, ...]:
+    parts = ("journal 1", "journal 2", "the collar")[: 3 if joint.kind == "shaft" else 2]
+    return tuple(
+        Parameter(f"permissible_pressure_{joint.name}{k + 1}", "pressure",
+                  f"permissible mean pressure of {part}: {joint.text}", positive=True)
+        for k, part in enumerate(parts)
+    )  # fmt: skip
+
+
+def _sliding_outputs(joint: LinkJoint) -> tuple[Output, ...]:
+    """Return pressures and utilisation, in the order of the kernel's results."""
+    j, words = joint.name, f"{joint.text}{link_friction.TEXT}"
+    found = [Output(f"journal_pressure_{j}{k}", "pressure", f"mean pressure of journal {k}: {words}", EQUATION)
+             for k in "12"]  # fmt: skip
+    if joint.kind == "shaft":
+        found.append(Output(f"collar_pressure_{j}", "pressure", f"mean pressure of the collar: {words}", EQUATION))
+    text = f"largest mean pressure over its permissible value: {words}"
+    return (*found, Output(f"sliding_utilisation_{j}", "1", text, EQUATION))
+
+
+def _columns(scene: Scene, inputs: tuple[Parameter, ...], size: int) -> Array:
+    """Return inputs side by side, (n, size); zeros behind those that the joint has."""
+    table = np.zeros((len(scene.designs), size))
+    table[:, : len(inputs)] = scene.table(tuple(p.name for p in inputs))
+    return table
+
+
+def _axis(scene: Scene, joint: LinkJoint) -> Array:
+    """Return the axis of a shaft or a guide, (n, m, 3)."""
+    return np.ascontiguousarray(scene.links.axes[:, :, joint.freedom])
+
+
+def sliding(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Return the wanted pressures and utilisations under the loads with friction."""
+    asked = [j for j in journals(links.tree_of(scene)) if not wanted.isdisjoint(o.name for o in _sliding_outputs(j))]
+    supports = {j.name: [f"load_support_{j.name}{k}" for k in "12"] for j in asked}
+    axial = {j.name: [f"force_{j.name}{link_friction.SUFFIX}_{x}" for x in AXES] for j in asked if j.kind == "shaft"}
+    names = frozenset(name for found in (supports, axial) for part in found.values() for name in part)
+    loads = link_friction.compute(scene, names)
+    columns: Columns = {}
+    status = np.array(loads["status"], np.uint8)
+    for joint in asked:
+        outputs = tuple(o.name for o in _sliding_outputs(joint))
+        first, second = (np.ascontiguousarray(loads[name], np.float64) for name in supports[joint.name])
+        along = np.zeros(scene.shape)
+        if joint.kind == "shaft":
+            force = np.stack([np.asarray(loads[name], np.float64) for name in axial[joint.name]], axis=2)
+            along = (force * _axis(scene, joint)).sum(axis=2)
+            refuse(
+                status, scene.inputs[f"collar_diameter_{joint.name}"] <= scene.inputs[f"journal_diameter_{joint.name}"]
+            )
+        limits = _columns(scene, _pressure_limits(joint), 3) if outputs[-1] in wanted else None
+        size = _columns(scene, _sliding_inputs(joint), 4)
+        shaft = joint.kind == "shaft"
+        named = outputs if shaft else (*outputs[:2], f"collar_pressure_{joint.name}", outputs[-1])
+        columns |= filled(
+            journal_pressures, (first, second, along, size, limits), named, wanted & frozenset(outputs), status
+        )  # fmt: skip
+    return columns | {"status": status}
+
+
+def _rolling_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
+    supports = [p for p in link_friction.of_joint(joint) if p.name.startswith("support_")]
+    catalogue = [replace(p, name=f"{p.name}_{joint.name}", text=f"{p.text}: {joint.text}") for p in CATALOGUE]
+    return (*supports, *catalogue)
+
+
+def _life(joint: LinkJoint) -> Parameter:
+    return replace(REQUIRED_LIFE, name=f"required_life_{joint.name}", text=f"{REQUIRED_LIFE.text}: {joint.text}")
+
+
+def _rolling_outputs(joint: LinkJoint) -> tuple[Output, ...]:
+    text = f"larger equivalent load over the permissible one: {joint.text}"
+    return (
+        *load_outputs(joint.name, joint.text, EQUATION),
+        Output(f"rolling_utilisation_{joint.name}", "1", text, EQUATION, kinks=True),
+    )
+
+
+def _of_shaft(scene: Scene, wanted: frozenset[str], joint: LinkJoint) -> Columns:
+    """Return the wanted loads of one shaft's bearings, and the status."""
+    forces, status = _reactions(scene)
+    status = status.copy()
+    refuse(status, together(scene, joint.name))
+    tree = links.tree_of(scene)
+    at = 6 * tree.joints.index(joint)
+    return _shaft(joint).of_reactions(scene, forces, (at, at + 3), _axis(scene, joint), wanted, status)
+
+
+def _reactions(scene: Scene) -> tuple[Array, Status]:
+    """Return the reactions of all joints, (n, m, 6 Q), and the status; computed once for all shafts of a scene."""
+    if "reactions" not in scene.memo:
+        first = links.tree_of(scene).joints[0].name
+        links.compute(scene, frozenset({f"force_{first}"}))
+    found: tuple[Array, Status] = scene.memo["reactions"]
+    return found
+
+
+def _turning(scene: Scene, joint: LinkJoint) -> Array:
+    """Return the turning of a shaft in its bearings per unit crank speed, (n, m)."""
+    bodies, parents = scene.links.bodies, scene.links.parents
+    turn = bodies[:, :, joint.body, 9:12]
+    if parents[joint.body] >= 0:
+        turn = turn - bodies[:, :, parents[joint.body], 9:12]
+    rate: Array = (turn * _axis(scene, joint)).sum(axis=2)
+    return rate
+
+
+def _shaft(joint: LinkJoint) -> Shaft:
+    return Shaft(joint.name, f"_{joint.name}", partial(_of_shaft, joint=joint), partial(_turning, joint=joint))
+
+
+def rolling(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Return the wanted loads of bearings, and the share that they make of the permissible load."""
+    columns: Columns = {}
+    status = scene.status()
+    for joint in shafts(links.tree_of(scene)):
+        names = tuple(o.name for o in _rolling_outputs(joint))
+        used = names[-1]
+        own = wanted & frozenset(names)
+        if not own:
+            continue
+        pair = frozenset(names[3:5]) if used in own else frozenset[str]()
+        found = _of_shaft(scene, own - {used} | pair, joint)
+        take_over(status, found.pop("status"))
+        if used in own:
+            larger = np.maximum(*(np.asarray(found[name], np.float64) for name in names[3:5]))
+            found[used] = larger / permissible_load(scene, f"_{joint.name}")
+        columns |= {name: found[name] for name in own}
+    return columns | {"status": status}
+
+
+def rolling_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Return mean loads and lives of the shafts asked for; see :mod:`sweep.effects.shaft_life`."""
+    columns: Columns = {}
+    status = np.zeros(len(scene.designs), np.uint8)
+    for joint in shafts(links.tree_of(scene)):
+        own = wanted & frozenset(o.name for o in turn_outputs(joint.name, "", EQUATION))
+        if own:
+            found = turn_of_shaft(scene, own, accuracy, _shaft(joint))
+            take_over(status, found.pop("status"))
+            columns |= found
+    return columns | {"status": status}
+
+
+def sliding_of(name: str) -> Effect:
+    """Return the entry of the sliding bearings of a family with a tree of links."""
+    rubbing = link_friction.friction_of(name)
+    tree = rubbing.tree
+    assert tree is not None
+    found = {j: (_sliding_inputs(j), _pressure_limits(j), _sliding_outputs(j)) for j in journals(tree)}
+    only = {p.name: tuple(o.name for o in out) for own, _, out in found.values() for p in own}
+    only |= {p.name: (out[-1].name,) for _, limits, out in found.values() for p in limits}
+    own = tuple(p for sizes, limits, _ in found.values() for p in (*sizes, *limits))
+    return Effect(
+        key="B1",
+        name=f"{name}_sliding_bearings",
+        title=f"sliding bearings of every shaft and guide: mean pressures, utilisation: {family(name).title}",
+        equation=EQUATION,
+        formulas=SLIDING_FORMULAS,
+        needs=(rubbing.name,),
+        inputs=(*rubbing.inputs, *own),
+        only_for=only,
+        outputs=tuple(replace(o, kinks=True) for _, _, out in found.values() for o in out),
+        compute=sliding,
+        called_for="choice of sliding bearings",
+        negligible="other members govern: utilisation below 0.5",
+        takes_load=FRICTION,
+        requires=LinkTree,
+        tree=tree,
+    )
+
+
+def rolling_of(name: str) -> Effect:
+    """Return the entry of the rolling bearings of a family with a tree of links."""
+    bare = links.loads_of(name)
+    tree = bare.tree
+    assert tree is not None
+    poses: list[Output] = []
+    lives: list[Output] = []
+    inputs: list[Parameter] = []
+    only: dict[str, tuple[str, ...]] = {}
+    for joint in shafts(tree):
+        own, life = _rolling_inputs(joint), _life(joint)
+        out, turn = _rolling_outputs(joint), turn_outputs(joint.name, joint.text, EQUATION)
+        inputs += [*own, life]
+        poses += out
+        lives += turn
+        only |= {p.name: tuple(o.name for o in (*out, *turn)) for p in own} | {life.name: (out[-1].name,)}
+    return Effect(
+        key="B2",
+        name=f"{name}_rolling_bearings",
+        title=f"rolling bearings of every shaft: loads, mean loads over the turn, lives: {family(name).title}",
+        equation=EQUATION,
+        formulas=ROLLING_FORMULAS,
+        needs=(bare.name,),
+        inputs=(*bare.inputs, *inputs),
+        only_for=only,
+        outputs=tuple(poses),
+        compute=rolling,
+        called_for="choice and life of rolling bearings",
+        negligible="sliding bearings; elsewhere never, the life is what is asked for",
+        even_crank=True,
+        takes_load=LOADS,
+        requires=LinkTree,
+        tree=tree,
+        design_result=DesignResult(tuple(lives), rolling_turn, BLOCK),
+    )
