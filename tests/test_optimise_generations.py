@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import sweep
-from sweep.optimise import generations
+from sweep.optimise import generations, globally
 from sweep.optimise.abreast import Abreast
 from sweep.optimise.filling import kinds
 from sweep.optimise.generations import Bred, bred
@@ -25,7 +25,7 @@ from tests.needle208_record import record
 EXPECTED = json.loads((Path(__file__).parents[1] / "studies" / "needle208" / "expected.json").read_text())["record"]
 RECORD = EXPECTED["outputs"]["max_abs_d2s"]
 SIGNS = [{"branch1": 1.0, "branch2": x, "kappa2": 1.0} for x in (1.0, -1.0)]
-SEEN = 2e-3  # 64 poses see the peaks of acceleration to this part of them
+SEEN = 2e-4  # parabolas through 64 poses see the peaks of acceleration to this part of them
 
 
 def eliminated(least: float | None = None) -> Elimination:
@@ -52,8 +52,12 @@ def place_of_record(rows: PoseRows) -> np.ndarray:
 
 def test_record_is_worth_its_acceleration_and_its_rows_hold(rows: PoseRows) -> None:
     place = place_of_record(rows)
+    # The first linear program knows the peaks at the poses only, the others those between them.
     x = rows.unknowns(place)
-    assert rows.worth(place, x)[0] == pytest.approx(RECORD, rel=SEEN)
+    for _ in range(4):
+        x = rows.solved(place, x)
+    # The record keeps its limits to the last digit, and what 64 poses see beyond them is priced.
+    assert rows.worth(place, x)[0] == pytest.approx(RECORD, rel=3.0 * SEEN)
     names = rows.family.parameter_names
     design = rows.designs(place, x)[0]
     for name in ("a2", "xi2", "eta2", "h2"):  # a line the other way round is the same line
@@ -131,8 +135,31 @@ def test_populations_are_those_of_their_seed_and_number(monkeypatch: pytest.Monk
     assert not bred(linear, SIGNS, 2, 5, stop=lambda: True)
 
 
+def test_populations_are_made_until_they_tell_enough_whatever_the_number_of_processes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    small(monkeypatch)
+    monkeypatch.setattr(generations, "TOGETHER", 2)
+    monkeypatch.setattr(generations, "FIRST", 4)
+    monkeypatch.setattr(generations, "GENERATIONS", 0)
+    asked = []
+
+    def enough(found: list[Bred]) -> bool:
+        asked.append(len(found))
+        return len(found) >= 4
+
+    linear = eliminated(8.0)
+    alone = bred(linear, SIGNS, 6, 5, enough=enough)
+    assert asked == [2, 4] and len(alone) == 4
+    for one, other in zip(alone, bred(linear, SIGNS, 4, 5, jobs=2), strict=True):
+        same(one, other)
+    assert len(bred(linear, SIGNS, 3, 5)) == 3
+
+
 def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest.MonkeyPatch) -> None:
     small(monkeypatch)
+    monkeypatch.setattr(generations, "TOGETHER", 2)
+    monkeypatch.setattr(globally, "settled", lambda values, wanted: len(values) == 2)
     study = record(8.0, starts=4, seed=3, finalists=None)
     assert study.optimise is not None
     known = drawn(study, 1, 3)

@@ -7,11 +7,13 @@ mechanism at random.  Populations know nothing of each other: where several end 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, unsaid
@@ -26,9 +28,14 @@ from sweep.optimise.starts import spread
 
 SAMPLED, BLOCK = 1 << 14, 1 << 13  # proportions per combination of signs, two to eight in a hundred of which turn
 FIRST, LATER, GENERATIONS = 200, 80, 10  # descents of the first generation and of each other one; how many others
-HEAT, STEPS = 14, 50  # steps of all descents, and of the better half of them
+HEAT, STEPS = 14, 60  # steps of all descents, and of the better half of them
 PARENTS = 24  # best ends, no two of them alike, from which a generation is made: as many of all signs
+TRIES = (
+    8  # of every child, the first of which that turns descends: most mixed mechanisms do not, and that is quickly seen
+)
 MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations, one of which a child is varied by
+NICHE = 0.15  # of the average distance of two random guides: nearer ones are alike
+TOGETHER = 6  # populations between two looks at whether more are needed: the same for any number of jobs
 USELESS = 1.3  # times the best value: worse ends are no parents
 
 
@@ -64,7 +71,7 @@ class _Population:
         for generation in range(1 + GENERATIONS):
             if should_stop():
                 break
-            parents = _parents(ends, -(-PARENTS // len(rows)))
+            parents = _parents(ends, -(-PARENTS // len(rows)), ~rows[0].driving)
             if generation and not parents:
                 break
             for kind, own in enumerate(rows):
@@ -76,7 +83,7 @@ class _Population:
                     )
                 found, spent = _descended(own, kind, places, should_stop)
                 ends, looks = ends + found, looks + spent
-        best = _parents(ends, PARENTS)[:PARENTS]
+        best = _parents(ends, PARENTS, ~rows[0].driving)[:PARENTS]
         names = self.linear.problem.family.parameter_names
         designs = np.array([end.design for end in best]).reshape(-1, len(names))
         return Bred(turned_into(self.linear.problem, designs), np.array([end.worth for end in best]), looks)
@@ -103,6 +110,7 @@ def _children(
     """
     if not own:
         return np.empty((0, len(rows.own.columns)))
+    wanted, count = count, count * TRIES
     drivers = np.array([parents[k].place for k in rng.integers(0, len(parents), count)])
     places = np.array([own[k].place for k in rng.integers(0, len(own), count)])
     places[:, rows.driving] = drivers[:, rows.driving]
@@ -110,7 +118,9 @@ def _children(
     places = np.where(other, 1.0 - places, places)
     spread_by = np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)]
     places = places + spread_by[:, None] * rng.standard_normal(places.shape)
-    return rows.wrapped(places)
+    places = rows.wrapped(places).reshape(wanted, TRIES, -1)
+    worth = rows.begun(rows.without_middle(places.reshape(count, -1)))[1].reshape(wanted, TRIES)
+    return np.asarray(places[np.arange(wanted), np.argmin(worth >= STUCK, axis=1)], np.float64)
 
 
 def _descended(rows: PoseRows, kind: int, places: Array, stop: Callable[[], bool]) -> tuple[list[_End], int]:
@@ -126,12 +136,20 @@ def _descended(rows: PoseRows, kind: int, places: Array, stop: Callable[[], bool
     return [_End(float(many.worth[k]), kind, there[k], designs[k]) for k in known], many.looks
 
 
-def _parents(ends: Sequence[_End], most: int) -> list[_End]:
-    """The best ends, no two of the same signs and value and at most so many of the same signs."""
+def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[_End]:
+    """The best ends, at most so many of the same signs, no two of which have the same value or nearly the same guide.
+
+    Else the many that stopped on their way down one valley would take the places of all others.
+    """
     found: list[_End] = []
+    least = NICHE * math.sqrt(int(guide.sum()) / 6.0)
     for end in sorted(ends, key=lambda end: end.worth):
         own = [p for p in found if p.kind == end.kind]
-        alike = any(abs(end.worth - p.worth) <= 2.0 * AGREE * abs(p.worth) for p in own)
+        alike = any(
+            abs(end.worth - p.worth) <= 2.0 * AGREE * abs(p.worth)
+            or math.sqrt(float(((end.place - p.place)[guide] ** 2).sum())) < least
+            for p in own
+        )
         if not alike and len(own) < most and end.worth < USELESS * (found or [end])[0].worth:
             found.append(end)
     return found
@@ -140,30 +158,31 @@ def _parents(ends: Sequence[_End], most: int) -> list[_End]:
 def bred(
     linear: Elimination,
     signs: Sequence[dict[str, float]],
-    populations: int,
+    most: int,
     seed: int,
     stop: Callable[[], bool] = lambda: False,
     jobs: int = 1,
     say: Say = unsaid,
+    enough: Callable[[list[Bred]], bool] = lambda found: False,
 ) -> list[Bred]:
-    """Return the ends of populations that know nothing of each other.
+    """Return the ends of populations that know nothing of each other, six at a time until they tell enough.
 
     Parameters
     ----------
     linear : the linear part of the problem
     signs : combinations of the parameters that are not varied
-    populations : how many; each takes 14 000 looks, some 20 s
+    most : populations at most; each takes some 18 000 looks
     seed : of samples and children
     stop : true ends the populations where they are
     jobs : processes; the ends do not depend on it
-    say : called with how many populations have ended, and how many there are
+    say : called with how many populations have ended, and how many there are at most
+    enough : asked after every six of them whether they tell enough
     """
-    ended = itertools.count(1)
-    say("global search", 0, populations, "populations")
-    return spread_over(
-        _Population(linear, tuple(signs), seed),
-        list(range(populations)),
-        stop,
-        jobs,
-        lambda: say("global search", next(ended), populations, "populations"),
-    )
+    task, ended, found = _Population(linear, tuple(signs), seed), itertools.count(1), list[Bred]()
+    say("global search", 0, most, "populations")
+    for first in range(0, most, TOGETHER):
+        numbers = list(range(first, min(first + TOGETHER, most)))
+        found += spread_over(task, numbers, stop, jobs, lambda: say("global search", next(ended), most, "populations"))
+        if stop() or enough(found):
+            break
+    return found
