@@ -26,9 +26,7 @@ from sweep.optimise.pose_rows import PoseRows
 from sweep.optimise.proportions import turned_into
 from sweep.optimise.starts import spread
 
-SAMPLED, BLOCK = 1 << 14, 1 << 13  # proportions per combination of signs, two to eight in a hundred of which turn
-FIRST, LATER, GENERATIONS = 200, 80, 10  # descents of the first generation and of each other one; how many others
-HEAT, STEPS = 14, 60  # steps of all descents, and of the better half of them
+BLOCK = 1 << 13  # proportions that are looked at together
 PARENTS = 24  # best ends, no two of them alike, from which a generation is made: as many of all signs
 TRIES = (
     8  # of every child, the first of which that turns descends: most mixed mechanisms do not, and that is quickly seen
@@ -37,6 +35,25 @@ MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations, one of which a child is var
 NICHE = 0.15  # of the average distance of two random guides: nearer ones are alike
 TOGETHER = 6  # populations between two looks at whether more are needed: the same for any number of jobs
 USELESS = 1.3  # times the best value: worse ends are no parents
+
+
+class Size(NamedTuple):
+    """How large a population is.
+
+    ``sampled`` proportions for each combination of signs, two to eight in a hundred of which turn; ``first`` descents
+    of the first generation, ``later`` of each of the other ``generations``; ``heat`` steps of all descents, ``steps``
+    of the better half of them.
+    """
+
+    sampled: int = 1 << 14
+    first: int = 200
+    later: int = 80
+    generations: int = 10
+    heat: int = 14
+    steps: int = 60
+
+
+FULL = Size()
 
 
 class Bred(NamedTuple):
@@ -61,6 +78,7 @@ class _Population:
     linear: Elimination
     signs: tuple[dict[str, float], ...]
     seed: int
+    size: Size = FULL
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Bred:
         """The ends of the population of that number."""
@@ -68,7 +86,7 @@ class _Population:
         rng = np.random.default_rng((self.seed, number))
         ends: list[_End] = []
         looks = 0
-        for generation in range(1 + GENERATIONS):
+        for generation in range(1 + self.size.generations):
             if should_stop():
                 break
             parents = _parents(ends, -(-PARENTS // len(rows)), ~rows[0].driving)
@@ -76,12 +94,12 @@ class _Population:
                 break
             for kind, own in enumerate(rows):
                 if generation == 0:
-                    places = _sampled(own, rng, -(-FIRST // len(rows)))
+                    places = _sampled(own, rng, self.size, len(rows))
                 else:
                     places = _children(
-                        own, [p for p in parents if p.kind == kind], parents, rng, -(-LATER // len(rows))
+                        own, [p for p in parents if p.kind == kind], parents, rng, -(-self.size.later // len(rows))
                     )
-                found, spent = _descended(own, kind, places, should_stop)
+                found, spent = _descended(own, kind, places, self.size, should_stop)
                 ends, looks = ends + found, looks + spent
         best = _parents(ends, PARENTS, ~rows[0].driving)[:PARENTS]
         names = self.linear.problem.family.parameter_names
@@ -89,15 +107,17 @@ class _Population:
         return Bred(turned_into(self.linear.problem, designs), np.array([end.worth for end in best]), looks)
 
 
-def _sampled(rows: PoseRows, rng: np.random.Generator, count: int) -> Array:
+def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, kinds: int) -> Array:
     """Places of a Sobol sample that turn: the best that are not alike."""
     from scipy.stats import qmc
 
-    place = qmc.Sobol(len(rows.own.columns), seed=rng).random(SAMPLED)
-    worth = np.concatenate([rows.own.merit(block) for block in np.split(place, max(1, SAMPLED // BLOCK))])
+    place = qmc.Sobol(len(rows.own.columns), seed=rng).random(size.sampled)
+    worth = np.concatenate([rows.own.merit(block) for block in np.split(place, max(1, size.sampled // BLOCK))])
     order = np.argsort(worth, kind="stable")
     order = order[worth[order] < STUCK]
-    return np.asarray(place[order][spread(place[order], np.zeros(len(order), np.intp), count)], np.float64)
+    return np.asarray(
+        place[order][spread(place[order], np.zeros(len(order), np.intp), -(-size.first // kinds))], np.float64
+    )
 
 
 def _children(
@@ -123,14 +143,16 @@ def _children(
     return np.asarray(places[np.arange(wanted), np.argmin(worth >= STUCK, axis=1)], np.float64)
 
 
-def _descended(rows: PoseRows, kind: int, places: Array, stop: Callable[[], bool]) -> tuple[list[_End], int]:
+def _descended(
+    rows: PoseRows, kind: int, places: Array, size: Size, stop: Callable[[], bool]
+) -> tuple[list[_End], int]:
     """Where descents from some places end, the worse half given up after a heat; and how many looks that took."""
     if not len(places):
         return [], 0
     many = Abreast(rows, rows.without_middle(places))
-    many.advance(HEAT, stop)
+    many.advance(size.heat, stop)
     many.keep(np.argsort(many.worth, kind="stable")[: -(-len(places) // 2)])
-    many.advance(STEPS - HEAT, stop)
+    many.advance(size.steps - size.heat, stop)
     designs, there = rows.designs(many.places, many.x), rows.with_middle(many.places)
     known = np.flatnonzero(many.worth < STUCK)
     return [_End(float(many.worth[k]), kind, there[k], designs[k]) for k in known], many.looks
@@ -164,6 +186,7 @@ def bred(
     jobs: int = 1,
     say: Say = unsaid,
     enough: Callable[[list[Bred]], bool] = lambda found: False,
+    size: Size = FULL,
 ) -> list[Bred]:
     """Return the ends of populations that know nothing of each other, six at a time until they tell enough.
 
@@ -177,12 +200,13 @@ def bred(
     jobs : processes; the ends do not depend on it
     say : called with how many populations have ended, and how many there are at most
     enough : asked after every six of them whether they tell enough
+    size : of each
     """
-    task, ended, found = _Population(linear, tuple(signs), seed), itertools.count(1), list[Bred]()
+    task, ended, found = _Population(linear, tuple(signs), seed, size), itertools.count(1), list[Bred]()
     say("global search", 0, most, "populations")
     for first in range(0, most, TOGETHER):
         numbers = list(range(first, min(first + TOGETHER, most)))
         found += spread_over(task, numbers, stop, jobs, lambda: say("global search", next(ended), most, "populations"))
-        if stop() or enough(found):
+        if stop() or numbers[-1] == most - 1 or enough(found):
             break
     return found

@@ -11,8 +11,9 @@ from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.filling import kinds
-from sweep.optimise.generations import bred
+from sweep.optimise.generations import TOGETHER, Bred, bred
 from sweep.optimise.linear import NEEDED, Elimination, elimination
+from sweep.optimise.parallel import SearchTask, spread_over
 from sweep.optimise.problem import Problem
 from sweep.optimise.proportions import from_proportions, widened
 from sweep.optimise.starts import ALIKE, diverse
@@ -68,10 +69,19 @@ def proportion_starts(
     count = settings.starts
     own = diverse(problem, known, merit, count // SWEPT, ALIKE) if len(merit) else known[:0]
     signs = kinds(study, problem, own)
-    populations = bred(
-        linear, signs, max(1, count - len(own)), settings.seed, stop, jobs, say,
-        lambda found: settled([float(one.worth[0]) for one in found if len(one.worth)], settings.unseen),
-    )  # fmt: skip
+    ends: list[float] = []
+
+    def enough(found: list[Bred]) -> bool:
+        """Whether the best ends tell enough once they are searched on: the poses alone take one valley for several."""
+        new = [one.designs[0] for one in found[-TOGETHER:] if len(one.designs)]
+        if not new:
+            return False
+        task = SearchTask(_holding(study, problem, np.array(new)), np.array(new), settings.looks)
+        ends.extend(r.objective for r in spread_over(task, list(range(len(new))), stop, jobs) if r.feasible)
+        return settled(ends, settings.unseen)
+
+    most = max(1, count - len(own))
+    populations = bred(linear, signs, most, settings.seed, stop, jobs, say, enough)
     first = [(k, found.designs[0]) for k, found in enumerate(populations) if len(found.designs)]
     met = [float(found.worth[0]) for found in populations if len(found.worth)]
     others = sorted(
