@@ -32,8 +32,8 @@ study = load_study(Path("studies/needle208"))
 linear = elimination(problem_of(study, drawn(study, 1, 208)))
 signs = [{"branch1": 1.0, "branch2": 1.0, "kappa2": 1.0}]
 print(proportions.from_proportions(linear, signs, 2, 7).tobytes().hex())
-generations.SAMPLED, generations.FIRST, generations.LATER, generations.GENERATIONS = 1 << 13, 6, 4, 1
-print(generations.bred(linear, signs, 1, 7)[0].designs.tobytes().hex())
+size = generations.Size(sampled=1 << 13, first=6, later=4, generations=1)
+print(generations.bred(linear, signs, 1, 7, size=size)[0].designs.tobytes().hex())
 """
 # What numpy and OpenBLAS would choose on other processors: a search that asked them would end at other bits.
 OTHERS = [

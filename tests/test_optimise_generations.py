@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import itertools
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sweep
-from sweep.optimise import generations
+from sweep.optimise import generations, globally
 from sweep.optimise.abreast import Abreast
 from sweep.optimise.filling import kinds
-from sweep.optimise.generations import Bred, bred
+from sweep.optimise.generations import Bred, Size, bred
 from sweep.optimise.globally import proportion_starts
 from sweep.optimise.linear import Elimination, elimination
 from sweep.optimise.pose_rows import UNKNOWNS, PoseRows
@@ -25,7 +26,7 @@ from tests.needle208_record import record
 EXPECTED = json.loads((Path(__file__).parents[1] / "studies" / "needle208" / "expected.json").read_text())["record"]
 RECORD = EXPECTED["outputs"]["max_abs_d2s"]
 SIGNS = [{"branch1": 1.0, "branch2": x, "kappa2": 1.0} for x in (1.0, -1.0)]
-SEEN = 2e-3  # 64 poses see the peaks of acceleration to this part of them
+SEEN = 2e-4  # parabolas through 64 poses see the peaks of acceleration to this part of them
 
 
 def eliminated(least: float | None = None) -> Elimination:
@@ -52,8 +53,12 @@ def place_of_record(rows: PoseRows) -> np.ndarray:
 
 def test_record_is_worth_its_acceleration_and_its_rows_hold(rows: PoseRows) -> None:
     place = place_of_record(rows)
+    # The first linear program knows the peaks at the poses only, the others those between them.
     x = rows.unknowns(place)
-    assert rows.worth(place, x)[0] == pytest.approx(RECORD, rel=SEEN)
+    for _ in range(4):
+        x = rows.solved(place, x)
+    # The record keeps its limits to the last digit, and what 64 poses see beyond them is priced.
+    assert rows.worth(place, x)[0] == pytest.approx(RECORD, rel=3.0 * SEEN)
     names = rows.family.parameter_names
     design = rows.designs(place, x)[0]
     for name in ("a2", "xi2", "eta2", "h2"):  # a line the other way round is the same line
@@ -102,9 +107,7 @@ def test_descents_beside_change_nothing_and_descents_can_be_given_up(rows: PoseR
     assert together.worth[0] == alone.worth[0]
 
 
-def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in {"SAMPLED": 1 << 13, "FIRST": 12, "LATER": 6, "GENERATIONS": 1, "HEAT": 4, "STEPS": 8}.items():
-        monkeypatch.setattr(generations, name, value)
+SMALL = Size(sampled=1 << 13, first=12, later=6, generations=1, heat=4, steps=8)
 
 
 def same(one: Bred, other: Bred) -> None:
@@ -113,11 +116,10 @@ def same(one: Bred, other: Bred) -> None:
     assert one.looks == other.looks
 
 
-def test_populations_are_those_of_their_seed_and_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    small(monkeypatch)
+def test_populations_are_those_of_their_seed_and_number() -> None:
     linear = eliminated(8.0)
-    first, second = bred(linear, SIGNS, 2, 5)
-    same(bred(linear, SIGNS, 1, 5)[0], first)
+    first, second = bred(linear, SIGNS, 2, 5, size=SMALL)
+    same(bred(linear, SIGNS, 1, 5, size=SMALL)[0], first)
     assert not np.array_equal(first.designs, second.designs)
     assert (np.diff(first.worth) > 0.0).all() and len(first.worth) >= 4
     names = linear.problem.family.parameter_names
@@ -131,13 +133,34 @@ def test_populations_are_those_of_their_seed_and_number(monkeypatch: pytest.Monk
     assert not bred(linear, SIGNS, 2, 5, stop=lambda: True)
 
 
+def test_populations_are_made_until_they_tell_enough_whatever_the_number_of_processes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(generations, "TOGETHER", 2)
+    tiny = SMALL._replace(sampled=1 << 11, first=4, generations=0, steps=5)
+    asked = []
+
+    def enough(found: list[Bred]) -> bool:
+        asked.append(len(found))
+        return len(found) >= 4
+
+    linear = eliminated(8.0)
+    alone = bred(linear, SIGNS, 6, 5, enough=enough, size=tiny)
+    assert asked == [2, 4] and len(alone) == 4
+    for one, other in zip(alone, bred(linear, SIGNS, 2, 5, jobs=2, size=tiny), strict=False):
+        same(one, other)
+    assert len(bred(linear, SIGNS, 3, 5, size=tiny)) == 3
+
+
 def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    small(monkeypatch)
-    study = record(8.0, starts=4, seed=3, finalists=None)
+    monkeypatch.setattr(generations, "TOGETHER", 2)
+    monkeypatch.setattr(globally, "settled", lambda values, wanted: True)
+    monkeypatch.setattr(globally, "bred", partial(bred, size=SMALL))
+    study = record(8.0, starts=4, seed=3, looks=100)
     assert study.optimise is not None
     known = drawn(study, 1, 3)
     begun = proportion_starts(study, study.optimise, problem_of(study, known), known[:0], np.empty(0), lambda: False, 1)
-    found = bred(eliminated(8.0), kinds(study, begun.problem, known[:0]), 2, 3)
+    found = bred(eliminated(8.0), kinds(study, begun.problem, known[:0]), 2, 3, size=SMALL)
     assert begun.origins is not None and begun.origins[:2] == (0, 1) and len(begun.starts) == 4
     np.testing.assert_array_equal(begun.starts[:2], [one.designs[0] for one in found])
     worth = {one.designs[k].tobytes(): one.worth[k] for one in found for k in range(len(one.worth))}
@@ -149,8 +172,8 @@ def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest
 
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(1, 6))
-def test_two_populations_of_any_seed_find_the_record(seed: int) -> None:
-    study = record(seed=seed, starts=4, finalists=None, looks=2000)
+def test_three_populations_of_any_seed_find_the_record(seed: int) -> None:
+    study = record(seed=seed, starts=3, looks=2000)
     assert study.optimise is not None
     known = drawn(study, 1, seed)
     problem = problem_of(study, known)

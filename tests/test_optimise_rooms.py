@@ -9,10 +9,12 @@ from kernels.waves import trigonometric_sum
 from sweep.families import family
 from sweep.families.base import Angles
 from sweep.optimise import Problem
+from sweep.optimise.form import Program
 from sweep.optimise.gradients import gradients, stepped
 from sweep.optimise.made import changes
+from sweep.optimise.model import Model
 from sweep.optimise.points import Curves
-from sweep.optimise.rooms import curves_with_room, rooms
+from sweep.optimise.rooms import allowances, curves_with_room, rooms
 from sweep.reductions.measures import Series
 from sweep.study import Limit
 
@@ -106,3 +108,30 @@ def test_trigonometric_sum_and_its_slope_equal_numpys() -> None:
     np.testing.assert_allclose(out, coefficients[:, :1] + even @ cosines + odd @ sines, rtol=0.0, atol=1e-13)
     trigonometric_sum(coefficients, phi, True, out)
     np.testing.assert_allclose(out, (odd * k) @ cosines - (even * k) @ sines, rtol=0.0, atol=2e-12)
+
+
+def test_allowance_moves_a_bound_with_the_design_and_its_slope_is_in_the_gradients() -> None:
+    plain = problem()
+    # A room of the stroke that grows with the crank's length and with h, as a function of the design.
+    given = allowances(plain, DESIGN, lambda row: {"stroke": 0.5 * row[0] ** 2 + 0.1 * np.sin(row[7])})
+    assert given["stroke"].names == plain.variables
+    # Central differences over 6e-5 of a sine are good to 1e-9.
+    np.testing.assert_allclose(given["stroke"].slopes[[0, 7]], [DESIGN[0], 0.1 * np.cos(DESIGN[7])], rtol=1e-8)
+    np.testing.assert_allclose(given["stroke"].slopes[1:7], 0.0, atol=1e-9)
+    moving = problem(allowances=given)
+    models = [Model(x, Program(x), DESIGN, lambda: False) for x in (plain, moving)]
+    there = plain.scaled(DESIGN[None, :])[0] + 0.01
+    rows, slopes = [], []
+    for model in models:
+        state = model.state(there)
+        own = [k for k, label in enumerate(state.form.labels) if label.name == "stroke"]
+        rows.append(state.form.rows(state.atoms, 0.0)[own])
+        slopes.append(model.jacobian(there, state.form, state.form.points)[own])
+    moved = float(given["stroke"].slopes @ (moving.placed(DESIGN, there) - DESIGN)[:8])
+    state = models[1].state(there)
+    sides = {label.side for label in state.form.labels if label.name == "stroke"}
+    assert sides == {"minimum", "maximum"} and moved > 1e-3
+    # Both bounds of the band come nearer by as much, so every row of the stroke is smaller and steeper alike.
+    assert (rows[1] < rows[0]).all()
+    change = slopes[1] - slopes[0]
+    assert (change[:, 0] < 0.0).all() and (np.abs(change[:, 1:7]) < 1e-7).all()

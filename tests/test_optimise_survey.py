@@ -12,7 +12,7 @@ import pytest
 from kernels import status as st
 from sweep.optimise import Problem, Result, Survey, explore
 from sweep.optimise.solve import BATCH
-from sweep.optimise.survey import survey, with_basins
+from sweep.optimise.survey import settled, survey, with_basins
 from sweep.study import OptimiseSettings, load_study
 from tests.optimise_family import FAMILY
 from tests.test_optimise_study import STUDY
@@ -56,8 +56,39 @@ def test_of_a_global_search_the_best_end_counts_alone() -> None:
     # Three searches, all of which ended in the best basin; their other ends, and a start of the sweep, do not count.
     found = survey(bowl(), starts(7), ends, ASKED, "starts", (0, 1, 2, 0, 1, 2, -1))
     assert (found.basins, found.best, found.starts) == (1, 3, 7) and found.unseen == pytest.approx(2 / 6)
+    assert found.populations == 3 and found.better == pytest.approx(1 / 6) and not found.enough
+    assert found.words == (
+        "1 basin met by 3 populations, the best 3 times, estimated unseen 33 %, unseen and better 17 %"
+    )
+    assert "the share of unseen better basins is estimated at 17 %, not the 2 % asked" in found.warnings[-1]
     twice = survey(bowl(), starts(7), ends, ASKED, "starts", (0, 0, 0, 1, 1, 1, -1))
     assert (twice.basins, twice.best) == (2, 1) and twice.unseen == 1.0
+
+
+def test_populations_are_enough_where_few_unseen_basins_can_be_better() -> None:
+    # Twelve of which ten ended at the best: 1/12 unseen, of three ranks the first is one in three.
+    assert not settled([1.0] * 10 + [1.1, 1.2], 0.02)
+    # Two met twice: 3 * 4 / (12 * 11) unseen, a quarter of it better; where values nearly agree it is one basin.
+    assert not settled([1.0] * 8 + [1.1, 1.1, 1.2, 1.2], 0.02)
+    assert settled([1.0] * 8 + [1.1, 1.10001, 1.09999, 1.10002], 0.02)
+    assert settled([1.0] * 15 + [1.1, 1.2, 1.3], 0.05) and not settled([1.0] * 2 + [1.1] * 16, 0.02)
+    assert not settled([], 0.02) and not settled([1.0], 1.0)
+
+
+def test_chance_of_a_better_basin_is_what_random_searches_find() -> None:
+    # Six basins of random volumes and ranks; 18 searches each.  The estimate is no smaller than what happens.
+    rng = np.random.default_rng(8)
+    estimated, happened = [], []
+    for _ in range(1000):
+        volumes = rng.dirichlet(np.ones(6))
+        ends = rng.choice(6, 18, p=volumes)  # basin 0 is the best
+        first = int(ends.min())
+        if (ends == first).sum() >= 3:
+            found = survey(bowl(), starts(18), [result(k, 1.0 + x) for k, x in enumerate(ends)], ASKED, "starts",
+                           tuple(range(18)))  # fmt: skip
+            estimated.append(found.better)
+            happened.append(volumes[:first].sum())
+    assert np.mean(estimated) >= 0.9 * np.mean(happened)
 
 
 def test_starts_beside_each_other_count_once() -> None:

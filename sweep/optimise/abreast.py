@@ -19,6 +19,7 @@ from sweep.optimise.quasi import learnt
 
 RADIUS, LARGEST, LEAST = 0.1, 0.3, 1e-6  # of the first box about a place, of any, of one that has come to rest
 SPENT = 1e-6  # gain promised, as a share of the objective, at which a descent has come to rest
+RENEWED = 1e-5  # gain since it came to rest before, as a share of the objective, after which it begins anew
 EXACT = 1e-11  # distance by which the point nearest to the centre may miss a row
 NEAR = 0.15  # rows further from their bound join the quadratic program only where its step would miss them
 JOINED, MISSED = 6, 1e-6  # times that they may, and what is no miss
@@ -77,20 +78,19 @@ class Abreast:
 
     def __init__(self, rows: PoseRows, places: Array) -> None:
         self.rows, self.places = rows, places.copy()
-        x = rows.unknowns(places)
-        known: NDArray[np.bool_] = np.asarray(np.isfinite(x).all(axis=1), np.bool_)
-        self.x = np.where(known[:, None], x, 1.0)
-        self.worth: Array = np.where(known, rows.worth(self.places, self.x), np.inf)
+        self.x, self.worth = rows.begun(self.places)
         k, n = places.shape
         self.radius: Array = np.where(self.worth < LOCKED, RADIUS, 0.0)
-        self.curvature = np.repeat(np.diag([SOFT] * n + [LINEAR] * UNKNOWNS)[None], k, axis=0)
+        self.rested: Array = np.full(k, np.inf)
+        self.soft = np.diag([SOFT] * n + [LINEAR] * UNKNOWNS)
+        self.curvature = np.repeat(self.soft[None], k, axis=0)
         self.known: list[_Known | None] = [None] * k
         self.memory: list[tuple[_Known, Array] | None] = [None] * k
         self.looks = 0
 
     def keep(self, numbers: NDArray[np.intp]) -> None:
         """Go on with some of the descents only."""
-        for name in ("places", "x", "worth", "radius", "curvature"):
+        for name in ("places", "x", "worth", "radius", "rested", "curvature"):
             setattr(self, name, getattr(self, name)[numbers])
         self.memory = [self.memory[k] for k in numbers]
         self.known = [self.known[k] for k in numbers]
@@ -191,6 +191,13 @@ class Abreast:
             self.radius[k] = min(2.0 * self.radius[k], LARGEST)
         if promised <= SPENT * abs(self.worth[k]):
             self.radius[k] = 0.0
+        if self.radius[k] <= LEAST and self.rested[k] - self.worth[k] > RENEWED * abs(self.worth[k]):
+            self._renew(k)
+
+    def _renew(self, k: int) -> None:
+        """Begin anew where a descent has come to rest: curvature once learnt may promise less than there is."""
+        self.rested[k], self.radius[k], self.memory[k] = self.worth[k], RADIUS, None
+        self.curvature[k] = self.soft
 
     def _prepared(self, k: int) -> _Program:
         """The quadratic program of a descent's next step, but for the values of its rows."""
@@ -222,7 +229,7 @@ class Abreast:
         rows[:OBJECTIVE] += here.t / unit
         ends = np.concatenate([program.low, -program.high])
         inside = np.zeros(len(rows), np.bool_)
-        more, y = self.rows.peaks(rows, NEAR), np.empty(len(program.centre))
+        more, y = self.rows.turns.peaks(rows, NEAR), np.empty(len(program.centre))
         for _ in range(JOINED):
             inside |= more
             own = np.concatenate([program.turned[:, inside], program.box], axis=1)
@@ -230,7 +237,7 @@ class Abreast:
             nearest(own, np.concatenate([-rows[inside], ends]), program.centre, EXACT, y, found)
             step = times(program.back, y)
             there = rows + times(step, program.linear)
-            more = ~inside & self.rows.peaks(there, -MISSED)
+            more = ~inside & self.rows.turns.peaks(there, -MISSED)
             if not more.any():
                 break
         weights = np.zeros(len(rows))

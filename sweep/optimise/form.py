@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -18,16 +19,30 @@ from sweep.optimise.terms import Term, box, numbers
 from sweep.reductions.catalogue import output
 from sweep.reductions.measures import Measure, Series, margins, measure
 
+if TYPE_CHECKING:
+    from sweep.optimise.rooms import Allowance
+
 SMALLEST = 1e-100  # a limit nearer to zero is a limit at zero
+
+
+Moving: TypeAlias = tuple[Mapping[str, float], float]
+NOT_MOVING: Moving = ({}, 0.0)
+DIFFERENCE = 1e-6  # relative, for the derivative of an inner value by its output
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """One limit in the optimiser's inner values (`Measure`); it is an equation where ``minimum == maximum``."""
+    """One limit in the optimiser's inner values (`Measure`); it is an equation where ``minimum == maximum``.
+
+    ``raised`` and ``lowered`` say how its lower and upper bound change with parameters, by their names: derivatives,
+    and the sum of these times the values at which the bounds are as given.
+    """
 
     measure: Measure
     minimum: float | None
     maximum: float | None
+    raised: Moving = NOT_MOVING
+    lowered: Moving = NOT_MOVING
 
     @property
     def equal(self) -> bool:
@@ -72,10 +87,13 @@ class Program:
                 side is None or 0.0 < float(side) < math.pi / 2 for side in (limit.minimum, limit.maximum)
             ):
                 raise InputError(limit.output, (limit.minimum, limit.maximum), "angles between 0 and pi/2", PLACE)
-            self.requirements.append(Requirement(found, sides[0], sides[1]))
+            given = problem.allowances.get(limit.output)
+            raised, lowered = (_moving(found, b, given, s) for b, s in ((limit.minimum, 1.0), (limit.maximum, -1.0)))
+            self.requirements.append(Requirement(found, sides[0], sides[1], raised, lowered))
         measures = [self.objective, *(r.measure for r in self.requirements)]
         self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
-        self.scalars = tuple(dict.fromkeys(name for m in measures for name in m.numbers))
+        moving = [name for r in self.requirements for side in (r.raised, r.lowered) for name in side[0]]
+        self.scalars = tuple(dict.fromkeys([*(name for m in measures for name in m.numbers), *moving]))
         self.pieces = {name: piece for m in measures for name, piece in zip(m.numbers, m.pieces, strict=False)}
         self.places = any(m.follows_angles for m in measures)
         readings = (m.parts[0] if m.kind == "minus" else m for m in measures)
@@ -102,6 +120,17 @@ class Program:
         layout = _Layout(curves, form.points, design, self.scalars)
         inner = [sum(w * atoms[k] for k, w in term.items()) + shift for term, shift in layout.upper(found)]
         return found.from_inner(float(max(inner))) if inner else math.nan
+
+
+def _moving(found: Measure, bound: float | None, given: Allowance | None, sense: float) -> Moving:
+    """Return how a bound changes in inner values when its allowance grows; ``sense`` is +1 for a lower bound."""
+    if bound is None or given is None:
+        return NOT_MOVING
+    step = DIFFERENCE * max(abs(bound), DIFFERENCE)
+    per = sense * (found.to_inner(bound + step) - found.to_inner(bound - step)) / (2.0 * step)
+    slopes = {name: per * float(slope) for name, slope in zip(given.names, given.slopes, strict=True) if slope != 0.0}
+    at = dict(zip(given.names, given.place.tolist(), strict=True))
+    return slopes, sum(slope * at[name] for name, slope in slopes.items())
 
 
 def _label(r: Requirement, side: str, bound: float, size: float) -> Label:
@@ -140,16 +169,24 @@ class _Layout:
         if r.minimum is not None:
             terms, size = self.lower(r.measure), self._size(r, r.minimum)
             found = found and bool(terms)
-            for term, shift in terms:
+            for term, shift in self._moved(terms, r.raised):
                 label = _label(r, "minimum", r.minimum, size)
                 self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, False, label)
         if r.maximum is not None:
             terms, size = self.upper(r.measure), self._size(r, r.maximum)
             found = found and bool(terms)
-            for term, shift in terms:
+            for term, shift in self._moved(terms, r.lowered):
                 label = _label(r, "maximum", r.maximum, size)
                 self.add(term, shift, -1.0 / size, r.maximum / size, 0.0, False, label)
         return found
+
+    def _moved(self, terms: list[tuple[Term, float]], moving: Moving) -> list[tuple[Term, float]]:
+        """Return sums less by how much their bound has moved."""
+        first = 2 * len(self.points)
+        more = {first + self.scalars.index(name): -slope for name, slope in moving[0].items()}
+        return [
+            ({k: term.get(k, 0.0) + more.get(k, 0.0) for k in term | more}, shift + moving[1]) for term, shift in terms
+        ]
 
     def upper(self, m: Measure) -> list[tuple[Term, float]]:
         """List sums of atoms: the inner value is below a bound if and only if all of them are."""

@@ -7,11 +7,13 @@ mechanism at random.  Populations know nothing of each other: where several end 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, unsaid
@@ -24,12 +26,34 @@ from sweep.optimise.pose_rows import PoseRows
 from sweep.optimise.proportions import turned_into
 from sweep.optimise.starts import spread
 
-SAMPLED, BLOCK = 1 << 14, 1 << 13  # proportions per combination of signs, two to eight in a hundred of which turn
-FIRST, LATER, GENERATIONS = 200, 80, 10  # descents of the first generation and of each other one; how many others
-HEAT, STEPS = 14, 50  # steps of all descents, and of the better half of them
+BLOCK = 1 << 13  # proportions that are looked at together
 PARENTS = 24  # best ends, no two of them alike, from which a generation is made: as many of all signs
+TRIES = (
+    8  # of every child, the first of which that turns descends: most mixed mechanisms do not, and that is quickly seen
+)
 MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations, one of which a child is varied by
+NICHE = 0.15  # of the average distance of two random guides: nearer ones are alike
+TOGETHER = 6  # populations between two looks at whether more are needed: the same for any number of jobs
 USELESS = 1.3  # times the best value: worse ends are no parents
+
+
+class Size(NamedTuple):
+    """How large a population is.
+
+    ``sampled`` proportions for each combination of signs, two to eight in a hundred of which turn; ``first`` descents
+    of the first generation, ``later`` of each of the other ``generations``; ``heat`` steps of all descents, ``steps``
+    of the better half of them.
+    """
+
+    sampled: int = 1 << 14
+    first: int = 200
+    later: int = 80
+    generations: int = 10
+    heat: int = 14
+    steps: int = 60
+
+
+FULL = Size()
 
 
 class Bred(NamedTuple):
@@ -54,6 +78,7 @@ class _Population:
     linear: Elimination
     signs: tuple[dict[str, float], ...]
     seed: int
+    size: Size = FULL
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Bred:
         """The ends of the population of that number."""
@@ -61,36 +86,38 @@ class _Population:
         rng = np.random.default_rng((self.seed, number))
         ends: list[_End] = []
         looks = 0
-        for generation in range(1 + GENERATIONS):
+        for generation in range(1 + self.size.generations):
             if should_stop():
                 break
-            parents = _parents(ends, -(-PARENTS // len(rows)))
+            parents = _parents(ends, -(-PARENTS // len(rows)), ~rows[0].driving)
             if generation and not parents:
                 break
             for kind, own in enumerate(rows):
                 if generation == 0:
-                    places = _sampled(own, rng, -(-FIRST // len(rows)))
+                    places = _sampled(own, rng, self.size, len(rows))
                 else:
                     places = _children(
-                        own, [p for p in parents if p.kind == kind], parents, rng, -(-LATER // len(rows))
+                        own, [p for p in parents if p.kind == kind], parents, rng, -(-self.size.later // len(rows))
                     )
-                found, spent = _descended(own, kind, places, should_stop)
+                found, spent = _descended(own, kind, places, self.size, should_stop)
                 ends, looks = ends + found, looks + spent
-        best = _parents(ends, PARENTS)[:PARENTS]
+        best = _parents(ends, PARENTS, ~rows[0].driving)[:PARENTS]
         names = self.linear.problem.family.parameter_names
         designs = np.array([end.design for end in best]).reshape(-1, len(names))
         return Bred(turned_into(self.linear.problem, designs), np.array([end.worth for end in best]), looks)
 
 
-def _sampled(rows: PoseRows, rng: np.random.Generator, count: int) -> Array:
+def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, kinds: int) -> Array:
     """Places of a Sobol sample that turn: the best that are not alike."""
     from scipy.stats import qmc
 
-    place = qmc.Sobol(len(rows.own.columns), seed=rng).random(SAMPLED)
-    worth = np.concatenate([rows.own.merit(block) for block in np.split(place, max(1, SAMPLED // BLOCK))])
+    place = qmc.Sobol(len(rows.own.columns), seed=rng).random(size.sampled)
+    worth = np.concatenate([rows.own.merit(block) for block in np.split(place, max(1, size.sampled // BLOCK))])
     order = np.argsort(worth, kind="stable")
     order = order[worth[order] < STUCK]
-    return np.asarray(place[order][spread(place[order], np.zeros(len(order), np.intp), count)], np.float64)
+    return np.asarray(
+        place[order][spread(place[order], np.zeros(len(order), np.intp), -(-size.first // kinds))], np.float64
+    )
 
 
 def _children(
@@ -103,6 +130,7 @@ def _children(
     """
     if not own:
         return np.empty((0, len(rows.own.columns)))
+    wanted, count = count, count * TRIES
     drivers = np.array([parents[k].place for k in rng.integers(0, len(parents), count)])
     places = np.array([own[k].place for k in rng.integers(0, len(own), count)])
     places[:, rows.driving] = drivers[:, rows.driving]
@@ -110,28 +138,40 @@ def _children(
     places = np.where(other, 1.0 - places, places)
     spread_by = np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)]
     places = places + spread_by[:, None] * rng.standard_normal(places.shape)
-    return rows.wrapped(places)
+    places = rows.wrapped(places).reshape(wanted, TRIES, -1)
+    worth = rows.begun(rows.without_middle(places.reshape(count, -1)))[1].reshape(wanted, TRIES)
+    return np.asarray(places[np.arange(wanted), np.argmin(worth >= STUCK, axis=1)], np.float64)
 
 
-def _descended(rows: PoseRows, kind: int, places: Array, stop: Callable[[], bool]) -> tuple[list[_End], int]:
+def _descended(
+    rows: PoseRows, kind: int, places: Array, size: Size, stop: Callable[[], bool]
+) -> tuple[list[_End], int]:
     """Where descents from some places end, the worse half given up after a heat; and how many looks that took."""
     if not len(places):
         return [], 0
     many = Abreast(rows, rows.without_middle(places))
-    many.advance(HEAT, stop)
+    many.advance(size.heat, stop)
     many.keep(np.argsort(many.worth, kind="stable")[: -(-len(places) // 2)])
-    many.advance(STEPS - HEAT, stop)
+    many.advance(size.steps - size.heat, stop)
     designs, there = rows.designs(many.places, many.x), rows.with_middle(many.places)
     known = np.flatnonzero(many.worth < STUCK)
     return [_End(float(many.worth[k]), kind, there[k], designs[k]) for k in known], many.looks
 
 
-def _parents(ends: Sequence[_End], most: int) -> list[_End]:
-    """The best ends, no two of the same signs and value and at most so many of the same signs."""
+def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[_End]:
+    """The best ends, at most so many of the same signs, no two of which have the same value or nearly the same guide.
+
+    Else the many that stopped on their way down one valley would take the places of all others.
+    """
     found: list[_End] = []
+    least = NICHE * math.sqrt(int(guide.sum()) / 6.0)
     for end in sorted(ends, key=lambda end: end.worth):
         own = [p for p in found if p.kind == end.kind]
-        alike = any(abs(end.worth - p.worth) <= 2.0 * AGREE * abs(p.worth) for p in own)
+        alike = any(
+            abs(end.worth - p.worth) <= 2.0 * AGREE * abs(p.worth)
+            or math.sqrt(float(((end.place - p.place)[guide] ** 2).sum())) < least
+            for p in own
+        )
         if not alike and len(own) < most and end.worth < USELESS * (found or [end])[0].worth:
             found.append(end)
     return found
@@ -140,30 +180,33 @@ def _parents(ends: Sequence[_End], most: int) -> list[_End]:
 def bred(
     linear: Elimination,
     signs: Sequence[dict[str, float]],
-    populations: int,
+    most: int,
     seed: int,
     stop: Callable[[], bool] = lambda: False,
     jobs: int = 1,
     say: Say = unsaid,
+    enough: Callable[[list[Bred]], bool] = lambda found: False,
+    size: Size = FULL,
 ) -> list[Bred]:
-    """Return the ends of populations that know nothing of each other.
+    """Return the ends of populations that know nothing of each other, six at a time until they tell enough.
 
     Parameters
     ----------
     linear : the linear part of the problem
     signs : combinations of the parameters that are not varied
-    populations : how many; each takes 14 000 looks, some 20 s
+    most : populations at most; each takes some 18 000 looks
     seed : of samples and children
     stop : true ends the populations where they are
     jobs : processes; the ends do not depend on it
-    say : called with how many populations have ended, and how many there are
+    say : called with how many populations have ended, and how many there are at most
+    enough : asked after every six of them whether they tell enough
+    size : of each
     """
-    ended = itertools.count(1)
-    say("global search", 0, populations, "populations")
-    return spread_over(
-        _Population(linear, tuple(signs), seed),
-        list(range(populations)),
-        stop,
-        jobs,
-        lambda: say("global search", next(ended), populations, "populations"),
-    )
+    task, ended, found = _Population(linear, tuple(signs), seed, size), itertools.count(1), list[Bred]()
+    say("global search", 0, most, "populations")
+    for first in range(0, most, TOGETHER):
+        numbers = list(range(first, min(first + TOGETHER, most)))
+        found += spread_over(task, numbers, stop, jobs, lambda: say("global search", next(ended), most, "populations"))
+        if stop() or numbers[-1] == most - 1 or enough(found):
+            break
+    return found

@@ -11,16 +11,19 @@ from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.filling import kinds
-from sweep.optimise.generations import bred
+from sweep.optimise.generations import TOGETHER, Bred, bred
 from sweep.optimise.linear import NEEDED, Elimination, elimination
+from sweep.optimise.parallel import SearchTask, spread_over
 from sweep.optimise.problem import Problem
 from sweep.optimise.proportions import from_proportions, widened
 from sweep.optimise.starts import ALIKE, diverse
+from sweep.optimise.survey import settled
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study, Tolerance
 
 SWEPT = 6  # of so many starts one comes from the sweep where there is a global search
+INSENSITIVE = 2  # of so many starts one is looked for by strategies that know the tolerances
 OTHER_SEED = 1000  # further on, for samples of their own
 ANOTHER = 1e-3  # share of a value by which that of another basin differs
 
@@ -50,7 +53,8 @@ def proportion_starts(
 
     Parameters
     ----------
-    study, settings, problem : what is searched; there is one population for two starts asked
+    study, settings, problem : what is searched; populations are made until they tell enough (``settings.unseen``), at
+        most one for each start that the sweep does not give
     known, merit : designs (k, P) of the sweep, and what they are worth (k,), empty where none is feasible
     stop : true ends the global search early
     jobs : processes; the starts do not depend on it
@@ -65,7 +69,19 @@ def proportion_starts(
     count = settings.starts
     own = diverse(problem, known, merit, count // SWEPT, ALIKE) if len(merit) else known[:0]
     signs = kinds(study, problem, own)
-    populations = bred(linear, signs, max(1, count // 2), settings.seed, stop, jobs, say)
+    ends: list[float] = []
+
+    def enough(found: list[Bred]) -> bool:
+        """Whether the best ends tell enough once they are searched on: the poses alone take one valley for several."""
+        new = [one.designs[0] for one in found[-TOGETHER:] if len(one.designs)]
+        if not new:
+            return False
+        task = SearchTask(_holding(study, problem, np.array(new)), np.array(new), settings.looks)
+        ends.extend(r.objective for r in spread_over(task, list(range(len(new))), stop, jobs) if r.feasible)
+        return settled(ends, settings.unseen)
+
+    most = max(1, count - len(own))
+    populations = bred(linear, signs, most, settings.seed, stop, jobs, say, enough)
     first = [(k, found.designs[0]) for k, found in enumerate(populations) if len(found.designs)]
     met = [float(found.worth[0]) for found in populations if len(found.worth)]
     others = sorted(
@@ -97,7 +113,8 @@ def insensitive(
         return problem, np.empty((0, len(problem.family.parameters)))
     linear = _linear(study, problem, study.tolerance)
     signs = kinds(study, problem, np.empty((0, len(problem.family.parameters))))
-    found = from_proportions(linear, signs, settings.starts, settings.seed + OTHER_SEED, stop, jobs, say)
+    count = -(-settings.starts // INSENSITIVE)
+    found = from_proportions(linear, signs, count, settings.seed + OTHER_SEED, stop, jobs, say)
     return _holding(study, problem, found), found
 
 

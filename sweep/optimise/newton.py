@@ -20,6 +20,8 @@ CORRECTIONS = 8  # of a step along curved limits, each two or three milliseconds
 SHORTENED, KEPT = 4, 0.1  # times a step is halved, and the share of the promised gain that it must keep
 LOST = 1.0  # scaled violation that no correction mends, above all of links that do not reach: the step must be shorter
 DIFFERENCE = 1e-5  # of the scaled variables; gradients are good to 1e-12, so the Hessian is to 1e-5
+CENTRAL = 1e-6  # the same to both sides of a design
+SLIPPED = 1e-5  # by so much the merit may grow in between while a design is polished
 RANK = 1e-9  # of rows that hold: what is left of one below this, relative to the largest, is rounding
 
 
@@ -83,18 +85,25 @@ def _missed(form: Form, rows: Array) -> float:
     return float(np.maximum(np.where(form.equal, np.abs(rows), -rows), 0.0).max(initial=0.0))
 
 
-def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index) -> Array:
-    """Return the second derivatives of the Lagrangian by the free variables, from differences of exact gradients."""
-    base = times(found.weights, np.nan_to_num(model.jacobian(at.fractions, form, form.points)))
-    columns = []
-    for j in free:
+def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index, both_sides: bool = False) -> Array:
+    """Return the second derivatives of the Lagrangian by the free variables, from differences of exact gradients.
+
+    With ``both_sides`` they are good to 1e-8 instead of 1e-5, for twice as many looks: the curvature along a valley may
+    be 1e-9 of that across it.
+    """
+
+    def slope(j: int, step: float) -> Array:
         moved = at.fractions.copy()
-        step = DIFFERENCE if moved[j] <= 0.5 else -DIFFERENCE
         moved[j] += step
         points, _ = model.moved(moved, form, form.points)
-        slope = times(found.weights, np.nan_to_num(model.jacobian(moved, form, points)))
-        columns.append((slope - base)[free] / -step)
-    square = np.array(columns)
+        return times(found.weights, np.nan_to_num(model.jacobian(moved, form, points)))[free]
+
+    if both_sides:
+        square = np.array([(slope(j, CENTRAL) - slope(j, -CENTRAL)) / (-2.0 * CENTRAL) for j in free])
+    else:
+        base = times(found.weights, np.nan_to_num(model.jacobian(at.fractions, form, form.points)))[free]
+        steps = [DIFFERENCE if at.fractions[j] <= 0.5 else -DIFFERENCE for j in free]
+        square = np.array([(slope(j, step) - base) / -step for j, step in zip(free, steps, strict=True)])
     return np.asarray(0.5 * (square + square.T), np.float64)
 
 
@@ -152,7 +161,8 @@ def repair(model: Model, state: State) -> State:
 
 def polish(model: Model, state: State) -> State:
     """Take Newton steps on the optimality conditions of the active rows, as long as they improve them."""
-    residual = model.certificate(state).residual
+    residual, begun, size = model.certificate(state).residual, state, max(1.0, abs(state.objective))
+    best = state
     for _ in range(6):
         if not residual > 1e-12 and state.feasible:
             break
@@ -160,13 +170,16 @@ def polish(model: Model, state: State) -> State:
         if fractions is None:
             break
         new = model.state(fractions)
-        if not new.merit(model.price) <= state.merit(model.price) + 1e-9 * max(1.0, abs(state.objective)):
+        # Limits that bend are missed by the square of a step; the next one brings them back.
+        if not new.merit(model.price) <= begun.merit(model.price) + SLIPPED * size:
             break
         new_residual = model.certificate(new).residual
         if new_residual > 0.5 * residual and new.violation >= 0.5 * state.violation:
             break
         state, residual = new, new_residual
-    return state
+        if new.merit(model.price) <= begun.merit(model.price) + 1e-9 * size:
+            best = new
+    return best
 
 
 def _conditions_step(model: Model, state: State) -> Array | None:
@@ -178,7 +191,7 @@ def _conditions_step(model: Model, state: State) -> Array | None:
         return None
     n = len(free)
     system = np.zeros((n + 1 + len(active), n + 1 + len(active)))
-    system[:n, :n] = hessian(model, state, state.form, found, free)
+    system[:n, :n] = hessian(model, state, state.form, found, free, both_sides=True)
     a = np.column_stack([jacobian[np.ix_(active, free)], state.form.slack[active]])
     system[: n + 1, n + 1 :], system[n + 1 :, : n + 1] = -a.T, a
     gradient = np.concatenate([np.zeros(n), [1.0]]) - times(a.T, found.weights[active])

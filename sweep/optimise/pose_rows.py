@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.minimax import minimax
 from sweep.families.base import Angles, Array
 from sweep.families.capabilities import Assembly
+from sweep.optimise.between import End, Turns
 from sweep.optimise.linear import POSES, TURN, Elimination
 from sweep.optimise.points import STEP
 from sweep.optimise.proportions import Proportions
@@ -30,9 +30,6 @@ DEVIATION = 1.0 / 30.0  # the same for the deviation, as a share: a straightness
 LOCKED = 1e6  # what a design is worth that does not turn
 COMPLEX_TURN = Angles.of(TURN[None, :].astype(np.complex128))
 REAL_TURN = Angles.of(TURN[None, :])
-
-
-Numbers = NDArray[np.intp]
 
 
 class Rows(NamedTuple):
@@ -124,19 +121,10 @@ class PoseRows:
             soft += [r, r + 1]
             above += [-1.0, 1.0]
             r += 2
-        self.turns = np.array(turns)
-        self.before, self.after = np.roll(np.arange(POSES), 1), np.roll(np.arange(POSES), -1)
+        self.turns = Turns.of(np.array(turns))
         self.soft, self.above = np.array(soft, np.intp), np.array(above)
         self.needed = np.array([k for k, _ in need], np.intp)
         self.need = np.array([x for _, x in need])
-
-    def peaks(self, values: Array, below: float) -> NDArray[np.bool_]:
-        """Rows (r,) below a value that are lowest among their neighbours along the turn, or stand beside such a one."""
-        along = values[self.turns]
-        lowest = (along <= along[:, self.before]) & (along <= along[:, self.after])
-        found = np.ones(len(values), np.bool_)
-        found[self.turns] = lowest | lowest[:, self.before] | lowest[:, self.after]
-        return np.asarray(found & (values < below))
 
     def without_middle(self, places: Array, sign: float = -1.0) -> Array:
         """Places with the offset between the stages itself for those with the middle of the guide's input angles."""
@@ -221,10 +209,11 @@ class PoseRows:
             ends = self._ends(columns)
             values = np.concatenate(self._pieces(columns, real, ends, 1.0), axis=1)
             turned = {name: moved[name].reshape(k * m, -1) for name in self.outputs}
-            every = {name: (np.repeat(high, m), np.repeat(low, m)) for name, (high, low) in ends.items()}
+            every = {name: (high.repeated(m), low.repeated(m)) for name, (high, low) in ends.items()}
             pieces = self._pieces(turned, tangents.reshape(k * m, -1), every, 0.0)
-        slopes = np.concatenate(pieces, axis=1).reshape(k, m, -1).transpose(0, 2, 1)
-        return Rows(values, np.ascontiguousarray(slopes), -values[:, : 2 * POSES].min(axis=1))
+        slopes = np.ascontiguousarray(np.concatenate(pieces, axis=1).reshape(k, m, -1).transpose(0, 2, 1))
+        sharp = self.turns.sharpened(values, slopes)
+        return Rows(sharp, slopes, -sharp[:, : 2 * POSES].min(axis=1))
 
     def solved(self, places: Array, x: Array) -> Array:
         """The best linear unknowns (k, 5) of some proportions, limits that bend taken for straight about ``x``."""
@@ -244,6 +233,13 @@ class PoseRows:
         """Objective plus what missed limits cost (k,), the smaller the better."""
         return self.judged(self.values(places, x))
 
+    def begun(self, places: Array) -> tuple[Array, Array]:
+        """The best linear unknowns (k, 5) of some proportions, and what the designs are worth (k,)."""
+        x = self.unknowns(places)
+        known = np.asarray(np.isfinite(x).all(axis=1), np.bool_)
+        x = np.where(known[:, None], x, 1.0)
+        return x, np.asarray(np.where(known, self.worth(places, x), np.inf), np.float64)
+
     def values(self, places: Array, x: Array) -> Array:
         """Values of the rows (k, r), those of the objective for t = 0."""
         designs = self.designs(places, x)
@@ -252,7 +248,9 @@ class PoseRows:
             columns = {name: np.asarray(found[name], np.float64) for name in self.outputs}
             for name, loop in self.loops.items():
                 columns[name] = columns[name] / loop.scale(designs)[:, None]
-            return np.concatenate(self._pieces(columns, designs, self._ends(columns), 1.0), axis=1)
+            return self.turns.sharpened(
+                np.concatenate(self._pieces(columns, designs, self._ends(columns), 1.0), axis=1)
+            )
 
     def judged(self, values: Array) -> Array:
         """What designs with such values are worth (k,): see :meth:`worth`."""
@@ -262,13 +260,13 @@ class PoseRows:
         turns = np.isfinite(worth) & (margins > 0.0)
         return np.asarray(np.where(turns, worth, LOCKED * (2.0 - np.maximum(np.nan_to_num(margins, nan=-1e3), -1e3))))
 
-    def _ends(self, columns: Mapping[str, Array]) -> dict[str, tuple[Numbers, Numbers]]:
-        """Poses (k,) at which outputs are highest and lowest, of those whose ends are limited."""
+    def _ends(self, columns: Mapping[str, Array]) -> dict[str, tuple[End, End]]:
+        """Where outputs are highest and lowest, of those whose ends are limited."""
         limited = {curve.output for curve in self.curves if curve.at != "every"}
-        return {name: (np.argmax(columns[name], axis=1), np.argmin(columns[name], axis=1)) for name in limited}
+        return {name: (End.of(-columns[name]), End.of(columns[name])) for name in limited}
 
     def _pieces(
-        self, columns: Mapping[str, Array], designs: Array, ends: Mapping[str, tuple[Numbers, Numbers]], one: float
+        self, columns: Mapping[str, Array], designs: Array, ends: Mapping[str, tuple[End, End]], one: float
     ) -> list[Array]:
         """The rows (k, .) one limit after the other, those of the objective first, of outputs and designs.
 
@@ -276,11 +274,10 @@ class PoseRows:
         """
         own = columns[self.objective]
         out = [-own, own]
-        number = np.arange(len(own))
         for curve in self.curves:
             y = columns[curve.output]
             if curve.at != "every":
-                high, low = (y[number, at] for at in ends[curve.output])
+                high, low = (end.value(y) for end in ends[curve.output])
                 y = {"highest": high, "lowest": low, "range": high - low}[curve.at][:, None]
             out.append((one * curve.bound - curve.sign * y) / curve.size)
         for column, least, most in self.lengths:

@@ -15,7 +15,7 @@ from sweep.families.domain import March
 from sweep.optimise.coordinates import Coordinates
 
 if TYPE_CHECKING:
-    from sweep.optimise.rooms import Room
+    from sweep.optimise.rooms import Allowance, Room
     from sweep.study import Limit
 
 PLACE = "optimisation problem"
@@ -39,6 +39,7 @@ class Problem:
         turn they are looked for on (``samples``)
     coordinates : variables that are no parameters, and what follows from them; None varies parameters alone
     rooms : what tolerances add to pose outputs along the turn, where limits are to hold for what is made
+    allowances : how what other limits give up to tolerances changes with the design, by their outputs
 
     Raises
     ------
@@ -57,6 +58,7 @@ class Problem:
     accuracy: Accuracy = field(default_factory=lambda: Accuracy(target=1e-9))
     coordinates: Coordinates | None = None
     rooms: Mapping[str, Room] = field(default_factory=dict)
+    allowances: Mapping[str, Allowance] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if isinstance(self.family.domain, March):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.parallel import spread_over
 from sweep.optimise.problem import Problem
-from sweep.optimise.rooms import curves_with_room, rooms
+from sweep.optimise.rooms import Room, allowances, curves_with_room, rooms
 from sweep.optimise.search import search
 from sweep.optimise.sensitivity import sensitivities
 from sweep.optimise.survey import CUT
@@ -35,10 +35,11 @@ ROUNDS, CORRECTIONS = 4, 10  # of search with the room of the design before; of 
 ONCE = 2  # looks that say how good a design is
 STAYED = 1e-3  # step of a design that the room and the share agree on
 RADIUS = 0.15  # of the first rounds, in scaled variables
+CLOSE = 3.0  # rooms from its bound at which the slopes of a limit's room are still asked for
 SETTLED = 1e-5  # step of a round, in scaled variables
 NEARLY = 1e-4  # scaled violation of a design whose objective counts
 ALIKE = 0.02  # greatest distance in scaled variables of designs that are taken for one
-ENOUGH = 0.004  # by so much the sampled share may exceed the wanted one
+ENOUGH = 0.0005  # by so much the sampled share may exceed the wanted one; 0.003 cost 0.02 % of acceleration
 
 
 @dataclass(frozen=True)
@@ -271,32 +272,48 @@ def _with_room(problem: Problem, design: Array, tolerance: Tolerance, level: flo
     sigma = touched(problem.family, tolerance) / SIGMAS
     along = curves_with_room(problem)
     curves = rooms(problem, design, sigma, level, set(along.values()))
-    fixed = _fixed_rooms(problem, design, sigma, level, {name for name, curve in along.items() if curve in curves})
+    fixed = _fixed_rooms(problem, design, sigma, level, _others(problem, along, curves))
     limits = tuple(_drawn_in(x, fixed) for x in problem.limits)
+    close = [x.output for x in problem.limits if x.output in fixed and _close(x, *fixed[x.output])]
+    given = allowances(
+        problem, design, lambda row: {k: v[0] for k, v in _fixed_rooms(problem, row, sigma, level, close).items()}
+    )
     lower, upper = problem.lower, problem.upper
     if radius is not None:
         place = np.clip(problem.scaled(design[None, :])[0], 0.0, 1.0)
         lower = problem.lower + np.maximum(place - radius, 0.0) * problem.span
         upper = problem.lower + np.minimum(place + radius, 1.0) * problem.span
-    return replace(problem, limits=limits, rooms=curves, lower=lower, upper=upper)
+    return replace(problem, limits=limits, rooms=curves, allowances=given, lower=lower, upper=upper)
+
+
+def _others(problem: Problem, along: dict[str, str], curves: Mapping[str, Room]) -> list[str]:
+    """Return limited outputs whose room is no curve along the turn."""
+    followed = {name for name, curve in along.items() if curve in curves}
+    names = dict.fromkeys(x.output for x in bounded(problem))
+    return [name for name in names if name not in followed and not name.startswith("rotatable")]
+
+
+def _close(limit: Limit, room: float, value: float) -> bool:
+    """Return whether a limit is so near that how its room changes may matter."""
+    low = limit.minimum is not None and value - CLOSE * room < limit.minimum
+    return low or (limit.maximum is not None and value + CLOSE * room > limit.maximum)
 
 
 def _fixed_rooms(
-    problem: Problem, design: Array, sigma: Array, level: float, others: set[str]
+    problem: Problem, design: Array, sigma: Array, level: float, names: Sequence[str]
 ) -> dict[str, tuple[float, float]]:
-    """Return the room below and above of limited outputs but ``others``,
-    from exact derivatives by every toleranced dimension.
-    """
-    names = [x.output for x in bounded(problem) if x.output not in others and not x.output.startswith("rotatable")]
+    """Return the room of limited outputs, from exact derivatives by every toleranced dimension, and their values."""
     if not names:
         return {}
-    rows = sensitivities(problem.family, design, list(dict.fromkeys(names)), problem.window)
+    rows = sensitivities(problem.family, design, names, problem.window)
     spread = dict(zip(problem.family.parameter_names, sigma, strict=True))
-    variance: dict[str, float] = {}
-    for name, output, up, down in zip(*(rows[k] for k in ("parameter", "output", "growing", "shrinking")), strict=True):
+    variance, values = dict.fromkeys(names, 0.0), dict.fromkeys(names, math.nan)
+    kinds = ("parameter", "output", "value", "growing", "shrinking")
+    for name, output, value, up, down in zip(*(rows[k] for k in kinds), strict=True):
         steep = max(abs(up), abs(down)) * spread[name]
-        variance[output] = variance.get(output, 0.0) + (steep * steep if math.isfinite(steep) else 0.0)
-    return {name: (level * math.sqrt(v),) * 2 for name, v in variance.items()}
+        variance[output] += steep * steep if math.isfinite(steep) else 0.0
+        values[output] = value
+    return {name: (level * math.sqrt(v), values[name]) for name, v in variance.items()}
 
 
 def _share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> float:
@@ -304,11 +321,11 @@ def _share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> 
 
 
 def _drawn_in(limit: Limit, rooms: dict[str, tuple[float, float]]) -> Limit:
-    if limit.output not in rooms or limit.output.startswith("rotatable"):
+    if limit.output not in rooms:
         return limit
-    below, above = rooms[limit.output]
-    low = None if limit.minimum is None else limit.minimum + below
-    high = None if limit.maximum is None else limit.maximum - above
+    room = rooms[limit.output][0]
+    low = None if limit.minimum is None else limit.minimum + room
+    high = None if limit.maximum is None else limit.maximum - room
     if low is not None and high is not None and low > high:  # the band is narrower than what the tolerances need
         low = high = 0.5 * (low + high)
     return replace(limit, minimum=low, maximum=high)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,6 +46,47 @@ class Room:
         return np.asarray(_summed((self.constant + times(self.slopes, moved))[None, :], phi, True)[0], np.float64)
 
 
+@dataclass(frozen=True)
+class Allowance:
+    """What a limit gives up to tolerances beyond a fixed amount: ``slopes`` (V,) times what the ``names`` have moved.
+
+    ``place`` (V,) are the values of these parameters at which the fixed amount is exact.
+    """
+
+    names: tuple[str, ...]
+    place: Array
+    slopes: Array
+
+
+def allowances(problem: Problem, design: Array, spread: Callable[[Array], dict[str, float]]) -> dict[str, Allowance]:
+    """Return how the rooms of some outputs change with the variables, to first order.
+
+    Parameters
+    ----------
+    problem : its variables are the ones that may change
+    design : (P,)
+    spread : gives the room of every output for a design
+    """
+    around, moved = _around(problem, design)
+    found = [spread(row) for row in around[1:]]
+    n, columns = len(moved), list(problem.columns)
+    names = tuple(problem.family.parameter_names[k] for k in columns)
+    change = {name: np.array([found[k][name] - found[n + k][name] for k in range(n)]) for name in found[0]}
+    return {
+        name: Allowance(names, design[columns], _shortest(moved, own))
+        for name, own in change.items()
+        if np.isfinite(own).all()
+    }
+
+
+def _around(problem: Problem, design: Array) -> tuple[Array, Array]:
+    """Return a design with those a step to either side of it in every variable, and by how much columns differ."""
+    n = len(problem.variables)
+    steps = np.concatenate([np.zeros((1, n)), STEP * np.eye(n), -STEP * np.eye(n)])
+    designs = problem.placed(design, problem.scaled(design[None, :])[0] + steps)
+    return designs, np.stack([designs[1 : n + 1, k] - designs[n + 1 :, k] for k in problem.columns], axis=1)
+
+
 def _summed(coefficients: Array, phi: Array, derivative: bool = False) -> Array:
     out = np.empty((len(coefficients), len(phi)))
     trigonometric_sum(np.ascontiguousarray(coefficients), np.ascontiguousarray(phi, np.float64), derivative, out)
@@ -79,15 +121,12 @@ def rooms(problem: Problem, design: Array, sigma: Array, level: float, outputs: 
     level : of them
     outputs : names of pose outputs
     """
-    fractions = problem.scaled(design[None, :])[0]
-    n = len(fractions)
-    around = np.concatenate([np.zeros((1, n)), STEP * np.eye(n), -STEP * np.eye(n)])
-    designs = problem.placed(design, fractions + around)
+    n = len(problem.variables)
+    # Parameters that follow from coordinates move together: the slopes by the parameters that reproduce those seen.
+    designs, moved = _around(problem, design)
     turn: Array = np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
     found = changes(problem.family, designs, sigma, tuple(outputs), turn)
     columns = tuple(problem.columns)
-    # Parameters that follow from coordinates move together: the slopes by the parameters that reproduce those seen.
-    moved = np.stack([designs[1 : n + 1, k] - designs[n + 1 :, k] for k in columns], axis=1)
     waves = np.array([_summed(row[None, :], turn)[0] for row in np.eye(2 * HARMONICS + 1)])
     weights = waves * (np.where(np.arange(len(waves)) == 0, 1.0, 2.0) / POSES)[:, None]
     out = {}

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,6 +39,7 @@ class Survey:
     ended : "enough" where the rule was fulfilled, "starts" where none was left, "time" or "interrupted"
     kinds : starts and basins for each combination of signs, as ``(("branch = 1", 7, 3), ...)``
     late : whether all starts were searched, and time ran out over what follows them
+    populations : global searches that were counted, each with its best end; 0 where starts were
     """
 
     starts: int
@@ -51,11 +52,25 @@ class Survey:
     ended: str
     kinds: tuple[tuple[str, int, int], ...] = ()
     late: bool = False
+    populations: int = 0
+
+    @property
+    def better(self) -> float:
+        """Estimated share of basins that are unseen and better than the best.
+
+        Nothing is known of the values of unseen basins, so each is as likely as any of the w seen ones to be the best.
+        """
+        return self.unseen / (self.basins + 1)
+
+    @property
+    def decides(self) -> float:
+        """The share that is to fall below the wanted one."""
+        return self.better if self.populations else self.unseen
 
     @property
     def enough(self) -> bool:
         """Whether the best basin was met often enough and few basins are likely to be unseen."""
-        return self.best >= MET and self.unseen <= self.wanted
+        return self.best >= MET and self.decides <= self.wanted
 
     @property
     def words(self) -> str:
@@ -64,7 +79,10 @@ class Survey:
             return f"none of {started(self.starts)} became feasible"
         basins = f"{self.basins} basin{'s' if self.basins > 1 else ''} met"
         times = {1: "once", 2: "twice"}.get(self.best, f"{self.best} times")
-        return f"{basins}, the best {times}, estimated unseen {_percent(self.unseen)}"
+        if not self.populations:
+            return f"{basins}, the best {times}, estimated unseen {_percent(self.unseen)}"
+        share = f"estimated unseen {_percent(self.unseen)}, unseen and better {_percent(self.better)}"
+        return f"{basins} by {self.populations} populations, the best {times}, {share}"
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -80,10 +98,12 @@ class Survey:
                 f"only {started(self.starts)} of the {self.asked} asked: no more were found in the design space"
             )
         if self.ended == "starts" and self.basins and not self.enough:
-            rare = f"the best basin was met from {self.best} of the {MET} distinct valleys wanted"
+            of = "populations" if self.populations else "distinct valleys"
+            rare = f"the best basin was met from {self.best} of the {MET} {of} wanted"
             parts = [rare] if self.best < MET else []
-            if self.unseen > self.wanted:
-                parts.append(f"the share of unseen basins is estimated at {_percent(self.unseen)}, not the "
+            if self.decides > self.wanted:
+                kind = "unseen better" if self.populations else "unseen"
+                parts.append(f"the share of {kind} basins is estimated at {_percent(self.decides)}, not the "
                              f"{_percent(self.wanted)} asked")  # fmt: skip
             found.append(f"{' and '.join(parts)}: more starts may find a better one")
         return tuple(found)
@@ -114,6 +134,8 @@ def survey(
     The unseen share is the larger of two estimates for n starts that met w basins, s of them once: s / n (Good and
     Turing) and w (w + 1) / (n (n - 1)) (Boender and Rinnooy Kan 1987, for unknown volumes).  Both suppose that starts
     are drawn at random; ours are the best of samples, so the estimate says how much to expect from more of their kind.
+
+    Of populations the next one matters where it ends at something better than the best: see :attr:`Survey.better`.
     """
     whole = [r for r in results if r.ended not in CUT]
     # What was left after the first heat has not reached the bottom of any basin.
@@ -125,8 +147,19 @@ def survey(
     best = _distinct(problem, starts, ends) if origins is None else len(ends)
     return Survey(
         len(whole), settings.starts, len(starts), w, best, _unseen(n, met), settings.unseen, ended,
-        _kinds(problem, starts, numbered),
+        _kinds(problem, starts, numbered), populations=0 if origins is None else n,
     )  # fmt: skip
+
+
+def settled(values: Sequence[float], wanted: float) -> bool:
+    """Return whether populations that ended at these values tell enough: the rule of :class:`Survey`."""
+    first, met = -math.inf, Counter[float]()
+    for value in sorted(values):
+        first = value if not value - first <= AGREE * abs(value) else first
+        met[first] += 1
+    n, w = len(values), len(met)
+    best = met[min(met)] if met else 0
+    return Survey(n, n, n, w, best, _unseen(n, met), wanted, "", populations=n).enough
 
 
 def _best_of_each(ranked: Sequence[Result], origins: Sequence[int]) -> list[Result]:
@@ -161,7 +194,7 @@ def _objective(r: Result) -> float:
     return math.inf if math.isnan(r.objective) else r.objective
 
 
-def _unseen(n: int, met: Counter[int]) -> float:
+def _unseen(n: int, met: Counter[Any]) -> float:
     w, once = len(met), sum(1 for count in met.values() if count == 1)
     if n < 2:
         return 1.0
