@@ -171,7 +171,7 @@ class _Place(UserProvidedCacheLocator):
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> _Place | None:
-        """The folder, made if need be; None where it cannot be written."""
+        """Return the folder, made if need be; None where it cannot be written."""
         place = cls(function, file)
         try:
             _made(CACHE_DIR)
@@ -235,7 +235,7 @@ class _Checked(IndexDataCacheFile):
 
 
 def _checked(path: Path) -> bytes:
-    """What stands behind the hash at the beginning of a file.
+    """Return what stands behind the hash at the beginning of a file.
 
     Raises
     ------
@@ -260,7 +260,7 @@ class KernelCache(FunctionCache):
         self._cache_file = _Checked(self._cache_path, base, stamp)  # type: ignore[no-untyped-call]
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        """What tells compiled code apart: signature, processor and byte code.
+        """Return what tells compiled code apart: signature, processor and byte code.
 
         numba adds a hash of what a function closes over.  Other kernels in there carry a random number, so no process
         would find the code of another.  A generated kernel says by its name what it closes over (`kernels._jit`).
@@ -285,7 +285,7 @@ class KernelCache(FunctionCache):
 
 
 def kept(dispatcher: Any) -> Any:
-    """A dispatcher that loads its machine code and keeps what it compiles, where that is safe and there is room.
+    """Make a dispatcher that loads its machine code and keeps what it compiles, where that is safe and there is room.
 
     A function from outside of the package, as a bench or a study may have, is in no hash: every process compiles it.
     """

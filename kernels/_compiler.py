@@ -54,7 +54,7 @@ class _PartLibrary(_Library):
 
     @classmethod
     def loaded(cls, codegen: Any, name: str, bitcode: bytes) -> _PartLibrary:
-        """The library whose optimised module was kept on disk."""
+        """Return the library whose optimised module was kept on disk."""
         library = cls(codegen, name)
         library._final_module = library._shared_module = llvm.parse_bitcode(bitcode)
         library._finalized = True
@@ -74,7 +74,7 @@ class _PartLibrary(_Library):
         self._finalized = True
 
     def serialize_using_object_code(self) -> tuple[str, str, bytes]:
-        """What the cache keeps; there is no object code."""
+        """Return what the cache keeps; there is no object code."""
         self._ensure_finalized()
         return self.name, PART, self._final_module.as_bitcode()
 
@@ -87,7 +87,7 @@ class _Typing(Context):
         self._known_operators: dict[Any, Any] = {}
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
-        """The signature of a function for types of arguments."""
+        """Return the signature of a function for types of arguments."""
         function = func.typing_key if isinstance(func, types.BaseFunction) else func
         if id(function) not in _OPERATORS or kws:
             return super().resolve_function_type(func, args, kws)
@@ -127,7 +127,7 @@ class _KernelCompiler(CompilerBase):
         super().__init__(_remembering(typingctx), *args)
 
     def define_pipelines(self) -> list[Any]:
-        """The passes that a function goes through."""
+        """Return the passes that a function goes through."""
         state = self.state
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
@@ -177,7 +177,7 @@ class Part(Kernel):
 
 
 def rebuilt_part(target: Any, payload: tuple[Any, ...]) -> Any:
-    """The compiled part that the cache kept, from what numba keeps of compiled code."""
+    """Return the compiled part that the cache kept, from what numba keeps of compiled code."""
     kept, fndesc, environment, signature, objectmode, lifted, annotation, reload_init, referenced = payload
     name, _, bitcode = kept
     for function in reload_init:

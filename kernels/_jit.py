@@ -52,7 +52,7 @@ def inline(function: F) -> F:
 
 
 def inline_fused(helper: F) -> F:
-    """The same helper again, for :func:`kernel_fused` loops: products and sums may be contracted in it too.
+    """Return the same helper again, for :func:`kernel_fused` loops: products and sums may be contracted in it too.
 
     The flag belongs to the instructions of the function that was compiled, so a helper made by :func:`inline` keeps
     its products and sums apart wherever it is folded in.

@@ -107,7 +107,7 @@ def _finite(rows: Array) -> bool:
 def _most_violated(
     g: Array, d: Array, e: Array, bound: Array, need: Array, price: float, size: float, z: Array
 ) -> int:  # fmt: skip
-    """Number of the row that a point z misses most, -1 where it keeps all of them to rounding."""
+    """Return number of the row that a point z misses most, -1 where it keeps all of them to rounding."""
     mg, md = g.shape[0], d.shape[0]
     t, v = z[UNKNOWNS], z[UNKNOWNS + 1]
     entering, worst = -1, ROUNDING * (abs(t) + price * abs(v) + size)

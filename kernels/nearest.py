@@ -40,7 +40,7 @@ def _turned(a: Array, b: Array, first: float, second: float, left: int, right: i
 
 @inline
 def _most_missed(rows: Array, needs: Array, size: Array, y: Array, inside: Index, tolerance: float, room: Array) -> int:
-    """The row that a point misses most, relative to its size; -1 where it keeps all of them."""
+    """Return the row that a point misses most, relative to its size; -1 where it keeps all of them."""
     for j in range(rows.shape[1]):
         room[j] = -needs[j]
     for i in range(rows.shape[0]):
@@ -94,7 +94,7 @@ def _shares(rows: Array, p: int, count: int, q: Array, r: Array, d: Array, z: Ar
 
 @kernel
 def nearest(rows: Array, needs: Array, centre: Array, tolerance: float, y: Array, weights: Array) -> int:
-    """The point nearest to a centre with ``rows.T y >= needs``.
+    """Return the point nearest to a centre with ``rows.T y >= needs``.
 
     Parameters
     ----------

@@ -161,7 +161,7 @@ def _ended(driving: Driving, form: Form, stages: int) -> Chained:
 
 
 def _recorded(before: Record, form: Form) -> Record:
-    """The constants of some stages and of one more, coupled to them."""
+    """Return the constants of some stages and of one more, coupled to them."""
     start, end = before.columns, before.columns + form.columns
     link_row, stage_row = before.numbers * STRIDE, (before.numbers + NUMBERS) * STRIDE
     constants_before, put_before, get_before, doubts_before = before.constants, before.put, before.get, before.doubts

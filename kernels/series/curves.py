@@ -37,7 +37,7 @@ class Curve:
 
 
 def curve(chain: Chained, order: int) -> Curve:
-    """The derivative of that order, 0, 1 or 2, or the `MARGIN`."""
+    """Return the derivative of that order, 0, 1 or 2, or the `MARGIN`."""
     kind = "margin" if order == MARGIN else f"order{order}"
     name = f"{kind}_{chain.record.name}"
     jet, sample, rounding = _margin(chain) if order == MARGIN else (_position, _velocity, _acceleration)[order](chain)

@@ -19,7 +19,7 @@ Least: TypeAlias = tuple[float, ...]
 
 @lru_cache(maxsize=64)
 def dense_maxima(chain: Chained) -> Helper:
-    """The kernel ``dense(designs, cos, sin, least, x1, x2, x3, y0, y1, y2)`` of a chain.
+    """Make the kernel ``dense(designs, cos, sin, least, x1, x2, x3, y0, y1, y2)`` of a chain.
 
     Its arguments: designs (n, P); the grid (m,), shared by all designs, m a multiple of 8 is fastest; ``least``
     (n, stages) out, smallest discriminant of each stage on the grid less a bound of its rounding error, nan for what is
@@ -63,7 +63,7 @@ def dense_maxima(chain: Chained) -> Helper:
 
 
 def _lower(stages: int, name: str) -> Helper:
-    """The smaller of two tuples, number by number."""
+    """Return the smaller of two tuples, number by number."""
     last = stages - 1
     if last == 0:
 

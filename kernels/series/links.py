@@ -33,7 +33,9 @@ class Input(NamedTuple):
 
 @inline
 def link_of(designs: Any, i: int, column: int) -> Link:
-    """The coupling whose kappa and offset stand in this column and the next; kappa is nan if one of them is refused."""
+    """Return the coupling whose kappa and offset stand in this column and the next;
+    kappa is nan if one of them is refused.
+    """
     kappa, offset = designs[i, column], designs[i, column + 1]
     sine, cosine = sincos(offset)
     return Link(kappa if (kappa * kappa == 1.0) & (abs(offset) < 1e5) else math.nan, cosine, sine)
@@ -53,7 +55,7 @@ def get_link(at: Any, place: int) -> Link:
 
 @inline
 def enter(link: Link, m: Turned) -> Input:
-    """The input angle of the next stage from the output angle of this one; (1)."""
+    """Return the input angle of the next stage from the output angle of this one; (1)."""
     k = link.kappa
     s = k * m.sin
     u, v = m.cos * link.cos - s * link.sin, s * link.cos + m.cos * link.sin
@@ -62,7 +64,9 @@ def enter(link: Link, m: Turned) -> Input:
 
 @inline
 def through(t: Input, y1: Any, y2: Any, y3: Any, y4: Any) -> tuple[Any, Any, Any, Any]:
-    """Derivatives by the crank angle of the chain from those by the input angle of a stage; (22) to order four."""
+    """Return derivatives by the crank angle of the chain from those by the input angle of a stage;
+    (22) to order four.
+    """
     t1, t2, square = t.t1, t.t2, t.t1 * t.t1
     second = t2 * y1 + square * y2
     third = t.t3 * y1 + t1 * (3.0 * t2 * y2 + square * y3)

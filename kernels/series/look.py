@@ -66,7 +66,7 @@ def _dips(n: int, guards: Array, begin: int) -> tuple[float, float]:
 
 
 def looker(curve: Curve) -> Helper:
-    """The function ``look(k, a, b, c, n, cos, sin, mode, doubts, values, guards)`` of a curve.
+    """Make the function ``look(k, a, b, c, n, cos, sin, mode, doubts, values, guards)`` of a curve.
 
     It samples a design, n times at first, and returns the number of samples that resolve the curve, their largest and
     least, and a status: OK; NOT_ROTATABLE, where a later stage does not reach; OPEN.  The samples stand in

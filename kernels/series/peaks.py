@@ -60,7 +60,7 @@ def begin_at_vertex(count: int, m: Array) -> None:
 
 
 def refiner(curve: Curve, get: Helper) -> Helper:
-    """The kernel ``refine(begin, end, m, rounds)``: Newton steps, uphill where the curve is not concave."""
+    """Make the kernel ``refine(begin, end, m, rounds)``: Newton steps, uphill where the curve is not concave."""
     jet = curve.jet
 
     def refine(begin: int, end: int, m: Array, rounds: int) -> None:
@@ -79,7 +79,7 @@ def refiner(curve: Curve, get: Helper) -> Helper:
 
 
 def finisher(curve: Curve, get: Helper) -> Helper:
-    """The kernel ``finish(begin, end, m, target)``: heights, what is left of the way to the tops, rounding errors.
+    """Make the kernel ``finish(begin, end, m, target)``: heights, what is left of the way to the tops, rounding errors.
 
     A height is that of the parabola through the last point.  Its error is infinite where the maximum is not trusted:
     where it left its samples, rose too far above them, or does not fall towards them as a single top would.

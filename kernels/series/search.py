@@ -60,7 +60,7 @@ _PLACE = np.array([next((k for k in range(CHUNK) if 2**k % _PRIME == r), -1) for
 
 @lru_cache(maxsize=64)
 def find_extrema(chain: Chained, order: int) -> Helper:
-    """The kernel ``find(designs, opening, distance, cos, sin, made_of, mode, target, status, found)`` of a chain.
+    """Make the kernel ``find(designs, opening, distance, cos, sin, made_of, mode, target, status, found)`` of a chain.
 
     It finds one extremum over the turn of a curve of `kernels.series.curves`, of that order or the `MARGIN`.
 

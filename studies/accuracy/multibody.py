@@ -70,7 +70,7 @@ class Multibody:
             self.weights.append((at, np.asarray(centre, np.float64) - place, mass * np.asarray(gravity, np.float64)))
 
     def load(self, body: str, point: ArrayLike, force: ArrayLike) -> None:
-        """A constant force in fixed axes at a point that the body carries, given at the reference pose."""
+        """Return a constant force in fixed axes at a point that the body carries, given at the reference pose."""
         at = self.ids[body]
         place = np.asarray(point, np.float64) - self.origin[at]
         self.weights.append((at, place, np.asarray(force, np.float64)))
@@ -136,7 +136,9 @@ class Multibody:
         change: float,
         extra: Callable[[Multibody], list[Applied]] | None = None,
     ) -> tuple[list[Array], float, float]:
-        """Forces where the cranks have turned by an angle from the reference pose, in steps small enough for Newton."""
+        """Return forces where the cranks have turned by an angle from the reference pose,
+        in steps small enough for Newton.
+        """
         model, data, pin = self.model, self.data, self.pin
         free = [k for k in range(model.nv) if k not in self.cranks]
         start = self.q[self.cranks[0]]

@@ -50,7 +50,7 @@ class Known(NamedTuple):
 
 
 def reference(mechanism: Family, designs: Array) -> Known:
-    """The family's measure by the method of this module."""
+    """Return the family's measure by the method of this module."""
     if isinstance(mechanism.domain, March):
         return _marched(mechanism, designs)
     name, precise = measure(mechanism), on_closed_turn(mechanism.precise())
@@ -73,7 +73,7 @@ def _marched(mechanism: Family, designs: Array) -> Known:
 
 
 def position(mechanism: Family, designs: Array, phi: Array) -> Array:
-    """The position at angles (n, m) of each design, made continuous along the row where it is an angle."""
+    """Return the position at angles (n, m) of each design, made continuous along the row where it is an angle."""
     y = pose_columns(mechanism, designs, np.ascontiguousarray(phi), (mechanism.position,))[0][mechanism.position]
     return np.unwrap(y, axis=1) if mechanism.pose_output[mechanism.position].wraps else y
 

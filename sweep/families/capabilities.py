@@ -40,7 +40,7 @@ class Assembly:
 
 
 def constant(*numbers: float) -> DesignMap:
-    """The same numbers for every design, (n, k)."""
+    """Return the same numbers for every design, (n, k)."""
     return lambda designs: np.tile(np.array(numbers), (len(designs), 1))
 
 

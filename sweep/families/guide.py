@@ -86,7 +86,7 @@ def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Col
 
 
 def _with_point(kernel: Callable[..., object], designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """The kernel's outputs, and the coupler point's rates along and across the line turned into the frame."""
+    """Return the kernel's outputs, and the coupler point's rates along and across the line turned into the frame."""
     own = [name for name in _POINT if name in wanted]
     if not own:
         return filled_with_places(kernel, designs, angles, _VALUES, _JOINTS, wanted)
@@ -114,7 +114,7 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
 
 
 def ellipse(designs: Array) -> Array:
-    """The curve of the coupler direction across the rocker's motion, (n, 7)."""
+    """Return the curve of the coupler direction across the rocker's motion, (n, 7)."""
     return crank_rocker.ellipse(as_crank_rocker(designs))
 
 
@@ -126,7 +126,7 @@ def travel_shares(designs: Array) -> Array:
 
 
 def guiding_line(designs: Array) -> tuple[Array, Array]:
-    """The point of the guiding line nearest to the crank pivot, and the line's direction, each (n, 3)."""
+    """Return the point of the guiding line nearest to the crank pivot, and the line's direction, each (n, 3)."""
     lam, h = parameter(PARAMETERS, "lam", designs), parameter(PARAMETERS, "h", designs)
     along = np.stack([np.cos(lam), np.sin(lam), np.zeros(len(designs))], axis=1)
     return h[:, None] * np.cross(Z, along), along
@@ -138,12 +138,12 @@ def tool_point(designs: Array) -> Array:
 
 
 def tool_direction(designs: Array) -> Array:
-    """Unit vector of the guiding line, (n, 3)."""
+    """Return unit vector of the guiding line, (n, 3)."""
     return np.column_stack([np.cos(designs[:, 6]), np.sin(designs[:, 6]), 0.0 * designs[:, 6]])
 
 
 def _in_frame(designs: Array, along: Array, across: Array) -> Array:
-    """A coordinate of the coupler point from s and dev, (n, 3): what it takes of each, and a constant."""
+    """Return a coordinate of the coupler point from s and dev, (n, 3): what it takes of each, and a constant."""
     h = parameter(PARAMETERS, "h", designs)
     return np.column_stack([along, across, across * h])
 

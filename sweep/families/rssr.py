@@ -144,7 +144,7 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
 
 
 def ellipse(designs: Array) -> Array:
-    """The curve of the coupler direction across the rocker's motion, (n, 7)."""
+    """Return the curve of the coupler direction across the rocker's motion, (n, 7)."""
     out = np.empty((len(designs), 7))
     rssr.pressure_ellipse(designs, out)
     return out
@@ -157,7 +157,7 @@ def discriminant_scale(designs: Array) -> Array:
 
 
 def rocker_origin(designs: Array) -> Array:
-    """The foot of the common perpendicular on the rocker axis, (n, 3)."""
+    """Return the foot of the common perpendicular on the rocker axis, (n, 3)."""
     origin = np.zeros((len(designs), 3), designs.dtype)
     origin[:, 0] = designs[:, 3]
     return origin
@@ -231,7 +231,7 @@ def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> C
 
 
 def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """True maxima with the proof that no peak was missed: their errors are bounds, not estimates.
+    """Find true maxima with the proof that no peak was missed: their errors are bounds, not estimates.
 
     The place of a maximum is one where its value is taken; how far it is from the exact place stays an estimate.
     """

@@ -200,7 +200,7 @@ class Abreast:
         self.curvature[k] = self.soft
 
     def _prepared(self, k: int) -> _Program:
-        """The quadratic program of a descent's next step, but for the values of its rows."""
+        """Return the quadratic program of a descent's next step, but for the values of its rows."""
         here, unit = self._here(k), self.rows.unit
         size, of_t = _size(here.varied), np.zeros(len(here.values))
         of_t[:OBJECTIVE] = 1.0

@@ -40,7 +40,7 @@ class End(NamedTuple):
         return cls(poses, np.stack(parabola(before, here, after), axis=1))
 
     def repeated(self, times: int) -> End:
-        """The same for so many rows of each."""
+        """Return the same for so many rows of each."""
         return End(np.repeat(self.poses, times, axis=0), np.repeat(self.weights, times, axis=0))
 
     def value(self, curves: Array) -> Array:
@@ -59,7 +59,7 @@ class Turns(NamedTuple):
 
     @classmethod
     def of(cls, rows: Index) -> Turns:
-        """The turns with these rows."""
+        """Return the turns with these rows."""
         poses = np.arange(rows.shape[1])
         return cls(rows, np.roll(poses, 1), np.roll(poses, -1))
 

@@ -81,7 +81,7 @@ class _Population:
     size: Size = FULL
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Bred:
-        """The ends of the population of that number."""
+        """Return the ends of the population of that number."""
         rows = [PoseRows(self.linear, choice) for choice in self.signs]
         rng = np.random.default_rng((self.seed, number))
         ends: list[_End] = []
@@ -159,7 +159,8 @@ def _descended(
 
 
 def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[_End]:
-    """The best ends, at most so many of the same signs, no two of which have the same value or nearly the same guide.
+    """Return the best ends, at most so many of the same signs,
+    no two of which have the same value or nearly the same guide.
 
     Else the many that stopped on their way down one valley would take the places of all others.
     """

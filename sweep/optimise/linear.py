@@ -109,12 +109,14 @@ class Elimination:
         return out, t + price * v, np.isfinite(t + v) & np.isfinite(out).all(axis=1)
 
     def unknowns(self, designs: Array) -> Array:
-        """The best z1, z2 and h (n, 5) of designs as they are drawn, nan where there is no solution."""
+        """Return the best z1, z2 and h (n, 5) of designs as they are drawn, nan where there is no solution."""
         x, t, _ = _minimised(*self._posed(designs))
         return np.asarray(np.where(np.isfinite(t)[:, None], x, np.nan), np.float64)
 
     def _posed(self, designs: Array) -> tuple[_Motion, Array, Array, Array, float]:
-        """The linear programs of designs: motion, bounds, needs, least scales and the price of a missed bound."""
+        """Return the linear programs of designs: motion, bounds, needs,
+        least scales and the price of a missed bound.
+        """
         base = designs.copy()
         base[:, [self.column(name) for name in self.guide.fitted]] = 0.0
         motion = self._motion(base)
@@ -123,7 +125,7 @@ class Elimination:
         return motion, bounds, need, self._least_scale(base), EXCESS * self.stroke / bound
 
     def _motion(self, base: Array) -> _Motion:
-        """What is linear in the unknowns, of designs without point and line."""
+        """Return what is linear in the unknowns, of designs without point and line."""
         beside = base.copy()
         # The coupler's length as the arm keeps the columns of one size.
         beside[:, self.column(self.guide.arms[0])] = base[:, self.column(self.guide.links[1])]
@@ -165,7 +167,7 @@ class Elimination:
         return out
 
     def turned(self, lam: Array) -> Array:
-        """The direction as an angle within its bounds, if one of its turns is."""
+        """Return the direction as an angle within its bounds, if one of its turns is."""
         name = f"{self.guide.direction}{self.last}"
         if name not in self.problem.variables:
             return lam
@@ -239,7 +241,7 @@ def _minimised(motion: _Motion, bounds: Array, need: Array, least: Array, price:
 
 
 def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimination | None:
-    """The linear part of a problem, or None where it has none.
+    """Return the linear part of a problem, or None where it has none.
 
     With a ``tolerance`` that has a share, the limits on deviation and stroke are to hold for what is made.
     """

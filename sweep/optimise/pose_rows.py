@@ -143,7 +143,7 @@ class PoseRows:
         return out
 
     def with_middle(self, places: Array) -> Array:
-        """The other way round."""
+        """Return the other way round."""
         return self.without_middle(places, 1.0)
 
     def designs(self, places: Array, x: Array) -> Array:
@@ -160,7 +160,7 @@ class PoseRows:
         return out
 
     def tangents(self, places: Array, x: Array) -> Array:
-        """Derivatives (k, n + 5, P) of the designs by their places and linear unknowns."""
+        """Return derivatives (k, n + 5, P) of the designs by their places and linear unknowns."""
         own, ratios, n = self.own, self.own.placed(places), places.shape[1]
         out = np.zeros((len(places), n + UNKNOWNS, ratios.shape[1]))
         scale = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
@@ -186,7 +186,7 @@ class PoseRows:
         return out
 
     def unknowns(self, places: Array) -> Array:
-        """The linear unknowns (k, 5) that are best for some proportions, nan where nothing is."""
+        """Return the linear unknowns (k, 5) that are best for some proportions, nan where nothing is."""
         return self.linear.unknowns(self.own.placed(places))
 
     def rows(self, places: Array, x: Array, linear_part: bool = False) -> Rows:
@@ -216,7 +216,9 @@ class PoseRows:
         return Rows(sharp, slopes, -sharp[:, : 2 * POSES].min(axis=1))
 
     def solved(self, places: Array, x: Array) -> Array:
-        """The best linear unknowns (k, 5) of some proportions, limits that bend taken for straight about ``x``."""
+        """Return the best linear unknowns (k, 5) of some proportions,
+        limits that bend taken for straight about ``x``.
+        """
         slopes = self.rows(places, x, linear_part=True).slopes
         k = len(places)
         bound = np.repeat(np.stack([np.full(len(self.above), np.inf), self.above])[None], k, axis=0)
@@ -234,7 +236,7 @@ class PoseRows:
         return self.judged(self.values(places, x))
 
     def begun(self, places: Array) -> tuple[Array, Array]:
-        """The best linear unknowns (k, 5) of some proportions, and what the designs are worth (k,)."""
+        """Return the best linear unknowns (k, 5) of some proportions, and what the designs are worth (k,)."""
         x = self.unknowns(places)
         known = np.asarray(np.isfinite(x).all(axis=1), np.bool_)
         x = np.where(known[:, None], x, 1.0)
@@ -253,7 +255,7 @@ class PoseRows:
             )
 
     def judged(self, values: Array) -> Array:
-        """What designs with such values are worth (k,): see :meth:`worth`."""
+        """Return what designs with such values are worth (k,): see :meth:`worth`."""
         own, others = values[:, : 2 * POSES], values[:, 2 * POSES :]
         worth = self.price * np.maximum(-others.min(axis=1), 0.0) - own.min(axis=1)
         margins = others[:, : len(self.loops) * POSES].min(axis=1, initial=1.0)
@@ -268,7 +270,7 @@ class PoseRows:
     def _pieces(
         self, columns: Mapping[str, Array], designs: Array, ends: Mapping[str, tuple[End, End]], one: float
     ) -> list[Array]:
-        """The rows (k, .) one limit after the other, those of the objective first, of outputs and designs.
+        """Return the rows (k, .) one limit after the other, those of the objective first, of outputs and designs.
 
         They are linear: with ``one`` zero, derivatives of outputs and designs give those of the rows.
         """

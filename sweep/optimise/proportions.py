@@ -69,7 +69,7 @@ class Proportions:
         return designs
 
     def placed(self, places: Array) -> Array:
-        """The same with the offset between the stages itself at its place."""
+        """Return the same with the offset between the stages itself at its place."""
         values: Array = self.low + places * (self.high - self.low)
         low, wide = self.low[self.log], np.array([math.log(x) for x in self.high[self.log] / self.low[self.log]])
         # numpy's exponential depends on the processor, that of the C library does not
@@ -161,7 +161,7 @@ def from_proportions(
 
 
 def turned_into(problem: Problem, designs: Array) -> Array:
-    """The designs whose angles lie within their bounds, by whole turns."""
+    """Return the designs whose angles lie within their bounds, by whole turns."""
     out = designs.copy()
     for k, name in enumerate(problem.variables):
         column = problem.family.parameter_names.index(name)

@@ -163,7 +163,7 @@ def settled(values: Sequence[float], wanted: float) -> bool:
 
 
 def _best_of_each(ranked: Sequence[Result], origins: Sequence[int]) -> list[Result]:
-    """The best result of every global search, of results in the order of their basins."""
+    """Return the best result of every global search, of results in the order of their basins."""
     found: dict[int, Result] = {}
     for r in ranked:
         if r.basin and origins[r.start] >= 0:

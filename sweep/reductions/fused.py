@@ -42,7 +42,7 @@ class FusedCurve:
     scale: DesignMap | None = None
 
     def extremum(self, designs: Array, target: float) -> tuple[Extremum, Status, Mask]:
-        """What is requested, of every design.
+        """Return what is requested, of every design.
 
         Parameters
         ----------
@@ -112,7 +112,7 @@ class FusedCurve:
 
 
 def curve_of(family: Family, request: Request, anywhere: bool) -> FusedCurve | None:
-    """The fused curve of what is requested; None where there is none.
+    """Return the fused curve of what is requested; None where there is none.
 
     ``anywhere`` as of `sweep.reductions.extrema.true_extrema`: then the least discriminant of a later stage.
     """
@@ -178,7 +178,7 @@ def _component(family: Family, forms: tuple[InSeries, ...], request: Request) ->
 
 
 def _forms(family: Family) -> tuple[InSeries, ...] | None:
-    """What the stages of a chain are fused by; None for any other family, and for poses of higher precision."""
+    """Return what the stages of a chain are fused by; None for any other family, and for poses of higher precision."""
     if not isinstance(family, Chain) or family.poses is family.precise_poses:
         return None
     forms = [stage.family.find(InSeries) for stage in family.stages]

@@ -110,7 +110,7 @@ def _stay(
 
 
 def quantities(family: Family, names: Sequence[str]) -> list[Quantity]:
-    """The quantities of design outputs that general routes compute."""
+    """Return the quantities of design outputs that general routes compute."""
     asked = [quantity(family, name) for name in names]
     assert all(one is not None for one in asked)
     return [one for one in asked if one is not None]
@@ -174,7 +174,7 @@ def _best_samples(
 
 
 def _value(family: Family, designs: Array, one: Quantity, found: Found, windowed: bool) -> tuple[Array, Array]:
-    """A design output and its error from the extrema it is made of."""
+    """Return a design output and its error from the extrema it is made of."""
     first = found[one.requests(family, windowed)[0]]
     if one.kind in ("phi_max_abs", "phi_max", "phi_min"):
         return variable(family, designs, first.phi, first.err_phi)
@@ -197,7 +197,9 @@ def _extended_is_largest(family: Family, designs: Array, position: str) -> Mask:
 
 
 def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mask) -> tuple[Array, Array]:
-    """What the two limit positions say; ``wraps`` is about the position, ``outward`` (n,): the largest is extended."""
+    """Return what the two limit positions say; ``wraps`` is about the position, ``outward`` (n,):
+    the largest is extended.
+    """
     ext = Extremum(*(np.where(outward, a, b) for a, b in zip(most, least, strict=True)))
     fold = Extremum(*(np.where(outward, b, a) for a, b in zip(most, least, strict=True)))
     if kind in ("ext", "fold"):
@@ -216,5 +218,5 @@ def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mas
 
 
 def _principal(angle: Array) -> Array:
-    """The angle in (-pi, pi], as atan2 has it."""
+    """Return the angle in (-pi, pi], as atan2 has it."""
     return angle - TWO_PI * np.ceil((angle - np.pi) / TWO_PI)

@@ -106,7 +106,7 @@ def place(r: Any, u: Any, v: Any) -> Place:
 
 @inline
 def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
-    """Rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (7)."""
+    """Return rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (7)."""
     t = 8.0 * EPS
     first = abs(x.real) * r.x_size + abs(y.real) * r.a.real + abs(w.real) * r.w_size
     return t * first + t * t * (r.x_size * r.x_size + r.a.real * r.a.real + r.w_size * r.w_size)

@@ -47,7 +47,7 @@ def jerk(at: Place, first: First, q: Any, t: Any, per_t: Any) -> Any:
 
 @inline
 def snap(r: Any, at: Place, first: First, q: Any, j: Any, t: Any, per_t: Any) -> Any:
-    """The fourth derivative of psi from psi'' = ``q``, psi''' = ``j`` and T."""
+    """Return the fourth derivative of psi from psi'' = ``q``, psi''' = ``j`` and T."""
     p, g_turn, g_near, w = first.p, first.g_turn, first.g_near, at.w
     by_p = p * (4.0 * g_near - p * (6.0 * g_near - p * (4.0 * g_near - w * p)))
     by_q = q * (6.0 * g_turn - p * (12.0 * g_turn + 6.0 * t * p) + 3.0 * w * q)

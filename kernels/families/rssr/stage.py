@@ -125,7 +125,7 @@ FORM = Form("rssr", 8, 10, _constants, _put, _get, _turn, _travel, _dip, _turn_b
 
 @kernel
 def opening(designs: Array, status: Status, distance: Array) -> None:
-    """Does the first stage of a chain turn, and how near is its motion's nearest singularity?
+    """Tell whether the first stage of a chain turns, and how near its motion's nearest singularity is.
 
     Parameters
     ----------
