@@ -21,7 +21,7 @@ from sweep.chunks.chunk import compute_chunk
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.optimise import minimise
-from sweep.optimise.study import problem_of
+from sweep.optimise.posing import problem_of
 from sweep.study import OptimiseSettings, load_study, study_from_data
 from sweep.study.study import Limit
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from sweep.evaluation.summaries import design_outputs
+from sweep.optimise.posing import problem_of
 from sweep.optimise.robust import SAMPLES, yields
-from sweep.optimise.study import problem_of
 from sweep.study import load_study
 from tests.reference.made import normal, outputs
 

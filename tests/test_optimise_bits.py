@@ -16,7 +16,7 @@ from sweep.optimise import generations, proportions
 from sweep.optimise.evolution import evolved
 from sweep.optimise.linear import elimination
 from sweep.optimise.starts import drawn
-from sweep.optimise.study import problem_of
+from sweep.optimise.posing import problem_of
 from sweep.study import Limit, OptimiseSettings, load_study
 
 names = ("a", "b", "c", "e", "f", "g", "alpha")

@@ -18,9 +18,9 @@ from sweep.optimise.generations import Bred, Size, bred
 from sweep.optimise.globally import proportion_starts
 from sweep.optimise.linear import Elimination, elimination
 from sweep.optimise.pose_rows import UNKNOWNS, PoseRows
+from sweep.optimise.posing import problem_of
 from sweep.optimise.solve import explore
 from sweep.optimise.starts import drawn
-from sweep.optimise.study import problem_of
 from tests.needle208_record import record
 
 EXPECTED = json.loads((Path(__file__).parents[1] / "studies" / "needle208" / "expected.json").read_text())["record"]

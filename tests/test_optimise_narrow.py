@@ -12,7 +12,8 @@ import pytest
 from sweep.engine.run import run
 from sweep.families import family
 from sweep.optimise import Problem, optimum
-from sweep.optimise.study import problem_and_starts, read_survey
+from sweep.optimise.posing import problem_and_starts
+from sweep.optimise.study import read_survey
 from sweep.study import Limit, OptimiseSettings, load_study
 
 NARROW = """

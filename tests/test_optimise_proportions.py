@@ -15,8 +15,8 @@ from sweep.optimise.evolution import evolved
 from sweep.optimise.linear import Elimination, elimination
 from sweep.optimise.made import changes
 from sweep.optimise.merit import merit
+from sweep.optimise.posing import problem_of
 from sweep.optimise.proportions import from_proportions, widened
-from sweep.optimise.study import problem_of
 from sweep.study import load_study, study_from_data
 from tests.needle208_record import record
 

@@ -14,8 +14,8 @@ from sweep.dataset.layout import beside
 from sweep.engine.run import run
 from sweep.errors import InputError
 from sweep.optimise import optimise_study
+from sweep.optimise.posing import problem_of
 from sweep.optimise.starts import best_rows
-from sweep.optimise.study import problem_of
 from sweep.study import Study, load_study
 
 STUDY = """

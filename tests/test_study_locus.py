@@ -22,7 +22,7 @@ from sweep.chunks.chunk import compute_chunk
 from sweep.dataset.layout import beside
 from sweep.engine.run import run
 from sweep.errors import StudyError
-from sweep.optimise.study import problem_of
+from sweep.optimise.posing import problem_of
 from sweep.study import Study, load_study
 from sweep.study.study import Limit
 

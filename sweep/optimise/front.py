@@ -19,8 +19,8 @@ from sweep.families.base import Array
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.certificate import Result
 from sweep.optimise.pareto import Front, advance
+from sweep.optimise.posing import problem_of_dataset
 from sweep.optimise.starts import diverse
-from sweep.optimise.study import problem_and_starts
 from sweep.optimise.written import certificates, outputs, write
 from sweep.quantities.names import by_magnitude
 
@@ -78,8 +78,9 @@ def front_study(
         return path
     many = front.steps
     say("front", front.taken, many, "steps")
-    problem = problem_and_starts(study, place)[1].problem
-    starts = _starts(study, settings, problem, place)
+    ends, optimum = _searched(study, place)
+    problem = problem_of_dataset(study, place, ends)
+    starts = _starts(study, settings, problem, place, optimum)
     kept, begin = front, time.monotonic()
     for best in advance(problem, settings, front, starts, stop, jobs):
         kept = best if best.taken > kept.taken else kept
@@ -146,13 +147,18 @@ def _unit(study: Study, name: str) -> str:
     return internal_unit(output(study.family, name).unit)
 
 
-def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path) -> list[Array]:
-    """Return for each bound, the loosest first,
-    the optimum and then diverse best designs of the dataset within the bound.
-    """
+def _searched(study: Study, folder: Path) -> tuple[Array, Array]:
+    """Return the designs that the search for the optimum ended at (k, P), and of them the optimum (1, P)."""
     names = list(study.family.parameter_names)
-    optimum = _columns(store.beside(folder) / store.OPTIMUM, [*names, "role"])
-    own = np.column_stack([optimum[name] for name in names])[optimum["role"] == "optimum"].astype(np.float64)
+    rows = _columns(store.beside(folder) / store.OPTIMUM, [*names, "role"])
+    designs = np.column_stack([rows[name] for name in names]).astype(np.float64)
+    return designs[rows["role"] != "reference"], designs[rows["role"] == "optimum"]
+
+
+def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path, own: Array) -> list[Array]:
+    """Return for each bound, the loosest first,
+    the optimum ``own`` and then diverse best designs of the dataset within the bound.
+    """
     chosen = []
     for designs, merit in within(study, settings, Front.of(settings).bounds, folder):
         found = diverse(problem, designs, merit, settings.starts) if settings.starts else designs[:0]

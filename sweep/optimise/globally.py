@@ -76,7 +76,7 @@ def proportion_starts(
         new = [one.designs[0] for one in found[-TOGETHER:] if len(one.designs)]
         if not new:
             return False
-        task = SearchTask(_holding(study, problem, np.array(new)), np.array(new), settings.looks)
+        task = SearchTask(holding(study, problem, np.array(new)), np.array(new), settings.looks)
         ends.extend(r.objective for r in spread_over(task, list(range(len(new))), stop, jobs) if r.feasible)
         return settled(ends, settings.unseen)
 
@@ -100,7 +100,7 @@ def proportion_starts(
     if not len(starts):
         allowed = "proportions with which the mechanism turns"
         raise InputError("design space", study.space.count, allowed, str(study.path))
-    return Begun(_holding(study, problem, found), starts, tuple([k for k, _ in first] + [-1] * len(own)))
+    return Begun(holding(study, problem, found), starts, tuple([k for k, _ in first] + [-1] * len(own)))
 
 
 def insensitive(
@@ -115,7 +115,7 @@ def insensitive(
     signs = kinds(study, problem, np.empty((0, len(problem.family.parameters))))
     count = -(-settings.starts // INSENSITIVE)
     found = from_proportions(linear, signs, count, settings.seed + OTHER_SEED, stop, jobs, say)
-    return _holding(study, problem, found), found
+    return holding(study, problem, found), found
 
 
 def _linear(study: Study, problem: Problem, tolerance: Tolerance | None = None) -> Elimination:
@@ -125,5 +125,6 @@ def _linear(study: Study, problem: Problem, tolerance: Tolerance | None = None) 
     return linear
 
 
-def _holding(study: Study, problem: Problem, found: Array) -> Problem:
+def holding(study: Study, problem: Problem, found: Array) -> Problem:
+    """Return the problem with bounds that hold designs (k, P), of the variables that [fit] makes."""
     return widened(problem, found, [n for n in problem.variables if n in study.made])
