@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as some
 from mpmath import mp, mpf
 
@@ -145,6 +145,14 @@ GIVEN = some.fixed_dictionaries({
 })  # fmt: skip
 
 
+PRESSED = {
+    "a1": 0.75, "b1": 0.5, "a2": 0.1875, "b2": 0.5, "H": 0.0, "r": 0.0625, "r0": 0.0625, "psi": 1.0, "xE": 0.0,
+    "yE": 0.25, "f": 0.0, "P1": 0.0, "P2": 0.0, "lM": 0.25, "nu": 1.6953125, "x3": 0.75, "y3": 0.6875, "cs": 1242.0,
+    "l0": 0.5, "F0": 100.0, "rg": 0.1875, "nug": 0.125, "s1": -1.0, "s2": -1.0,
+}  # fmt: skip  # a spring shorter than at rest
+
+
+@example(PRESSED, 0.5, 0.25)
 @settings(deadline=None, max_examples=25)
 @given(GIVEN, some.floats(0.0, 0.5), some.floats(0.09, 0.38))
 def test_backrest_equals_points_and_balances(p, phi, rho):

@@ -116,7 +116,8 @@ def test_twice_the_samples_cost_nearly_twice(tmp_path: Path) -> None:
     model = with_accuracy(tmp_path, "samples = 1440")
     found, now = dict(other_accuracies(model, 2)), estimate(model, 2).seconds
     assert list(found) == ["half the samples", "twice the samples"]
-    assert 1.6 < found["twice the samples"] / now < 2.0
+    # Twice the samples halve the designs of a chunk, so the fixed time of each chunk comes twice as often.
+    assert 1.6 < found["twice the samples"] / now < 2.05
     assert 0.5 < found["half the samples"] / now < 0.65
 
 

@@ -68,7 +68,8 @@ def statics(p: dict[str, Any], phi: Any, rho: Any) -> dict[str, Any]:
     m = g["pivot"] + p["lM"] * mp.mpc(-mp.cos(phi + p["nu"]), mp.sin(phi + p["nu"]))
     anchor = mp.mpc(p["x3"], p["y3"])
     length = abs(anchor - m)
-    pull = (p["F0"] + p["cs"] * (length - p["l0"])) * (anchor - m) / length
+    force = p["F0"] + p["cs"] * (length - p["l0"])  # negative where the spring is pressed
+    pull = force * (anchor - m) / length
     centre = p["rg"] * mp.mpc(-mp.cos(phi + p["nug"]), mp.sin(phi + p["nug"]))
     outer = cross(m - g["pivot"], pull) + cross(centre, mp.mpc(0, -p["P2"]))
     # unknowns K, N1, N2, and the moment arm e N2 of the slider's reaction along the bracket
@@ -91,5 +92,5 @@ def statics(p: dict[str, Any], phi: Any, rho: Any) -> dict[str, Any]:
     return {
         "K": source[0], "N1": source[1], "N2": source[2],
         "K_couple": consistent[0], "N1_couple": consistent[1], "N2_couple": consistent[2],
-        "offset_e": consistent[3] / consistent[2], "F_spring": abs(pull), "spring_length": length,
+        "offset_e": consistent[3] / consistent[2], "F_spring": force, "spring_length": length,
     }  # fmt: skip
