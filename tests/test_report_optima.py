@@ -101,6 +101,8 @@ def test_cards_have_picture_sizes_and_yield(tmp_path) -> None:
     assert ("least link", "12\u00a0mm") in first.extras and "of what is made keeps all limits" in second.made
     assert second.against == "40\u00a0% more"
     assert "2 structurally different optima; the next has 0.7" in optima_sentence(data, found)
+    sentence = optima_sentence(data, groups(data_of(row("optimum", 0.7), row("nominal", 0.5, c=17.0))))
+    assert "the best on paper has 0.5" in sentence and "% less), but" in sentence and "keeps all limits" in sentence
     assert optima(data, found[:1], tmp_path) == [] and optima_sentence(data, found[:1]) == ""
 
 

@@ -181,8 +181,10 @@ def _proof(data: Dataset, found: Scan) -> str:
     kind = "" if found.feasible else "random "
     proven = proof_sentence(data)
     head = f"{proven[0].upper()}{proven[1:]}. The" if proven else f"{NO_PROOF}: the"
-    text = f"{head} optimiser started from {starts} {kind}design{'s' if starts != 1 else ''} of the sweep"
-    if math.isfinite(agree):
+    text = f"{head} optimiser started from {starts} {kind}design{'s' if starts != 1 else ''}"
+    populations = 0 if data.survey is None else data.survey.populations
+    text += f", ends of {populations} global searches and designs of the sweep" if populations else " of the sweep"
+    if math.isfinite(agree) and not populations:  # of those the survey tells more
         text += f", {number(agree)} of which ended at this value"
     if data.survey is not None:
         text += f"; {data.survey.words}"

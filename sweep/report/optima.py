@@ -80,8 +80,13 @@ def optima_sentence(data: Dataset, found: list[Group]) -> str:
     shown = quantity(objective.output, data.units.get(objective.output, ""))
     value, best = (float(group.row[objective.output]) for group in (found[1], found[0]))
     difference = change(shown, value, best)
-    text = f"The search ended in {len(found)} structurally different optima; the next has {shown.show(value)}"
-    return f"{text} ({difference})." if difference else f"{text}."
+    text = f"The search ended in {len(found)} structurally different optima"
+    row = found[1].row
+    paper = row.get("role") == "nominal"
+    text += f"; the {'best on paper' if paper else 'next'} has {shown.show(value)}"
+    text += f" ({difference})" if difference else ""
+    share = _made(data, row) if paper else ""
+    return f"{text}, but {share}." if share else f"{text}."
 
 
 def _made(data: Dataset, row: dict[str, Any]) -> str:
