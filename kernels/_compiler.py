@@ -8,7 +8,8 @@ is folded into its caller.  For each ``a * b`` it asks every operator it knows a
 * what an operator gives for the types of its operands is remembered.
 * optimisers of single functions run on those that have a body.
 
-The time of a first use is a third less (``make bench-first-use``), the loops are as fast and no value changes.
+Side by side with numba's own way a first use took a third less, and loops 0.97 to 1.04 of their time; ``make
+bench-first-use`` and ``make bench`` give both as they are now.
 The classes derive from numba's at the places that numba has for it: dispatcher, compiler, pass, code library.
 """
 
