@@ -21,8 +21,9 @@ from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work
 from sweep.families.chain import Chain
 from sweep.families.derived import of_family
 from sweep.families.members import Machine
+from sweep.families.pace import of_order, of_table
 from sweep.families.relations import Reading
-from sweep.numerics.curves import Curve
+from sweep.numerics.curves import Curve, TableCurve
 from sweep.quantities.names import stem
 from sweep.quantities.reduction import reduced
 
@@ -265,12 +266,26 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
     return replace(
         family,
         parameters=(*family.parameters, *added),
-        pose_outputs=(*family.pose_outputs, *(o for placed in effects for o in placed.pose_outputs)),
+        pose_outputs=(*family.pose_outputs, *_bent(effects, curves)),
         poses=partial(effect_poses, family, effects, added, curves, own),
         precise_poses=family.precise_poses and partial(effect_poses, family.precise(), effects, added, curves, own),
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
+        capabilities=(*family.capabilities, *_paces(curves)),
         dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )
+
+
+def _bent(effects: tuple[Placed, ...], curves: Mapping[str, Curve]) -> list[Output]:
+    """Return pose outputs of effects: between the points of a table of loads they may have a narrow peak."""
+    tables = any(isinstance(curve, TableCurve) for curve in curves.values())
+    found = [o for placed in effects for o in placed.pose_outputs]
+    return [replace(o, kinks=not (o.wraps or o.jumps)) for o in found] if tables else found
+
+
+def _paces(curves: Mapping[str, Curve]) -> list[object]:
+    """Return where the tables among loads bend, and how many waves the series have."""
+    of = curves.values()
+    return [of_table(c.phi) if isinstance(c, TableCurve) else of_order(max(len(c.cos), len(c.sin))) for c in of]
 
 
 def _design_ns(entry: Effect, accuracy: Accuracy) -> float:

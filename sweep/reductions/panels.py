@@ -18,12 +18,14 @@ from numpy.polynomial import chebyshev
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
+from sweep.families.pace import switches, waves
 from sweep.numerics.chebyshev import NODES, at_nodes, basis, product, rising
 from sweep.numerics.events import sign_changes, with_events
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
 from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, blocks, discriminants, pose_columns
 
 PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
+PER_PANEL = 0.25  # waves that a first panel may hold
 DENSE = 33  # places at which the highest point of a polynomial is looked for, its ends included
 NEWTON = 4
 TAIL = 3  # last coefficients that tell how wrong a polynomial may be ...
@@ -129,9 +131,15 @@ def _block(
 
 
 def _cut(family: Family, designs: Array) -> tuple[Index, Array, Array]:
-    """Return design and ends of the first panels: even ones, cut where followers reverse."""
+    """Return design and ends of the first panels: even ones, cut where outputs switch and where followers reverse."""
     n = len(designs)
     edges = np.tile(np.linspace(0.0, TWO_PI, PANELS + 1), (n, 1))
+    known = switches(family, designs)
+    edges = with_events(edges, np.repeat(np.arange(n), known.shape[1]), known.ravel())
+    fast = np.ceil(waves(family, designs) / PER_PANEL).astype(np.int64)  # even ends of so many panels
+    more = np.repeat(np.arange(n), np.where(fast > PANELS, fast, 0))
+    place = np.arange(more.size) - np.searchsorted(more, more)
+    edges = with_events(edges, more, TWO_PI * place / fast[more])
     speeds = reversing(family)
     if speeds:
 
