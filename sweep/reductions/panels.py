@@ -35,7 +35,7 @@ LATELY = 0.25  # of what the polynomial before was wrong by: halving takes a kin
 NARROWEST = 1e-11  # width of a panel [rad] that can only hold a jump
 EDGE = 2.0**17  # times EPS of the size: what a curve that rises by six sizes a radian may do in a quarter of that
 CROWD = 48  # panels of one curve beyond which rounding alone is halved
-ALLOWED = 1.0 / 16.0  # of the target: what two successive polynomials may differ by
+ALLOWED = 1.0 / 32.0  # of the target: what two successive polynomials may differ by
 AGAIN = 8.0  # times that difference is claimed: poses see a kink between them as low as that
 SLOPE = 2.0 * (NODES - 1) ** 2  # of a polynomial bounded by 1 on a panel of width 1 (Markov)
 EPS = 2.0**-53
@@ -173,9 +173,9 @@ def _climbed(
     tops: list[Top] = []
     while panels.row.size:
         panels = panels.only(_upper(panels, request.mode) >= best[panels.row])
-        crowded = np.bincount(panels.row, minlength=n)[panels.row] > CROWD
-        # Even first panels may all be within the target of each other: a constant.
-        crowded &= panels.high - panels.low < 0.25 * TWO_PI / PANELS
+        # Even first panels may all be within the target of each other: a constant, or a dwell.
+        crowded = panels.high - panels.low < 0.25 * TWO_PI / PANELS
+        crowded &= np.bincount(panels.row[crowded], minlength=n)[panels.row] > CROWD
         tops.append(_given_up(panels.only(crowded), request.mode))
         panels = panels.only(~crowded)
         halves, miss = _halved(family, designs, panels, request)
