@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.families.base import Angles, Array, Columns, Family
 from sweep.families.capabilities import Assembly, DesignMap
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 TWO_PI = 2.0 * np.pi
 
+T = TypeVar("T")
 SingularCurve: TypeAlias = Callable[[Array, Angles], Array]
 
 
@@ -58,6 +60,18 @@ class Switches:
     angles: DesignMap
 
 
+@dataclass(frozen=True)
+class Crossing:
+    """Outputs jump where the pose output ``of`` passes ``level(designs)``, (n,), in designs that it ``matters`` for.
+
+    A tool that pierces is loaded from there to its turning point: perhaps for less of the turn than two samples span.
+    """
+
+    of: str
+    level: DesignMap
+    matters: Callable[[Array], NDArray[np.bool_]]
+
+
 def waves(family: Family, designs: Array) -> Array:
     """Return how many waves one turn holds at least, (n,)."""
     most = np.ones(len(designs))
@@ -72,6 +86,14 @@ def switches(family: Family, designs: Array) -> Array:
     every = [np.zeros((len(designs), 0)), *(known.angles(designs) for known in family.every(Switches))]
     angles = np.mod(np.concatenate(every, axis=1), TWO_PI)
     return np.where(np.isfinite(angles), angles, 0.0)
+
+
+def crossed(family: Family, designs: Array) -> NDArray[np.bool_]:
+    """Return which designs have outputs that jump where a pose output passes a level, (n,)."""
+    found: NDArray[np.bool_] = np.zeros(len(designs), np.bool_)
+    for known in family.every(Crossing):
+        found = found | known.matters(designs)
+    return found
 
 
 def singular_curves(family: Family) -> Sequence[SingularCurve]:
@@ -123,11 +145,17 @@ def of_members(members: Sequence[Member]) -> list[object]:
     for m in members:
         if m.driver is None:
             found += [Switches(partial(_on_shaft, m, known.angles)) for known in m.family.every(Switches)]
+        found += [_of_part(m, known) for known in m.family.every(Crossing)]
         for known in m.family.every(Singular):
             if known.needs:
                 names = {name: f"{m.name}.{name}" for name in known.needs}
                 found.append(Singular(partial(_renamed, m.designs, names, known.curve), tuple(names.values())))
     return found
+
+
+def _of_part(member: Member, known: Crossing) -> Crossing:
+    level, matters = partial(_on_part, member.designs, known.level), partial(_on_part, member.designs, known.matters)
+    return Crossing(f"{member.name}.{known.of}", level, matters)
 
 
 def _alike(angles: Array, designs: Array) -> Array:
@@ -138,7 +166,7 @@ def _many(count: float, designs: Array) -> Array:
     return np.full(len(designs), count)
 
 
-def _on_part(part: Callable[[Array], Array], of_design: DesignMap, designs: Array) -> Array:
+def _on_part(part: Callable[[Array], Array], of_design: Callable[[Array], T], designs: Array) -> T:
     return of_design(part(designs))
 
 

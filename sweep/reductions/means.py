@@ -14,10 +14,11 @@ import numpy as np
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.families.pace import Singular, singular_curves, switches
+from sweep.families.pace import Singular, crossed, singular_curves
 from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import Singularities, crowded, turn_edges
+from sweep.reductions.cuts import ends
 from sweep.reductions.density import denser, nearest
 from sweep.reductions.extrema import DESIGN_STATUS, LIMIT, START
 from sweep.reductions.sampling import (
@@ -37,6 +38,8 @@ NEAR = 0.3  # distance of a singularity [rad] as samples see it, from which on i
 PER_SINGULARITY = 12.0  # samples per distance of it, below which two grids may agree and both miss a peak
 PANEL = 1.0  # length of the first panels against that distance; the rule of 15 points errs by 1e-13 there
 PANELS_AT_ONCE = 1024
+LOOKS = 512  # samples among which a curve with kinks or jumps is searched for what cuts it
+EVEN = 16  # first panels of a curve with kinks or jumps, beside those between its known ones
 PREFIX = "rms_"
 
 
@@ -80,9 +83,9 @@ def _refined(family: Family, designs: Array, poses: Sequence[str], target: float
     needed = np.zeros(n)
     needed[alive] = PER_SINGULARITY / near.rho.min(axis=1, initial=np.inf)
     needed = np.maximum(needed, START * denser(family, designs))
-    known = switches(family, designs)
-    if any(family.pose_output[pose].kinks for pose in poses):
-        needed[:] = np.inf
+    kinks = any(family.pose_output[pose].kinks for pose in poses)
+    jumping = np.full(n, kinks) | crossed(family, designs)
+    needed[jumping] = np.inf
     unresolved = _by_grids(family, designs, poses, target, found, err, status, needed)
     settled = np.setdiff1d(np.flatnonzero(status == st.OK), unresolved)
     rounding = _rounding(family, designs[settled], poses, near.only(np.searchsorted(alive, settled)))
@@ -94,7 +97,10 @@ def _refined(family: Family, designs: Array, poses: Sequence[str], target: float
     for k in range(0, unresolved.size, PANELS_AT_ONCE):
         rows = unresolved[k : k + PANELS_AT_ONCE]
         edges = turn_edges(near.only(np.searchsorted(alive, rows)), PANEL)
-        edges = with_events(edges, np.repeat(np.arange(rows.size), known.shape[1]), known[rows].ravel())
+        if jumping[rows].any():
+            cut = ends(family, designs[rows[jumping[rows]]], EVEN, LOOKS)
+            which = np.repeat(np.flatnonzero(jumping[rows]), cut.shape[1])
+            edges = with_events(edges, which, cut.ravel())
         found[rows], err[rows], status[rows] = _on_panels(family, designs[rows], poses, edges, target)
     lost = (status != st.OK) & (status != st.NOT_CONVERGED)
     found[lost], err[lost] = np.nan, np.nan

@@ -18,14 +18,12 @@ from numpy.polynomial import chebyshev
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
-from sweep.families.pace import switches, waves
 from sweep.numerics.chebyshev import NODES, at_nodes, basis, product, rising
-from sweep.numerics.events import sign_changes, with_events
+from sweep.reductions.cuts import ends
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
 from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, blocks, discriminants, pose_columns
 
 PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
-PER_PANEL = 0.25  # waves that a first panel may hold
 DENSE = 33  # places at which the highest point of a polynomial is looked for, its ends included
 NEWTON = 4
 TAIL = 3  # last coefficients that tell how wrong a polynomial may be ...
@@ -72,10 +70,10 @@ class Top(NamedTuple):
     err_phi: Array
 
 
-def has_kinks(family: Family, request: Request) -> bool:
-    """Return whether an extremum is to be searched for on panels."""
+def has_kinks(family: Family, request: Request, jumps: bool = False) -> bool:
+    """Return whether an extremum is to be searched for on panels; ``jumps``: all curves of these designs may jump."""
     output = family.pose_output[request.pose]
-    return output.kinks and not output.wraps and not request.windowed
+    return (output.kinks or jumps) and not output.wraps and not request.windowed
 
 
 def extrema(
@@ -131,34 +129,11 @@ def _block(
 
 
 def _cut(family: Family, designs: Array) -> tuple[Index, Array, Array]:
-    """Return design and ends of the first panels: even ones, cut where outputs switch and where followers reverse."""
-    n = len(designs)
-    edges = np.tile(np.linspace(0.0, TWO_PI, PANELS + 1), (n, 1))
-    known = switches(family, designs)
-    edges = with_events(edges, np.repeat(np.arange(n), known.shape[1]), known.ravel())
-    fast = np.ceil(waves(family, designs) / PER_PANEL).astype(np.int64)  # even ends of so many panels
-    more = np.repeat(np.arange(n), np.where(fast > PANELS, fast, 0))
-    place = np.arange(more.size) - np.searchsorted(more, more)
-    edges = with_events(edges, more, TWO_PI * place / fast[more])
-    speeds = reversing(family)
-    if speeds:
-
-        def functions(rows: Index, phi: Array) -> Array:
-            columns, _ = pose_columns(family, designs[rows], phi, speeds)
-            return np.nan_to_num(np.stack([columns[name] for name in speeds], axis=2))
-
-        phi = np.arange(PANELS * NODES) * (TWO_PI / (PANELS * NODES))
-        edges = with_events(edges, *sign_changes(functions, np.tile(phi, (n, 1))))
+    """Return design and ends of the first panels."""
+    edges = ends(family, designs, PANELS, PANELS * NODES)
     low, high = edges[:, :-1], edges[:, 1:]
     row, column = np.nonzero(high - low > NARROWEST)
     return row, low[row, column], high[row, column]
-
-
-def reversing(family: Family) -> tuple[str, ...]:
-    """Return the pose outputs whose zeros cut the turn: the speeds of all positions of the family."""
-    speeds = set(family.derivative_of.values())
-    dear = set(family.dear)
-    return tuple(rate for of, rate in family.derivative_of.items() if of not in speeds and rate not in dear)
 
 
 def _climbed(
