@@ -28,6 +28,7 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba.core import codegen, types
 from numba.core.compiler import CompilerBase, compile_result
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 
@@ -142,7 +143,7 @@ class Kernel(CPUDispatcher):
 
     def compile(self, sig: Any) -> Any:
         """Load or compile the code for types of arguments."""
-        with _without_collector(), plainly():
+        with global_compiler_lock, _without_collector(), plainly():
             return super().compile(sig)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:

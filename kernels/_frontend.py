@@ -2,8 +2,8 @@
 
 numba's front end takes most of a first use.  Here, against its own way,
 
-* passes are left out that look for what no kernel has: ``with``, inlined functions, parallel loops, and array
-  expressions or closures in functions without any;
+* passes are left out that look for what no kernel has, as ``with``, or write what nobody reads; those for closures and
+  expressions of whole arrays where a function has none;
 * what an operator is, and what it gives for the types of its operands, is remembered;
 * what fails by design, as a look for constants among variables, fails without a message in colours;
 * a constraint of the types is looked at again only after one of its types has changed.
@@ -50,8 +50,6 @@ _UNUSED = (
 )
 # These are for functions made within a function.
 _FOR_CLOSURES = (untyped_passes.InlineClosureLikes, untyped_passes.MakeFunctionToJitFunction)
-
-
 _SIZES: dict[str, int] = {}
 
 
@@ -170,9 +168,10 @@ class _Merged(typeinfer.Propagate):
     def __call__(self, typeinfer: Any) -> None:
         # A counter that begins at 0 is a number like others.  numba takes it for the constant 0 until it sees what else
         # it becomes, and compiles what is called with it for that constant first.
-        for kind in typeinfer.typevars[self.src].get():
-            typeinfer.add_type(self.dst, types.unliteral(kind), loc=self.loc)
-        typeinfer.refine_map[self.dst] = self
+        known = typeinfer.typevars
+        if not known[self.dst].defined and isinstance(known[self.src].type, types.Literal):
+            known[self.dst].add_type(types.unliteral(known[self.src].type), loc=self.loc)
+        super().__call__(typeinfer)
 
 
 class _Inferer(typeinfer.TypeInferer):
@@ -197,9 +196,11 @@ def _variables(constraint: Any) -> list[str]:
         return [constraint.src, constraint.dst]
     if isinstance(constraint, typeinfer.BuildTupleConstraint):
         return [constraint.target, *(x.name for x in constraint.items)]
-    if isinstance(constraint, (typeinfer.StaticGetItemConstraint, typeinfer.GetAttrConstraint)):
-        index = getattr(constraint, "index_var", None)
-        return [constraint.target, constraint.value.name, *([] if index is None else [index.name])]
+    if isinstance(constraint, typeinfer.StaticGetItemConstraint):
+        others = constraint.fallback.args if constraint.fallback else ()
+        return [constraint.target, constraint.value.name, *(x.name for x in others)]
+    if isinstance(constraint, typeinfer.GetAttrConstraint):
+        return [constraint.target, constraint.value.name]
     if type(constraint) is typeinfer.IntrinsicCallConstraint:
         return [constraint.target, *(x.name for x in constraint.args)]
     if isinstance(constraint, typeinfer.SetItemConstraint):

@@ -81,7 +81,9 @@ def _everything(x, z, n, wanted):  # type: ignore[no-untyped-def]
             wanted[i, 0] = y
         while count < n and y < 1.0:
             y, count = 2.0 * y + min(x[i], 1.0), count + 1
-        total += y
+        _, exponent = math.frexp(y)  # an integer of 32 bits
+        exponent = exponent if y > 1.0 else 0
+        total += math.ldexp(y, -exponent)
     room = np.zeros(n)
     room[:] = 2.0 * room + total
     row = x[1:] + room[: x.size - 1]

@@ -5,12 +5,14 @@ from __future__ import annotations
 import pickle
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
 from sweep.families import family, rssr
 from sweep.families.base import Angles, Array, Columns
 from sweep.families.together import MANY, PAID, Together
+from sweep.reductions.sampling import turn
 from tests.rssr_designs import random_designs
 
 TURN = Angles.of(np.linspace(0.0, 6.0, 24)[None, :])
@@ -86,3 +88,7 @@ def test_a_set_from_the_set_of_all_has_the_bits_of_its_own(name: str, designs: A
 
 def test_poses_go_to_another_process_by_their_name() -> None:
     assert pickle.loads(pickle.dumps(rssr.poses)) is rssr.poses
+
+
+def test_a_turn_has_the_type_of_all_angles_so_that_kernels_are_compiled_once() -> None:
+    assert [numba.typeof(x) for x in turn(16)] == [numba.typeof(x) for x in angles(16)]

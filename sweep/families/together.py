@@ -15,7 +15,7 @@ import numpy as np
 
 from sweep.families.base import Angles, Array, Columns, PoseFunction
 
-MANY = 2**14  # poses of one call: a piece of a sweep, or the price of an output being measured
+MANY = 2**13  # poses of one call: half a block of a sweep, or the price of an output being measured
 # Poses of all calls so far.  All outputs take 30 to 100 ns more per pose than a few: for so many, as long as compiling.
 PAID = 2**22
 
