@@ -42,9 +42,13 @@ def sampling_tables() -> tuple[Array, Array]:
 def _spread(n: int, values: Array) -> tuple[float, float, float]:
     """Largest fourth difference, largest and least of n samples that stand in values[2 ... n + 1]."""
     fourth, most, least = 0.0, -1e300, 1e300
-    for j in range(2, n + 2):
-        y = values[j]
-        beside, beyond = values[j - 1] + values[j + 1], values[j - 2] + values[j + 2]
+    # Indices into such parts are seen not to count from the end; with sums as indices each number is fetched alone.
+    first, left, here, right, last = (
+        values[:n], values[1 : n + 1], values[2 : n + 2], values[3 : n + 3], values[4 : n + 4],
+    )  # fmt: skip
+    for j in range(n):
+        y = here[j]
+        beside, beyond = left[j] + right[j], first[j] + last[j]
         fourth = largest(fourth, abs(beyond - 4.0 * beside + 6.0 * y))
         most, least = largest(most, y), smallest(least, y)
     return fourth, most, least
@@ -54,8 +58,9 @@ def _spread(n: int, values: Array) -> tuple[float, float, float]:
 def _dips(n: int, guards: Array, begin: int) -> tuple[float, float]:
     """Least of n discriminants, and squared distance [samples] of their nearest complex zero, by parabolas."""
     low, nearest = 1e300, 1e300
-    for j in range(begin + 1, begin + n + 1):
-        left, here, right = guards[j - 1], guards[j], guards[j + 1]
+    before, at, after = guards[begin : begin + n], guards[begin + 1 : begin + n + 1], guards[begin + 2 : begin + n + 2]
+    for j in range(n):
+        left, here, right = before[j], at[j], after[j]
         low = smallest(low, here)
         bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
         dips = (here <= left) & (here <= right) & (bend > 0.0)
@@ -120,8 +125,9 @@ def _taker(curve: Curve) -> Helper:
         k: Any, a: float, b: float, c: float, n: int, cos: Array, sin: Array, values: Array, guards: Array
     ) -> None:
         begin = n - FEWEST
+        us, vs = cos[begin : begin + n], sin[begin : begin + n]
         for j in range(n):
-            y, deltas = sample(k, a, b, c, cos[begin + j], sin[begin + j])
+            y, deltas = sample(k, a, b, c, us[j], vs[j])
             values[2 + j] = y
             keep(deltas, guards, 1 + j)
         values[0], values[1], values[n + 2], values[n + 3] = values[n], values[n + 1], values[2], values[3]

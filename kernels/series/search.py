@@ -200,10 +200,12 @@ def _enlister(chain: Chained, of: Curve) -> Helper:
 def _peaks(chunk: int, values: Array, up: float, down: float, floor: float) -> int:
     """Local maxima that count among the next samples, one bit each; without a branch, so that it is vector code."""
     found = 0
+    end = chunk + CHUNK
+    before, here, after = values[chunk - 1 : end - 1], values[chunk:end], values[chunk + 1 : end + 1]
     for j in range(CHUNK):
-        y = values[chunk + j]
+        y = here[j]
         sign = up if y >= 0.0 else down
         z = sign * y
-        peak = (z >= floor) & (z > sign * values[chunk + j - 1]) & (z >= sign * values[chunk + j + 1])
+        peak = (z >= floor) & (z > sign * before[j]) & (z >= sign * after[j])
         found |= (1 << j) if peak else 0
     return found
