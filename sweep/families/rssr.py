@@ -39,6 +39,7 @@ from sweep.families.capabilities import (
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
+from sweep.families.together import together
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -111,14 +112,11 @@ def _filled(
     if wanted.isdisjoint(_JOINTS):
         return filled(kernel, arguments, _NO_JOINTS, wanted, status, dtype)
     room = optional_outputs(_JOINTS, wanted, status.shape, dtype)
-
-    def with_joints(*given: object) -> None:
-        kernel(*given, rssr.Joints(*room))
-
-    found = filled(with_joints, arguments, _VALUES, wanted, status, dtype)
+    found = filled(lambda *given: kernel(*given, rssr.Joints(*room)), arguments, _VALUES, wanted, status, dtype)
     return found | {name: x for name, x in zip(_JOINTS, room, strict=True) if x is not None}
 
 
+@together(*_VALUES, *_JOINTS)
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     dtype = np.result_type(designs, angles.cos)
