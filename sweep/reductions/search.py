@@ -12,7 +12,7 @@ from kernels import status as st
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly
 from sweep.reductions.breaks import jumps, level, near_jumps, search
-from sweep.reductions.refine import EPS, SHRINK, Peaks, Sampler, confirmed, first_peaks, polish_places, sharpen
+from sweep.reductions.refine import EPS, SHRINK, Peaks, Sampler, confirmed, first_peaks, polished, sharpen
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
 from sweep.reductions.sampling import (
     TWO_PI,
@@ -318,22 +318,13 @@ class Search:
         phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
         slope = self.family.derivative_of.get(request.pose)
         if (self.locate or request.place) and slope is not None and not request.windowed:
-            phi, err_phi = self._polish(rows[has], slope, phi, err_phi)
+            phi, err_phi = polished(self.family, self.designs[rows[has]], slope, phi, err_phi)
         found.phi[rows[has]] = np.mod(phi, TWO_PI)
         found.err[rows[has]] = peaks.err_height[chosen]
         found.err_phi[rows[has]] = err_phi
         moved = np.zeros(rows.size)
         moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
         return moved
-
-    def _polish(self, rows: Index, slope: str, phi: Array, err_phi: Array) -> tuple[Array, Array]:
-        """Return places of flat tops from the zero of the derivative, which is steep there."""
-        precise = self.family.precise()
-
-        def sample(active: Index, angles: Array) -> Array:
-            return pose_columns(precise, self.designs[rows[active]], angles, [slope])[0][slope]
-
-        return polish_places(sample, phi, err_phi)
 
 
 def _tells(discriminant: Array) -> Mask:
