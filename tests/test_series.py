@@ -147,11 +147,17 @@ def test_places_of_extrema_are_those_of_the_search_on_poses(name, request_):
     found, _ = extrema.true_extrema(of, designs, [request_], 1e-8)
     slow, _ = extrema._searched(of, designs, [request_], 1e-8, False, False, None)
     left = fused.curve_of(of, request_, False).extremum(designs, 1e-8)[2]
-    # Travel that turns back within the swing of the stage before is equally low twice: rounding says where, on poses.
-    assert left.mean() < (0.2 if request_.pose == "s" else 0.02)
-    off = np.abs(np.angle(np.exp(1j * (found[request_].phi - slow[request_].phi))))
-    # Each knows its place to its own error; next to a dead point both see the rounding of the same poses.
-    assert (off <= found[request_].err_phi + slow[request_].err_phi)[~left].all()
+    # What turns back within the swing of the stage before is equally high twice: rounding says where, on poses.
+    assert left.mean() < (0.3 if request_.pose in ("s", "dev") else 0.02)
+    both = np.stack([found[request_].phi, slow[request_].phi], axis=1)
+    off = np.abs(np.angle(np.exp(1j * (both[:, 0] - both[:, 1]))))
+    # Each knows its place to its own error, next to a dead point too, where both see the rounding of the same poses;
+    # or the curve is as high at one place as at the other.
+    same = off <= found[request_].err_phi + slow[request_].err_phi
+    there = of.precise_poses(designs, Angles.of(both), frozenset((request_.pose,)))[request_.pose]
+    height = np.abs(there) if request_.mode == 0 else there
+    assert (same | (np.abs(height[:, 0] - height[:, 1]) <= 64.0 * EPS * np.abs(height[:, 0]))).all()
+    assert same.mean() > 0.8
     assert np.median(found[request_].err_phi) < 1e-12
 
 
