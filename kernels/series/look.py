@@ -22,6 +22,7 @@ from kernels.series.form import Helper
 Array: TypeAlias = NDArray[np.float64]
 
 OPEN = 255  # instead of a status: nothing is decided here, a slower search is to be asked
+_LOOKING = 252
 FEWEST, MOST = 32, 8192
 PER_SINGULARITY = 12.0
 AT_ONCE = 8.0  # times as many samples at most: the first look sees a near zero only roughly
@@ -83,29 +84,30 @@ def looker(curve: Curve) -> Helper:
         k: Any, a: float, b: float, c: float, n: int, cos: Array, sin: Array, mode: int, doubts: Any, values: Array,
         guards: Array,
     ) -> tuple[int, float, float, int]:  # fmt: skip
-        while n <= MOST:
+        # One way out only: with several each array's references are counted, which takes as long as the samples do.
+        code, most, least = _LOOKING, 0.0, 0.0
+        while code == _LOOKING and n <= MOST:
             take(k, a, b, c, n, cos, sin, values, guards)
             needed = n
             for s in range(guarded):
                 low, nearest = _dips(n, guards, s * GUARD_ROW)
-                if low < -doubts[s + 1]:
-                    return n, 0.0, 0.0, st.NOT_ROTATABLE
-                if not low > doubts[s + 1]:
-                    return n, 0.0, 0.0, OPEN
+                if code == _LOOKING and not low > doubts[s + 1]:
+                    code = st.NOT_ROTATABLE if low < -doubts[s + 1] else OPEN
                 wanted = PER_SINGULARITY * n / (TURN * math.sqrt(largest(nearest, 1e-12)))
                 while needed < min(wanted, AT_ONCE * n):
                     needed *= 2
             fourth, most, least = _spread(n, values)
             size = max(most, -least)
             scale = size if mode == 0 else most - least
-            if not most - least > FLAT * size:
-                return n, most, least, OPEN
             if fourth > ROUGH * scale:
                 needed = max(needed, 2 * n)
-            if needed == n:
-                return n, most, least, st.OK
-            n = needed
-        return n, 0.0, 0.0, OPEN
+            if code == _LOOKING and not most - least > FLAT * size:
+                code = OPEN
+            elif code == _LOOKING and needed == n:
+                code = st.OK
+            elif code == _LOOKING:
+                n = needed
+        return n, most, least, OPEN if code == _LOOKING else code
 
     return generated_inline(f"look_{curve.name}", look)
 
