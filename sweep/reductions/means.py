@@ -83,7 +83,7 @@ def _refined(family: Family, designs: Array, poses: Sequence[str], target: float
     needed = np.zeros(n)
     needed[alive] = PER_SINGULARITY / near.rho.min(axis=1, initial=np.inf)
     needed = np.maximum(needed, START * denser(family, designs))
-    kinks = any(family.pose_output[pose].kinks for pose in poses)
+    kinks = any(family.pose_output[pose].kinks or family.pose_output[pose].jumps for pose in poses)
     jumping = np.full(n, kinks) | crossed(family, designs)
     needed[jumping] = np.inf
     unresolved = _by_grids(family, designs, poses, target, found, err, status, needed)

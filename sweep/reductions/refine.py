@@ -16,7 +16,8 @@ Sampler: TypeAlias = Callable[[Index, Array], Array]
 
 OFFSETS = np.arange(-2.0, 3.0)
 SHRINK = 0.125
-PASSES = 14
+SHRINK_KINKED = 0.25  # the quartic misplaces the tip of a kink by up to a quarter of a step
+PASSES = 20
 POLISHES = 3
 NARROW, WIDE = 1e-8, 1e-4  # secants [rad]: shorter ones would see the rounding of the crank angle
 # The quartic over a five-point window errs in proportion to at least the fourth power of its width, so one pass to the
@@ -26,7 +27,7 @@ RIPPLE = 0.25  # of the fourth difference: eight times the noise of one sample o
 # Second differences of five samples that follow a smooth top are nearly equal.  Where they are not, a kink may lie
 # between them: there a fourth difference vanishes by chance, and halving the window halves the error, no more.
 BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences against the largest, of first samples and of later ones
-LEARNT = 0.5  # of the error before: what a narrower window about a kink leaves of it at most
+LEARNT = 0.8  # of the error before: what a narrower window about a kink leaves of it at most
 SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # of the spacing of the samples: steps of the last windows
 VARIES = 8.0  # times the rounding at one pose: what that of its neighbours may be
 EPS = 2.0**-53
@@ -91,6 +92,7 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
     followed.
     """
     phi, height, err_phi, err_height, guess, spacing, step = (column.copy() for column in peaks)
+    looked = step.copy()  # widths of the last windows that held their peaks
     active = np.flatnonzero((err_height > tolerance) | (err_phi > locate))
     for _ in range(PASSES):
         if not active.size:
@@ -106,15 +108,17 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
         # Too small a window sees only noise: it may sharpen the height but must not spoil the place.
         err_place = u * (claim * np.abs(place) + blur) + 4.0 * EPS * np.pi
         # At a kink the error shrinks with the window.  Noise looks bent too, but stays: nothing is learnt from it.
-        noisy = inside & (kink > 0.0) & (error >= LEARNT * err_height[active]) & (u < SHRINK * spacing[active])
-        sharper = ~inside | ((err_place < err_phi[active]) & ~noisy)
+        noisy = inside & (kink > 0.0) & (error >= LEARNT * err_height[active]) & (u < looked[active])
+        looked[active] = np.where(inside, u, looked[active])
+        sharper = ~inside | (((err_place < err_phi[active]) | (kink > 0.0)) & ~noisy)
         phi[active[sharper]] += (u * place)[sharper]
         height[active] = top
         err_height[active] = error
         err_phi[active[sharper]] = err_place[sharper]
         enough = inside & (error <= tolerance[active]) & ((err_phi[active] <= locate[active]) | ~sharper)
         # A window that has lost its peak was too small for its place.
-        step[active] = np.where(inside, SHRINK * u, np.minimum(u / SHRINK, SHRINK * spacing[active]))
+        shrink = np.where(kink > 0.0, SHRINK_KINKED, SHRINK)
+        step[active] = np.where(inside, shrink * u, np.minimum(u / SHRINK, SHRINK * spacing[active]))
         shortest = np.where(kink > 0.0, SHORTEST_KINKED, SHORTEST)
         active = active[~enough & ~noisy & (step[active] > shortest * spacing[active])]
     return Peaks(phi, height, err_phi, err_height, guess, spacing, step)
