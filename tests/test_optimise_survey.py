@@ -65,6 +65,17 @@ def test_of_a_global_search_the_best_end_counts_alone() -> None:
     assert (twice.basins, twice.best) == (2, 1) and twice.unseen == 1.0
 
 
+def test_starts_of_different_samples_are_distinct_wherever_they_stand() -> None:
+    alike = np.tile(starts(1), (12, 1)) + 1e-4 * np.arange(12)[:, None] * np.array([1.0, 1.0, 0.0, 0.0])
+    ends = [result(k, 1.0) for k in range(12)]
+    together = survey(bowl(), alike, ends, ASKED, "starts")
+    assert together.best == 1 and not together.enough
+    apart = survey(bowl(), alike, ends, ASKED, "starts", samples=[k // 4 for k in range(12)])
+    assert apart.best == 3 and apart.enough
+    found, told = explore(bowl(), alike, ASKED, samples=[k // 4 for k in range(12)])
+    assert (len(found), told.best, told.ended) == (12, 3, "enough")
+
+
 def test_populations_are_enough_where_few_unseen_basins_can_be_better() -> None:
     # Twelve of which ten ended at the best: 1/12 unseen, of three ranks the first is one in three.
     assert not settled([1.0] * 10 + [1.1, 1.2], 0.02)

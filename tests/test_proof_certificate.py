@@ -76,7 +76,8 @@ def test_certificate_does_not_depend_on_the_number_of_cores(tmp_path):
 
 
 def test_best_bound_is_stated_where_the_boxes_do_not_suffice(tmp_path):
-    proof = proven(small(), tmp_path, settings=ProveSettings(1e-6, 128), target=0.58819)
+    whole = question_of(load_study(STUDIES / "crank-rocker-proof"))
+    proof = proven(whole, tmp_path, settings=ProveSettings(1e-6, 128), target=0.58819)
     assert proof.open > 0 and not proof.settled
     assert 0.0 <= proof.bound < 0.58819
     assert covers(tmp_path / "_proof.parquet")

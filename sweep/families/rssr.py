@@ -98,7 +98,6 @@ MAXIMA_OUTPUTS = tuple(
     )
 )
 
-ROUNDING = 2.0**-53
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up; 100 suffice within 1e-9 of a change point
 _JOINTS = rssr.Joints._fields
 _VALUES = tuple(o.name for o in POSE_OUTPUTS if o.name not in _JOINTS)
@@ -169,14 +168,16 @@ def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     n = len(designs)
     status = np.empty(n, np.uint8)
     with_error = accuracy.target is not None and not wanted <= {"rotatable"}
-    names = ("margin", "rotatable", "max_pressure_angle", "error")
-    needed = wanted | {"margin", "error"} if with_error else wanted
-    least, turns, angle, error = optional_outputs(names, frozenset(needed), (n,))
-    rssr.margin(designs, status, least, turns, angle, None, error)
+    names = ("margin", "rotatable", "max_pressure_angle", "error", "angle_error")
+    needed = set(wanted)
+    if with_error:
+        needed |= {"error", "angle_error"} if "max_pressure_angle" in wanted else {"error"}
+    least, turns, angle, error, angle_error = optional_outputs(names, frozenset(needed), (n,))
+    rssr.margin(designs, status, least, turns, angle, None, error, angle_error)
     columns: Columns = {"status": status}
     if turns is not None:
         columns["rotatable"] = turns == 1.0
-    if least is not None and "margin" in wanted:
+    if least is not None:
         columns["margin"] = least
     if angle is not None:
         columns["max_pressure_angle"] = angle
@@ -184,13 +185,8 @@ def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
         columns["err_rotatable"] = np.zeros(n)
     if error is not None and least is not None:
         columns["err_margin"] = error
-        if angle is not None:
-            # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
-            turning, far = status == st.OK, np.full(n, np.nan)
-            with np.errstate(divide="ignore"):
-                linear = error[turning] / np.abs(np.sin(2.0 * angle[turning]))
-            far[turning] = np.minimum(linear, np.sqrt(error[turning])) + 8.0 * ROUNDING
-            columns["err_max_pressure_angle"] = far
+    if angle_error is not None:
+        columns["err_max_pressure_angle"] = angle_error
     return columns
 
 

@@ -54,6 +54,7 @@ def explore(
     jobs: int = 1,
     tell: Tell | None = None,
     origins: Sequence[int] | None = None,
+    samples: Sequence[int] | None = None,
 ) -> tuple[list[Result], Survey]:
     """Return the smallest objective under the limits from one start after the other,
     until enough is known of the basins.
@@ -70,6 +71,7 @@ def explore(
     jobs : processes the starts are spread over, once the search turns out to be long; results do not depend on it
     tell : called with the number of starts that are done and the most there will be
     origins : see :func:`sweep.optimise.survey.survey`; with them all starts are searched
+    samples : see there
 
     Returns
     -------
@@ -93,7 +95,7 @@ def explore(
         def asked() -> bool:
             return time.monotonic() >= end or bool(own) or (stop is not None and stop())
 
-        results, ended = _first(problem, starts, settings, asked, jobs, tell, origins is None)
+        results, ended = _first(problem, starts, settings, asked, jobs, tell, origins is None, samples)
         if settings.finalists is not None and ended == "starts":
             results, whole = _final(problem, starts, results, settings, asked, jobs)
             ended = "starts" if whole else "time"
@@ -103,7 +105,7 @@ def explore(
             signal.raise_signal(signal.SIGTERM)
     if ended == "time" and (own.signal_number is not None or any(r.ended == "interrupted" for r in results)):
         ended = "interrupted"
-    return ranked(results), survey(problem, starts, results, settings, ended, origins)
+    return ranked(results), survey(problem, starts, results, settings, ended, origins, samples)
 
 
 def _first(
@@ -114,6 +116,7 @@ def _first(
     jobs: int,
     tell: Tell | None,
     early: bool,
+    samples: Sequence[int] | None,
 ) -> tuple[list[Result], str]:
     """Results of the starts in batches, or of their first heat where there are finalists; and what ended it.
 
@@ -130,7 +133,8 @@ def _first(
         last = batch[-1] == numbers[-1]
         if _cut(results, first + len(batch)) or (not last and asked()):
             return results, "time"
-        if early and settings.finalists is None and survey(problem, starts, results, settings, "").enough:
+        stops = early and settings.finalists is None
+        if stops and survey(problem, starts, results, settings, "", samples=samples).enough:
             return results, "enough"
     return results, "starts"
 
