@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -27,8 +28,9 @@ from sweep.optimise.proportions import turned_into
 from sweep.optimise.starts import spread
 
 BLOCK = 1 << 13  # proportions that are looked at together
-PARENTS = 24  # best ends, no two of them alike, from which a generation is made: as many of all signs
+PARENTS = 40  # best ends, no two of them alike, from which a generation is made: as many of all signs
 TRIES, STRANGERS = 64, 256  # of every child, the best of which descends; of one half of which is at random
+DRIVERS = 4  # among the tries of a child
 MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations, one of which a child is varied by
 NICHE = 0.15  # of the average distance of two random guides: nearer ones are alike
 TOGETHER = 6  # populations between two looks at whether more are needed: the same for any number of jobs
@@ -46,8 +48,8 @@ class Size(NamedTuple):
     """
 
     sampled: int = 1 << 14
-    first: int = 80
-    later: int = 48
+    first: int = 120
+    later: int = 60
     generations: int = 10
     heat: int = 14
     steps: int = 60
@@ -132,18 +134,18 @@ def _children(
 ) -> Array:
     """Places of children: the best of many tries for each, by what they are worth before any descent.
 
-    Half of them are stage 1 of one parent and the guide of another, slightly varied, a quarter is stage 1 of a parent
-    with a guide at random, a quarter the guide of a parent with a stage 1 at random.
+    Most of them are stage 1 of one parent and the guide of another, slightly varied, a sixth is stage 1 of a parent
+    with a guide at random, a sixth the guide of a parent with a stage 1 at random.
     """
     if not own:
         return np.empty((0, len(rows.own.columns)))
-    quarter = count // 4
-    drivers = np.array([p.place for p in parents])[rng.integers(0, len(parents), quarter)]
-    guides = np.array([p.place for p in own])[rng.integers(0, len(own), quarter)]
-    found = [_mixed(rows, own, parents, rng, count - 2 * quarter)]
+    few = count // 6
+    drivers = np.array([p.place for p in parents])[rng.integers(0, len(parents), few)]
+    guides = np.array([p.place for p in own])[rng.integers(0, len(own), few)]
+    found = [_mixed(rows, own, parents, rng, count - 2 * few)]
     for kept, part in ((drivers, ~rows.driving), (guides, rows.driving)):
         places = np.repeat(kept[:, None], STRANGERS, axis=1)
-        places[:, :, part] = rng.random((quarter, STRANGERS, int(part.sum())))
+        places[:, :, part] = rng.random((few, STRANGERS, int(part.sum())))
         found.append(_best(rows, places))
     return np.concatenate(found)
 
@@ -155,7 +157,8 @@ def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np
     its mirror image move alike.
     """
     guide = rng.integers(0, len(own), count)
-    driver = rng.integers(0, len(parents), (count, TRIES))
+    # Among all drivers the best try would be that of the same valley nearly every time.
+    driver = np.repeat(rng.integers(0, len(parents), (count, DRIVERS)), TRIES // DRIVERS, axis=1)
     places = np.repeat(np.array([p.place for p in own])[guide][:, None], TRIES, axis=1)
     places[:, :, rows.driving] = np.array([p.place for p in parents])[driver][:, :, rows.driving]
     other = (rng.random((count, TRIES)) < 0.5)[:, :, None] & rows.mirrored
@@ -219,13 +222,15 @@ class _Classes(NamedTuple):
 
 
 def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[_End]:
-    """Return the best ends of each class of swings, at most so many of the same signs,
+    """Return the best ends, half as many as said of the same signs, and the best of each class of swings,
     no two of which have the same value or nearly the same guide.
 
-    Else the many that stopped on their way down one valley would take the places of all others, and a guide that
-    suits large swings those of all that suit small ones.
+    Else the many that stopped on their way down one valley would take the places of all others, and guides that
+    suit large swings those of all that suit small ones.
     """
     found: list[_End] = []
+    beside: Counter[tuple[int, int]] = Counter()
+    first: Counter[int] = Counter()
     least = NICHE * math.sqrt(int(guide.sum()) / 6.0)
     useful = sorted(ends, key=lambda end: end.worth)
     useful = [end for end in useful if end.worth < USELESS * useful[0].worth]
@@ -238,8 +243,10 @@ def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[
             or math.sqrt(float(((end.place - p.place)[guide] ** 2).sum())) < least
             for p in own
         )
-        beside = sum(classes[id(p)] == classes[id(end)] for p in own)
-        if not alike and beside < -(-most // CLASSES):
+        place = (end.kind, classes[id(end)])
+        if not alike and (first[end.kind] < most // 2 or beside[place] < -(-most // (2 * CLASSES))):
+            first[end.kind] += 1
+            beside[place] += 1
             found.append(end)
     return found
 
