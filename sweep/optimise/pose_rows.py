@@ -166,16 +166,7 @@ class PoseRows:
 
     def designs(self, places: Array, x: Array) -> Array:
         """Designs (k, P) at places (k, n) with linear unknowns (k, 5)."""
-        linear, out = self.linear, self.own.placed(places)
-        scale = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
-        arm = out[:, self.links[1]] / scale
-        out[:, self.links] *= scale[:, None]
-        along, aside, line, offset = self.fitted
-        out[:, along] = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * arm
-        out[:, aside] = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * arm
-        out[:, line] = linear.turned(np.array([math.atan2(-v, u) for u, v in x[:, :2]]))
-        out[:, offset] = x[:, 4]
-        return out
+        return self.linear.finished(self.own.placed(places), x)
 
     def tangents(self, places: Array, x: Array) -> Array:
         """Return derivatives (k, n + 5, P) of the designs by their places and linear unknowns."""

@@ -104,7 +104,7 @@ def robust(
     """
     heads: list[Result] = []
     for result in results:
-        if result.feasible and result.ended not in (*CUT, "left") and result.basin not in [h.basin for h in heads]:
+        if result.feasible and result.ended not in CUT and result.basin not in [h.basin for h in heads]:
             heads.append(result)
     heads = heads[:TRIED]
     number = 1 + max((r.start for r in results), default=-1)

@@ -141,8 +141,7 @@ def survey(
     Of populations the next one matters where it ends at something better than the best: see :attr:`Survey.better`.
     """
     whole = [r for r in results if r.ended not in CUT]
-    # What was left after the first heat has not reached the bottom of any basin.
-    numbered = with_basins([r for r in whole if r.ended != "left"])
+    numbered = with_basins(whole)
     drawn = numbered if origins is None else _best_of_each(numbered, origins)
     met = Counter(r.basin for r in drawn if r.basin)
     n, w = sum(met.values()), len(met)
