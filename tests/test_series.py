@@ -114,8 +114,15 @@ def test_a_grid_that_meets_what_does_not_reach_is_left_to_poses():
 
 
 REQUESTS = {
-    "rssr+guide": (Request("d2s", 0), Request("dev", 0), Request("s", 1), Request("x_m", -1), Request("y_m2", 1)),
-    "rssr+rssr": (Request("dpsi", 1), Request("d2psi", 0)),
+    "rssr+guide": (
+        Request("d2s", 0),
+        Request("dev", 0),
+        Request("s", 1),
+        Request("x_m", -1),
+        Request("y_m2", 1),
+        Request("d3s", 0),
+    ),
+    "rssr+rssr": (Request("dpsi", 1), Request("d2psi", 0), Request("d3psi", -1)),
     "rssr+rssr+guide": (Request("ds", -1), Request("d2dev", 0), Request("dev", -1)),
 }
 
@@ -313,8 +320,9 @@ def test_a_wrong_chain_rule_or_a_lost_stage_would_be_noticed():
 
 def test_requests_without_a_fused_curve_go_to_poses():
     of, _ = CASES["rssr+guide"]
-    assert fused.curve_of(of, Request("d3s", 0), False) is None  # its slope is not among what the kernel has
-    assert fused.curve_of(of, Request("d2dev", 0, place=True), False) is None  # no slope to find its place by
+    for pose in ("d3s", "d2dev"):
+        assert fused.curve_of(of, Request(pose, 0), False) is not None
+        assert fused.curve_of(of, Request(pose, 0, place=True), False) is None  # no slope to find its place by
     assert fused.curve_of(of, Request("psi1", 1), False) is None
     assert fused.curve_of(of, Request("discriminant1", -1), True) is None  # the first stage has its own margin
     assert fused.curve_of(of.precise(), Request("d2s", 0), False) is None

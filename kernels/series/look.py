@@ -1,8 +1,8 @@
 """Samples of a curve over the turn, as many as resolve it; and the local maxima among them.
 
-Samples stand no wider than a twelfth of the distance of the nearest complex singularity: that of the first stage is
-known beforehand, those of the others show as dips of their discriminants.  Where the fourth difference of the samples
-says that they do not resolve the curve all the same, twice as many are taken.
+Samples stand no wider than a twelfth (of the jerk an eighteenth) of the distance of the nearest complex singularity:
+that of the first stage is known beforehand, those of the others show as dips of their discriminants.  Where the fourth
+difference of the samples says that they do not resolve the curve all the same, twice as many are taken.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ Array: TypeAlias = NDArray[np.float64]
 OPEN = 255  # instead of a status: nothing is decided here, a slower search is to be asked
 _LOOKING = 252
 FEWEST, MOST = 32, 8192
-PER_SINGULARITY = 12.0
 AT_ONCE = 8.0  # times as many samples at most: the first look sees a near zero only roughly
 ROUGH = 0.5  # fourth difference against the size of the curve; at a pole a twelfth of a turn of samples away it is 0.6
 FLAT = 1e-9  # a curve that varies by less of its size is left to the slower search
@@ -78,7 +77,7 @@ def looker(curve: Curve) -> Helper:
     least, and a status: OK; NOT_ROTATABLE, where a later stage does not reach; OPEN.  The samples stand in
     values[2 ... n + 1], closed periodically.
     """
-    guarded, take = curve.guarded, _taker(curve)
+    guarded, samples, take = curve.guarded, curve.samples, _taker(curve)
 
     def look(
         k: Any, a: float, b: float, c: float, n: int, cos: Array, sin: Array, mode: int, doubts: Any, values: Array,
@@ -93,7 +92,7 @@ def looker(curve: Curve) -> Helper:
                 low, nearest = _dips(n, guards, s * GUARD_ROW)
                 if code == _LOOKING and not low > doubts[s + 1]:
                     code = st.NOT_ROTATABLE if low < -doubts[s + 1] else OPEN
-                wanted = PER_SINGULARITY * n / (TURN * math.sqrt(largest(nearest, 1e-12)))
+                wanted = samples * n / (TURN * math.sqrt(largest(nearest, 1e-12)))
                 while needed < min(wanted, AT_ONCE * n):
                     needed *= 2
             fourth, most, least = _spread(n, values)

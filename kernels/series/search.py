@@ -20,7 +20,7 @@ from kernels.bits import lowest_bit
 from kernels.series.chain import Chained
 from kernels.series.curves import MARGIN, Curve, curve
 from kernels.series.form import STRIDE, Helper
-from kernels.series.look import FEWEST, GUARD_ROW, MOST, OPEN, PER_SINGULARITY, TURN, looker
+from kernels.series.look import FEWEST, GUARD_ROW, MOST, OPEN, TURN, looker
 from kernels.series.peaks import (
     BLOCK,
     CAPACITY,
@@ -78,7 +78,7 @@ def find_extrema(chain: Chained, order: int) -> Helper:
     """
     of = curve(chain, order)
     get, rows = chain.record.get, CONSTANTS + chain.record.numbers * STRIDE
-    guards_size, allowed = max(of.guarded, 1) * GUARD_ROW, 1.0 if order == MARGIN else PLAIN
+    per_rho, guards_size, allowed = of.samples, max(of.guarded, 1) * GUARD_ROW, 1.0 if order == MARGIN else PLAIN
     enlist, refine, finish = _enlister(chain, of), refiner(of, get), finisher(of, get)
 
     def find(
@@ -109,8 +109,8 @@ def find_extrema(chain: Chained, order: int) -> Helper:
                 status[i] = _decide(low, high, m, mode, allowed * target, tie, i, found)
             # Now the list is free for those, one by one, whose tops were not single ones between their samples.
             for i in range(start, end):
-                rho = PER_SINGULARITY / (FEWEST * MORE)
-                while status[i] == UNTRUSTED and rho * MOST >= PER_SINGULARITY:
+                rho = per_rho / (FEWEST * MORE)
+                while status[i] == UNTRUSTED and rho * MOST >= per_rho:
                     near[0] = min(rho, distance[i])
                     enlist(designs, i, i + 1, near, cos, sin, made_of, mode, m, first, status, values, guards)
                     begin_at_vertex(first[1], m)
@@ -157,7 +157,7 @@ def _enlister(chain: Chained, of: Curve) -> Helper:
     where its maxima begin in the list, and at last the list's length.
     """
     constants, put, doubts, look = chain.record.constants, chain.record.put, chain.record.doubts, looker(of)
-    last = chain.stages - 1
+    last, per_rho = chain.stages - 1, of.samples
 
     # One function without a return half way: with more the references to each array are counted, which takes time.
     def enlist(
@@ -171,11 +171,11 @@ def _enlister(chain: Chained, of: Curve) -> Helper:
             first[i - begin], distance = count, near[i - begin]
             k: Any = constants(designs, i)
             limits: Any = doubts(k)
-            if not (distance * MOST >= PER_SINGULARITY and limits[last] < math.inf):
+            if not (distance * MOST >= per_rho and limits[last] < math.inf):
                 continue
             a, b, c = made_of[i, 0], made_of[i, 1], made_of[i, 2]
             n = FEWEST
-            while n * distance < PER_SINGULARITY:
+            while n * distance < per_rho:
                 n *= 2
             n, most, least, status[i] = look(k, a, b, c, n, cos, sin, mode, limits, values, guards)
             if status[i] != st.OK:

@@ -173,7 +173,7 @@ _ALONG, _ACROSS = constant(1.0, 0.0, 0.0), constant(0.0, 1.0, 0.0)
 IN_SERIES = InSeries(
     guide.FORM,
     {
-        "s": Curve(0, _ALONG), "ds": Curve(1, _ALONG), "d2s": Curve(2, _ALONG),
+        "s": Curve(0, _ALONG), "ds": Curve(1, _ALONG), "d2s": Curve(2, _ALONG), "d3s": Curve(3, _ALONG),
         "dev": Curve(0, _ACROSS), "ddev": Curve(1, _ACROSS), "d2dev": Curve(2, _ACROSS),
         "x_m": Curve(0, x_of_point), "y_m": Curve(0, y_of_point),
     },

@@ -304,7 +304,7 @@ def _sampled(accuracy: Accuracy) -> bool:
     return accuracy.samples is not None
 
 
-CURVES = {"dpsi": Curve(1, constant(1.0, 0.0, 0.0)), "d2psi": Curve(2, constant(1.0, 0.0, 0.0))}
+CURVES = {name: Curve(order, constant(1.0, 0.0, 0.0)) for order, name in enumerate(("dpsi", "d2psi", "d3psi"), start=1)}
 
 FAMILY = Family(
     name="rssr",
