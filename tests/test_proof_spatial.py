@@ -15,6 +15,7 @@ from sweep.jobs.signals import Stop
 from sweep.proof.certificate import Proof, concluded, write
 from sweep.proof.question import Question, question_of
 from sweep.proof.rounds import Cores, explored
+from sweep.proof.words import proof_words
 from sweep.study import ProveSettings
 from sweep.study.load import load_study
 from tests.reference.proof import covers, refuted
@@ -58,6 +59,20 @@ def test_second_program_confirms_every_box_in_four_dimensions(ends, target, kind
     assert refuted(path) == (proof.leaves, 0)
 
 
+def test_second_program_confirms_rows_of_time_for_given_axes(tmp_path):
+    planar = question_of(load_study(Path(__file__).parents[1] / "studies" / "crank-rocker-proof"))
+    given = planar.given.copy()
+    given[1] = np.radians(178.0)
+    links = np.array([-np.inf, 500.0, 20.0, 200.0, 120.0, 500.0])  # crank, rocker, coupler
+    question = replace(
+        planar, names=("phi_ext",), low=np.array([0.0]), high=np.radians([75.0]), given=given, links=links
+    )
+    proof = proven(question, tmp_path, 0.58)
+    path = tmp_path / "_proof.parquet"
+    assert {AHEAD, BEHIND} & {kind for leaf in pq.read_table(path).to_pylist() for kind in leaf["kinds"]}
+    assert proof.open == 0 and covers(path) and refuted(path) == (proof.leaves, 0)
+
+
 def _rewritten(path: Path, leaves: list[dict[str, object]], **question: object) -> None:
     """Put other leaves or another question into a certificate."""
     import pyarrow as pa
@@ -87,4 +102,11 @@ def test_wrong_side_of_the_tube_is_refuted(tmp_path):
 def test_a_bound_above_the_optimum_is_not_proven(tmp_path):
     proof = proven(part(ABOUT_IT), tmp_path, BEST * 1.0005, boxes=2000)
     assert proof.open > 0 and proof.bound <= BEST
-    assert proof.bound >= part(ABOUT_IT).floor  # from rest to rest in so much time, whatever the mechanism
+
+
+def test_bound_of_any_motion_is_stated_where_the_boxes_do_not_suffice(tmp_path):
+    study = load_study(Path(__file__).parents[1] / "studies" / "crank-rocker-proof-spatial")
+    proof = proven(question_of(study), tmp_path, BEST / 1.001, boxes=64)
+    # 60 degrees in 170 degrees of the crank: half of the way at full acceleration, half at full deceleration
+    assert proof.bound == pytest.approx(4.0 * np.radians(60.0) / np.radians(170.0) ** 2)
+    assert proof.open > 0 and "no follower at all" in proof_words(proof, "acceleration", lambda x: f"{x:.4f}")
