@@ -30,7 +30,7 @@ BEST, TARGET = 0.5882, 0.58
 def small(name: str = "crank-rocker-proof"):
     """A part of the planar study's space, about its optimum."""
     question = question_of(load_study(STUDIES / name))
-    return replace(question, low=np.array([176.0, 8.0]) * DEGREE, high=np.array([180.0, 16.0]) * DEGREE)
+    return replace(question, low=np.array([177.0, 10.0]) * DEGREE, high=np.array([179.0, 14.0]) * DEGREE)
 
 
 def proven(question, folder, cores=None, settings=None, target=TARGET):
