@@ -17,7 +17,7 @@ from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.pace import Singular, crossed, singular_curves
 from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
-from sweep.numerics.singularities import Singularities, crowded, turn_edges
+from sweep.numerics.singularities import Singularities, crowded, steps, turn_edges
 from sweep.reductions.cuts import ends
 from sweep.reductions.density import denser, nearest
 from sweep.reductions.extrema import DESIGN_STATUS, LIMIT, START
@@ -204,7 +204,8 @@ def _blur(values: Array) -> Array:
     their variation times that.
     """
     squares = values * values
-    variation: Array = np.abs(squares - np.roll(squares, 1, axis=1)).sum(axis=1)
+    # One after the other: repeated angles add nothing, however many there are.
+    variation: Array = np.cumsum(np.abs(squares - np.roll(squares, 1, axis=1)), axis=1)[:, -1]
     return 2.0 * EPS * TWO_PI * variation
 
 
@@ -241,8 +242,9 @@ def _rounding(family: Family, designs: Array, poses: Sequence[str], near: Singul
     if not n:
         return out
     precise = family.precise()
-    alike = np.argsort(near.rho.min(axis=1))  # the nearest of a block decides how many angles it takes
-    for part in blocks(alike, 4 * START, len(names)):
+    own = steps(near, PANEL)  # designs with as many angles together: sums have the same bits in any company
+    alike = (np.flatnonzero(own == number) for number in np.unique(own))
+    for part in (part for rows in alike for part in blocks(rows, 4 * START, len(names))):
         angles = crowded(near.only(part), PANEL)
         width = 0.5 * np.mod(np.roll(angles, -1, axis=1) - np.roll(angles, 1, axis=1), TWO_PI)
         columns, _ = pose_columns(family, designs[part], angles, names)
@@ -272,7 +274,8 @@ def _on_grid(
         status[part] = state
         for k, pose in enumerate(poses):
             values = columns[pose]
-            mean = np.sqrt(np.einsum("ij,ij->i", values, values) / samples)
+            # Not by einsum: from 8192 samples on it adds up one row otherwise than several.
+            mean = np.sqrt(np.square(values).sum(axis=1) / samples)
             found[part, k] = np.where(state == st.OK, mean, np.nan)
     return found, status
 

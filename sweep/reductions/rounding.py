@@ -12,7 +12,7 @@ from sweep.reductions.sampling import Index, Mask
 
 def rounding_share(
     family: Family, designs: Array, columns: dict[str, Array], row: Index, column: Index, guards: list[str],
-    derived: Mask,
+    order: Index,
 ) -> Array:  # fmt: skip
     """Return the share of values that rounding may have changed (docs/extrema.md, section 3).
 
@@ -21,7 +21,7 @@ def rounding_share(
     family, designs : the (n, P) design matrix
     columns : the discriminants ``guards`` over one turn, (n, m) each
     row, column : (k,) design and sample of each value
-    derived : (k,) whether it is a derivative
+    order : (k,) of the derivative that each value is, as of :func:`order_of`
 
     Notes
     -----
@@ -36,8 +36,17 @@ def rounding_share(
         if name in sizes:
             largest = np.maximum(largest, sizes[name](designs)[row])
         amplified += np.divide(largest, here, out=np.ones(row.size), where=tells(largest) & (here > 0.0))
-    found: Array = 4.0 * EPS * np.where(derived, amplified, np.sqrt(amplified))
+    # A derivative of order n grows like the power 1/2 - n of the discriminant.
+    found: Array = 4.0 * EPS * np.where(order == 0, np.sqrt(amplified), np.where(order < 3, amplified, 2.0 * amplified))
     return found
+
+
+def order_of(family: Family, pose: str) -> int:
+    """Return the order of the derivative that a pose output is; 3 for what may be made of any: a magnitude, a force."""
+    lower = {derivative: of for of, derivative in family.derivative_of.items()}
+    if pose not in lower:
+        return 0 if pose in family.derivative_of else 3
+    return 1 + order_of(family, lower[pose])
 
 
 def tells(discriminant: Array) -> Mask:

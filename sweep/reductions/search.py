@@ -24,7 +24,7 @@ from sweep.reductions.refine import (
     sharpen,
 )
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
-from sweep.reductions.rounding import rounding_share, tells
+from sweep.reductions.rounding import order_of, rounding_share, tells
 from sweep.reductions.sampling import (
     TWO_PI,
     Index,
@@ -269,10 +269,9 @@ class Search:
 
     def _rounding(self, rows: Index, columns: dict[str, Array], candidates: Candidates, guards: list[str]) -> Array:
         """Return the share of a value that rounding may have changed alike at neighbouring poses."""
-        derivatives = set(self.family.derivative_of.values())
-        derived = np.array([request.pose in derivatives for request in self.requests])[candidates.request]
         given = self.designs[rows], columns, candidates.row, candidates.column
-        return rounding_share(self.family, *given, guards, derived)
+        orders = np.array([order_of(self.family, request.pose) for request in self.requests])
+        return rounding_share(self.family, *given, guards, orders[candidates.request])
 
     def _within_window(
         self, rows: Index, columns: dict[str, Array], request: Request, row: Index, peaks: Peaks, resolved: Mask

@@ -98,7 +98,7 @@ def moves(subject: Subject, designs: Array) -> Array:
     closed = on_closed_turn(subject.family)
     phi = np.tile(PHI, (len(designs), 1))
     with np.errstate(all="ignore"):
-        status = np.asarray(closed.poses(designs, Angles.of(phi), frozenset(subject.outputs[:1]))["status"])
+        status = np.asarray(closed.poses(designs, Angles.of(phi), frozenset(subject.outputs))["status"])
     return (status == st.OK).all(axis=1)
 
 
