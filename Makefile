@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-first-use bench-optimise help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-first-use bench-optimise bench-basins help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -131,6 +131,10 @@ bench-scene: $(VENV)/ready  ## all effects on 10^5 designs x 360 angles: rate, i
 
 bench-optimise: $(VENV)/ready  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 10 minutes of processor time
 	$(BIN)/python -m tests.bench.optimise --out docs/optimise-marks.md
+
+bench-basins: $(VENV)/ready  ## five seeds of the search over proportions, two requirements: writes docs/basins.md, about an hour
+	mkdir -p results
+	$(BIN)/python -m tests.bench.basins --keep results/basins.jsonl --out docs/basins.md
 
 # The moving picture of the report: three.js with its licence, what is used of it, in one file that pages carry.
 THREE := three@0.187.0

@@ -71,7 +71,7 @@ def true_extrema(
         if not anywhere and panels.has_kinks(family, request, bool(jumping.any())):
             kinked.append(request)
             continue
-        curve = None if locate or request.place or request.windowed else fused.curve_of(family, request, anywhere)
+        curve = None if locate or request.windowed else fused.curve_of(family, request, anywhere)
         if curve is None:
             left.append(request)
             continue

@@ -8,8 +8,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kernels import scan
-from sweep.families.base import Array
-from sweep.reductions.sampling import Index, Mask
+from sweep.families.base import Array, Family
+from sweep.reductions.sampling import Index, Mask, pose_columns
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""
@@ -201,6 +201,19 @@ def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Ar
         err_phi[better] = 4.0 * np.maximum(np.abs(move), last)[better] + 8.0 * EPS * np.pi
         last = SHRINK * np.abs(move)
     return phi, err_phi
+
+
+def polished(family: Family, designs: Array, slope: str, phi: Array, err_phi: Array) -> tuple[Array, Array]:
+    """Return places of tops, one of each design, as `polish_places` does; ``slope`` is the pose output that is zero.
+
+    A top is flat, its slope is steep there; the family's most accurate poses give it.
+    """
+    precise = family.precise()
+
+    def sample(active: Index, angles: Array) -> Array:
+        return pose_columns(precise, designs[active], angles, [slope])[0][slope]
+
+    return polish_places(sample, phi, err_phi)
 
 
 def _kink(values: Array, bent: float) -> Array:

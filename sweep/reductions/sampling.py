@@ -25,11 +25,9 @@ TWO_PI = 2.0 * np.pi
 @lru_cache(maxsize=32)
 def turn(samples: int, shift: float = 0.0) -> Angles:
     """Return the equidistant crank angles of one turn, from 0 or a share of their spacing, shape (1, samples)."""
+    # Not locked: kernels would be compiled once more, for arrays that cannot be written.
     phi: Array = (np.arange(samples, dtype=np.float64)[None, :] + shift) * (TWO_PI / samples)
-    angles = Angles.of(phi)
-    for column in angles:
-        column.flags.writeable = False
-    return angles
+    return Angles.of(phi)
 
 
 def blocks(rows: Index, samples: int, columns: int = 1) -> Iterator[Index]:

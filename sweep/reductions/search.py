@@ -20,7 +20,7 @@ from sweep.reductions.refine import (
     attained,
     confirmed,
     first_peaks,
-    polish_places,
+    polished,
     sharpen,
 )
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
@@ -318,19 +318,10 @@ class Search:
         phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
         slope = self.family.derivative_of.get(request.pose)
         if (self.locate or request.place) and slope is not None and not request.windowed:
-            phi, err_phi = self._polish(rows[has], slope, phi, err_phi)
+            phi, err_phi = polished(self.family, self.designs[rows[has]], slope, phi, err_phi)
         found.phi[rows[has]] = np.mod(phi, TWO_PI)
         found.err[rows[has]] = peaks.err_height[chosen]
         found.err_phi[rows[has]] = err_phi
         moved = np.zeros(rows.size)
         moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
         return moved
-
-    def _polish(self, rows: Index, slope: str, phi: Array, err_phi: Array) -> tuple[Array, Array]:
-        """Return places of flat tops from the zero of the derivative, which is steep there."""
-        precise = self.family.precise()
-
-        def sample(active: Index, angles: Array) -> Array:
-            return pose_columns(precise, self.designs[rows[active]], angles, [slope])[0][slope]
-
-        return polish_places(sample, phi, err_phi)
