@@ -30,7 +30,7 @@ BEST, TARGET = 0.5882, 0.58
 def small(name: str = "crank-rocker-proof"):
     """A part of the planar study's space, about its optimum."""
     question = question_of(load_study(STUDIES / name))
-    return replace(question, low=np.array([176.0, 8.0]) * DEGREE, high=np.array([180.0, 16.0]) * DEGREE)
+    return replace(question, low=np.array([177.0, 10.0]) * DEGREE, high=np.array([179.0, 14.0]) * DEGREE)
 
 
 def proven(question, folder, cores=None, settings=None, target=TARGET):
@@ -76,7 +76,8 @@ def test_certificate_does_not_depend_on_the_number_of_cores(tmp_path):
 
 
 def test_best_bound_is_stated_where_the_boxes_do_not_suffice(tmp_path):
-    proof = proven(small(), tmp_path, settings=ProveSettings(1e-6, 128), target=0.58819)
+    whole = question_of(load_study(STUDIES / "crank-rocker-proof"))
+    proof = proven(whole, tmp_path, settings=ProveSettings(1e-6, 128), target=0.58819)
     assert proof.open > 0 and not proof.settled
     assert 0.0 <= proof.bound < 0.58819
     assert covers(tmp_path / "_proof.parquet")

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 from kernels.proof.branching import combined
 from kernels.proof.program import IMPOSSIBLE, SOLVED, multipliers
-from kernels.proof.slopes import SLOPES
+from kernels.proof.taylor import width
 
 
 def solved(rows, objective, half):
@@ -52,9 +52,9 @@ def test_multipliers_reach_the_optimum_of_another_solver(n):
 
 
 def test_combination_is_bounded_from_below_with_the_rounding_of_its_terms():
-    half = np.array([0.25])
-    forms = np.zeros((2, SLOPES + 2))
-    forms[0] = [1.0, 1.0, 0.0, 2.0, 2.0, 2.5]
-    forms[1] = [0.5, 0.5, 0.0, 1.0, -1.0, 1.0]
-    bound = combined(forms, np.array([1.0, -1.0]), 2, half)
-    assert 1.0 - 0.5 - 3.5 * 0.25 - 1e-12 < bound < 1.0 - 0.5 - 3.5 * 0.25
+    forms = np.zeros((2, width(1)))
+    forms[0] = [1.0, 0.5, 0.25, 0.125]
+    forms[1] = [0.5, 0.25, -1.0, 0.0]
+    bound = combined(forms, np.array([1.0, -1.0]), 2, 1, np.zeros(width(1)))
+    # 0.5 + 0.25 xi + 1.25 xi^2 +- 0.125, lowest at xi = -0.1
+    assert 0.3625 - 1e-12 < bound < 0.3625

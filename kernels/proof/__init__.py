@@ -1,5 +1,6 @@
-"""Proofs about whole boxes of designs: slope arithmetic with outward rounding, rows of a linear program, the search.
+"""Proofs about whole boxes of designs: Taylor models, rows of a linear program, motions in limited time, the search.
 
-``slopes`` encloses a function over a box, ``program`` finds the multipliers that combine such enclosures into a bound.
-What is enclosed belongs to a family (``kernels/families/X/boxes.py``), the search to ``branching``.
+``taylor`` encloses a function over a box, rounding included; ``tape`` records formulas for it.  ``program`` finds the
+multipliers that combine such enclosures into a bound; ``branching`` has what a search needs.  ``tube`` says where a
+follower can be in time.  What is enclosed belongs to a family (``kernels/families/rssr/box_*.py``).
 """

@@ -1,6 +1,6 @@
 """Branch and bound over boxes of designs: what the rows of a box prove together, and which box is next.
 
-A row is a function of the design, enclosed over a box as a form (:mod:`kernels.proof.slopes`).  Rows of the objective
+A row is a function of the design, enclosed over a box as a form (:mod:`kernels.proof.taylor`).  Rows of the objective
 are at most the value t of a design; rows of limits are at least 0 in a feasible one.  With multipliers that are not
 negative, l_j for the first and m_i for the others,
 
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from kernels._jit import inline, kernel
 from kernels.proof.program import IMPOSSIBLE, multipliers
-from kernels.proof.slopes import CENTRE, RANGE, SLOPES, Array, down, times, up
+from kernels.proof.taylor import LINEAR, ROUNDING, TINY, VALUE, Array, least, up
 
 Indices = NDArray[np.int64]
 Flags = NDArray[np.uint8]
 
 MOST_ROWS = 40
-COMBINED = 5  # rows that a proof combines at most: one more than a box may have variables
+COMBINED = 7  # rows that a proof combines at most: two more than the linear program may have variables
 
 
 @inline
@@ -35,47 +35,50 @@ def halves(low: Array, high: Array, centre: Array, half: Array) -> None:
 
 
 @kernel
-def combined(rows: Array, factors: Array, count: int, half: Array) -> float:
-    """Return a number below sum factors_j row_j over the whole box, rounding included."""
-    bound = 0.0
-    for j in range(count):
-        if factors[j] != 0.0:
-            low, _ = times(factors[j], factors[j], rows[j, CENTRE], rows[j, CENTRE + 1])
-            bound = down(bound + low)
-    for k in range(half.shape[0]):
-        low, high = 0.0, 0.0
-        for j in range(count):
-            if factors[j] != 0.0:
-                at = SLOPES + 2 * k
-                p, q = times(factors[j], factors[j], rows[j, at], rows[j, at + 1])
-                low, high = down(low + p), up(high + q)
-        bound = down(bound - up(max(abs(low), abs(high)) * half[k]))
-    return bound
+def combined(rows: Array, factors: Array, count: int, n: int, total: Array) -> float:
+    """Return a number below sum factors_j row_j over the whole box, rounding included.
 
-
-@inline
-def _linear(rows: Array, count: int, objective: Flags, half: Array, out: Array, sizes: Array) -> None:
-    """Compute rows as a linear program sees them:
-    the value and the middle of the slopes, less what the slopes leave open.
+    The sum is left in ``total``, one form.
     """
+    last, size = total.shape[0] - 1, 0.0
+    total[:] = 0.0
     for j in range(count):
-        low, high, open_ = rows[j, CENTRE], rows[j, CENTRE + 1], 0.0
-        size = abs(low)
-        for k in range(half.shape[0]):
-            p, q = rows[j, SLOPES + 2 * k], rows[j, SLOPES + 2 * k + 1]
-            out[j, 1 + k] = 0.5 * (p + q)
-            open_ += 0.5 * (q - p) * half[k]
-            size += abs(out[j, 1 + k]) * half[k]
-        out[j, 0] = low - open_ if objective[j] else high + open_
+        factor = factors[j]
+        if factor != 0.0:
+            for k in range(last):
+                term = factor * rows[j, k]
+                total[k] += term
+                size += abs(term)
+            total[last] += abs(factor) * rows[j, last]
+    # the sum of at most MOST_ROWS terms errs by less than MOST_ROWS units of 2^-53 of their magnitudes
+    total[last] = total[last] * (1.0 + ROUNDING) + (size * ROUNDING + TINY)
+    return float(least(total, n))
+
+
+@kernel
+def _linear(rows: Array, count: int, objective: Flags, n: int, out: Array, sizes: Array) -> None:
+    """Compute rows as a linear program sees them: value and slopes, and all that is not linear at its worst."""
+    last = rows.shape[1] - 1
+    for j in range(count):
+        sign = -1.0 if objective[j] else 1.0
+        open_, size, place = rows[j, last], abs(rows[j, VALUE]), LINEAR + n
+        for k in range(n):
+            out[j, 1 + k] = rows[j, LINEAR + k]
+            size += abs(out[j, 1 + k])
+            open_ += max(sign * rows[j, place], 0.0)
+            for m in range(place + 1, place + n - k):
+                open_ += abs(rows[j, m])
+            place += n - k
+        out[j, 0] = rows[j, VALUE] + sign * open_
         sizes[j] = 1.0 if objective[j] or size == 0.0 else 1.0 / size
-        for k in range(half.shape[0] + 1):
+        for k in range(n + 1):
             out[j, k] *= sizes[j]
 
 
 @kernel
 def best_bound(
     rows: Array, count: int, objective: Flags, half: Array, work: Array, basis: Indices, linear: Array, sizes: Array,
-    factors: Array,
+    factors: Array, total: Array,
 ) -> tuple[float, bool]:  # fmt: skip
     """Return the best bound (1) of a box, and whether it is one of limits alone:
     then a positive one empties the box.
@@ -84,12 +87,12 @@ def best_bound(
     ----------
     rows : (m, width) forms, the first ``count`` of them used
     objective : (m,) which rows are the objective's
-    half : (n,)
-    work, basis, linear, sizes : scratch of (n + 5, n + 1), (n + 1,), (m, n + 1), (m,)
+    half : (n,) ones: the variables of forms go from -1 to 1
+    work, basis, linear, sizes, total : scratch of (n + 5, n + 1), (n + 1,), (m, n + 1), (m,), (width,)
     factors : (m,) out, l_j, and -m_i; zero beyond ``count``
     """
     n = half.shape[0]
-    _linear(rows, count, objective, half, linear, sizes)
+    _linear(rows, count, objective, n, linear, sizes)
     scale = 0.0
     for j in range(count):
         if objective[j]:
@@ -101,38 +104,54 @@ def best_bound(
             for k in range(n + 1):
                 linear[j, k] *= per_scale
     outcome = multipliers(linear, count, objective, half, work, basis, factors)
-    total = 0.0
+    weight = 0.0
     for j in range(count):
         if not objective[j]:
             factors[j] *= -sizes[j] * (scale if outcome != IMPOSSIBLE and scale > 0.0 else 1.0)
         elif outcome == IMPOSSIBLE:
             factors[j] = 0.0
         else:
-            total = up(total + factors[j])
-    if total > 1.0:
+            weight += factors[j]
+    if weight > 1.0 - ROUNDING:  # the sum of the factors as they are stored must not be above 1
         for j in range(count):
-            factors[j] = down(factors[j] / total) if objective[j] else factors[j] / total
-            if objective[j] and factors[j] < 0.0:
-                factors[j] = 0.0
-    return combined(rows, factors, count, half), outcome == IMPOSSIBLE
+            factors[j] /= weight * (1.0 + 2.0 * ROUNDING)
+    return combined(rows, factors, count, n, total), outcome == IMPOSSIBLE
 
 
 @kernel
-def looseness(rows: Array, factors: Array, count: int, half: Array, out: Array) -> None:
-    """Compute what each variable's width costs the bound, to decide which one to halve."""
-    for k in range(half.shape[0]):
-        total, low, high = 0.0, 0.0, 0.0
+def looseness(rows: Array, factors: Array, count: int, n: int, total: Array, out: Array) -> None:
+    """Compute what each variable's width costs the bound, to decide which one to halve.
+
+    The cost is that of the combined linear and quadratic terms; what is left open goes to the variables by the size of
+    the rows' own linear terms.
+    """
+    combined(rows, factors, count, n, total)
+    own = 0.0
+    place = LINEAR + n
+    for k in range(n):
+        out[k] = 0.0
+    for k in range(n):
+        out[k] += abs(total[LINEAR + k]) + abs(total[place])
+        for m in range(k + 1, n):
+            mixed = 0.5 * abs(total[place + m - k])
+            out[k] += mixed
+            out[m] += mixed
+        place += n - k
         for j in range(count):
-            p, q = rows[j, SLOPES + 2 * k], rows[j, SLOPES + 2 * k + 1]
-            total += abs(factors[j]) * (q - p)
-            low, high = low + min(factors[j] * p, factors[j] * q), high + max(factors[j] * p, factors[j] * q)
-        out[k] = half[k] * (total + max(abs(low), abs(high)))
+            own += abs(factors[j] * rows[j, LINEAR + k])
+    if own > 0.0:
+        for k in range(n):
+            for j in range(count):
+                out[k] += total[total.shape[0] - 1] * abs(factors[j] * rows[j, LINEAR + k]) / own
 
 
-@inline
-def surely_negative(rows: Array, j: int) -> bool:
+@kernel
+def surely_negative(rows: Array, j: int, n: int, total: Array) -> bool:
     """Return whether no design of the box has a value of the row that is not negative."""
-    return bool(rows[j, RANGE + 1] < 0.0)
+    for k in range(total.shape[0] - 1):
+        total[k] = -rows[j, k]
+    total[total.shape[0] - 1] = rows[j, total.shape[0] - 1]
+    return bool(least(total, n) > 0.0)
 
 
 @inline

@@ -1,7 +1,7 @@
-"""Formulas as data: what slope arithmetic is to compute, written once in Python and run by one small kernel.
+"""Formulas as data: what Taylor models are to compute, written once in Python and run by one small kernel.
 
 A :class:`Tape` records the operations of a formula on :class:`Number` objects; :func:`run` carries them out on forms
-(:mod:`kernels.proof.slopes`).  So a formula of a hundred operations reads as a formula, and only the nine operations
+(:mod:`kernels.proof.taylor`).  So a formula of a hundred operations reads as a formula, and only the few operations
 are compiled, once, for every family.
 """
 
@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels._jit import kernel
-from kernels.proof.slopes import Array, combine, constant, inverse, multiply, root, sine_cosine, square
+from kernels.proof.taylor import Array, combine, constant, inverse, multiply, root, sine_cosine
 
 Operations = NDArray[np.int64]
 
-COMBINE, MULTIPLY, SQUARE, INVERSE, ROOT, SINE, CONSTANT = range(7)
+COMBINE, MULTIPLY, INVERSE, ROOT, SINE, CONSTANT = range(6)
 
 
 @dataclass(frozen=True)
@@ -37,15 +37,15 @@ class Number:
         return self.tape.put(COMBINE, self, self, -1.0, 0.0)
 
     def __mul__(self, other: Number) -> Number:
-        return self.square() if other is self else self.tape.put(MULTIPLY, self, other)
+        return self.tape.put(MULTIPLY, self, other)
 
     def times(self, factor: float) -> Number:
         """Return the product with a number that is exact, as 0.5 or 2."""
         return self.tape.put(COMBINE, self, self, factor, 0.0)
 
     def square(self) -> Number:
-        """Return the square, never negative."""
-        return self.tape.put(SQUARE, self, self)
+        """Return the square."""
+        return self.tape.put(MULTIPLY, self, self)
 
     def inverse(self) -> Number:
         """Return 1/x; the run ends without result where x may vanish."""
@@ -106,7 +106,7 @@ class Tape:
 
 
 @kernel
-def run(operations: Operations, factors: Array, ends: Operations, part: int, at: Array, half: Array) -> bool:
+def run(operations: Operations, factors: Array, ends: Operations, part: int, at: Array, n: int) -> bool:
     """Carry out one part of a tape on the forms of a box; false where an operation has no enclosure there.
 
     Parameters
@@ -114,23 +114,21 @@ def run(operations: Operations, factors: Array, ends: Operations, part: int, at:
     operations, factors, ends : of :meth:`Tape.recorded`
     part : number that :meth:`Tape.end` gave
     at : (forms, width) in and out
-    half : (n,) half widths of the box
+    n : variables of the box
     """
     for i in range(ends[part], ends[part + 1]):
         what, out, a, b = operations[i, 0], operations[i, 1], operations[i, 2], operations[i, 3]
         enclosed = True
         if what == MULTIPLY:
-            multiply(at, out, a, b, half)
+            multiply(at, out, a, b, n)
         elif what == COMBINE:
-            combine(at, out, factors[i, 0], a, factors[i, 1], b, half)
-        elif what == SQUARE:
-            square(at, out, a, half)
+            combine(at, out, factors[i, 0], a, factors[i, 1], b)
         elif what == INVERSE:
-            enclosed = bool(inverse(at, out, a, half))
+            enclosed = bool(inverse(at, out, a, n))
         elif what == ROOT:
-            enclosed = bool(root(at, out, a, half))
+            enclosed = bool(root(at, out, a, n))
         elif what == SINE:
-            sine_cosine(at, out, out + 1, a, factors[i, 0], half)
+            sine_cosine(at, out, out + 1, a, factors[i, 0], n)
         else:
             constant(at, out, factors[i, 0], factors[i, 0])
         if not enclosed:

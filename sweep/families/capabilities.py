@@ -145,9 +145,10 @@ class Searched:
     """What a search over boxes of designs is given; lengths in one unit, angles in rad.
 
     ``branch``; the number of the ``objective``; least ``cos2`` of the pressure angle; least and most of all ``links``;
-    the ``target`` of the objective; low and high ends and known bounds of the boxes it ``starts`` from; widths of the
-    ``whole`` space; numbers of the ``free`` coordinates, and all of them as ``given``; the share of the whole below
-    which a box is not halved; the ``most`` boxes to judge.
+    the ``target`` of the objective; the ``tube``, crank angles with the least and most angle of a follower that reaches
+    it (:mod:`kernels.proof.tube`), empty where none is known; low and high ends and known bounds of the boxes it
+    ``starts`` from; widths of the ``whole`` space; numbers of the ``free`` coordinates, and all of them as ``given``;
+    the share of the whole below which a box is not halved; the ``most`` boxes to judge.
     """
 
     branch: float
@@ -155,6 +156,7 @@ class Searched:
     cos2: float
     links: Array
     target: float
+    tube: Array
     starts: tuple[Array, Array, Array]
     whole: Array
     free: Array

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from kernels.families.rssr import box_by_axes, box_by_rocker, proof
-from kernels.families.rssr.box_rows import Problem
+from kernels.families.rssr.box_problem import Problem
 from kernels.families.rssr.box_turn import Formulas
 from sweep.families.capabilities import Numbers, ProvableLocus, Searched
 
@@ -16,7 +16,7 @@ _by_rocker = cache(box_by_rocker.recorded)
 def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
     """Return leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
     s = searched
-    problem = Problem(s.branch, s.objective, s.cos2, s.links, s.target)
+    problem = Problem(s.branch, s.objective, s.cos2, s.links, s.target, s.tube)
     found = proof.explore(
         problem, formulas, s.starts, s.whole, s.free, s.given, s.smallest, s.most, proof.Leaves(*leaves)
     )
@@ -39,6 +39,8 @@ def _tests(lengths: tuple[str, ...]) -> tuple[str, ...]:
         "extended position on the other branch", "folded position on the other branch",
         *(f"{name} too {word}" for name in lengths for word in ("small", "large")), *[""] * (2 * room),
         "pressure angle", "objective", "objective",
+        *("rocker earlier than the bound allows", "rocker later than the bound allows") * 2,
+        "crank too long for the limits", "crank too short for the limits",
     )  # fmt: skip
 
 

@@ -25,7 +25,8 @@ class Proof:
     study found, nan where it found none.  ``exceptions`` boxes were too small to be halved again; together they are the
     share ``exceptional`` of the space, and lie between ``exception_low`` and ``exception_high``.  ``open`` boxes were
     left when their number or the time was used up; the bound holds for them too.  ``empty_share`` of the space was
-    proven to hold no feasible design.  ``reasons`` counts the boxes by what proves them.
+    proven to hold no feasible design.  ``reasons`` counts the boxes by what proves them.  ``floor`` is what no motion
+    from rest to rest can be below; without a bound of its own, the ``bound`` is that.
     """
 
     objective: str
@@ -46,6 +47,7 @@ class Proof:
     cut_short: bool
     reasons: tuple[tuple[str, int], ...]
     left_out: tuple[str, ...]
+    floor: float = 0.0
 
     @property
     def gap(self) -> float:
@@ -87,6 +89,7 @@ def concluded(
         cut_short=cut_short,
         reasons=_reasons(question, leaves),
         left_out=question.left_out,
+        floor=question.outside(question.floor),
     )
 
 

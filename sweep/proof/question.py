@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kernels.proof.tube import HIGH, LOW, least_acceleration, tube
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.families.capabilities import ProvableLocus
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from sweep.study import Limit, Study
 
 MOST_FREE = 4
+HUGE = 1e9  # no acceleration, but a target that stands for none
 WEAKER = 1.0 - 1e-14  # cos^2 of a limit, rounded to the side on which more designs are feasible
 
 
@@ -45,6 +47,47 @@ class Question:
     def free(self) -> Array:
         """Numbers of the free coordinates, as the kernels count them."""
         return np.array([self.provable.coordinates.index(name) for name in self.names], np.float64)
+
+    @property
+    def floor(self) -> float:
+        """What no mechanism at all can be better than, in the unit of the rows: from rest to rest in so much time."""
+        motion = self._motion()
+        if motion is None:
+            return 0.0
+        swing, phi0 = motion
+        return max(least_acceleration(swing, phi0), least_acceleration(swing, 2.0 * np.pi - phi0))
+
+    def tube(self, target: float) -> Array:
+        """Return where a rocker can be that has an acceleration of at most ``target``; empty where nothing is known.
+
+        Only poses are given at which the row of the proof tells the sides of the tube apart: across the tube, psi must
+        not meet the other assembly mode.  That one is 2 atan(T/W) away, T at least b cos(mu), W at most b + c.
+        """
+        motion = self._motion()
+        if motion is None or not self.floor < target < HUGE:
+            return np.zeros((0, 9))
+        least, longest = self.least_coupler, self._longest_rocker()
+        found = tube(*motion, target)
+        wide = np.tan(0.5 * (found[:, HIGH] - found[:, LOW]))
+        blurred = ~(wide * (least + longest) < least * np.sqrt(self.cos2) * WEAKER)
+        found[blurred, LOW], found[blurred, HIGH] = -np.inf, np.inf
+        return found
+
+    @property
+    def least_coupler(self) -> float:
+        """Least length of the coupler that the limits allow, the last of the links."""
+        return max(float(self.links[-2]), 0.0)
+
+    def _longest_rocker(self) -> float:
+        names = self.provable.links
+        if "c" in names:
+            return float(self.links[2 * names.index("c") + 1])
+        return float(self.given[self.provable.coordinates.index("c")])
+
+    def _motion(self) -> tuple[float, float] | None:
+        """Return swing and phi0 where the objective is an acceleration and both are given."""
+        order = self.provable.objectives[self.objective]
+        return None if order != 2 or set(self.names) & {"swing", "phi0"} else (self.given[0], self.given[1])
 
     def in_kernel(self, value: float) -> float:
         """Return a value of the objective in the unit of the proof's rows: sin^2 for a pressure angle."""

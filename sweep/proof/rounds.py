@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 UNITS = 64
 SHARES = (0.1, 0.15, 0.25, 0.5)  # of all boxes, round by round: later ones know better where to look
-COMBINED = 5
+COMBINED = 7
 OPEN, TOO_SMALL, BOUND, EMPTY = range(4)
 Tell: TypeAlias = Callable[[int, int], None]
 OUTCOMES = ("open", "too small", "bound", "empty")
@@ -104,8 +104,8 @@ class Unit:
         leaves = empty(len(mine.bound) + self.most, mine.low.shape[1])
         searched = Searched(
             asked.branch, provable.objectives[asked.objective], asked.cos2, asked.links, self.target,
-            (mine.low, mine.high, mine.bound), asked.high - asked.low, asked.free, asked.given, self.smallest,
-            self.most,
+            asked.tube(self.target), (mine.low, mine.high, mine.bound), asked.high - asked.low, asked.free,
+            asked.given, self.smallest, self.most,
         )  # fmt: skip
         filled, judged = provable.explore(searched, tuple(getattr(leaves, n) for n in Leaves.__dataclass_fields__))
         _write(self.path(number), leaves.taken(np.arange(filled)), judged)
@@ -147,6 +147,7 @@ def explored(
     done: list[Leaves] = []
     start = empty(1, len(question.names))
     start.low[0], start.high[0] = question.low, question.high
+    start.bound[0] = question.floor
     todo, judged, begin = start, 0, time.monotonic()
     for number, share in enumerate(SHARES):
         if not len(todo.bound):

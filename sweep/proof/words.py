@@ -26,6 +26,8 @@ def proof_words(proof: Proof, name: str, show: Callable[[float], str]) -> str:
     text = f"proven{outside}: no design of this space has a {name} below {show(proof.bound)}"
     if math.isfinite(proof.gap):
         text += f"; the optimum is within {_percent(proof.gap)} of that"
+    if not proof.settled and proof.bound <= proof.floor:
+        text += ", which no follower at all gets below that goes so far in that time"
     if not proof.settled:
         text += f" ({_percent(proof.wanted_gap)} were asked for; {proof.open} of {boxes} are open)"
     else:

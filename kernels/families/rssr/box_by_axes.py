@@ -6,7 +6,19 @@ place can still be told to hold no mechanism: rho1 = n1/det, X1 = nx/det, Y1 = n
 
 from __future__ import annotations
 
-from kernels.families.rssr.box_turn import INPUTS, Formulas, Linkage, constant_of_closure, formulas, sense, turn, within
+from kernels.families.rssr.box_turn import (
+    INPUTS,
+    PASSED,
+    Formulas,
+    LimitPositions,
+    Linkage,
+    arrival,
+    constant_of_closure,
+    formulas,
+    sense,
+    turn,
+    within,
+)
 from kernels.proof.tape import Number, Tape
 
 SWING, PHI0, PHI1, E, F, G, ALPHA = range(7)
@@ -42,6 +54,10 @@ def recorded() -> Formulas:
     )  # fmt: skip
     limits = [within(tape, 0, crank.square(), total2, 2), within(tape, 1, rocker2, det2, 2)]
     tape.end()
+    start = LimitPositions(total, crank, n1, nx, ny, e, fs, ca, u1, v1)
+    found = {PASSED: arrival(tape, start)}
+    tape.end()
+    tape.end()
     sign = tape.new()
     rocker, per_det = rocker2.root(), det.inverse()
     per_rocker = rocker.inverse()
@@ -52,7 +68,7 @@ def recorded() -> Formulas:
     at = at._replace(k0=constant_of_closure(at, _signed(sign, nx, per_rocker), _signed(sign, ny, per_rocker)))
     limits.append(within(tape, 2, b2, one, 2))
     tape.end()
-    return formulas(tape, at, turn(tape, at), acceptance, limits, 2, (det, sign))
+    return formulas(tape, at, found | turn(tape, at), acceptance, limits, 2, start, (det, sign))
 
 
 def _signed(sign: Number, x: Number, per_size: Number) -> Number:

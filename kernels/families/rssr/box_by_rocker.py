@@ -1,15 +1,38 @@
 """Boxes of crank-rockers on the locus whose rocker is given: its length and its angle at the extended position.
 
-In both limit positions the ball lies in the plane of crank axis and crank (docs/synthesis.md, section 1):
+In both limit positions the ball lies in the plane of crank axis and crank (docs/synthesis.md, section 1), at the
+distances rho1 on the crank's side and rho2 on the other:
 
-    v1 (e + X1) = u1 (ca Y1 - h),   v2 (e + X2) = u2 (ca Y2 - h),   h = g sa                                         (1)
+    e + X1 =  rho1 u1,   ca Y1 - h =  rho1 v1,   e + X2 = -rho2 u2,   ca Y2 - h = -rho2 v2,   h = g sa               (1)
 
-Solved for e and h the determinant is -sin(phi0), so no place of this locus is singular but phi0 = 180 degrees.
+The differences of these equations hold rho1 and rho2 alone, their sums e and h.  With the middle m of the rocker's and
+p of the crank's limit angles, and k = 2 c sin(swing/2)/sin(phi0),
+
+    rho1 = k (sin(m) v2 + ca cos(m) u2),   rho2 = -k (sin(m) v1 + ca cos(m) u1)                                      (2)
+    e = k/2 (sin(m) sin(2p) + ca cos(m) (cos(2p) + cos(phi0))) - c cos(swing/2) cos(m)                               (3)
+    h = k/2 (sin(m) (cos(2p) - cos(phi0)) - ca cos(m) sin(2p)) + c cos(swing/2) ca sin(m)                            (4)
+
+No place of this locus is singular but phi0 = 180 degrees.
 """
 
 from __future__ import annotations
 
-from kernels.families.rssr.box_turn import INPUTS, Formulas, Linkage, constant_of_closure, formulas, sense, turn, within
+from kernels.families.rssr.box_turn import (
+    ANY_CRANK,
+    FREE_CRANK,
+    FREE_PASSED,
+    INPUTS,
+    PASSED,
+    Formulas,
+    LimitPositions,
+    Linkage,
+    arrival,
+    constant_of_closure,
+    formulas,
+    sense,
+    turn,
+    within,
+)
 from kernels.proof.tape import Tape
 
 SWING, PHI0, PHI1, PSI_EXT, C, F, ALPHA = range(7)
@@ -19,36 +42,47 @@ def recorded() -> Formulas:
     """Return the formulas; the limited lengths are crank, e, g, coupler. The angle alpha must not be 0."""
     tape = Tape(INPUTS)
     one = tape.one()
-    c, f = tape.input(C), tape.input(F)
-    sin_half, cos_half = tape.input(SWING).sine_cosine(of_half=True)
-    s0, c0 = tape.input(PHI0).sine_cosine()
-    v1, u1 = tape.input(PHI1).sine_cosine()
-    sin1, cos1 = tape.input(PSI_EXT).sine_cosine()
+    c, f, phi1, psi1 = tape.input(C), tape.input(F), tape.input(PHI1), tape.input(PSI_EXT)
+    swing, phi0 = tape.input(SWING), tape.input(PHI0)
+    sin_half, cos_half = swing.sine_cosine(of_half=True)
+    s0, c0 = phi0.sine_cosine()
+    v1, u1 = phi1.sine_cosine()
+    v2, u2 = (phi1 + phi0).sine_cosine()
+    sin_p, cos_p = (phi1 + phi0.times(0.5)).sine_cosine()
+    sin_2p, cos_2p = (phi1.times(2.0) + phi0).sine_cosine()
+    sin1, cos1 = psi1.sine_cosine()
+    sin2, cos2 = (psi1 + swing).sine_cosine()
+    sin_m, cos_m = (psi1 + swing.times(0.5)).sine_cosine()
     sa, ca = tape.input(ALPHA).sine_cosine()
-    u2, v2 = u1 * c0 - v1 * s0, v1 * c0 + u1 * s0
-    mid_cos, mid_sin = cos1 * cos_half - sin1 * sin_half, sin1 * cos_half + cos1 * sin_half
-    cos2, sin2 = mid_cos * cos_half - mid_sin * sin_half, mid_sin * cos_half + mid_cos * sin_half
-    # (1) in units of the rocker
-    per_s0 = s0.inverse()
-    first, second = ca * (u1 * sin1) - v1 * cos1, ca * (u2 * sin2) - v2 * cos2
-    e, h = (second * u1 - first * u2) * per_s0 * c, (first * v2 - second * v1) * per_s0 * c
+    chord, ca_m = (sin_half * c).times(2.0), ca * cos_m
+    k = chord * s0.inverse()
+    rho1, rho2 = k * (sin_m * v2 + ca_m * u2), -(k * (sin_m * v1 + ca_m * u1))
+    # rho1 + rho2 by (2), without the division by a small sin(phi0)
+    _, cos_half0 = phi0.sine_cosine(of_half=True)
+    total = chord * cos_half0.inverse() * (sin_m * cos_p - ca_m * sin_p)
+    e = (k * (sin_m * sin_2p + ca_m * (cos_2p + c0))).times(0.5) - c * cos_half * cos_m
     x1, y1, x2, y2 = c * cos1, c * sin1, c * cos2, c * sin2
-    rho1 = u1 * (e + x1) + v1 * (ca * y1 - h)
-    rho2 = -(u2 * (e + x2) + v2 * (ca * y2 - h))
-    fs, total = f * sa, rho1 + rho2
-    crank = sin_half.times(2.0) * c * (e * mid_sin + fs * mid_cos)
-    g = h * sa.inverse()
+    h = (k * (sin_m * (cos_2p - c0) - ca_m * sin_2p)).times(0.5) + c * cos_half * (ca * sin_m)
+    fs, per_sa = f * sa, sa.inverse()
+    crank, g = chord * (e * sin_m + fs * cos_m), h * per_sa
     acceptance = (
         rho1, rho2, crank,
         sense(tape, total, crank, e, fs, ca, u1, v1, x1, y1), sense(tape, total, crank, e, fs, ca, u2, v2, x2, y2),
     )  # fmt: skip
     limits = [within(tape, 0, crank, total), within(tape, 1, e, one), within(tape, 2, g, one)]
     tape.end()
+    start = LimitPositions(total, crank, rho1, x1, y1, e, fs, ca, u1, v1)
+    found = {PASSED: arrival(tape, start)}
+    tape.end()
+    any_crank = tape.input(ANY_CRANK)
+    found[FREE_PASSED] = arrival(tape, start._replace(total=one, crank=any_crank))
+    found[FREE_CRANK] = any_crank * total - crank
+    tape.end()
     a = crank * total.inverse()
-    b2 = (rho1 - a).square() + (y1 * sa + g * ca - f).square()
+    b2 = (rho1 - a).square() + ((y1 - ca * (rho1 * v1)) * per_sa - f).square()
     share = a * c.inverse()
     at = Linkage(one, a, e, fs, a * ca, one, share * h, share * e, b2, u1, v1)
     at = at._replace(k0=constant_of_closure(at, cos1, sin1))
     limits.append(within(tape, 3, b2, one, 2))
     tape.end()
-    return formulas(tape, at, turn(tape, at), acceptance, limits, 3)
+    return formulas(tape, at, found | turn(tape, at), acceptance, limits, 3, start)

@@ -12,24 +12,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.proof.slopes import Array
 from kernels.proof.tape import Number, Operations, Tape
+from kernels.proof.taylor import Array
 
 # Inputs after the seven coordinates: cosine and sine of the crank angle after the extended position, branch, least
-# cos^2 of the pressure angle, then least and most of every length that may have limits.
+# cos^2 of the pressure angle, cosine and sine of a rocker angle after the extended position, a crank length that is a
+# variable, then least and most of every length that may have limits.
 COORDINATES = 7
-COS_THETA, SIN_THETA, BRANCH, COS2, LIMITS = range(COORDINATES, COORDINATES + 5)
+COS_THETA, SIN_THETA, BRANCH, COS2, COS_TURN, SIN_TURN, ANY_CRANK, LIMITS = range(COORDINATES, COORDINATES + 8)
 MOST_LIMITED = 5
 INPUTS = LIMITS + 2 * MOST_LIMITED
 
 # Parts of the tape, in the order in which they run.
-PLACE, LENGTHS, CLOSURE, ANGLE, MOTION = range(5)
+PLACE, ARRIVAL, FREE, LENGTHS, CLOSURE, ANGLE, MOTION = range(7)
 
 # Where the forms stand that the rows of a box are made of.
 ACCEPTANCE = 0  # five: both distances from the crank axis, order of the limits, crank, branch at both limits
 LIMITED = 5  # two per length: above its least, below its most
-PRESSURE, SIN2, PSI1, PSI2, SIGNED, SIGN, CRANK, CENTRES = range(15, 23)
-SLOTS = CENTRES + 10
+PRESSURE, SIN2, PSI1, PSI2, SIGNED, SIGN, CRANK, PASSED, FREE_PASSED, FREE_CRANK = range(15, 25)
+CENTRES, STARTS = 25, 35  # ten numbers each
+SLOTS = STARTS + 10
 
 
 class Formulas(NamedTuple):
@@ -41,6 +43,24 @@ class Formulas(NamedTuple):
     slots: Operations
     forms: int
     early: int  # so many lengths have limits that are known without a division
+
+
+class LimitPositions(NamedTuple):
+    """The numbers that fix the motion in the limit positions: rho1, X1, Y1 and the crank are ratios.
+
+    ``total`` is rho1 + rho2 and ``crank`` a times it; ``total``, ``n1``, ``x1``, ``y1`` share a further factor.
+    """
+
+    total: Number
+    crank: Number
+    n1: Number
+    x1: Number
+    y1: Number
+    e: Number
+    fs: Number  # f sa
+    ca: Number
+    u1: Number
+    v1: Number
 
 
 class Linkage(NamedTuple):
@@ -57,6 +77,24 @@ class Linkage(NamedTuple):
     b2: Number
     u1: Number
     v1: Number
+
+
+def arrival(tape: Tape, at: LimitPositions) -> Number:
+    """Record what tells whether the rocker has passed a given angle at a crank angle.
+
+    It is F(phi, psi) of docs/rssr.md, (1), times ``branch`` and times numbers that are positive in a mechanism, from
+    the equation of displacements, (15) of docs/synthesis.md.  There xi - rho1, the way of the ball along the crank, is
+    written with the ball's place in the plane of the crank at the extended position:
+
+        xi - rho1 = rho1 (cos(theta) - 1) + u (X - X1) + v ca (Y - Y1)                                               (1)
+    """
+    total, crank, n1, x1, y1, e, fs, ca, u1, v1 = at
+    one, cos, sin = tape.one(), tape.input(COS_THETA), tape.input(SIN_THETA)
+    less, sin_turn = tape.input(COS_TURN) - one, tape.input(SIN_TURN)
+    u, v = u1 * cos - v1 * sin, v1 * cos + u1 * sin
+    x, y = x1 * less - y1 * sin_turn, y1 * less + x1 * sin_turn
+    along, across = n1 * (cos - one) + (u * x + v * (ca * y)), e * x - fs * y
+    return tape.input(BRANCH) * (total * across - crank * along)
 
 
 def turn(tape: Tape, at: Linkage) -> dict[int, Number]:
@@ -109,15 +147,17 @@ def within(tape: Tape, number: int, value: Number, unit: Number, power: int = 1)
 
 def formulas(
     tape: Tape, at: Linkage, found: dict[int, Number], acceptance: Sequence[Number],
-    limits: Sequence[tuple[Number, Number]], early: int, signs: tuple[Number, Number] | None = None,
+    limits: Sequence[tuple[Number, Number]], early: int, start: LimitPositions,
+    signs: tuple[Number, Number] | None = None,
 ) -> Formulas:  # fmt: skip
     """Return the recorded tape with its table of forms.
 
     Parameters
     ----------
-    tape, at, found : the tape, its linkage, and what :func:`turn` gave
+    tape, at, found : the tape, its linkage, and rows of the turn, by slot
     acceptance : five rows that a mechanism keeps
     limits : two rows of every limited length; of the first ``early`` ones they stand in the part PLACE
+    start : the limit positions
     signs : a number whose sign must be known before the part LENGTHS, and the form that takes it as +1 or -1
     """
     slots = np.full(SLOTS, -1, np.int64)
@@ -132,4 +172,6 @@ def formulas(
     slots[CRANK] = at.a.form
     for k, number in enumerate(at[1:]):
         slots[CENTRES + k] = number.form
+    for k, number in enumerate(start):
+        slots[STARTS + k] = number.form
     return Formulas(*tape.recorded(), slots, tape.forms, early)

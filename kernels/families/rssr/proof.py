@@ -6,15 +6,21 @@ that reaches the target.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from kernels._jit import inline, kernel
-from kernels.families.rssr.box_rows import OPEN, POSES, TOO_SMALL, Problem, Rows, judge
+from kernels.families.rssr import box_turn as bt
+from kernels.families.rssr.box_peaks import POSES
+from kernels.families.rssr.box_problem import OPEN, TOO_SMALL, Problem, Room, room
+from kernels.families.rssr.box_rows import crank_known, judge, judge_any_crank
 from kernels.families.rssr.box_turn import Formulas
-from kernels.proof.branching import COMBINED, MOST_ROWS, Flags, Indices, pop, push
-from kernels.proof.slopes import SLOPES, Array
+from kernels.proof.branching import COMBINED, Flags, Indices, pop, push
+from kernels.proof.taylor import Array
+
+NARROWEST = 1.0 / 64.0  # of the widest side
 
 
 class Leaves(NamedTuple):
@@ -31,7 +37,7 @@ class Leaves(NamedTuple):
 
 @kernel
 def _record(
-    leaves: Leaves, count: int, low: Array, high: Array, outcome: int, bound: float, rows: Rows, used: int
+    leaves: Leaves, count: int, low: Array, high: Array, outcome: int, bound: float, rows: Room, used: int
 ) -> int:
     """Return one more leaf, with the rows that prove it."""
     leaves.low[count], leaves.high[count] = low, high
@@ -50,14 +56,20 @@ def _record(
 def _to_halve(low: Array, high: Array, whole: Array, smallest: float, loose: Array) -> int:
     """Return the variable whose width costs the bound most, of those that are not too narrow; -1 where all are.
 
+    One that is far narrower than the widest is not halved, so that no row that stays undecided is followed for ever.
+
     Where nothing is known of the costs it is the one of the widest share.
     """
-    best, most = -1, 0.0
+    best, most, widest = -1, 0.0, 0.0
     known = loose.max() > 0.0
+    for k in range(low.shape[0]):
+        widest = max(widest, (high[k] - low[k]) / whole[k])
+    least_share = max(smallest, NARROWEST * widest)
     for k in range(low.shape[0]):
         share = (high[k] - low[k]) / whole[k]
         cost = loose[k] if known else share
-        if share >= smallest and low[k] < 0.5 * (low[k] + high[k]) < high[k] and (best < 0 or cost > most):
+        divisible = share >= least_share and low[k] < 0.5 * (low[k] + high[k]) < high[k]
+        if divisible and (best < 0 or cost > most):
             best, most = k, cost
     return best
 
@@ -85,12 +97,8 @@ def explore(
     bound is what is known of them.
     """
     boxes, n = starts[0].shape
-    at = np.zeros((f.forms, SLOPES + 2 * n))
-    rows = Rows(
-        np.zeros((MOST_ROWS, SLOPES + 2 * n)), np.zeros(MOST_ROWS, np.int64), np.zeros(MOST_ROWS),
-        np.zeros(MOST_ROWS, np.uint8), np.zeros(MOST_ROWS), np.zeros((n + 6, n + 1)), np.zeros(n + 1, np.int64),
-        np.zeros((MOST_ROWS, n + 1)), np.zeros(MOST_ROWS), np.zeros(n),
-    )  # fmt: skip
+    rows, more = room(f.forms, n), room(f.forms, n + 1)
+    any_crank = p.tube.shape[0] > 0 and f.slots[bt.FREE_PASSED] >= 0 and p.limits[1] < math.inf
     scratch, used = np.zeros((4, POSES)), np.zeros(POSES, np.uint8)
     lows, highs, bounds = np.zeros((boxes + most, n)), np.zeros((boxes + most, n)), np.zeros(boxes + most)
     heap, depths = np.zeros(boxes + most, np.int64), np.zeros(boxes + most, np.int64)
@@ -104,14 +112,18 @@ def explore(
         waiting -= 1
         judged += 1
         lo, hi = lows[box], highs[box]
-        outcome, count, bound = judge(p, f, lo, hi, varied, given, at, rows, scratch, used)
+        found, loose = rows, rows.loose
+        outcome, count, bound = judge(p, f, lo, hi, varied, given, rows, scratch, used)
+        if outcome == OPEN and any_crank and not crank_known(f, rows):
+            found, loose = more, more.loose[:n]
+            outcome, count, bound = judge_any_crank(p, f, lo, hi, varied, given, more, scratch)
         bounds[box] = max(bounds[box], bound)
         if outcome != OPEN:
-            filled = _record(leaves, filled, lo, hi, outcome, bound, rows, count)
+            filled = _record(leaves, filled, lo, hi, outcome, bound, found, count)
             continue
-        k = _to_halve(lo, hi, whole, smallest, rows.loose)
+        k = _to_halve(lo, hi, whole, smallest, loose)
         if k < 0:
-            filled = _record(leaves, filled, lo, hi, TOO_SMALL, bounds[box], rows, 0)
+            filled = _record(leaves, filled, lo, hi, TOO_SMALL, bounds[box], found, 0)
             continue
         middle = 0.5 * (lo[k] + hi[k])
         lows[boxes], highs[boxes], bounds[boxes] = lo, hi, bounds[box]
@@ -124,5 +136,5 @@ def explore(
         boxes += 1
     for i in range(waiting):
         box = heap[i]
-        filled = _record(leaves, filled, lows[box], highs[box], OPEN, bounds[box], rows, 0)
+        filled = _record(leaves, filled, lows[box], highs[box], OPEN, bounds[box], found, 0)
     return filled, judged

@@ -1,0 +1,125 @@
+"""What is asked of boxes of crank-rockers on the locus, the kinds of their rows, and the room to judge a box in."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels._jit import inline, kernel
+from kernels.families.rssr import box_turn as bt
+from kernels.families.rssr.box_turn import Formulas
+from kernels.proof.branching import MOST_ROWS, Flags, Indices
+from kernels.proof.taylor import VALUE, Array, constant, variable, width
+from kernels.sincos import sincos
+
+# Kinds of rows: the acceptance tests, two per limited length, those of the turn, and those of a design that reaches the
+# target: psi is in the tube.  The last four hold for any crank length between its limits that is one of the locus.
+LIMITED, PRESSURE, ABOVE, BELOW, AHEAD, BEHIND = bt.LIMITED, 15, 16, 17, 18, 19
+FREE_AHEAD, FREE_BEHIND, FREE_LONG, FREE_SHORT = 20, 21, 22, 23
+# What happened to a box.
+OPEN, TOO_SMALL, BOUND, EMPTY = 0, 1, 2, 3
+
+LARGE = 1e30
+
+
+class Problem(NamedTuple):
+    """What is asked of a design on the locus."""
+
+    branch: float
+    order: int  # 2: |psi''|, 1: |psi'|, 0: sin^2 of the pressure angle
+    cos2: float  # least cos^2 of the pressure angle; 0 without a limit: then only the links must reach
+    limits: Array  # (2 k,) least and most of every limited length, the crank first; infinite without a limit
+    target: float
+    tube: Array  # (2 m, 9) of kernels.proof.tube, for the target; may be empty
+
+
+class Room(NamedTuple):
+    """The forms of a box, its rows, and the scratch of its linear program."""
+
+    at: Array  # (forms, width) of the formulas
+    forms: Array  # (MOST_ROWS, width) of the rows
+    kinds: Indices
+    theta: Array
+    objective: Flags
+    factors: Array
+    work: Array
+    basis: Indices
+    linear: Array
+    sizes: Array
+    loose: Array
+    ones: Array
+    total: Array
+
+
+@kernel
+def room(forms: int, n: int) -> Room:
+    """Return the room for boxes of ``n`` variables."""
+    return Room(
+        np.zeros((forms, width(n))), np.zeros((MOST_ROWS, width(n))), np.zeros(MOST_ROWS, np.int64),
+        np.zeros(MOST_ROWS), np.zeros(MOST_ROWS, np.uint8), np.zeros(MOST_ROWS), np.zeros((n + 6, n + 1)),
+        np.zeros(n + 1, np.int64), np.zeros((MOST_ROWS, n + 1)), np.zeros(MOST_ROWS), np.zeros(n), np.ones(n),
+        np.zeros(width(n)),
+    )  # fmt: skip
+
+
+@kernel
+def inputs(p: Problem, centre: Array, half: Array, varied: Array, given: Array, at: Array) -> None:
+    """Compute the inputs of the formulas: coordinates number ``varied[k]`` vary, the others are given."""
+    for j in range(bt.COORDINATES):
+        constant(at, j, given[j], given[j])
+    for k in range(varied.shape[0]):
+        variable(at, int(varied[k]), centre[k], half, k)
+    constant(at, bt.BRANCH, p.branch, p.branch)
+    constant(at, bt.COS2, p.cos2, p.cos2)
+    for k in range(2 * bt.MOST_LIMITED):  # rows without a limit are not taken
+        limit = p.limits[k] if k < p.limits.shape[0] and abs(p.limits[k]) < math.inf else 0.0
+        constant(at, bt.LIMITS + k, limit, limit)
+
+
+@kernel
+def take(rows: Room, count: int, form: int, kind: int, theta: float, sign: float) -> int:
+    """Return the number of rows after a form, or its negative, was copied to them."""
+    last = rows.at.shape[1] - 1
+    for j in range(last):
+        rows.forms[count, j] = sign * rows.at[form, j]
+    rows.forms[count, last] = rows.at[form, last]
+    rows.kinds[count], rows.theta[count], rows.objective[count] = kind, theta, kind in (ABOVE, BELOW)
+    # a form without a bound says nothing, and would spoil the linear program
+    return count + 1 if rows.at[form, last] < LARGE else count
+
+
+@kernel
+def angle_inputs(at: Array, cosine: int, angle: float) -> None:
+    """Compute the cosine and sine of a given angle as two inputs.
+
+    :func:`sincos` errs by less than a unit of its last place, so the intervals hold the exact sine and cosine.
+    """
+    s, c = sincos(angle)
+    constant(at, cosine, c - 2.0**-51, c + 2.0**-51)
+    constant(at, cosine + 1, s - 2.0**-51, s + 2.0**-51)
+
+
+@inline
+def middle(at: Array, form: int) -> float:
+    """Return a number of the design at the centre of the box."""
+    return float(at[form, VALUE])
+
+
+@kernel
+def acceptance_rows(p: Problem, f: Formulas, rows: Room) -> int:
+    """Return the number of the first rows: acceptance tests, and limits that are known without a division."""
+    count = 0
+    for kind in range(LIMITED):
+        count = take(rows, count, f.slots[bt.ACCEPTANCE + kind], kind, 0.0, 1.0)
+    return int(limit_rows(p, f, rows, count, 0, f.early))
+
+
+@kernel
+def limit_rows(p: Problem, f: Formulas, rows: Room, count: int, first: int, last: int) -> int:
+    """Return the number of rows with the limits number ``first`` to ``last`` - 1, where there are such."""
+    for k in range(2 * first, min(2 * last, p.limits.shape[0])):
+        if abs(p.limits[k]) < math.inf:
+            count = take(rows, count, f.slots[LIMITED + k], LIMITED + k, 0.0, 1.0)
+    return count

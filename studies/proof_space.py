@@ -1,0 +1,144 @@
+"""The space of a proof: what excludes which part of it, from the certificate; for the figures of the proof studies."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from sweep.report.figures import WIDTH, house_style, new_figure, save
+
+Array = NDArray[np.float64]
+
+COLOURS = {
+    "not a mechanism with these limit positions": "#dddddd",
+    "links outside their limits": "#d9c9e8",
+    "pressure angle above its limit": "#c9d7e8",
+    "rocker cannot be there in time": "#bfdcc3",
+    "acceleration not below the bound": "#f2c38f",
+    "open": "#d62728",
+}
+# Kinds of rows in a certificate, docs/proof.md.
+LENGTHS, PRESSURE, ACCELERATION, ARRIVAL = range(5, 15), 15, (16, 17), range(18, 24)
+WORDS = {
+    "phi_ext": "crank angle of the extended position [deg]",
+    "phi0": "crank angle between the limits [deg]",
+    "psi_ext": "rocker angle of the extended position [deg]",
+    "alpha": "angle between the axes [deg]",
+    "f": "offset f of the crank [mm]",
+}
+STRIPS = 120
+
+
+@dataclass(frozen=True)
+class Space:
+    """The boxes of a certificate: ends by coordinate, in the units of WORDS, and what excludes each, of COLOURS."""
+
+    names: tuple[str, ...]
+    low: Array  # (m, n)
+    high: Array
+    reasons: NDArray[np.int64]
+    ends: Array  # (n, 2) of the whole space
+
+
+def _reason(outcome: str, kinds: list[int]) -> int:
+    """Return the number of what excludes a box."""
+    rows = set(kinds)
+    if outcome not in ("bound", "empty"):
+        word = "open"
+    elif rows & set(ACCELERATION):
+        word = "acceleration not below the bound"
+    elif rows & set(ARRIVAL):
+        word = "rocker cannot be there in time"
+    elif PRESSURE in rows:
+        word = "pressure angle above its limit"
+    elif rows & set(LENGTHS):
+        word = "links outside their limits"
+    else:
+        word = "not a mechanism with these limit positions"
+    return list(COLOURS).index(word)
+
+
+def read(path: Path) -> Space:
+    """Return the boxes of a certificate."""
+    table = pq.read_table(path)
+    asked = json.loads(table.schema.metadata[b"question"])
+    names = tuple(asked["free"])
+    units = np.array([1.0 if name in "efg" else np.degrees(1.0) for name in names])
+    ends = [np.column_stack([table[f"{name}_{end}"].to_numpy() for name in names]) * units for end in ("low", "high")]
+    pairs = zip(table["outcome"].to_pylist(), table["kinds"].to_pylist(), strict=True)
+    reasons = np.array([_reason(outcome, kinds) for outcome, kinds in pairs])
+    return Space(names, *ends, reasons, np.column_stack([asked["low"], asked["high"]]) * units[:, None])
+
+
+def _map(axes: Axes, space: Space, reach: float) -> None:
+    """Draw the boxes of two free coordinates in the colours of what excludes them; the crank angle up to ``reach``."""
+    x = space.names.index("phi_ext")
+    y = 1 - x
+    (x0, y0), (x1, y1) = space.low[:, [x, y]].T, space.high[:, [x, y]].T
+    corners = np.stack([np.stack(corner, axis=1) for corner in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))], axis=1)
+    colours = [list(COLOURS.values())[k] for k in space.reasons]
+    axes.add_collection(PolyCollection(list(corners), facecolors=colours, edgecolors="white", linewidths=0.3))
+    axes.set_xlim(space.ends[x, 0], min(space.ends[x, 1], reach))
+    axes.set_ylim(*space.ends[y])
+    axes.set_xlabel(WORDS[space.names[x]])
+    axes.set_ylabel(WORDS[space.names[y]])
+
+
+def shares(space: Space, k: int) -> tuple[Array, Array]:
+    """Return the edges of strips across coordinate k, and the share of each strip by reason, (STRIPS, reasons)."""
+    edges = np.linspace(*space.ends[k], STRIPS + 1)
+    width = space.high - space.low
+    others = np.prod(np.delete(width / np.diff(space.ends)[:, 0], k, axis=1), axis=1)
+    found = np.zeros((STRIPS, len(COLOURS)))
+    for i in range(STRIPS):
+        shared = np.minimum(space.high[:, k], edges[i + 1]) - np.maximum(space.low[:, k], edges[i])
+        within = np.maximum(shared, 0.0) / (edges[i + 1] - edges[i]) * others
+        found[i] = np.bincount(space.reasons, within, len(COLOURS))
+    return edges, found
+
+
+def _strips(axes: Axes, space: Space, k: int) -> None:
+    """Draw what excludes the space, over one coordinate."""
+    edges, found = shares(space, k)
+    base = np.zeros(STRIPS)
+    for number, colour in enumerate(COLOURS.values()):
+        top = base + 100.0 * found[:, number]
+        axes.stairs(top, edges, baseline=base, fill=True, color=colour, linewidth=0.0)
+        base = top
+    axes.set_xlim(*space.ends[k])
+    axes.set_ylim(0.0, 100.0)
+    axes.set_xlabel(WORDS[space.names[k]])
+
+
+def draw(space: Space, reach: float) -> Figure:
+    """Return the figure of a space: a map of two free coordinates, of more a panel for each."""
+    with house_style():
+        n = len(space.names)
+        columns = 3 if n == 3 else 2
+        figure = new_figure(WIDTH, (0.4 if n == 3 else 0.62) * WIDTH)
+        if n == 2:
+            _map(figure.add_subplot(), space, reach)
+        else:
+            for k in range(n):
+                axes = figure.add_subplot((n + columns - 1) // columns, columns, k + 1)
+                _strips(axes, space, k)
+                if k % columns == 0:
+                    axes.set_ylabel("share of the space [%]")
+        handles = [Patch(color=c, label=w) for k, (w, c) in enumerate(COLOURS.items()) if (space.reasons == k).any()]
+        figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
+    return figure
+
+
+def main(folder: Path, reach: float = 360.0) -> None:
+    """Draw the certificate in ``folder`` into its report; a map only up to the crank angle ``reach``, in degrees."""
+    with house_style():
+        save(draw(read(folder / "_proof.parquet"), reach), folder / "figures" / "space.svg")
