@@ -179,11 +179,14 @@ def test_populations_are_those_of_their_seed_and_number() -> None:
     assert not bred(linear, SIGNS, 2, 5, stop=lambda: True)
 
 
-def test_populations_are_made_until_they_tell_enough_whatever_the_number_of_processes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_populations_are_made_until_they_tell_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is counted does not matter here: each stands for itself by its number."""
     monkeypatch.setattr(generations, "TOGETHER", 2)
-    tiny = SMALL._replace(sampled=1 << 11, first=4, generations=0, steps=5)
+
+    def numbered(task: object, numbers: list[int], *rest: object) -> list[Bred]:
+        return [Bred(np.empty((0, 1)), np.empty(0), number) for number in numbers]
+
+    monkeypatch.setattr(generations, "spread_over", numbered)
     asked = []
 
     def enough(found: list[Bred]) -> bool:
@@ -191,11 +194,18 @@ def test_populations_are_made_until_they_tell_enough_whatever_the_number_of_proc
         return len(found) >= 4
 
     linear = eliminated(8.0)
-    alone = bred(linear, SIGNS, 6, 5, enough=enough, size=tiny)
-    assert asked == [2, 4] and len(alone) == 4
-    for one, other in zip(alone, bred(linear, SIGNS, 2, 5, jobs=2, size=tiny), strict=False):
+    assert [one.looks for one in bred(linear, SIGNS, 6, 5, enough=enough)] == [0, 1, 2, 3]
+    assert asked == [2, 4]
+    assert [one.looks for one in bred(linear, SIGNS, 3, 5)] == [0, 1, 2]
+
+
+def test_populations_in_processes_are_those_of_one_process() -> None:
+    tiny = SMALL._replace(sampled=1 << 11, first=4, generations=0, steps=5)
+    linear = eliminated(8.0)
+    here, there = (bred(linear, SIGNS, 2, 5, jobs=jobs, size=tiny) for jobs in (1, 2))
+    assert len(here) == len(there) == 2
+    for one, other in zip(here, there, strict=True):
         same(one, other)
-    assert len(bred(linear, SIGNS, 3, 5, size=tiny)) == 3
 
 
 def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,12 +105,12 @@ def test_samples_have_points_of_their_own_and_do_not_depend_on_their_number() ->
     assert from_samples(problem, BRANCHES, 7, 3)[1] == (0, 0, 0, 0, 1, 1, 1)
 
 
-def test_one_coordinate_in_seven_of_half_a_sample_is_at_a_bound_but_no_angle_of_a_whole_turn() -> None:
+def test_two_coordinates_in_five_of_half_a_sample_are_at_bounds_but_no_angle_of_a_whole_turn() -> None:
     problem = on_locus(CORNER)
     drawn = candidates._brought_in(problem, np.random.default_rng(1).random((20_000, 5)))
     ends = ((drawn == 0.0) | (drawn == 1.0)).mean(axis=0)
-    # 0.4 of a width of 1.4, in half of the sample
-    np.testing.assert_allclose(ends[:4], 1.0 / 7.0, atol=0.01)
+    # 0.7 of a width of 1.7, in half of the sample
+    np.testing.assert_allclose(ends[:4], 0.35 / 1.7, atol=0.01)
     assert ends[4] == 0.0 and drawn[:, 4].min() >= 0.25 and drawn[:, 4].max() <= 0.75
 
 

@@ -22,7 +22,7 @@ from sweep.reductions.measures import ROTATABLE_MARGIN, margins
 GROUP = 6  # starts of one sample: as many as a search begins together
 SAMPLED = 1 << 15  # designs per start: on a locus they cost a third of a microsecond each
 BLOCK, LEAST = 1 << 15, 1 << 12  # designs ranked together; the least number, where there are many signs
-BEYOND = 0.2  # of the width of the bounds, to either side: one coordinate in seven is brought back onto a bound
+BEYOND = 0.35  # of the width of the bounds, to either side: two coordinates in five are brought back onto a bound
 KEPT = 512  # best of the sample per start, and as many of those that miss their limits
 PARENTS, CHILDREN, ROUNDS = 16, 24, 12  # improved per start; samples around each and round
 FARTHEST = 1e100
