@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-first-use bench-optimise help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-first-use bench-optimise bench-basins help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -94,6 +94,9 @@ bench-object-store: $(VENV)/ready  ## a dataset by way of an object store; its s
 search-worse: $(VENV)/ready  ## look for poses with larger errors than any known; appends to tests/oracle/worst_found.json
 	$(BIN)/python -m tests.search.worse
 
+search-wrong: $(VENV)/ready  ## look for design outputs that are wrong though their status is OK: every family, chain and effect; an hour
+	$(BIN)/python -m tests.search.wrong
+
 bench: $(VENV)/ready  ## ns per sample against numpy and C; what everything takes, into sweep/costs.toml and docs
 	$(BIN)/python -m tests.bench.kernels
 	$(BIN)/python -m tests.bench.chains
@@ -128,6 +131,10 @@ bench-scene: $(VENV)/ready  ## all effects on 10^5 designs x 360 angles: rate, i
 
 bench-optimise: $(VENV)/ready  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 10 minutes of processor time
 	$(BIN)/python -m tests.bench.optimise --out docs/optimise-marks.md
+
+bench-basins: $(VENV)/ready  ## five seeds of the search over proportions, two requirements: writes docs/basins.md, about an hour
+	mkdir -p results
+	$(BIN)/python -m tests.bench.basins --keep results/basins.jsonl --out docs/basins.md
 
 # The moving picture of the report: three.js with its licence, what is used of it, in one file that pages carry.
 THREE := three@0.187.0

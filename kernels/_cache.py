@@ -30,6 +30,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -162,23 +163,35 @@ def _is_as_hashed(module: ModuleType) -> bool:
     return bool(marshal.loads(code) == compile(text, str(module.__file__), "exec", dont_inherit=True))
 
 
+@cache
+def _resolved(file: str) -> Path:
+    return Path(file).resolve()
+
+
+@cache
+def _writable(folder: Path) -> bool:
+    """Return whether a folder of the cache, made if need be, takes files."""
+    try:
+        _made(CACHE_DIR)
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
 class _Place(UserProvidedCacheLocator):
     """The folder of a kernel's compiled code."""
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         super().__init__(function, file)  # type: ignore[no-untyped-call]
-        self._cache_path = str(CACHE_DIR / Path(file).resolve().relative_to(SOURCES).with_suffix(""))
+        self._cache_path = str(CACHE_DIR / _resolved(file).relative_to(SOURCES).with_suffix(""))
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> _Place | None:
         """Return the folder, made if need be; None where it cannot be written."""
         place = cls(function, file)
-        try:
-            _made(CACHE_DIR)
-            place.ensure_cache_path()  # type: ignore[no-untyped-call]
-        except OSError:
-            return None
-        return place
+        return place if _writable(Path(place.get_cache_path())) else None  # type: ignore[no-untyped-call]
 
     def get_source_stamp(self) -> str:
         """Nothing: the folder's name is made of the sources' hash already, so numba need not compare them."""
@@ -290,7 +303,7 @@ def kept(dispatcher: Any) -> Any:
     A function from outside of the package, as a bench or a study may have, is in no hash: every process compiles it.
     """
     file = dispatcher.py_func.__code__.co_filename
-    ours = Path(file).resolve().is_relative_to(SOURCES)
+    ours = _resolved(file).is_relative_to(SOURCES)
     if ours and _IMPORTED.as_hashed() and _Place.from_function(dispatcher.py_func, file):
         dispatcher._cache = KernelCache(dispatcher.py_func)
     return dispatcher

@@ -2,13 +2,14 @@
 
 From an empty cache a study compiles hundreds of helpers that only other kernels call.  For each of them numba makes a
 function that Python can call, optimises it and translates it to machine code, and throws all that away when the helper
-is folded into its caller.  For each ``a * b`` it asks every operator it knows anew.  Here instead
+is folded into its caller.  Here instead
 
 * a :class:`Part`, what kernels call, ends as LLVM code.  It is optimised and translated within its callers.
-* what an operator gives for the types of its operands is remembered.
 * optimisers of single functions run on those that have a body.
+* Python does not look for garbage meanwhile.
+* the way from Python to LLVM code is that of :mod:`kernels._frontend`.
 
-Side by side with numba's own way a first use took a third less, and loops 0.97 to 1.04 of their time; ``make
+Side by side with numba's own way a first use takes half the time, and loops 0.97 to 1.04 of theirs; ``make
 bench-first-use`` and ``make bench`` give both as they are now.
 The classes derive from numba's at the places that numba has for it: dispatcher, compiler, pass, code library.
 """
@@ -18,23 +19,22 @@ The classes derive from numba's at the places that numba has for it: dispatcher,
 
 from __future__ import annotations
 
-import operator
+import gc
 import sys
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba import types
-from numba.core import codegen
-from numba.core.compiler import CompilerBase, DefaultPassBuilder, compile_result
+from numba.core import codegen, types
+from numba.core.compiler import CompilerBase, compile_result
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import NativeLowering
-from numba.core.typing.context import Context
+
+from kernels._frontend import KernelLowering, contexts, passes, plainly
 
 PART = "part"  # kind of a library without machine code, in the cache on disk
-_OPERATORS = {id(function) for function in vars(operator).values() if callable(function)}
 
 
 class _Library(codegen.JITCodeLibrary):
@@ -80,29 +80,8 @@ class _PartLibrary(_Library):
         return self.name, PART, self._final_module.as_bitcode()
 
 
-class _Typing(Context):
-    """numba's table of types, remembering what operators give; it shares all else with the one it is made of."""
-
-    def __init__(self, of: Context) -> None:
-        self.__dict__ = of.__dict__
-        self._known_operators: dict[Any, Any] = {}
-
-    def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
-        """Return the signature of a function for types of arguments."""
-        function = func.typing_key if isinstance(func, types.BaseFunction) else func
-        if id(function) not in _OPERATORS or kws:
-            return super().resolve_function_type(func, args, kws)
-        key = id(function), args
-        if key not in self._known_operators:
-            self._known_operators[key] = super().resolve_function_type(func, args, kws)
-        return self._known_operators[key]
-
-
-_remembering = cache(_Typing)  # one for each table: numba keeps what it has compiled of its own by the table asked for
-
-
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _PartLowering(NativeLowering):
+class _PartLowering(KernelLowering):
     """Code for callers alone."""
 
     _name = "part_lowering"
@@ -123,26 +102,35 @@ class _KernelCompiler(CompilerBase):
     """numba's way from a Python function to machine code, with our library and table of types."""
 
     library: type[_Library] = _Library
+    lowering: type[KernelLowering] = KernelLowering
 
-    def __init__(self, typingctx: Any, *args: Any) -> None:
-        super().__init__(_remembering(typingctx), *args)
+    def __init__(self, typingctx: Any, targetctx: Any, *args: Any) -> None:
+        super().__init__(*contexts(typingctx, targetctx), *args)
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes that a function goes through."""
         state = self.state
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+        return [passes(state, self.lowering)]
 
 
 class _PartCompiler(_KernelCompiler):
     library = _PartLibrary
+    lowering = _PartLowering
 
-    def define_pipelines(self) -> list[Any]:
-        passes = super().define_pipelines()
-        for way in passes:
-            way.passes = [(_PartLowering if made is NativeLowering else made, about) for made, about in way.passes]
-        return passes
+
+@contextmanager
+def _without_collector() -> Iterator[None]:
+    """Keep Python from looking for garbage: of what a compiler makes, nearly all lives until it is done."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
 
 
 class Kernel(CPUDispatcher):
@@ -152,6 +140,16 @@ class Kernel(CPUDispatcher):
 
     def __init__(self, py_func: Callable[..., Any], locals: Any = None, targetoptions: dict[str, Any] | None = None):
         super().__init__(py_func, locals, targetoptions, self.compiler)
+
+    def compile(self, sig: Any) -> Any:
+        """Load or compile the code for types of arguments."""
+        with global_compiler_lock, _without_collector(), plainly():
+            return super().compile(sig)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how it is called with such types; a number that is written there is a number like others."""
+        named = {name: types.unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(types.unliteral(kind) for kind in args), named)
 
     def __reduce__(self) -> Any:
         """By its name where it has one: numba would send the source, and the process that gets it compile it anew."""
@@ -165,6 +163,10 @@ class Part(Kernel):
 
     compiler = _PartCompiler
     _callable: Any = None  # the kernel for calls from Python
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how it is called with such types; its loops may be those of a number that is written there."""
+        return CPUDispatcher.get_call_template(self, args, kws)
 
     def add_overload(self, cres: Any) -> None:
         """Take compiled code in for callers among the kernels; for Python there is nothing to call."""

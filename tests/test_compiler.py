@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import gc
+import math
 import pickle
+import re
 
+import numba
 import numpy as np
 import pytest
+from numba.core import errors
 
 from kernels._compiler import PART, Kernel, Part, rebuilt_part
 from kernels._jit import inline, kernel
@@ -64,3 +69,98 @@ def test_a_kernel_goes_to_another_process_by_its_name(function: Kernel) -> None:
 def test_a_kernel_without_a_name_of_its_own_goes_as_its_source() -> None:
     nameless = kernel(lambda x: 2.0 * x)
     assert pickle.loads(pickle.dumps(nameless))(1.5) == 3.0
+
+
+def _everything(x, z, n, wanted):  # type: ignore[no-untyped-def]
+    """What kernels are written with: loops, branches, tuples, arrays of several kinds, optional ones, numpy's loops."""
+    count, total = 0, 0.0
+    shape = (x.shape[0], 2 * n + 1)
+    for i in range(shape[0]):
+        y = abs(x[i] - 0.5) ** 2 if x[i] > 0.0 else math.sin(x[i])
+        if wanted is not None:
+            wanted[i, 0] = y
+        while count < n and y < 1.0:
+            y, count = 2.0 * y + min(x[i], 1.0), count + 1
+        _, exponent = math.frexp(y)  # an integer of 32 bits
+        exponent = exponent if y > 1.0 else 0
+        total += math.ldexp(y, -exponent)
+    room = np.zeros(n)
+    room[:] = 2.0 * room + total
+    row = x[1:] + room[: x.size - 1]
+    return row, z * (1.0 + 2.0j) / z.real, math.copysign(total, -1.0), count, shape[1]
+
+
+OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None, "fastmath": False}
+ARGUMENTS = [(np.linspace(-1.0, 1.0, 9), 1.0 + 1.0j, 12, wanted) for wanted in (None, np.empty((9, 1)))]
+
+
+@pytest.mark.parametrize("arguments", ARGUMENTS, ids=["none", "array"])
+def test_the_llvm_code_is_that_of_numbas_own_way(arguments: tuple[object, ...]) -> None:
+    ours, theirs = Kernel(_everything, None, OPTIONS | {"no_cfunc_wrapper": True}), numba.jit(**OPTIONS)(_everything)
+    found, expected = ours(*arguments), theirs(*arguments)
+    assert np.array_equal(found[0], expected[0]) and found[1:] == expected[1:]
+    (own,), (other,) = ours.overloads.values(), theirs.overloads.values()
+    texts = {_body(compiled.library.get_llvm_str(), compiled.fndesc.mangled_name) for compiled in (own, other)}
+    assert len(texts) == 1 and "fmul" in texts.pop()
+
+
+def _body(text: str, name: str) -> str:
+    """The LLVM code of a function, its symbols and blocks counted in the order in which they come."""
+    (body,) = re.findall(rf"^define [^\n]*@{re.escape(name)}\(.*?^}}", text, re.M | re.S)
+    known: dict[str, str] = {}
+    return re.sub(r"[@%!#][\w.$<>\"-]+", lambda found: known.setdefault(found[0], f"{found[0][0]}{len(known)}"), body)
+
+
+@inline
+def _from(begin: int, x: float) -> float:
+    return x + begin
+
+
+@kernel
+def _after(begin: int, x: float) -> float:
+    return x - begin
+
+
+@kernel
+def _counted(x: np.ndarray) -> float:  # type: ignore[type-arg]
+    count, total = 0, 0.0
+    while count < x.size:
+        total += _from(count, x[count]) * _after(0, x[count]) * _after(count, 1.0)
+        count += 1
+    return total
+
+
+def test_a_counter_that_begins_at_a_constant_compiles_what_it_calls_once() -> None:
+    """Nor does a kernel have code of its own for a number that is written at the place of its call."""
+    assert _counted(np.array([2.0, 3.0])) == 4.0
+    assert [str(args) for args in _from.overloads] == ["(int64, float64)"]
+    assert [str(args) for args in _after.overloads] == ["(int64, float64)"]
+
+
+def test_loops_of_a_part_are_those_of_the_number_at_the_place_of_its_call() -> None:
+    part = inline(lambda n, x: x * n)
+    whole = kernel(lambda x: part(3, x))
+    assert whole(2.0) == 6.0
+    assert [str(args) for args in part.overloads] == ["(Literal[int](3), float64)"]
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_garbage_is_collected_and_complaints_are_coloured_again_after_compiling(works: bool) -> None:
+    markup = vars(type(errors.termcolor())).get("_markup")
+    function = kernel(lambda x: x + (1.0 if works else "one"))
+    assert gc.isenabled()
+    if works:
+        assert function(1.0) == 2.0
+    else:
+        with pytest.raises(errors.TypingError, match=r"\+"):
+            function(1.0)
+    assert gc.isenabled() and vars(type(errors.termcolor())).get("_markup") is markup
+
+
+def test_a_program_that_does_without_the_collector_is_left_without_it() -> None:
+    gc.disable()
+    try:
+        assert kernel(lambda x: 3.0 * x)(1.0) == 3.0
+        assert not gc.isenabled()
+    finally:
+        gc.enable()

@@ -28,7 +28,7 @@ def installed(tmp_path: Path) -> Path:
     for name in ("__init__.py", "_kernels.py", "errors.py"):
         shutil.copy(ROOT / "sweep" / name, tmp_path / "site" / "sweep" / name)
     (tmp_path / "site" / "kernels").mkdir()
-    for name in ("__init__.py", "_jit.py", "_cache.py", "_compiler.py"):
+    for name in ("__init__.py", "_jit.py", "_cache.py", "_compiler.py", "_frontend.py"):
         shutil.copy(ROOT / "kernels" / name, tmp_path / "site" / "kernels" / name)
     return tmp_path / "site"
 

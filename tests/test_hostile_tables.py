@@ -19,6 +19,12 @@ def test_many_hostile_tables_have_an_answer_a_status_or_an_error_of_ours() -> No
     assert not wrong
 
 
+@pytest.mark.parametrize("seed", [609, 1845])
+def test_dynamic_elasticity_of_a_table_without_a_turning_design_is_missing_with_a_status(seed: int) -> None:
+    """Both once ended in a KeyError: nothing was left to solve, and its result was looked up."""
+    assert not faults(seed)
+
+
 def test_the_tables_are_hostile_and_of_every_family() -> None:
     cases = [case(seed) for seed in range(FEW)]
     assert {str(one[0]) for one in cases} == {str(name) for name in FAMILIES}

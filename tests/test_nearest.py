@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import nnls
 
 from kernels import status as st
-from kernels.nearest import nearest
+from kernels.nearest import nearest, nearest_of_many
 
 
 def solved(rows: np.ndarray, needs: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -68,3 +68,49 @@ def test_plain_python_gives_the_same_bits() -> None:
     np.testing.assert_array_equal(ours[0], y)
     np.testing.assert_array_equal(ours[1], weights)
     assert status == ours[2]
+
+
+def curves(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows of three smooth curves around a turn of 32 poses and four that belong to none; values and slopes."""
+    phi = np.arange(32) * (2.0 * np.pi / 32)
+    waves = np.array([np.ones(32), np.cos(phi), np.sin(phi), np.cos(2.0 * phi), np.sin(2.0 * phi)])
+    values = np.concatenate([rng.standard_normal((3, 5)) @ waves + 1.0, np.full((1, 32), np.nan)])[:3].ravel()
+    slopes = np.concatenate([rng.standard_normal((n, 5)) @ waves for _ in range(3)], axis=1)
+    turns = np.arange(96).reshape(3, 32)
+    values = np.concatenate([values, rng.standard_normal(4)])
+    return values, np.concatenate([slopes, rng.standard_normal((n, 4))], axis=1), turns
+
+
+def stepped(seed: int, function: object = nearest_of_many, near: float = 0.2) -> tuple[np.ndarray, ...]:
+    """The step among few of the rows, that among all of them, the rows after it and their weights."""
+    rng = np.random.default_rng(seed)
+    n = 5
+    values, slopes, turns = curves(rng, n)
+    slopes[-1] = 1.0  # one unknown mends them all, so that some step keeps every row
+    back = np.linalg.qr(rng.standard_normal((n, n)))[0] * (1.0 + rng.random(n))
+    centre, low, high = rng.standard_normal(n), np.full(n, -3.0), np.full(n - 1, 3.0)
+    step, there, weights = np.empty(n), np.empty(len(values)), np.empty(len(values))
+    status = function(values, slopes, back, centre, low, high, turns, near, 1e-9, 20, 1e-13, step, there, weights)  # type: ignore[operator]
+    box = np.concatenate([back, -back[: n - 1]])
+    rows = np.concatenate([back.T @ slopes, box.T], axis=1)
+    whole, _, told = solved(rows, np.concatenate([-values, low, -high]), centre)
+    assert status == told == st.OK
+    return step, back @ whole, there, weights, values + step @ slopes
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_step_among_the_rows_that_matter_is_that_among_all_rows(seed: int) -> None:
+    step, whole, there, weights, after = stepped(seed)
+    # What is missed joins until nothing is missed by more than 1e-9.
+    np.testing.assert_allclose(step, whole, atol=1e-7)
+    np.testing.assert_allclose(there, after, atol=1e-12)
+    assert (there >= -1e-8).all() and (weights >= 0.0).all() and np.abs(there[weights > 0.0]).max(initial=0.0) < 1e-8
+
+
+def test_rows_that_join_later_go_on_from_the_point_reached() -> None:
+    """With all rows near or none at first the step is the same; plain Python gives the same bits."""
+    for seed in range(5):
+        first, later = stepped(seed, near=1e3), stepped(seed, near=-1e3)
+        np.testing.assert_allclose(first[0], later[0], atol=1e-7)
+    for ours, plain in zip(stepped(3), stepped(3, nearest_of_many.py_func), strict=True):
+        np.testing.assert_array_equal(ours, plain)

@@ -107,6 +107,52 @@ def test_descents_beside_change_nothing_and_descents_can_be_given_up(rows: PoseR
     assert together.worth[0] == alone.worth[0]
 
 
+def test_linear_unknowns_and_worth_are_looked_for_where_something_turns_only(rows: PoseRows) -> None:
+    places = np.random.default_rng(3).random((400, len(rows.own.columns)))
+    places[:20] = np.clip(place_of_record(rows) + 0.002 * np.random.default_rng(4).standard_normal((20, 11)), 0.0, 1.0)
+    x, worth = rows.begun(places)
+    known = np.isfinite(rows.unknowns(places)).all(axis=1)
+    assert 5 < known.sum() < 200 and np.isinf(worth[~known]).all()
+    np.testing.assert_array_equal(worth[known], rows.worth(places[known], x[known]))
+
+
+def end(worth: float, swing: float, place: np.ndarray, kind: int = 0) -> generations._End:
+    return generations._End(worth, kind, place, place, swing)
+
+
+def test_every_class_of_swings_has_parents_however_good_the_others_are() -> None:
+    """Thirty good ends at large swings, two a little worse at small ones: these are parents too."""
+    rng = np.random.default_rng(5)
+    many = [end(10.6 + 0.01 * k, 0.95 + 0.01 * k, rng.random(4)) for k in range(30)]
+    few = [end(11.5, 0.55, rng.random(4)), end(11.6, 0.56, rng.random(4))]
+    guide = np.ones(4, np.bool_)
+    found = generations._parents(many + few, 12, guide)
+    swings = [x.swing for x in found]
+    assert sum(x < 0.6 for x in swings) == 2 and len(found) <= 5 * 3
+    # Negative control: the twelve best are all of large swings.
+    assert all(x.swing > 0.9 for x in sorted(many + few, key=lambda e: e.worth)[:12])
+    # No two are alike, useless ones and a third of the same class beside better ones are left out.
+    again = generations._parents([*many, end(10.6, 0.95, many[0].place), end(99.0, 0.55, rng.random(4))], 12, guide)
+    assert len({x.worth for x in again}) == len(again) and all(x.worth < 99.0 for x in again)
+
+
+def test_children_are_the_best_of_many_tries(rows: PoseRows, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(6)
+    record_place = rows.with_middle(place_of_record(rows))[0]
+    parents = [end(10.3, 0.83, record_place), end(10.9, 0.8, np.clip(record_place + 0.02 * rng.random(11), 0.0, 1.0))]
+    worth = {}
+    monkeypatch.setattr(generations, "DRIVERS", 1)
+    for tries in (1, 64):
+        monkeypatch.setattr(generations, "TRIES", tries)
+        monkeypatch.setattr(generations, "STRANGERS", 4 * tries)
+        places = generations._children(rows, parents, parents, np.random.default_rng(7), 24)
+        assert places.shape == (24, 11) and (places >= 0.0).all() and (places <= 1.0).all()
+        worth[tries] = rows.begun(rows.without_middle(places))[1]
+    # Of one try most do not turn; of 64 nearly all children do, and their middle is far better.
+    assert np.isfinite(worth[64]).mean() > 0.9 and np.median(worth[64]) < 0.5 * np.median(worth[1])
+    assert not len(generations._children(rows, [], parents, rng, 24))
+
+
 SMALL = Size(sampled=1 << 13, first=12, later=6, generations=1, heat=4, steps=8)
 
 

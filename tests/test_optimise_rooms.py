@@ -53,7 +53,7 @@ def test_changes_are_the_derivatives_times_the_standard_deviations() -> None:
 
 
 def test_room_is_the_spread_along_the_turn_and_follows_the_design_to_first_order() -> None:
-    room = rooms(problem(), DESIGN, SIGMA, LEVEL, {"dev"})["dev"]
+    room = rooms(problem(), DESIGN, SIGMA, {"dev": LEVEL})["dev"]
     phi = np.linspace(0.1, 6.2, 40)
     # Sixteen harmonics of a curve as smooth as this leave 1e-6 of it.
     np.testing.assert_allclose(room.at(DESIGN[None, :], phi)[0], LEVEL * spread(DESIGN, phi), rtol=1e-4)
@@ -67,7 +67,7 @@ def test_room_is_the_spread_along_the_turn_and_follows_the_design_to_first_order
 
 
 def test_extrema_with_room_are_those_of_the_curve_and_its_room_together() -> None:
-    own = problem(rooms=rooms(problem(), DESIGN, SIGMA, LEVEL, {"dev"}))
+    own = problem(rooms=rooms(problem(), DESIGN, SIGMA, {"dev": LEVEL}))
     points, turns = Curves(own, (Series("dev"),)).scan(DESIGN, 64)
     assert turns
     phi = np.linspace(0.0, 2.0 * np.pi, 20001)
@@ -80,7 +80,7 @@ def test_extrema_with_room_are_those_of_the_curve_and_its_room_together() -> Non
 
 
 def test_gradients_with_room_equal_differences() -> None:
-    own = problem(rooms=rooms(problem(), DESIGN, SIGMA, LEVEL, {"dev"}))
+    own = problem(rooms=rooms(problem(), DESIGN, SIGMA, {"dev": LEVEL}))
     curves = Curves(own, (Series("dev"),))
     points, _ = curves.scan(DESIGN, 64)
     fractions = own.scaled(DESIGN[None, :])[0]

@@ -65,6 +65,17 @@ def test_of_a_global_search_the_best_end_counts_alone() -> None:
     assert (twice.basins, twice.best) == (2, 1) and twice.unseen == 1.0
 
 
+def test_starts_of_different_samples_are_distinct_wherever_they_stand() -> None:
+    alike = np.tile(starts(1), (12, 1)) + 1e-4 * np.arange(12)[:, None] * np.array([1.0, 1.0, 0.0, 0.0])
+    ends = [result(k, 1.0) for k in range(12)]
+    together = survey(bowl(), alike, ends, ASKED, "starts")
+    assert together.best == 1 and not together.enough
+    apart = survey(bowl(), alike, ends, ASKED, "starts", samples=[k // 4 for k in range(12)])
+    assert apart.best == 3 and apart.enough
+    found, told = explore(bowl(), alike, ASKED, samples=[k // 4 for k in range(12)])
+    assert (len(found), told.best, told.ended) == (12, 3, "enough")
+
+
 def test_populations_are_enough_where_few_unseen_basins_can_be_better() -> None:
     # Twelve of which ten ended at the best: 1/12 unseen, of three ranks the first is one in three.
     assert not settled([1.0] * 10 + [1.1, 1.2], 0.02)
@@ -139,17 +150,7 @@ def test_signs_have_basins_of_their_own() -> None:
     assert math.isclose(found.unseen, 6 / 30)
 
 
-def test_only_the_finalists_go_on_after_the_first_heat(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.optimise.solve.TRIAL", 12)
-    many, asked = starts(8), OptimiseSettings(starts=8, finalists=3)
-    alone, found = explore(bowl(), many, asked)
-    assert sorted(r.ended for r in alone).count("left") == 5 and found.starts == 8 and found.basins == 1
-    assert alone[0].ended == "converged" and alone[0].objective == pytest.approx(1.0, rel=1e-9)
-    together, _ = explore(bowl(), many, asked, jobs=2)
-    assert [(r.objective, r.looks) for r in together] == [(r.objective, r.looks) for r in alone]
-
-
 def test_every_key_of_the_search_arrives(tmp_path: Path) -> None:
-    keys = 'starts = 7\nseed = 3\nunseen = "5 %"\nlooks = 900\nfinalists = 4\ntime_budget = "2 s"\nglobal = "none"\n'
+    keys = 'starts = 7\nseed = 3\nunseen = "5 %"\nlooks = 900\ntime_budget = "2 s"\nglobal = "none"\n'
     (tmp_path / "study.toml").write_text(STUDY.format(swing=40).replace("starts = 3\nseed = 1\n", keys))
-    assert load_study(tmp_path).optimise == OptimiseSettings(7, 3, 2.0, None, 0.05, 900, "none", 4)
+    assert load_study(tmp_path).optimise == OptimiseSettings(7, 3, 2.0, None, 0.05, 900, "none")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from sweep.errors import StudyError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
+from sweep.optimise import Problem
+from sweep.optimise.robust import yields
 from sweep.optimise.sensitivity import sensitivities
 from sweep.optimise.tolerance import deviating, tolerance_rows
 from sweep.study import Limit, Tolerance, load_study
@@ -92,6 +95,22 @@ def test_share_within_a_limit_at_the_nominal_value_is_half() -> None:
     assert rows["output"] == ["max_pressure_angle", "swing", "all limits"]
     assert rows["within"][0] == pytest.approx(0.5, abs=0.03)
     assert rows["within"][1] == 1.0 and rows["within"][2] == rows["within"][0]
+
+
+def test_equations_are_no_limits_of_what_is_made() -> None:
+    names, tolerance = ("max_pressure_angle", "swing"), Tolerance(0.003)
+    at = {k: float(x[0]) for k, x in design_outputs(RSSR, DESIGN[None, :], names, Accuracy(target=1e-9)).items()}
+    held = Limit("swing", abs(at["swing"]), abs(at["swing"]))
+    limits = (Limit("max_pressure_angle", None, at["max_pressure_angle"]), held)
+    rows = tolerance_rows(RSSR, DESIGN, names, limits, tolerance, 3, Accuracy(target=1e-9))
+    # Nothing that is made has a prescribed swing to the last digit: it would be 0 % of everything.
+    assert math.isnan(rows["within"][1])
+    assert rows["within"][2] == rows["within"][0] == pytest.approx(0.5, abs=0.03)
+    lower, upper = DESIGN[:7] - 0.5, DESIGN[:7] + 0.5
+    problem = Problem(RSSR, RSSR.parameter_names[:7], lower, upper, {}, "max_abs_d2psi", limits)
+    assert yields(problem, DESIGN[None, :], tolerance, 3)[0] == pytest.approx(0.5, abs=0.03)
+    band = replace(held, minimum=0.5 * abs(at["swing"]), maximum=abs(at["swing"]))
+    assert yields(replace(problem, limits=(band,)), DESIGN[None, :], tolerance, 3)[0] == pytest.approx(0.5, abs=0.05)
 
 
 def test_study_writes_both_tables(tmp_path: Path) -> None:

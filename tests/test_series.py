@@ -114,8 +114,15 @@ def test_a_grid_that_meets_what_does_not_reach_is_left_to_poses():
 
 
 REQUESTS = {
-    "rssr+guide": (Request("d2s", 0), Request("dev", 0), Request("s", 1), Request("x_m", -1), Request("y_m2", 1)),
-    "rssr+rssr": (Request("dpsi", 1), Request("d2psi", 0)),
+    "rssr+guide": (
+        Request("d2s", 0),
+        Request("dev", 0),
+        Request("s", 1),
+        Request("x_m", -1),
+        Request("y_m2", 1),
+        Request("d3s", 0),
+    ),
+    "rssr+rssr": (Request("dpsi", 1), Request("d2psi", 0), Request("d3psi", -1)),
     "rssr+rssr+guide": (Request("ds", -1), Request("d2dev", 0), Request("dev", -1)),
 }
 
@@ -135,6 +142,64 @@ def test_extrema_lie_within_their_errors_of_precise_poses_climbed_from_the_searc
     allowed = found[request_].err + 8.0 * EPS * amplified(of, designs) * np.abs(exact)
     assert (off <= allowed).all()
     assert np.quantile(off / np.abs(exact), 0.9) < 1e-13
+
+
+PLACES = {"rssr+guide": (Request("d2s", 0, place=True), Request("s", -1, place=True), Request("dev", 1, place=True))}
+PLACES["rssr+rssr"] = (Request("dpsi", 1, place=True),)
+
+
+@pytest.mark.parametrize(("name", "request_"), [(n, r) for n, rs in PLACES.items() for r in rs], ids=str)
+def test_places_of_extrema_are_those_of_the_search_on_poses(name, request_):
+    of, designs = CASES[name]
+    found, _ = extrema.true_extrema(of, designs, [request_], 1e-8)
+    slow, _ = extrema._searched(of, designs, [request_], 1e-8, False, False, None)
+    left = fused.curve_of(of, request_, False).extremum(designs, 1e-8)[2]
+    # What turns back within the swing of the stage before is equally high twice: rounding says where, on poses.
+    assert left.mean() < (0.3 if request_.pose in ("s", "dev") else 0.02)
+    both = np.stack([found[request_].phi, slow[request_].phi], axis=1)
+    off = np.abs(np.angle(np.exp(1j * (both[:, 0] - both[:, 1]))))
+    # Each knows its place to its own error, next to a dead point too, where both see the rounding of the same poses;
+    # or the curve is as high at one place as at the other.
+    same = off <= found[request_].err_phi + slow[request_].err_phi
+    there = of.precise_poses(designs, Angles.of(both), frozenset((request_.pose,)))[request_.pose]
+    height = np.abs(there) if request_.mode == 0 else there
+    assert (same | (np.abs(height[:, 0] - height[:, 1]) <= 64.0 * EPS * np.abs(height[:, 0]))).all()
+    assert same.mean() > 0.8
+    assert np.median(found[request_].err_phi) < 1e-12
+
+
+def on_the_tie(curve, design):
+    """A design between this one and its like with the next stage turned, of which two peaks are equally high."""
+
+    def at(turned):
+        row = design.copy()
+        row[18] += turned
+        found, status, undecided = curve.extremum(row[None], 1e-8)
+        return row, found.phi[0] if status[0] == st.OK and not undecided[0] else np.nan
+
+    def apart(a, b):
+        return abs(np.angle(np.exp(1j * (a - b)))) > 0.5
+
+    steps = [0.02 * k for k in range(40)]
+    places = [at(t)[1] for t in steps]
+    jump = next((k for k in range(39) if apart(places[k], places[k + 1])), None)
+    if jump is None:
+        return None
+    low, high, before = steps[jump], steps[jump + 1], places[jump]
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if apart(before, at(middle)[1]) else (middle, high)
+    return at(low)[0]
+
+
+def test_which_of_two_equal_peaks_is_higher_is_left_to_the_search_on_poses_where_the_place_is_wanted():
+    of, designs = CASES["rssr+guide"]
+    plain, placed = (fused.curve_of(of, Request("d2s", 0, place=place), False) for place in (False, True))
+    tied = next(row for design in designs if (row := on_the_tie(plain, design)) is not None)[None]
+    assert not plain.extremum(tied, 1e-8)[2][0]
+    assert placed.extremum(tied, 1e-8)[2][0]
+    found, status = extrema.true_extrema(of, tied, [placed.request], 1e-8)
+    assert status[0] == st.OK and np.isfinite(found[placed.request].phi[0])
 
 
 @pytest.mark.parametrize("name", ["rssr+guide", "rssr+rssr+guide"])
@@ -236,7 +301,7 @@ def test_jitted_kernels_give_the_bits_of_their_python_bodies(monkeypatch):
     made_of = np.tile([1.0, 0.0, 0.0], (6, 1))
     for function in (search, search.py_func):
         status, found = np.empty(6, np.uint8), np.empty((6, 6))
-        function(few, opening, distance, *tables, made_of, 0, 1e-8, status, found)
+        function(few, opening, distance, *tables, made_of, 0, 1e-8, -1.0, status, found)
         searched.append((status, found))
     for a, b in (*zip(*results, strict=True), *zip(*searched, strict=True)):
         np.testing.assert_array_equal(a, b)
@@ -255,7 +320,9 @@ def test_a_wrong_chain_rule_or_a_lost_stage_would_be_noticed():
 
 def test_requests_without_a_fused_curve_go_to_poses():
     of, _ = CASES["rssr+guide"]
-    assert fused.curve_of(of, Request("d3s", 0), False) is None  # its slope is not among what the kernel has
+    for pose in ("d3s", "d2dev"):
+        assert fused.curve_of(of, Request(pose, 0), False) is not None
+        assert fused.curve_of(of, Request(pose, 0, place=True), False) is None  # no slope to find its place by
     assert fused.curve_of(of, Request("psi1", 1), False) is None
     assert fused.curve_of(of, Request("discriminant1", -1), True) is None  # the first stage has its own margin
     assert fused.curve_of(of.precise(), Request("d2s", 0), False) is None

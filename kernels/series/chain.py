@@ -38,7 +38,7 @@ class Driving:
     """Some stages in a row, the last of which drives another.
 
     ``turn(c, u, v)`` gives the output angle as `Turned` by the crank angle of the chain and the discriminants of all
-    stages, ``blur(c, u, v)`` the same `Turned` and the rounding errors of its angle and first two derivatives.
+    stages, ``blur(c, u, v)`` the same `Turned` and the rounding errors of its angle and first three derivatives.
     """
 
     record: Record
@@ -57,7 +57,7 @@ class Chained:
     travel : (c, u, v) -> `Travel` by the crank angle of the chain, discriminants of all stages
     dip : (c, u, v) -> squared cosine of the last stage's pressure angle and its first two derivatives
     before : (c, u, v) -> discriminants of the stages before the last
-    blur : (c, u, v) -> rounding errors of x, x', x'', y, y', y'' and of that squared cosine
+    blur : (c, u, v) -> rounding errors of x, x', x'', x''', y, y', y'', y''' and of that squared cosine
     """
 
     stages: int
@@ -87,8 +87,8 @@ def _first(form: Form) -> Driving:
 
     def blur(c: Any, u: Any, v: Any) -> Any:
         m = turn_alone(c, u, v)
-        b0, b1, b2 = blur_alone(c, u, v, m.d1, m.d2)
-        return m, b0, b1, b2
+        b0, b1, b2, b3 = blur_alone(c, u, v, m.d1, m.d2, m.d3)
+        return m, b0, b1, b2, b3
 
     def doubts(c: Any) -> Any:
         return (c.doubt,)
@@ -112,13 +112,13 @@ def _longer(driving: Driving, form: Form) -> Driving:
         return Turned(n.cos, n.sin, d1, d2, d3, d4, n.delta), (*deltas, n.delta)
 
     def blur(c: Any, u: Any, v: Any) -> Any:
-        m, b0, b1, b2 = blur_before(c[0], u, v)
+        m, b0, b1, b2, b3 = blur_before(c[0], u, v)
         t = enter(c[1], m)
         n = turn_here(c[2], t.u, t.v)
-        e0, e1, e2 = blur_here(c[2], t.u, t.v, n.d1, n.d2)
-        b0, b1, b2 = blurred_through(t, b0, b1, b2, n.d1, n.d2, n.d3, e0, e1, e2)
+        e = blur_here(c[2], t.u, t.v, n.d1, n.d2, n.d3)
+        b0, b1, b2, b3 = blurred_through(t, b0, b1, b2, b3, n.d1, n.d2, n.d3, n.d4, e)
         d1, d2, d3, d4 = through(t, n.d1, n.d2, n.d3, n.d4)
-        return Turned(n.cos, n.sin, d1, d2, d3, d4, n.delta), b0, b1, b2
+        return Turned(n.cos, n.sin, d1, d2, d3, d4, n.delta), b0, b1, b2, b3
 
     return Driving(record, _made("turn", record.name, turn), _made("blur", record.name, blur))
 
@@ -147,14 +147,14 @@ def _ended(driving: Driving, form: Form, stages: int) -> Chained:
         return deltas
 
     def blur(c: Any, u: Any, v: Any) -> Any:
-        m, b0, b1, b2 = blur_before(c[0], u, v)
+        m, b0, b1, b2, b3 = blur_before(c[0], u, v)
         t = enter(c[1], m)
         n = travel_here(c[2], t.u, t.v)
-        e0, e1, e2, f0, f1, f2, g = blur_here(c[2], t.u, t.v, n.x1, n.x2)
-        e0, e1, e2 = blurred_through(t, b0, b1, b2, n.x1, n.x2, n.x3, e0, e1, e2)
-        f0, f1, f2 = blurred_through(t, b0, b1, b2, n.y1, n.y2, n.y3, f0, f1, f2)
+        e0, e1, e2, e3, f0, f1, f2, f3, g = blur_here(c[2], t.u, t.v, n.x1, n.x2, n.x3)
+        e0, e1, e2, e3 = blurred_through(t, b0, b1, b2, b3, n.x1, n.x2, n.x3, n.x4, (e0, e1, e2, e3))
+        f0, f1, f2, f3 = blurred_through(t, b0, b1, b2, b3, n.y1, n.y2, n.y3, n.y4, (f0, f1, f2, f3))
         _, slope, _ = dip_here(c[2], t.u, t.v)
-        return e0, e1, e2, f0, f1, f2, g + abs(slope) * b0
+        return e0, e1, e2, e3, f0, f1, f2, f3, g + abs(slope) * b0
 
     made = [_made(f.__name__, f"{record.name}_ended", f) for f in (travel, dip, before, blur)]
     return Chained(stages, record, *made)

@@ -63,8 +63,10 @@ class Form:
     turn : (c, u, v) -> `Turned`; None for a family that drives nothing
     travel : (c, u, v) -> `Travel`
     dip : (c, u, v) -> squared cosine of the pressure angle where the links reach, and its first two derivatives
-    turn_blur : (c, u, v, d1, d2) -> estimates of the rounding errors of the output angle and its first two derivatives
-    travel_blur : (c, u, v, x1, x2) -> those of x, x', x'', y, y', y'', and of the squared cosine of ``dip``
+    turn_blur : (c, u, v, d1, d2, d3) -> estimates of the rounding errors of the output angle and its first three
+        derivatives
+    travel_blur : (c, u, v, x1, x2, x3) -> those of x, x', x'', x''', y, y', y'', y''', and of the squared cosine of
+        ``dip``
     """
 
     name: str

@@ -76,14 +76,19 @@ def through(t: Input, y1: Any, y2: Any, y3: Any, y4: Any) -> tuple[Any, Any, Any
 
 @inline
 def blurred_through(
-    t: Input, b0: Any, b1: Any, b2: Any, y1: Any, y2: Any, y3: Any, e0: Any, e1: Any, e2: Any
-) -> tuple[Any, Any, Any]:
-    """Errors of a function of the input angle and its first two derivatives, to first order.
+    t: Input, b0: Any, b1: Any, b2: Any, b3: Any, y1: Any, y2: Any, y3: Any, y4: Any, e: tuple[Any, ...]
+) -> tuple[Any, Any, Any, Any]:
+    """Errors of a function of the input angle and its first three derivatives, to first order.
 
-    ``b0``, ``b1``, ``b2`` are the errors of the input angle and its derivatives, ``e0``, ``e1``, ``e2`` those of the
-    function and its derivatives y1, y2, y3 by the input angle at an exact one.
+    ``b0`` to ``b3`` are the errors of the input angle and its derivatives, ``e`` those of the function and its
+    derivatives y1, y2, y3 by the input angle at an exact one.
     """
-    square = t.t1 * t.t1
-    first = abs(t.t1) * e1 + abs(y1) * b1 + abs(t.t1 * y2) * b0
-    second = abs(t.t2) * e1 + square * e2 + abs(y1) * b2 + 2.0 * abs(t.t1 * y2) * b1
-    return e0 + abs(y1) * b0, first, second + b0 * (abs(t.t2 * y2) + square * abs(y3))
+    t1, t2, t3, square = abs(t.t1), abs(t.t2), abs(t.t3), t.t1 * t.t1
+    y1, y2, y3, y4 = abs(y1), abs(y2), abs(y3), abs(y4)
+    e0, e1, e2, e3 = e
+    first = t1 * e1 + y1 * b1 + t1 * y2 * b0
+    second = t2 * e1 + square * e2 + y1 * b2 + 2.0 * (t1 * y2) * b1
+    third = t3 * e1 + 3.0 * t1 * t2 * e2 + square * t1 * e3
+    third += y1 * b3 + 3.0 * (t1 * y2 * b2 + (t2 * y2 + square * y3) * b1)
+    third += b0 * (t3 * y2 + 3.0 * t1 * t2 * y3 + square * t1 * y4)
+    return e0 + y1 * b0, first, second + b0 * (t2 * y2 + square * y3), third

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import generated, inline
+from kernels.bits import lowest_bit
 from kernels.series.chain import Chained
 from kernels.series.curves import MARGIN, Curve, curve
 from kernels.series.form import STRIDE, Helper
-from kernels.series.look import FEWEST, GUARD_ROW, MOST, OPEN, PER_SINGULARITY, TURN, looker
+from kernels.series.look import FEWEST, GUARD_ROW, MOST, OPEN, TURN, looker
 from kernels.series.peaks import (
     BLOCK,
     CAPACITY,
@@ -45,6 +46,7 @@ from kernels.series.peaks import (
 
 Array: TypeAlias = NDArray[np.float64]
 Status: TypeAlias = NDArray[np.uint8]
+Counts: TypeAlias = NDArray[np.int64]
 
 SHARE = 0.6  # a peak below this share of the best sample is not refined
 PLAIN = 2.0**-14  # of the target: larger rounding errors are left to precise poses
@@ -54,73 +56,68 @@ MORE = 4  # times as many samples for a design of which a maximum is not trusted
 ROUNDED, UNTRUSTED = 254, 253  # instead of a status; the first see `find_extrema`
 VALUE, PHI, VALUE_ERROR, PHI_ERROR, SCALE_ROW, SPACING = range(6)
 CHUNK = 32  # samples whose peaks are looked for together
-_PRIME = 37  # the powers of two up to 2^31 leave different remainders: so a bit gives its place
-_PLACE = np.array([next((k for k in range(CHUNK) if 2**k % _PRIME == r), -1) for r in range(_PRIME)])
 
 
 @lru_cache(maxsize=64)
 def find_extrema(chain: Chained, order: int) -> Helper:
-    """Make the kernel ``find(designs, opening, distance, cos, sin, made_of, mode, target, status, found)`` of a chain.
+    """Make the kernel ``find(designs, opening, distance, cos, sin, made_of, mode, target, tie, status, found)``.
 
-    It finds one extremum over the turn of a curve of `kernels.series.curves`, of that order or the `MARGIN`.
+    It finds one extremum over the turn of a curve of a chain, one of `kernels.series.curves`, of that order or the
+    `MARGIN`.
 
     Its arguments: designs (n, P); opening (n,), OK where the first stage turns, NOT_ROTATABLE where it does not;
     distance (n,) [rad] of its nearest singularity from the real axis; `sampling_tables`; made_of (n, 3), the numbers a,
     b, c of the curve; mode: 0 for the largest magnitude, +1 for the largest value, -1 for the least; target: relative
-    error wanted, of the magnitude or of the curve's range.  Then out: status (n,), and found (6, n) with the rows
-    VALUE; PHI, its crank angle in [0, 2 pi); estimates of the errors of both; SCALE, what the target is relative to;
-    SPACING of the samples [rad].
+    error wanted, of the magnitude or of the curve's range; tie: share of that size by which no other peak may come near
+    the highest one, negative where it does not matter which of two is higher.  Then out: status (n,), and found (6, n)
+    with the rows VALUE; PHI, its crank angle in [0, 2 pi); estimates of the errors of both; SCALE, what the target is
+    relative to; SPACING of the samples [rad].
 
     The status is OK; ROUNDED, where rounding may have moved a single highest peak by more than its share of the target;
     NOT_ROTATABLE, where a stage does not reach; OPEN, where nothing is decided.  With the last two the others are nan.
     """
     of = curve(chain, order)
     get, rows = chain.record.get, CONSTANTS + chain.record.numbers * STRIDE
-    guards_size, allowed = max(of.guarded, 1) * GUARD_ROW, 1.0 if order == MARGIN else PLAIN
+    per_rho, guards_size, allowed = of.samples, max(of.guarded, 1) * GUARD_ROW, 1.0 if order == MARGIN else PLAIN
     enlist, refine, finish = _enlister(chain, of), refiner(of, get), finisher(of, get)
 
     def find(
         designs: Array, opening: Status, distance: Array, cos: Array, sin: Array, made_of: Array, mode: int,
-        target: float, status: Status, found: Array,
+        target: float, tie: float, status: Status, found: Array,
     ) -> None:  # fmt: skip
         m, values, guards = np.zeros(rows), np.empty(MOST + 4), np.empty(guards_size)
-        first = np.empty(BLOCK + 1, np.int64)
+        first, near = np.empty(BLOCK + 1, np.int64), np.empty(BLOCK)
         rounds = 2 if target > 1e-4 else 3
         for start in range(0, designs.shape[0], BLOCK):
-            first[0] = 0  # with a literal the helpers would be compiled once more
-            number, count = min(BLOCK, designs.shape[0] - start), first[0]
-            for k in range(number):
-                i = start + k
-                first[k] = count
+            end = min(start + BLOCK, designs.shape[0])
+            for i in range(start, end):
                 status[i] = st.NOT_ROTATABLE if opening[i] == st.NOT_ROTATABLE else OPEN
-                rho = distance[i]
-                if opening[i] == st.OK and rho * MOST >= PER_SINGULARITY:
-                    count, status[i] = enlist(designs, i, rho, cos, sin, made_of, mode, m, count, values, guards)
-            first[number] = count
-            padded = (count + 7) & ~7  # whole vectors; what stands in the surplus is never read
+                near[i - start] = distance[i] if opening[i] == st.OK else 0.0
+            enlist(designs, start, end, near, cos, sin, made_of, mode, m, first, status, values, guards)
+            padded = (first[end - start] + 7) & ~7  # whole vectors; what stands in the surplus is never read
             begin_at_vertex(padded, m)
             refine(0, padded, m, rounds)
             finish(0, padded, m, target)
-            for k in range(number):
-                if status[start + k] != st.OK:
+            for i in range(start, end):
+                if status[i] != st.OK:
                     continue
-                for peak in range(first[k], first[k + 1]):
+                low, high = first[i - start], first[i - start + 1]
+                for peak in range(low, high):
                     if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
                         refine(peak, peak + 1, m, SETTLING)
                         finish(peak, peak + 1, m, target)
-                status[start + k] = _decide(first[k], first[k + 1], m, mode, allowed * target, start + k, found)
+                status[i] = _decide(low, high, m, mode, allowed * target, tie, i, found)
             # Now the list is free for those, one by one, whose tops were not single ones between their samples.
-            for i in range(start, start + number):
-                rho = PER_SINGULARITY / (FEWEST * MORE)
-                while status[i] == UNTRUSTED and rho * MOST >= PER_SINGULARITY:
-                    count, status[i] = enlist(
-                        designs, i, min(rho, distance[i]), cos, sin, made_of, mode, m, first[0], values, guards
-                    )
-                    begin_at_vertex(count, m)
-                    refine(0, count, m, rounds + SETTLING)
-                    finish(0, count, m, target)
+            for i in range(start, end):
+                rho = per_rho / (FEWEST * MORE)
+                while status[i] == UNTRUSTED and rho * MOST >= per_rho:
+                    near[0] = min(rho, distance[i])
+                    enlist(designs, i, i + 1, near, cos, sin, made_of, mode, m, first, status, values, guards)
+                    begin_at_vertex(first[1], m)
+                    refine(0, first[1], m, rounds + SETTLING)
+                    finish(0, first[1], m, target)
                     if status[i] == st.OK:
-                        status[i] = _decide(first[0], count, m, mode, allowed * target, i, found)
+                        status[i] = _decide(first[0], first[1], m, mode, allowed * target, tie, i, found)
                     rho /= MORE
                 status[i] = OPEN if status[i] == UNTRUSTED else status[i]
                 if status[i] != st.OK and status[i] != ROUNDED:
@@ -130,8 +127,8 @@ def find_extrema(chain: Chained, order: int) -> Helper:
 
 
 @inline
-def _decide(begin: int, end: int, m: Array, mode: int, rounding: float, i: int, found: Array) -> int:
-    """Write the highest maximum of design i; OK, ROUNDED, UNTRUSTED, or OPEN where rounding hides which is highest."""
+def _decide(begin: int, end: int, m: Array, mode: int, rounding: float, tie: float, i: int, found: Array) -> int:
+    """Write the highest maximum of design i; OK, ROUNDED, UNTRUSTED, or OPEN where it is not sure which is highest."""
     winner = begin
     for peak in range(begin, end):
         if not m[peak + ERROR] < math.inf:
@@ -139,9 +136,10 @@ def _decide(begin: int, end: int, m: Array, mode: int, rounding: float, i: int, 
         winner = peak if m[peak + HEIGHT] > m[winner + HEIGHT] else winner
     height, blur, scale = m[winner + HEIGHT], m[winner + ROUNDING], m[winner + SCALE]
     code = st.OK if blur <= rounding * scale else ROUNDED
-    if code == ROUNDED:
+    apart = RIVALS if code == ROUNDED else tie
+    if apart >= 0.0:
         for peak in range(begin, end):
-            if peak != winner and m[peak + HEIGHT] + m[peak + ROUNDING] >= height - blur - RIVALS * scale:
+            if peak != winner and m[peak + HEIGHT] + m[peak + ROUNDING] >= height - blur - apart * scale:
                 return OPEN
     found[VALUE, i] = -height if mode < 0 else height
     place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
@@ -152,46 +150,56 @@ def _decide(begin: int, end: int, m: Array, mode: int, rounding: float, i: int, 
 
 
 def _enlister(chain: Chained, of: Curve) -> Helper:
-    """Sample a design and append its local maxima to the list: the list's new length, and a status."""
-    constants, put, doubts, look = chain.record.constants, chain.record.put, chain.record.doubts, looker(of)
-    last = chain.stages - 1
+    """Make the kernel ``enlist(designs, begin, end, near, ...)``: samples designs begin, ..., end - 1 and lists their
+    local maxima.
 
+    ``near`` has for each the distance of its nearest singularity, 0 for one that is left out; ``first`` gets for each
+    where its maxima begin in the list, and at last the list's length.
+    """
+    constants, put, doubts, look = chain.record.constants, chain.record.put, chain.record.doubts, looker(of)
+    last, per_rho = chain.stages - 1, of.samples
+
+    # One function without a return half way: with more the references to each array are counted, which takes time.
     def enlist(
-        designs: Array, i: int, distance: float, cos: Array, sin: Array, made_of: Array, mode: int, m: Array,
-        count: int, values: Array, guards: Array,
-    ) -> tuple[int, int]:  # fmt: skip
-        k: Any = constants(designs, i)
-        limits: Any = doubts(k)
-        if not limits[last] < math.inf:
-            return count, OPEN
-        a, b, c = made_of[i, 0], made_of[i, 1], made_of[i, 2]
-        n = FEWEST
-        while n * distance < PER_SINGULARITY:
-            n *= 2
-        n, most, least, code = look(k, a, b, c, n, cos, sin, mode, limits, values, guards)
-        if code != st.OK:
-            return count, code
-        scale = max(most, -least) if mode == 0 else most - least
+        designs: Array, begin: int, end: int, near: Array, cos: Array, sin: Array, made_of: Array, mode: int, m: Array,
+        first: Counts, status: Status, values: Array, guards: Array,
+    ) -> None:  # fmt: skip
         # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
         up, down = (1.0, -1.0) if mode == 0 else (1.0 * mode, 1.0 * mode)
-        floor = SHARE * scale if mode == 0 else (most if mode > 0 else -least) - (1.0 - SHARE) * scale
-        length, width = count, TURN / n
-        for chunk in range(2, n + 2, CHUNK):
-            peaks = _peaks(chunk, values, up, down, floor)
-            while peaks != 0:
-                lowest = peaks & -peaks
-                j = chunk + _PLACE[lowest % _PRIME]
-                peaks ^= lowest
-                sign = up if values[j] >= 0.0 else down
-                left, z, right = sign * values[j - 1], sign * values[j], sign * values[j + 1]
-                if length - count == MOST_PEAKS or length == CAPACITY:
-                    return count, OPEN
-                here = n - FEWEST + j - 2
-                append(m, length, cos[here], sin[here], width, (j - 2) * width, left, z, right, sign, scale)
-                m[length + A], m[length + B], m[length + C] = a, b, c
-                put(m, length + CONSTANTS, k)
-                length += 1
-        return length, st.OK if length > count else OPEN
+        count = 0
+        for i in range(begin, end):
+            first[i - begin], distance = count, near[i - begin]
+            k: Any = constants(designs, i)
+            limits: Any = doubts(k)
+            if not (distance * MOST >= per_rho and limits[last] < math.inf):
+                continue
+            a, b, c = made_of[i, 0], made_of[i, 1], made_of[i, 2]
+            n = FEWEST
+            while n * distance < per_rho:
+                n *= 2
+            n, most, least, status[i] = look(k, a, b, c, n, cos, sin, mode, limits, values, guards)
+            if status[i] != st.OK:
+                continue
+            scale = max(most, -least) if mode == 0 else most - least
+            floor = SHARE * scale if mode == 0 else (most if mode > 0 else -least) - (1.0 - SHARE) * scale
+            length, width = count, TURN / n
+            for chunk in range(2, n + 2, CHUNK):
+                peaks = _peaks(chunk, values, up, down, floor)
+                while peaks != 0:
+                    j = chunk + lowest_bit(peaks)
+                    peaks &= peaks - 1
+                    if (length - count < MOST_PEAKS) & (length < CAPACITY):
+                        here, sign = n - FEWEST + j - 2, up if values[j] >= 0.0 else down
+                        left, z, right = sign * values[j - 1], sign * values[j], sign * values[j + 1]
+                        append(m, length, cos[here], sin[here], width, (j - 2) * width, left, z, right, sign, scale)
+                        m[length + A], m[length + B], m[length + C] = a, b, c
+                        put(m, length + CONSTANTS, k)
+                    length += 1
+            if length == count or length - count > MOST_PEAKS or length > CAPACITY:
+                status[i] = OPEN
+            else:
+                count = length
+        first[end - begin] = count
 
     return generated(f"enlist_{of.name}", enlist)
 
@@ -200,10 +208,12 @@ def _enlister(chain: Chained, of: Curve) -> Helper:
 def _peaks(chunk: int, values: Array, up: float, down: float, floor: float) -> int:
     """Local maxima that count among the next samples, one bit each; without a branch, so that it is vector code."""
     found = 0
+    end = chunk + CHUNK
+    before, here, after = values[chunk - 1 : end - 1], values[chunk:end], values[chunk + 1 : end + 1]
     for j in range(CHUNK):
-        y = values[chunk + j]
+        y = here[j]
         sign = up if y >= 0.0 else down
         z = sign * y
-        peak = (z >= floor) & (z > sign * values[chunk + j - 1]) & (z >= sign * values[chunk + j + 1])
+        peak = (z >= floor) & (z > sign * before[j]) & (z >= sign * after[j])
         found |= (1 << j) if peak else 0
     return found

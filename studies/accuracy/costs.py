@@ -51,12 +51,10 @@ FINE, MANY = Accuracy(target=1e-8), 4000
 
 
 def output_costs(designs: Array, smoke: bool) -> pd.DataFrame:
-    """Return the time of every output of the crank-rocker and of every effect of the register, each alone,
-    in one run.
+    """Return the time of every output of the crank-rocker, each alone, in one run, and of every effect of the register.
 
     Columns: what is computed, of which families, ns per pose or per design, and how many times the angle psi at one
-    pose, or at the poses of a turn, that is.  Effects are measured on the first of their families, without the motion
-    they need, which has a row of its own.  In smoke two pose sets and one effect.
+    pose, or at the poses of a turn, that is.  In smoke two pose sets and one output of a turn.
     """
     import pandas as pd
 
@@ -64,15 +62,16 @@ def output_costs(designs: Array, smoke: bool) -> pd.DataFrame:
     rows = [_row("largest over a grid", names, _dense(designs, names), "pose") for names in GRIDS[few]]
     rows += [_row("poses", names, _poses(designs, names), "pose") for names in POSE_SETS[few]]
     rows += [_row("whole turn, exact", names, _turn(designs, names), "design") for names in TURNS[few]]
-    rows += [_effect(cost) for cost in effects.costs(NAMES[:1] if smoke else NAMES, n=16 if smoke else 64)]
-    frame = pd.DataFrame(rows)
-    position = float(frame.loc[frame["what"] == "psi", "nanoseconds"].iloc[0])
-    frame["times_position"] = frame["nanoseconds"] / np.where(frame["per"] == "pose", position, POSES * position)
-    return frame
+    motion = effects.motion_ns(RSSR.name, 16 if smoke else 64, REPEATS)
+    rows.append(_row("effect", (effects.MOTION,), 1e-9 * motion, "pose"))
+    return with_effects(pd.DataFrame(rows), NAMES)
 
 
 def with_effects(table: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
-    """Return the table of :func:`output_costs` with these effects as sweep/costs.toml has them, behind the others."""
+    """Return the table of :func:`output_costs` with these effects as sweep/costs.toml has them, behind the others.
+
+    `make bench` measures them on the first of their families, without the motion that they need.
+    """
     import pandas as pd
 
     whole = table["what"].str.partition(":")[0].isin(names) & (table["kind"] == "effect")
@@ -88,8 +87,6 @@ def with_effects(table: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
 
 def _effect(cost: effects.Cost) -> dict[str, object]:
     row: dict[str, object] = {"kind": "effect", "per": cost.per, "nanoseconds": cost.ns}
-    if cost.effect == effects.MOTION:
-        return row | {"what": "motion and joint records of every effect", "family": RSSR.name}
     entry = effect(cost.effect)
     design = entry.design_result.outputs if entry.design_result else ()
     count = len(entry.outputs if cost.per == "pose" else design)
@@ -99,6 +96,8 @@ def _effect(cost: effects.Cost) -> dict[str, object]:
 def _row(kind: str, names: tuple[str, ...], took: float, per: str) -> dict[str, object]:
     if kind.startswith("largest"):
         what = ", ".join(f"max_abs_{name}" for name in names) or "least discriminant"
+    elif kind == "effect":
+        what = f"{names[0]} and joint records of every effect"
     else:
         what = ", ".join(names)
     return {"kind": kind, "what": what, "family": RSSR.name, "per": per, "nanoseconds": 1e9 * took}

@@ -98,9 +98,9 @@ def _outputs(m: Measured) -> list[str]:
         "## What each further output costs",
         "",
         *prose(
-            "Every output and every effect of the register in one run, 360 poses a turn: outputs of the",
-            "crank-rocker alone with all they need; effects (`make bench`) on the first family named, all",
-            "their outputs together, the motion they share apart. Pose outputs, and how many times the angle psi:",
+            "Every output and every effect of the register, 360 poses a turn: outputs of the crank-rocker in one run,",
+            "alone with all they need; effects as `make bench` measured them, on the first family named, all their",
+            "outputs together, the motion they share apart. Pose outputs, and how many times the angle psi:",
         ),
         "",
         *pipe_table(["how", "outputs", "families", "per pose", "x psi"], rows),

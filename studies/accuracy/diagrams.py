@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SAMPLES = tuple(2**k for k in range(5, 15))
 TARGETS = tuple(10.0**-k for k in range(3, 13))
 DESIGNS, ANGLES, JUDGED = 200, 360, 12  # of positions: designs a region, crank angles timed, crank angles judged
-SMOKE_SAMPLES, SMOKE_TARGETS = (32, 256, 2048), (1e-3, 1e-6, 1e-10)
+SMOKE_SAMPLES, SMOKE_TARGETS = (32, 512), (1e-3, 1e-9)
 
 
 def work_table(regions: Iterable[Region], smoke: bool) -> pd.DataFrame:

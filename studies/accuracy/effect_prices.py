@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SAMPLES, TARGETS = (90, 360, 3600), (1e-3, 1e-6, 1e-9)
-SMOKE_SAMPLES, SMOKE_TARGETS, SMOKE_EVERY = (360,), (1e-6,), 8
+SMOKE_SAMPLES, SMOKE_TARGETS, SMOKE_EVERY = (360,), (1e-6,), 12
 GRID, REFINED = "grid", "accuracy="
 DEAR, DEAR_POSE, DEAREST = 5e6, 1e3, 5e7  # ns per design and per pose; per design
 MASS, ARM, MIXED = 1e-4, 0.4, ("xy", "xz", "yz")  # of bodies without inputs [t]; share of an ordinary length

@@ -81,8 +81,8 @@ class Batch:
     outputs: dict[str, Array]
     status: NDArray[np.uint8]
 
-    def only(self, which: NDArray[np.bool_] | slice) -> Batch:
-        """Take some of the designs."""
+    def only(self, which: NDArray[np.int64] | slice) -> Batch:
+        """Take some of the designs, by their places."""
         outputs = {name: values[which] for name, values in self.outputs.items()}
         return Batch(self.index[which], self.designs[which], outputs, self.status[which])
 
@@ -230,23 +230,23 @@ class Cascade:
         return Batch(batch.index, designs, batch.outputs, status), goes_on
 
     def _leave(self, limit: Limit, status: NDArray[np.uint8], exceeds: NDArray[np.bool_]) -> None:
-        status[exceeds] = codes.LIMIT_EXCEEDED
-        self.missed[limit.output] += int(exceeds.sum())
+        np.copyto(status, codes.LIMIT_EXCEEDED, where=exceeds)
+        self.missed[limit.output] += int(np.count_nonzero(exceeds))
 
     def _sort(self, batch: Batch, goes_on: NDArray[np.bool_], number: int) -> None:
         """Let the designs that go on wait at the next level, if there is one; the others leave."""
-        if number == len(self.levels):
-            goes_on = np.zeros(batch.index.size, np.bool_)
-        elif goes_on.any():
-            self._waiting[number].append(batch if goes_on.all() else batch.only(goes_on))
-        leaves = ~goes_on
+        staying = np.flatnonzero(goes_on) if number < len(self.levels) else np.empty(0, np.int64)
+        if staying.size:
+            self._waiting[number].append(batch if staying.size == goes_on.size else batch.only(staying))
+        if staying.size == goes_on.size:
+            return
         # Most leave: those that stay are fewer to look at.
         self.counts += np.bincount(batch.status, minlength=self.counts.size)
-        self.counts -= np.bincount(batch.status[goes_on], minlength=self.counts.size)
-        if not self.keep:
-            leaves &= batch.status == codes.OK
+        self.counts -= np.bincount(batch.status[staying], minlength=self.counts.size)
+        leaves = np.ones(goes_on.size, np.bool_) if self.keep else batch.status == codes.OK
+        leaves[staying] = False
         if leaves.any():
-            self._left.append(self._completed(batch if leaves.all() else batch.only(leaves)))
+            self._left.append(self._completed(batch if leaves.all() else batch.only(np.flatnonzero(leaves))))
 
 
 @dataclass

@@ -78,8 +78,7 @@ class Parameters:
         names = self.study.family.parameter_names
         if self.leading == len(names):
             return parameter_matrix(self.study, start, stop)
-        columns = self.study.space.columns(start, stop, names[: self.leading])
-        return _beside(columns.values(), stop - start), np.zeros(stop - start, np.uint8)
+        return self.study.space.matrix(start, stop, names[: self.leading]), np.zeros(stop - start, np.uint8)
 
 
 def completed(study: Study, index: NDArray[np.int64], designs: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -145,7 +146,7 @@ def _effect(
         followers=("rocker",),
         needs=("pressure",),
         inputs=inputs,
-        outputs=results,
+        outputs=tuple(replace(o, kinks=True) for o in results),  # magnitudes, and the larger of several
         compute=compute,
         called_for="bearing choice while the linkage is being synthesised",
         negligible="other members govern: utilisation below 0.5",

@@ -137,7 +137,7 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
     """
     kind = 2 * drives_something(grid) + (grid.inputs["speed"] < 0.0)
     kinds = np.unique(kind)
-    if kinds.size == 1:
+    if kinds.size <= 1:  # there may be no design at all: none that turns
         return _solved(grid, phi, last)
     found: dict[str, Array] = {}
     status = np.empty(len(grid.designs), np.uint8)

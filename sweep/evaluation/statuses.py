@@ -36,8 +36,8 @@ def explained(columns: Columns, names: Iterable[str]) -> Columns:
         missing = ~np.isfinite(columns[name])
         if not missing.any():
             continue
-        status[missing & (status == OK)] = INVALID_INPUT
+        np.copyto(status, INVALID_INPUT, where=missing & (status == OK))
         for key in (name, error_of(name)):
-            if key in columns and not np.isnan(columns[key][missing]).all():
+            if key in columns and not (np.isnan(columns[key]) | ~missing).all():
                 changed[key] = np.where(missing, np.nan, columns[key])
     return columns | changed | {"status": status}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from kernels.families.cam import law, translating
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled
 from sweep.families.capabilities import Link, Points, Skeleton
+from sweep.families.pace import Switches
 from sweep.families.skeletons import ORIGIN, X, line, parameter
 
 PHASES = (
@@ -50,7 +52,21 @@ ROLLER_OUTPUTS = (
     Output("x_r", "length", "roller's centre in the fixed frame, along the direction of lift", "(6)"),
     Output("y_r", "length", "roller's centre in the fixed frame, to the left of it", "(6)"),
 )
+_LAW = ("rise", "dwell", "fall", "start", "law")
 _PROFILE = tuple(o.name for o in PROFILE_OUTPUTS)
+
+
+def with_kinks(outputs: tuple[Output, ...]) -> tuple[Output, ...]:
+    """Return outputs of a cam, whose phases meet in kinks or jumps; an angle made continuous is left as it is."""
+    return tuple(replace(o, kinks=not o.wraps) for o in outputs)
+
+
+def phase_ends(designs: Array) -> Array:
+    """Return the cam angles at which a phase, or a piece of the modified sine, ends; of a Fourier table 0 (n, 8)."""
+    rise, dwell, fall, start, kind = (parameter(PARAMETERS, name, designs)[:, None] for name in _LAW)
+    shares = np.array([0.0, 0.125, 0.875, 1.0])
+    ends = np.concatenate([start + rise * shares, start + rise + dwell + fall * shares], axis=1)
+    return np.where(kind == law.FOURIER, 0.0, ends)
 
 
 def cam_poses(
@@ -87,11 +103,12 @@ FAMILY = Family(
     title="cam with a sliding roller follower",
     parameters=PARAMETERS,
     position="s",
-    pose_outputs=PROFILE_OUTPUTS + ROLLER_OUTPUTS,
+    pose_outputs=with_kinks(PROFILE_OUTPUTS + ROLLER_OUTPUTS),
     poses=poses,
     example={"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0},
     derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
     capabilities=(
+        Switches(phase_ends),
         Points({"r": ("x_r", "y_r", None)}),
         Skeleton({"a": ORIGIN, "d": line(follower_line)}, (Link("cam", ("a",)), Link("follower", ("r",)))),
     ),

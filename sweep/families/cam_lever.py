@@ -6,8 +6,9 @@ import numpy as np
 
 from kernels.families.cam import swinging
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
-from sweep.families.cam import PHASES, TABLE, cam_poses
+from sweep.families.cam import PHASES, TABLE, cam_poses, phase_ends, with_kinks
 from sweep.families.capabilities import Dimensions, Link, Made, OutputLink, Skeleton
+from sweep.families.pace import Switches
 from sweep.families.skeletons import ORIGIN, links, parameter, standing
 
 PARAMETERS = (
@@ -61,11 +62,12 @@ FAMILY = Family(
     title="cam with a roller on a swinging lever",
     parameters=PARAMETERS,
     position="psi",
-    pose_outputs=POSE_OUTPUTS,
+    pose_outputs=with_kinks(POSE_OUTPUTS),
     poses=poses,
     example={"lift": 0.4, "r0": 3.0, "c": 5.0, "e": 6.0, "branch": -1.0},
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     capabilities=(
+        Switches(phase_ends),
         Dimensions(links("c")),
         OutputLink(lever_origin),
         Skeleton(

@@ -15,6 +15,7 @@ from sweep.errors import InputError
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink, Points
 from sweep.families.domain import Turn
+from sweep.families.pace import of_stages
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
 
@@ -136,7 +137,7 @@ def chain(families: tuple[Family, ...]) -> Chain:
         outward=last.outward and f"{last.outward}{len(families)}",
         uses_phi=families[0].uses_phi,
         analytic=all(f.analytic for f in families),
-        capabilities=(*(loop for stage in stages for loop in _loops(stage)), *_of_last(stages[-1])),
+        capabilities=(*(loop for stage in stages for loop in _loops(stage)), *_of_last(stages[-1]), *of_stages(stages)),
         dear={
             f"{name}{s.number}": (f"{what}{s.number}", ns) for s in stages for name, (what, ns) in s.family.dear.items()
         }

@@ -7,6 +7,7 @@ import numpy as np
 from kernels.families import epicyclic_dwell
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, Work, poses_of
 from sweep.families.capabilities import Link, Made, Points, Skeleton
+from sweep.families.pace import Singular, Waves
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
@@ -42,6 +43,12 @@ _NAMES = tuple(o.name for o in POSE_OUTPUTS)
 poses = poses_of(epicyclic_dwell.poses, _NAMES)
 
 
+def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the squared distance of the pin from the output axis, (n, m): near the axis the output turns at once."""
+    x, y = (np.asarray(found[name], np.float64) for name in ("x_b", "y_b"))
+    return x * x + y * y
+
+
 def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Return dwell measures to rounding: every root is bisected."""
     n = len(designs)
@@ -49,6 +56,13 @@ def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
     epicyclic_dwell.dwell_measures(designs, status, *values)
     columns: Columns = {o.name: x for o, x in zip(DWELL_OUTPUTS, values, strict=True) if o.name in wanted}
     return columns | {"status": status}
+
+
+def planet_turns(designs: Array) -> Array:
+    """Return how often the planet turns while the carrier turns once, (n,)."""
+    n, mesh = (parameter(PARAMETERS, name, designs) for name in ("n", "mesh"))
+    found: Array = np.abs(n + mesh)
+    return found
 
 
 def planet_centre(designs: Array, angles: Angles, motion: Columns) -> Array:
@@ -70,6 +84,8 @@ FAMILY = Family(
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     uses_phi=False,
     capabilities=(
+        Singular(pin_distance_squared, ("x_b", "y_b")),
+        Waves(planet_turns),
         Points({"b": ("x_b", "y_b", None)}),
         Skeleton(
             {"a": standing(PARAMETERS, "a"), "d": ORIGIN},

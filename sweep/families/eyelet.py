@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from kernels.families import eyelet
-from sweep.families.base import Array, Family, Output, Parameter, poses_of
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, poses_of
 from sweep.families.capabilities import Fixed, Link, Points, Skeleton, ThreadPath
+from sweep.families.pace import Singular
 from sweep.families.skeletons import crank_axis, parameter
 
 PARAMETERS = (
@@ -50,6 +53,17 @@ def guide(number: int) -> Fixed:
     return Fixed(at, kind="point")
 
 
+EYELET = ("X_E", "Y_E", "Z_E")
+
+
+def thread_squared(number: int, designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the squared length of thread from a guide to the eyelet, (n, m): near the guide it turns fast."""
+    place = guide(number).at(designs)
+    squares = [np.square(np.asarray(found[name], np.float64) - place[:, [k]]) for k, name in enumerate(EYELET)]
+    total: Array = squares[0] + squares[1] + squares[2]
+    return total
+
+
 FAMILY = Family(
     name="eyelet",
     title="thread take-up by an eyelet on a crank",
@@ -61,7 +75,8 @@ FAMILY = Family(
     uses_phi=False,
     example={"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "P_h": 8.0},
     capabilities=(
-        Points({"eyelet": ("X_E", "Y_E", "Z_E")}),
+        *(Singular(partial(thread_squared, number), EYELET) for number in (1, 2)),
+        Points({"eyelet": EYELET}),
         ThreadPath("wrap", "dP", "d2P"),
         Skeleton(
             {"a": crank_axis(PARAMETERS, "f", "alpha"), "n1": guide(1), "n2": guide(2)},

@@ -9,7 +9,9 @@ from kernels.families.feed.events import OUTPUTS as _EVENTS
 from kernels.families.feed.motion import OUTPUTS as _POSES
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import Arm, Dimensions, Link, Points, Skeleton
-from sweep.families.skeletons import links, standing
+from sweep.families.pace import Singular
+from sweep.families.rssr import FAMILY as CRANK_ROCKER
+from sweep.families.skeletons import links, parameter, standing
 
 ROCKER = (
     Parameter("h_a", "length", "horizontal chain: crank", positive=True),
@@ -78,6 +80,7 @@ FEEDING_OUTPUTS = (
 )
 
 EPS = 2.0**-53
+_DELTA = frozenset({"discriminant"})
 _LENGTHS = [k for k, p in enumerate(PARAMETERS) if p.unit == "length"]
 
 
@@ -88,6 +91,25 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     outputs = np.empty((len(_POSES), *shape), np.result_type(designs, angles.cos))
     feed.poses(designs, angles.cos, angles.sin, status, outputs)
     return {name: x for name, x in zip(_POSES, outputs, strict=True) if name in wanted} | {"status": status}
+
+
+def rocker_loop(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the discriminant of the horizontal chain, (n, m)."""
+    return np.asarray(CRANK_ROCKER.poses(horizontal_chain(designs), angles, _DELTA)["discriminant"], np.float64)
+
+
+def horizontal_chain(designs: Array) -> Array:
+    """Return the design matrix of the crank-rocker in the horizontal chain, (n, 8)."""
+    return np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(PARAMETERS, SIGMA.name, designs)])
+
+
+def lift_loop(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return Heron's product of the triangle H, E, F, (n, m): 16 times its squared area."""
+    x_h, y_h, x_e, y_e = (np.asarray(found[name], np.float64) for name in ("x_h", "y_h", "x_e", "y_e"))
+    q, fx, fy = (parameter(PARAMETERS, name, designs)[:, None] for name in ("q", "fx", "fy"))
+    w, f = np.hypot(x_h - x_e, y_h - y_e), np.hypot(fx, fy)
+    product: Array = ((w + f) - q) * ((w + f) + q) * (q - (w - f)) * (q + (w - f))
+    return product
 
 
 def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -144,6 +166,8 @@ FAMILY = Family(
     },
     uses_phi=False,
     capabilities=(
+        Singular(rocker_loop),
+        Singular(lift_loop, ("x_h", "y_h", "x_e", "y_e")),
         SIZES,
         Points({k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")}),
         SKELETON,

@@ -9,6 +9,7 @@ from kernels.families.feed import triad
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Dimensions, Link, Made, Points, Skeleton
 from sweep.families.feed import ROCKER, SIGMA
+from sweep.families.pace import Singular
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.skeletons import links, parameter, standing
 
@@ -61,14 +62,29 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return {name: x for name, x in zip(triad.OUTPUTS, outputs, strict=True) if name in wanted} | {"status": status}
 
 
+def rocker_loop(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the discriminant of the horizontal chain, (n, m)."""
+    return np.asarray(
+        CRANK_ROCKER.poses(_chain(designs), angles, frozenset({"discriminant"}))["discriminant"], np.float64
+    )
+
+
+def determinant_squared(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the square of the determinant of the closures, (n, m): it falls like a root where the leads lock."""
+    return np.square(np.asarray(found["determinant"], np.float64))
+
+
+def _chain(designs: Array) -> Array:
+    return np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(PARAMETERS, SIGMA.name, designs)])
+
+
 def _columns(designs: Array, *names: str) -> list[Array]:
     return [parameter(PARAMETERS, name, designs)[:, None] for name in names]
 
 
 def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
     """Return H, on the arm of the horizontal chain's rocker."""
-    chain = np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(PARAMETERS, SIGMA.name, designs)])
-    psi = np.asarray(CRANK_ROCKER.poses(chain, angles, frozenset({"psi"}))["psi"], np.float64)
+    psi = np.asarray(CRANK_ROCKER.poses(_chain(designs), angles, frozenset({"psi"}))["psi"], np.float64)
     e, arm, ahead = _columns(designs, "h_e", "rh", "dh")
     return np.stack([e + arm * np.cos(psi + ahead), arm * np.sin(psi + ahead), 0.0 * psi], axis=-1)
 
@@ -115,6 +131,8 @@ FAMILY = Family(
         "x_t": "dx_t", "dx_t": "d2x_t", "y_t": "dy_t", "dy_t": "d2y_t", "chi": "dchi", "dchi": "d2chi",
     },
     capabilities=(
+        Singular(rocker_loop),
+        Singular(determinant_squared, ("determinant",)),
         Dimensions(links("h_a h_b h_c rh q1 q2 q3"), optional=("rE2", "rE3")),
         Points({"t": ("x_t", "y_t", None)}),
         Skeleton(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kernels.families import free_cam
@@ -78,7 +80,7 @@ FAMILY = Family(
     title="thread take-up by the bare edge of a turning cam, without friction",
     parameters=PARAMETERS,
     position="P",
-    pose_outputs=POSE_OUTPUTS,
+    pose_outputs=tuple(replace(o, kinks=not o.jumps) for o in POSE_OUTPUTS),  # where the thread comes to lie and leaves
     poses=poses,
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP"},
     uses_phi=False,

@@ -9,6 +9,7 @@ import numpy as np
 from kernels.families import geared_dwell
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, optional_outputs
 from sweep.families.capabilities import Link, Made, Points, Skeleton
+from sweep.families.pace import Singular
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
@@ -54,6 +55,12 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     geared_dwell.poses(designs, angles.phi, angles.cos, angles.sin, status, *outputs)
     columns: Columns = {name: out for name, out in zip(_POSE_NAMES, outputs, strict=True) if out is not None}
     return columns | {"status": status}
+
+
+def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the squared distance of the pin from the output axis, (n, m): near the axis the output turns at once."""
+    x, y = (np.asarray(found[name], np.float64) for name in ("x_b", "y_b"))
+    return x * x + y * y
 
 
 def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -150,6 +157,7 @@ FAMILY = Family(
     ),
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
     capabilities=(
+        Singular(pin_distance_squared, ("x_b", "y_b")),
         Points({"b": ("x_b", "y_b", None)}),
         Skeleton(
             {"a": standing(PARAMETERS, "a"), "d": ORIGIN},

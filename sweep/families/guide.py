@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from kernels.families import guide
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
+from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, PoseFunction, filled_with_places
 from sweep.families.capabilities import (
     Arm,
     Assembly,
@@ -28,6 +27,7 @@ from sweep.families.capabilities import (
 )
 from sweep.families.hardpoints import GUIDE_POINTS
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
+from sweep.families.together import together
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -75,23 +75,32 @@ _POINT = {"dx_m": ("ds", "ddev"), "dy_m": ("ds", "ddev"), "d2x_m": ("d2s", "d2de
 _LAM = [p.name for p in PARAMETERS].index("lam")
 
 
+@together(*_VALUES, *_JOINTS)
+def _motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    return filled_with_places(guide.poses, designs, angles, _VALUES, _JOINTS, wanted)
+
+
+def _precise_motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    return filled_with_places(guide.precise_poses, designs, angles, _VALUES, _JOINTS, wanted)
+
+
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return _with_point(guide.poses, designs, angles, wanted)
+    return _with_point(_motion, designs, angles, wanted)
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """As :func:`poses`, in twice the working precision; for float64 only."""
-    return _with_point(guide.precise_poses, designs, angles, wanted)
+    return _with_point(_precise_motion, designs, angles, wanted)
 
 
-def _with_point(kernel: Callable[..., object], designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the kernel's outputs, and the coupler point's rates along and across the line turned into the frame."""
+def _with_point(motion: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Return the outputs of a motion, and the coupler point's rates along and across the line turned into the frame."""
     own = [name for name in _POINT if name in wanted]
     if not own:
-        return filled_with_places(kernel, designs, angles, _VALUES, _JOINTS, wanted)
+        return motion(designs, angles, wanted)
     needed = (wanted - set(own)).union(*(_POINT[name] for name in own))
-    found: dict[str, Any] = dict(filled_with_places(kernel, designs, angles, _VALUES, _JOINTS, frozenset(needed)))
+    found: dict[str, Any] = dict(motion(designs, angles, frozenset(needed)))
     cos, sin = np.cos(designs[:, [_LAM]]), np.sin(designs[:, [_LAM]])
     for name in own:
         along, across = (found[part] for part in _POINT[name])
@@ -164,7 +173,7 @@ _ALONG, _ACROSS = constant(1.0, 0.0, 0.0), constant(0.0, 1.0, 0.0)
 IN_SERIES = InSeries(
     guide.FORM,
     {
-        "s": Curve(0, _ALONG), "ds": Curve(1, _ALONG), "d2s": Curve(2, _ALONG),
+        "s": Curve(0, _ALONG), "ds": Curve(1, _ALONG), "d2s": Curve(2, _ALONG), "d3s": Curve(3, _ALONG),
         "dev": Curve(0, _ACROSS), "ddev": Curve(1, _ACROSS), "d2dev": Curve(2, _ACROSS),
         "x_m": Curve(0, x_of_point), "y_m": Curve(0, y_of_point),
     },

@@ -18,6 +18,7 @@ from sweep.families.base import (
     filled_with_places,
 )
 from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton, ThreadPath
+from sweep.families.pace import Singular
 from sweep.families.skeletons import Y, line, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
@@ -60,6 +61,11 @@ DESIGN_OUTPUTS = (
 _VALUES = tuple(o.name for o in (*VALUE_OUTPUTS, CURVATURE))
 _PROFILE = tuple(o.name for o in PROFILE_OUTPUTS)
 ROUNDING = 2.0**-53
+
+
+def displacement_squared(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the square of the follower's displacement, (n, m): where it nearly vanishes its speed is large."""
+    return np.square(np.asarray(found["S"], np.float64))
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
@@ -134,6 +140,7 @@ FAMILY = Family(
     uses_phi=False,
     example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
     capabilities=(
+        Singular(displacement_squared, ("S",)),
         Points({"profile": ("X_P", "Y_P", None)}),
         ThreadPath(WRAP.name, "dP", "d2P"),
         Skeleton(

@@ -7,6 +7,7 @@ import numpy as np
 from kernels.families import inverted_slider_crank
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
 from sweep.families.capabilities import Assembly, Dimensions, Link, Made, OutputLink, Points, Skeleton
+from sweep.families.pace import Singular
 from sweep.families.skeletons import CRANK, ORIGIN, links, parameter, standing
 
 PARAMETERS = (
@@ -46,6 +47,11 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return filled_with_places(inverted_slider_crank.poses, designs, angles, _VALUES, _JOINTS, wanted)
 
 
+def slot_squared(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the square of the pin's place in the slot, (n, m): where it nearly vanishes the rocker turns at once."""
+    return np.square(np.asarray(found["s"], np.float64))
+
+
 def _one(designs: Array) -> Array:
     """Return 1 for every design: the discriminant is the squared cosine of the pressure angle as it stands."""
     return np.ones(len(designs))
@@ -76,6 +82,7 @@ FAMILY = Family(
     derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi", "s": "ds", "ds": "d2s"},
     uses_phi=False,
     capabilities=(
+        Singular(slot_squared, ("s",)),
         Dimensions(links("a")),
         Assembly("discriminant", "pressure_angle", _one),
         Points({"b": ("x_b", "y_b", None)}),

@@ -14,6 +14,7 @@ from kernels.status import OK
 from sweep.families.base import Angles, Array, Columns, Event, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.located import EYE, TIP, coordinates, coupler_joints, velocity
+from sweep.families.pace import of_members
 from sweep.families.placing import AXES, Place
 from sweep.families.relations import Frame, Reading, Relation, Timing
 
@@ -204,7 +205,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         derivative_of=derivative_of,
         outward="",
         analytic=all(m.family.analytic for m in placed),
-        capabilities=loops,
+        capabilities=(*loops, *of_members(placed)),
         dear={f"{m.name}.{k}": (f"{m.name}.{what}", ns) for m in placed for k, (what, ns) in m.family.dear.items()},
         members=tuple(placed),
     )

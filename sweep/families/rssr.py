@@ -39,6 +39,7 @@ from sweep.families.capabilities import (
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
+from sweep.families.together import together
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -97,7 +98,6 @@ MAXIMA_OUTPUTS = tuple(
     )
 )
 
-ROUNDING = 2.0**-53
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up; 100 suffice within 1e-9 of a change point
 _JOINTS = rssr.Joints._fields
 _VALUES = tuple(o.name for o in POSE_OUTPUTS if o.name not in _JOINTS)
@@ -112,14 +112,11 @@ def _filled(
     if wanted.isdisjoint(_JOINTS):
         return filled(kernel, arguments, _NO_JOINTS, wanted, status, dtype)
     room = optional_outputs(_JOINTS, wanted, status.shape, dtype)
-
-    def with_joints(*given: object) -> None:
-        kernel(*given, rssr.Joints(*room))
-
-    found = filled(with_joints, arguments, _VALUES, wanted, status, dtype)
+    found = filled(lambda *given: kernel(*given, rssr.Joints(*room)), arguments, _VALUES, wanted, status, dtype)
     return found | {name: x for name, x in zip(_JOINTS, room, strict=True) if x is not None}
 
 
+@together(*_VALUES, *_JOINTS)
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     dtype = np.result_type(designs, angles.cos)
@@ -171,14 +168,16 @@ def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     n = len(designs)
     status = np.empty(n, np.uint8)
     with_error = accuracy.target is not None and not wanted <= {"rotatable"}
-    names = ("margin", "rotatable", "max_pressure_angle", "error")
-    needed = wanted | {"margin", "error"} if with_error else wanted
-    least, turns, angle, error = optional_outputs(names, frozenset(needed), (n,))
-    rssr.margin(designs, status, least, turns, angle, None, error)
+    names = ("margin", "rotatable", "max_pressure_angle", "error", "angle_error")
+    needed = set(wanted)
+    if with_error:
+        needed |= {"error", "angle_error"} if "max_pressure_angle" in wanted else {"error"}
+    least, turns, angle, error, angle_error = optional_outputs(names, frozenset(needed), (n,))
+    rssr.margin(designs, status, least, turns, angle, None, error, angle_error)
     columns: Columns = {"status": status}
     if turns is not None:
         columns["rotatable"] = turns == 1.0
-    if least is not None and "margin" in wanted:
+    if least is not None:
         columns["margin"] = least
     if angle is not None:
         columns["max_pressure_angle"] = angle
@@ -186,13 +185,8 @@ def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
         columns["err_rotatable"] = np.zeros(n)
     if error is not None and least is not None:
         columns["err_margin"] = error
-        if angle is not None:
-            # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
-            turning, far = status == st.OK, np.full(n, np.nan)
-            with np.errstate(divide="ignore"):
-                linear = error[turning] / np.abs(np.sin(2.0 * angle[turning]))
-            far[turning] = np.minimum(linear, np.sqrt(error[turning])) + 8.0 * ROUNDING
-            columns["err_max_pressure_angle"] = far
+    if angle_error is not None:
+        columns["err_max_pressure_angle"] = angle_error
     return columns
 
 
@@ -310,7 +304,7 @@ def _sampled(accuracy: Accuracy) -> bool:
     return accuracy.samples is not None
 
 
-CURVES = {"dpsi": Curve(1, constant(1.0, 0.0, 0.0)), "d2psi": Curve(2, constant(1.0, 0.0, 0.0))}
+CURVES = {name: Curve(order, constant(1.0, 0.0, 0.0)) for order, name in enumerate(("dpsi", "d2psi", "d3psi"), start=1)}
 
 FAMILY = Family(
     name="rssr",

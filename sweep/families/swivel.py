@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from itertools import chain
 
+import numpy as np
+
 from kernels.families import swivel
 from kernels.families.swivel.links import links as fill_links
 from kernels.links import DRIVEN, FRAME, TURN
@@ -12,6 +14,7 @@ from sweep.families.capabilities import Dimensions, Link, Points, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.linked import filled_by, point_of
 from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, point_outputs
+from sweep.families.pace import Singular
 from sweep.families.skeletons import CRANK, crank_axis, links, standing
 
 PARAMETERS = (
@@ -41,6 +44,11 @@ _BLOCKS = (ROD_OUTPUTS, *POINT_OUTPUTS, JOINT_OUTPUTS)
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return filled_blocks(swivel.poses, designs, angles, _BLOCKS, wanted)
+
+
+def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the square of the rod between pin and block, (n, m): where it nearly vanishes the rod turns at once."""
+    return np.square(np.asarray(found["rho"], np.float64))
 
 
 _RATES, _DIRECTION = ("rho", "drho", "d2rho"), ("x_n", "y_n", "z_n")
@@ -74,6 +82,7 @@ FAMILY = Family(
     example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "Lw": 5.0},
     uses_phi=False,
     capabilities=(
+        Singular(pin_distance_squared, ("rho",)),
         Dimensions(links("a")),
         LINKS,
         Points({"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")}),

@@ -139,16 +139,24 @@ def _halved(function: Integrand, panels: _Panels) -> _Panels:
     return halves._replace(idle=np.concatenate([idle, idle]))
 
 
+def _weighted(weights: Array, values: Array) -> Array:
+    """Return sums (k, q) over the nodes of values (k, j, q), in one order: that of a library depends on k."""
+    total: Array = weights[0] * values[:, 0]
+    for j in range(1, weights.size):
+        total += weights[j] * values[:, j]
+    return total
+
+
 def _evaluated(function: Integrand, row: Index, origin: Index, low: Array, high: Array) -> _Panels:
     half = 0.5 * (high - low)
     x = (0.5 * (low + high))[:, None] + half[:, None] * NODES
     y = function(row, origin, x)
-    value = half[:, None] * np.einsum("j,kjq->kq", KRONROD, y)
-    coarse = half[:, None] * np.einsum("j,kjq->kq", GAUSS, y)
-    mean = np.einsum("j,kjq->kq", KRONROD, y)[:, None, :] / 2.0
-    spread = half[:, None] * np.einsum("j,kjq->kq", KRONROD, np.abs(y - mean))
+    value = half[:, None] * _weighted(KRONROD, y)
+    coarse = half[:, None] * _weighted(GAUSS, y)
+    mean = _weighted(KRONROD, y)[:, None, :] / 2.0
+    spread = half[:, None] * _weighted(KRONROD, np.abs(y - mean))
     off = np.abs(value - coarse)
     sharp = np.minimum(200.0 * off / np.maximum(spread, 1e-300), 1.0) ** 1.5 * spread
     err = np.where(spread > 0.0, np.maximum(np.minimum(sharp, spread), 0.0), off)
-    err = np.maximum(err, 8.0 * EPS * half[:, None] * np.einsum("j,kjq->kq", KRONROD, np.abs(y)))
+    err = np.maximum(err, 8.0 * EPS * half[:, None] * _weighted(KRONROD, np.abs(y)))
     return _Panels(row, origin, low, high, value, err, np.zeros((row.size, 1)))

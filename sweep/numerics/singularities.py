@@ -90,14 +90,23 @@ def crowded(near: Singularities, share: float) -> Array:
     """Return crank angles (n, m) of a turn in rising order,
     spaced by at most a share of the distance of the nearest zero.
 
-    About each zero they stand at phi + rho sinh(t) for equidistant t, which spaces them by hypot(rho, x) dt.
+    About each zero they stand at phi + rho sinh(t) for equidistant t, which spaces them by hypot(rho, x) dt.  A design
+    that needs fewer than others repeats some: its angles do not depend on what else is asked.
     """
     n, k = near.phi.shape
-    reach = np.arcsinh(np.pi / near.rho)
-    half = int(np.ceil(reach.max(initial=1.0) / share))
-    t = reach[:, :, None] * (np.arange(-half, half + 1) / half)
+    own = steps(near, share)
+    half = int(own.max(initial=1))
+    number = np.clip(np.arange(-half, half + 1), -own[:, None], own[:, None]) / own[:, None]
+    t = np.arcsinh(np.pi / near.rho)[:, :, None] * number[:, None, :]
     angles = near.phi[:, :, None] + near.rho[:, :, None] * np.sinh(t)
     return np.sort(np.mod(angles.reshape(n, k * (2 * half + 1)), TWO_PI), axis=1)
+
+
+def steps(near: Singularities, share: float) -> Index:
+    """Return how many angles on either side of its zeros each design needs, (n,)."""
+    reach = np.arcsinh(np.pi / near.rho).max(axis=1, initial=1.0)
+    found: Index = np.ceil(reach / share).astype(np.int64)
+    return found
 
 
 def turn_edges(near: Singularities, share: float) -> Array:

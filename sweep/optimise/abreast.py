@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.nearest import nearest
+from kernels.nearest import nearest_of_many
 from sweep.families.base import Array
 from sweep.optimise.dense import symmetric, times
 from sweep.optimise.linear import POSES
@@ -33,16 +33,14 @@ OBJECTIVE = 2 * POSES  # rows, the first ones
 class _Program(NamedTuple):
     """A quadratic program in the step, in t and in the violation, but for the values of its rows.
 
-    ``linear`` (n, r) are its rows, ``turned`` (n, r) the same in the axes of the curvature, to which ``back`` leads;
-    there its objective is the distance from ``centre``.  ``box`` are the rows of the ends ``low`` and ``high``; ``per``
-    are the units of the rows, ``size`` those of the step.
+    ``linear`` (n, r) are its rows, ``back`` leads from the axes of the curvature, where its objective is the distance
+    from ``centre``, to the step.  ``low`` and ``high`` are the ends of the box; ``per`` are the units of the rows,
+    ``size`` those of the step.
     """
 
     linear: Array
-    turned: Array
     back: Array
     centre: Array
-    box: Array
     low: Array
     high: Array
     per: Array
@@ -86,6 +84,7 @@ class Abreast:
         self.curvature = np.repeat(self.soft[None], k, axis=0)
         self.known: list[_Known | None] = [None] * k
         self.memory: list[tuple[_Known, Array] | None] = [None] * k
+        self.programs: list[_Program | None] = [None] * k
         self.looks = 0
 
     def keep(self, numbers: NDArray[np.intp]) -> None:
@@ -94,6 +93,7 @@ class Abreast:
             setattr(self, name, getattr(self, name)[numbers])
         self.memory = [self.memory[k] for k in numbers]
         self.known = [self.known[k] for k in numbers]
+        self.programs = [self.programs[k] for k in numbers]
 
     def advance(self, steps: int, stop: Callable[[], bool] = lambda: False) -> None:
         """So many steps of all descents that have not come to rest."""
@@ -125,6 +125,7 @@ class Abreast:
                 change = times(weights[held], before.slopes[held] - here.slopes[held]) * size
                 self.curvature[k] = learnt(self.curvature[k], (here.varied - before.varied) / size, change)
                 self.memory[k] = None
+            self.programs[k] = None
 
     def _varied(self, k: int) -> Array:
         return np.concatenate([self.places[k], self.x[k]])
@@ -197,27 +198,35 @@ class Abreast:
     def _renew(self, k: int) -> None:
         """Begin anew where a descent has come to rest: curvature once learnt may promise less than there is."""
         self.rested[k], self.radius[k], self.memory[k] = self.worth[k], RADIUS, None
-        self.curvature[k] = self.soft
+        self.curvature[k], self.programs[k] = self.soft, None
 
     def _prepared(self, k: int) -> _Program:
         """Return the quadratic program of a descent's next step, but for the values of its rows."""
+        here, program = self._here(k), self.programs[k]
+        if program is None:
+            program = self.programs[k] = self._without_box(k)
+        reach = np.full(UNKNOWNS, REACH * self.radius[k])
+        ends = [-here.t / self.rows.unit, 0.0]
+        low = np.concatenate([np.maximum(-self.radius[k], -self.places[k]), -reach, ends])
+        high = np.concatenate([np.minimum(self.radius[k], 1.0 - self.places[k]), reach])
+        return program._replace(low=low, high=high)
+
+    def _without_box(self, k: int) -> _Program:
+        """Return what stays of the program while a descent stands where it is: all but the ends of its box."""
         here, unit = self._here(k), self.rows.unit
         size, of_t = _size(here.varied), np.zeros(len(here.values))
         of_t[:OBJECTIVE] = 1.0
         per = np.where(of_t > 0.0, unit, 1.0)
         slopes = np.ascontiguousarray((here.slopes * size).T) / per
         linear = np.concatenate([slopes, [of_t, 1.0 - of_t]])
-        reach = np.full(UNKNOWNS, REACH * self.radius[k])
-        low = np.concatenate([np.maximum(-self.radius[k], -self.places[k]), -reach, [-here.t / unit, 0.0]])
-        high = np.concatenate([np.minimum(self.radius[k], 1.0 - self.places[k]), reach])
         values, axes = symmetric(self.curvature[k])
         stiffness = np.concatenate([np.maximum(values, 0.5 * FLAT), [BEND, BEND]])
-        back = np.eye(len(low))
+        back = np.eye(len(linear))
         back[: len(values), : len(values)] = axes
         back /= np.array([math.sqrt(v) for v in stiffness])
         centre = -times(back.T, np.concatenate([np.zeros(len(values)), [1.0, self.rows.price / unit]]))
-        box = np.concatenate([back, -back[: len(high)]])
-        return _Program(linear, times(back.T, linear), back, centre, box.T, low, high, per, size)
+        none = np.empty(0)
+        return _Program(linear, back, centre, none, none, per, size)
 
     def _solved(self, k: int, program: _Program, values: Array) -> tuple[Array, Array, float]:
         """Step (n + 5,), the multipliers of the rows (r,), and the gain it promises.
@@ -227,22 +236,12 @@ class Abreast:
         here, unit = self._here(k), self.rows.unit
         rows = values / program.per
         rows[:OBJECTIVE] += here.t / unit
-        ends = np.concatenate([program.low, -program.high])
-        inside = np.zeros(len(rows), np.bool_)
-        more, y = self.rows.turns.peaks(rows, NEAR), np.empty(len(program.centre))
-        for _ in range(JOINED):
-            inside |= more
-            own = np.concatenate([program.turned[:, inside], program.box], axis=1)
-            found = np.empty(own.shape[1])
-            nearest(own, np.concatenate([-rows[inside], ends]), program.centre, EXACT, y, found)
-            step = times(program.back, y)
-            there = rows + times(step, program.linear)
-            more = ~inside & self.rows.turns.peaks(there, -MISSED)
-            if not more.any():
-                break
-        weights = np.zeros(len(rows))
-        weights[inside] = found[: int(inside.sum())]
-        missed = -float((there - step[-1] * program.linear[-1])[OBJECTIVE:].min())
+        step, there, weights = np.empty(len(program.centre)), np.empty(len(rows)), np.empty(len(rows))
+        nearest_of_many(
+            rows, program.linear, program.back, program.centre, program.low, program.high, self.rows.turns.rows,
+            NEAR, MISSED, JOINED, EXACT, step, there, weights,
+        )  # fmt: skip
+        missed = -float((there[OBJECTIVE:] - step[-1]).min())
         after = here.t + unit * float(step[-2]) + self.rows.price * max(0.0, missed)
         return step[:-2] * program.size, weights / program.per, float(self.worth[k]) - after
 

@@ -79,11 +79,3 @@ class Turns(NamedTuple):
             parts = [x[:, None] * slopes[k, row] for x, row in zip(w, (left, at, right), strict=True)]
             slopes[k, at] = parts[0] + parts[1] + parts[2]
         return out
-
-    def peaks(self, values: Array, below: float) -> NDArray[np.bool_]:
-        """Rows (r,) below a value that are lowest among their neighbours along the turn, or stand beside such a one."""
-        along = values[self.rows]
-        lowest = (along <= along[:, self.before]) & (along <= along[:, self.after])
-        found = np.ones(len(values), np.bool_)
-        found[self.rows] = lowest | lowest[:, self.before] | lowest[:, self.after]
-        return np.asarray(found & (values < below))

@@ -1,4 +1,7 @@
-"""Starts without a dataset: the best of a large sample, improved by ever smaller samples around them."""
+"""Starts without a dataset: the best of large samples, improved by ever smaller samples around them.
+
+Each half a dozen starts has a sample of its own, so that what one of them does not hit the next one may.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +19,12 @@ from sweep.optimise.starts import spread
 from sweep.quantities.names import is_flag, stem
 from sweep.reductions.measures import ROTATABLE_MARGIN, margins
 
+GROUP = 6  # starts of one sample: as many as a search begins together
 SAMPLED = 1 << 15  # designs per start: on a locus they cost a third of a microsecond each
-BLOCK = 1 << 15  # designs ranked together
-KEPT = 512  # best of the sample per start
-PARENTS, CHILDREN, ROUNDS = 8, 24, 12  # improved per start; samples around each and round
+BLOCK, LEAST = 1 << 15, 1 << 12  # designs ranked together; the least number, where there are many signs
+BEYOND = 0.2  # of the width of the bounds, to either side: one coordinate in seven is brought back onto a bound
+KEPT = 512  # best of the sample per start, and as many of those that miss their limits
+PARENTS, CHILDREN, ROUNDS = 16, 24, 12  # improved per start; samples around each and round
 FARTHEST = 1e100
 RADIUS = 0.06  # of the first of these samples, in variables scaled to their bounds
 ACCURACY = Accuracy(samples=64)  # misses a peak by less than what the local search gains ...
@@ -31,43 +36,107 @@ OUTSIDE, STUCK = 1e100, 1e200  # above every objective: misses its limits, does 
 
 
 def from_sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int) -> Array:
-    """Return the diverse good designs, best first:
-    a Sobol sample between the bounds, and what is found around the best of it.
+    """Return the starts of :func:`from_samples` alone."""
+    return from_samples(problem, signs, count, seed)[0]
 
-    Ranked by :func:`ranking`.  Same arguments, same designs.
+
+def from_samples(
+    problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int
+) -> tuple[Array, tuple[int, ...]]:
+    """Return at most ``count`` good designs, and the number of the sample that each comes from.
+
+    Up to six designs come from one sample, the best first; then those of the next sample follow.  Same arguments, same
+    designs.
 
     Parameters
     ----------
     problem : what is to be minimised
-    signs : combinations of the parameters that are not varied (branches); the sample is shared out among them
+    signs : combinations of the parameters that are not varied (branches); each sample is shared out among them
     count : how many at most
-    seed : of the sample
+    seed : of the samples
+    """
+    number = -(-count // GROUP)
+    size = -(-count // number)
+    found = [sample(problem, signs, size, seed, k) for k in range(number)]
+    numbers = [k for k, designs in enumerate(found) for _ in designs]
+    return np.concatenate(found)[:count], tuple(numbers[:count])
+
+
+def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int, number: int) -> Array:
+    """Return diverse good designs of one Sobol sample and of what is found around the best of it, the best first.
+
+    Each sample is scrambled anew, so that it has points of its own.  Half of them are drawn from beyond the bounds and
+    brought back onto them.
+
+    Parameters
+    ----------
+    problem, signs, seed : see :func:`from_samples`
+    count : how many designs at most
+    number : of the sample
     """
     from scipy.stats import qmc
 
     centre = problem.lower + 0.5 * problem.span
     bases = [problem.rows(centre, **choice)[0] for choice in signs]
-    low, high = _one_turn(problem)
-    sobol = qmc.Sobol(len(problem.variables), seed=seed)
-    place, kind, merit = np.empty((0, len(low))), np.empty(0, np.intp), np.empty(0)
-    blocks = int(np.ceil(SAMPLED * count / BLOCK))
-    for number in range(max(blocks, len(bases))):
-        fractions = low + sobol.random(BLOCK) * (high - low)
-        own = number % len(bases)
+    block = BLOCK
+    while block > LEAST and block * len(bases) > SAMPLED * count:
+        block //= 2
+    blocks = max(-(-SAMPLED * count // block), len(bases))
+    rng = np.random.default_rng((seed, number))
+    sobol = qmc.Sobol(len(problem.variables), seed=rng)
+    place, kind, merit = np.empty((0, len(problem.variables))), np.empty(0, np.intp), np.empty(0)
+    for k in range(blocks):
+        fractions, own = _brought_in(problem, sobol.random(block)), k % len(bases)
         found = ranking(problem, problem.placed(bases[own], fractions))
         place = np.concatenate([place, fractions])
-        kind = np.concatenate([kind, np.full(BLOCK, own)])
+        kind = np.concatenate([kind, np.full(block, own)])
         merit = np.concatenate([merit, found])
-        best = np.sort(np.argsort(merit, kind="stable")[: KEPT * count])
+        order = np.argsort(merit, kind="stable")
+        good = merit[order] < OUTSIDE
+        best = np.sort(np.concatenate([order[good][: KEPT * count], order[~good][: KEPT * count]]))
         place, kind, merit = place[best], kind[best], merit[best]
     merit = _verified(problem, bases, place, kind, merit)
+    chosen, near = _parents(place, kind, merit, PARENTS * count)
+    place, merit = _improved(problem, bases, place[chosen], kind[chosen], merit[chosen], rng)
+    ranked = np.argsort(merit, kind="stable")
+    if near >= count:  # what was brought within the limits has to be as good as what was there
+        ranked = ranked[merit[ranked] <= merit[:near].max()]
+    place, kind = place[ranked], kind[chosen][ranked]
+    designs = [problem.placed(bases[kind[k]], place[k]) for k in spread(place, kind, count)]
+    return np.array(designs).reshape(-1, len(problem.family.parameters))
+
+
+def _brought_in(problem: Problem, fractions: Array) -> Array:
+    """Return the places of a block of a sample between the bounds, half of them drawn from beyond the bounds.
+
+    Optima stand at bounds, often at several at once, and the designs that keep the limits there may fill less than a
+    millionth of the space between the bounds.
+    """
+    low, high = _one_turn(problem)
+    bounded = high - low == 1.0  # an angle of a whole turn has no ends
+    half = len(fractions) // 2
+    out = fractions.copy()
+    wide = np.clip((1.0 + 2.0 * BEYOND) * fractions[:half] - BEYOND, 0.0, 1.0)
+    out[:half] = np.where(bounded, wide, fractions[:half])
+    return np.asarray(low + out * (high - low), np.float64)
+
+
+def _parents(place: Array, kind: NDArray[np.intp], merit: Array, count: int) -> tuple[NDArray[np.intp], int]:
+    """Return numbers of diverse designs to be improved, and how many of them, the first, keep the limits.
+
+    These are up to half; the others miss the limits and are away from them.
+
+    A limit may leave several separate regions, the smallest of which a sample does not hit, but finds the way to.
+    """
     order = np.argsort(merit, kind="stable")
     order = order[np.isfinite(merit[order])]
-    order = order[spread(place[order], kind[order], PARENTS * count)]
-    place, merit = _improved(problem, bases, place[order], kind[order], merit[order], np.random.default_rng(seed))
-    ranked = np.argsort(merit, kind="stable")
-    place, kind = place[ranked], kind[order][ranked]
-    return np.array([problem.placed(bases[kind[k]], place[k]) for k in spread(place, kind, count)])
+    near, turning = merit[order] < OUTSIDE, merit[order] < STUCK
+    taken = order[near][spread(place[order[near]], kind[order[near]], count // 2)]
+    first = len(taken)
+    for others in (order[turning & ~near], order):
+        rows = np.concatenate([taken, others[~np.isin(others, taken)]])
+        taken = rows[spread(place[rows], kind[rows], count, first=len(taken))]
+    return np.asarray(taken, np.intp), first
 
 
 def _one_turn(problem: Problem) -> tuple[Array, Array]:
@@ -90,7 +159,7 @@ def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[
     """
     out = merit.copy()
     for own, base in enumerate(bases):
-        rows = np.flatnonzero((kind == own) & np.isfinite(merit))
+        rows = np.flatnonzero((kind == own) & (merit < OUTSIDE))
         found = ranking(problem, problem.placed(base, place[rows]), VERIFIED)
         hidden = found > HIDDEN * merit[rows]
         out[rows[hidden]] = found[hidden]

@@ -20,6 +20,7 @@ from sweep.optimise.problem import Problem
 from sweep.optimise.rows import Form
 
 ROUNDS, CYCLES = 60, 3
+PATIENCE, AGAIN = 8, 2  # rounds of learnt curvature that may halve a violation, at first and after Newton rounds
 NEWTON = 240  # rounds of Newton steps: along a narrow curved valley hundreds are needed, and each gains
 SOON = 30  # of these on a locus, before the parameters are tried: near its singular places they creep
 KKT = 1e-6  # residual of a converged result
@@ -93,26 +94,44 @@ class Descent:
                     self.best = new
 
     def _restore(self) -> None:
-        """Find the smallest relaxation of the limits: zero where a feasible design is near."""
+        """Find the smallest relaxation of the limits: zero where a feasible design is near.
+
+        In a narrow curved valley learnt curvature, which every round begins anew, creeps; there Newton rounds go on.
+        """
+        patience = PATIENCE
         for _ in range(ROUNDS):
             before = self.best
             if math.isinf(before.known):
                 return  # the links reach nowhere: there is nothing to follow
-            self._rounds(quasi.propose, relaxed=True, enough=1e-4)
+            crept = self._rounds(quasi.propose, relaxed=True, enough=1e-4, patience=patience)
+            if crept and self.best.form.complete:
+                self._rounds(newton.propose, relaxed=True, enough=1e-4)
+                patience = AGAIN
             same_rows = before.form.complete == self.best.form.complete
             if self.best.feasible or (same_rows and self.best.known > 0.999 * before.known):
                 break
         if not self.best.feasible and self.best.form.complete:
             self._rounds(newton.propose, relaxed=True, enough=1e-13)
 
-    def _rounds(self, propose: Propose, relaxed: bool, enough: float, rounds: int = ROUNDS) -> None:
+    def _rounds(
+        self, propose: Propose, relaxed: bool, enough: float, rounds: int = ROUNDS, patience: int | None = None
+    ) -> bool:
         """Let ``propose`` find the next design, keep it if its true extrema are better, until it gains too little.
 
         A refused design shortens the next step, and its extrema that the rows did not know are added to them.
+
+        Returns
+        -------
+        Whether it crept: ``patience`` rounds in a row have not halved what the limits are missed by.
         """
         radius, extra, refused = 0.25, Points.of([]), False
+        missed: list[float] = []
         for _ in range(rounds):
             at = self.best
+            if patience is not None and at.form.complete:
+                missed.append(at.known)
+                if len(missed) > patience and at.known > 0.5 * missed[-1 - patience]:
+                    return True
             form, t, floor = self.model.with_points(at, extra), at.objective, None
             if not refused:
                 known = at.atoms if not len(extra) else self.model.atoms(at.design, form, form.points)
@@ -132,15 +151,16 @@ class Descent:
                 true = new.known if relaxed else new.objective
                 self.gap = abs(true - reached) / max(abs(true), 1e-300)
                 if gain <= enough * max(abs(true), 1.0) or (relaxed and new.feasible):
-                    return
+                    break
                 if residual <= (KKT if gain <= DWINDLING else 1e-2 * KKT):
-                    return  # the polish makes the rest of the way in one step
+                    break  # the polish makes the rest of the way in one step
             elif step < 1e-10 or gain > -1e-13 or radius < 1e-7:
-                return
+                break
             else:
                 radius, refused = 0.25 * min(radius, step), True
                 extra = Points.joined(extra, self._unknown(new.form.points, form.points))
                 extra = extra.take(slice(-REMEMBERED, None))
+        return False
 
     def _unknown(self, found: Points, known: Points) -> Points:
         """Return the extrema of a refused design that are not near a known point, to be held at their crank angles."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sweep.families.base import Array
-from sweep.optimise.candidates import from_sample, ranking
+from sweep.optimise.candidates import GROUP, ranking, sample
 from sweep.optimise.problem import Problem
 from sweep.optimise.starts import ALIKE, diverse, drawn
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 LOOKED_AT = 4  # times 256 designs of a space, that tell which signs it has
+SAMPLES = 2  # times as many as would do if no start were near another
 MOST_KINDS = 64  # combinations of signs among which a sample is shared out
 
 
@@ -37,26 +39,43 @@ def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]
 
 
 def filled(study: Study, problem: Problem, starts: Array, count: int, seed: int) -> Array:
-    """Return at most ``count`` starts: those given (k, P), then the best of a sample that are not near one of them.
+    """Return at most ``count`` starts: those given (k, P), then the best of samples that are not near one of them.
 
     A sample of the problem's own variables finds more than the space of the study, unless [fit] has to finish every
     design; then designs of the space are drawn.
     """
     if len(starts) >= count:
         return starts
+    taken = starts
+    for more in _offered(study, problem, starts, count, seed):
+        taken = apart(problem, taken, more, count)
+        if len(taken) == count:
+            break
+    return taken
+
+
+def _offered(study: Study, problem: Problem, starts: Array, count: int, seed: int) -> Iterator[Array]:
+    """Yield designs to begin with, one sample after the other."""
     if study.fit is None:
-        more = from_sample(problem, kinds(study, problem, starts), count, seed)
-    else:
-        designs = drawn(study, count, seed)
-        more = diverse(problem, designs, ranking(problem, designs), count) if len(designs) else designs
+        signs = kinds(study, problem, starts)
+        for number in range(SAMPLES * -(-count // GROUP)):
+            yield sample(problem, signs, min(count, GROUP), seed, number)
+        return
+    designs = drawn(study, count, seed)
+    if len(designs):
+        yield diverse(problem, designs, ranking(problem, designs), count)
+
+
+def apart(problem: Problem, starts: Array, more: Array, count: int) -> Array:
+    """Return the starts and, up to a number, those of others that are not near one of them."""
     both = np.concatenate([starts, more])
     place = problem.scaled(both)
     others = [c for c in range(both.shape[1]) if c not in problem.columns]
     least = ALIKE * math.sqrt(place.shape[1] / 6.0)
     taken = list(range(len(starts)))
     for k in range(len(starts), len(both)):
-        apart = np.linalg.norm(place[taken] - place[k], axis=1) >= least
+        away = np.linalg.norm(place[taken] - place[k], axis=1) >= least
         other = (both[taken][:, others] != both[k, others]).any(axis=1)
-        if len(taken) < count and bool((apart | other).all()):
+        if len(taken) < count and bool((away | other).all()):
             taken.append(k)
     return np.asarray(both[taken], np.float64)

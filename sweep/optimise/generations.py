@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -27,13 +28,14 @@ from sweep.optimise.proportions import turned_into
 from sweep.optimise.starts import spread
 
 BLOCK = 1 << 13  # proportions that are looked at together
-PARENTS = 24  # best ends, no two of them alike, from which a generation is made: as many of all signs
-TRIES = (
-    8  # of every child, the first of which that turns descends: most mixed mechanisms do not, and that is quickly seen
-)
+PARENTS = 40  # best ends, no two of them alike, from which a generation is made: as many of all signs
+TRIES, STRANGERS = 64, 256  # of every child, the best of which descends; of one half of which is at random
+DRIVERS = 4  # among the tries of a child
 MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations, one of which a child is varied by
 NICHE = 0.15  # of the average distance of two random guides: nearer ones are alike
 TOGETHER = 6  # populations between two looks at whether more are needed: the same for any number of jobs
+CLASSES = 5  # of swings, each of which has parents
+SMALLEST = 1e-3  # swing that is none [rad]
 USELESS = 1.3  # times the best value: worse ends are no parents
 
 
@@ -46,8 +48,8 @@ class Size(NamedTuple):
     """
 
     sampled: int = 1 << 14
-    first: int = 200
-    later: int = 80
+    first: int = 120
+    later: int = 60
     generations: int = 10
     heat: int = 14
     steps: int = 60
@@ -69,10 +71,11 @@ class _End(NamedTuple):
     kind: int
     place: Array
     design: Array
+    swing: float = 0.0
 
 
 @dataclass(frozen=True)
-class _Population:
+class Population:
     """Generations from one seed: a task for processes."""
 
     linear: Elimination
@@ -92,14 +95,15 @@ class _Population:
             parents = _parents(ends, -(-PARENTS // len(rows)), ~rows[0].driving)
             if generation and not parents:
                 break
+            classes = _Classes.between(np.array([p.swing for p in parents]))
             for kind, own in enumerate(rows):
                 if generation == 0:
-                    places = _sampled(own, rng, self.size, len(rows))
+                    places, classes = _sampled(own, rng, self.size, len(rows))
                 else:
                     places = _children(
                         own, [p for p in parents if p.kind == kind], parents, rng, -(-self.size.later // len(rows))
                     )
-                found, spent = _descended(own, kind, places, self.size, should_stop)
+                found, spent = _descended(own, kind, places, classes, self.size, should_stop)
                 ends, looks = ends + found, looks + spent
         best = _parents(ends, PARENTS, ~rows[0].driving)[:PARENTS]
         names = self.linear.problem.family.parameter_names
@@ -107,73 +111,142 @@ class _Population:
         return Bred(turned_into(self.linear.problem, designs), np.array([end.worth for end in best]), looks)
 
 
-def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, kinds: int) -> Array:
-    """Places of a Sobol sample that turn: the best that are not alike."""
+def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, kinds: int) -> tuple[Array, _Classes]:
+    """Places of a Sobol sample that turn, the best of every class of swings that are not alike; and these classes."""
     from scipy.stats import qmc
 
     place = qmc.Sobol(len(rows.own.columns), seed=rng).random(size.sampled)
     worth = np.concatenate([rows.own.merit(block) for block in np.split(place, max(1, size.sampled // BLOCK))])
     order = np.argsort(worth, kind="stable")
     order = order[worth[order] < STUCK]
-    return np.asarray(
-        place[order][spread(place[order], np.zeros(len(order), np.intp), -(-size.first // kinds))], np.float64
-    )
+    place, found = place[order], list[int]()
+    swings = rows.own.swings(rows.own.placed(place))
+    classes = _Classes.between(swings[: len(swings) // 4])
+    number = classes.of(swings)
+    for k in range(CLASSES):
+        own = np.flatnonzero(number == k)
+        found += own[spread(place[own], number[own], -(-size.first // (kinds * CLASSES)))].tolist()
+    return np.asarray(place[sorted(found)], np.float64), classes
 
 
 def _children(
     rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int
 ) -> Array:
-    """Places with stage 1 of one parent and the guide of another, slightly varied.
+    """Places of children: the best of many tries for each, by what they are worth before any descent.
 
-    Offsets whose bounds lie on both sides of zero alike change their side in every second child: a crank-rocker and
-    its mirror image move alike.
+    Most of them are stage 1 of one parent and the guide of another, slightly varied, a sixth is stage 1 of a parent
+    with a guide at random, a sixth the guide of a parent with a stage 1 at random.
     """
     if not own:
         return np.empty((0, len(rows.own.columns)))
-    wanted, count = count, count * TRIES
-    drivers = np.array([parents[k].place for k in rng.integers(0, len(parents), count)])
-    places = np.array([own[k].place for k in rng.integers(0, len(own), count)])
-    places[:, rows.driving] = drivers[:, rows.driving]
-    other = (rng.random(count) < 0.5)[:, None] & rows.mirrored[None, :]
+    few = count // 6
+    drivers = np.array([p.place for p in parents])[rng.integers(0, len(parents), few)]
+    guides = np.array([p.place for p in own])[rng.integers(0, len(own), few)]
+    found = [_mixed(rows, own, parents, rng, count - 2 * few)]
+    for kept, part in ((drivers, ~rows.driving), (guides, rows.driving)):
+        places = np.repeat(kept[:, None], STRANGERS, axis=1)
+        places[:, :, part] = rng.random((few, STRANGERS, int(part.sum())))
+        found.append(_best(rows, places))
+    return np.concatenate(found)
+
+
+def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int) -> Array:
+    """Places with stage 1 of one parent and the guide of another, slightly varied.
+
+    Offsets whose bounds lie on both sides of zero alike change their side in every second try: a crank-rocker and
+    its mirror image move alike.
+    """
+    guide = rng.integers(0, len(own), count)
+    # Among all drivers the best try would be that of the same valley nearly every time.
+    driver = np.repeat(rng.integers(0, len(parents), (count, DRIVERS)), TRIES // DRIVERS, axis=1)
+    places = np.repeat(np.array([p.place for p in own])[guide][:, None], TRIES, axis=1)
+    places[:, :, rows.driving] = np.array([p.place for p in parents])[driver][:, :, rows.driving]
+    other = (rng.random((count, TRIES)) < 0.5)[:, :, None] & rows.mirrored
     places = np.where(other, 1.0 - places, places)
-    spread_by = np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)]
-    places = places + spread_by[:, None] * rng.standard_normal(places.shape)
-    places = rows.wrapped(places).reshape(wanted, TRIES, -1)
-    worth = rows.begun(rows.without_middle(places.reshape(count, -1)))[1].reshape(wanted, TRIES)
-    return np.asarray(places[np.arange(wanted), np.argmin(worth >= STUCK, axis=1)], np.float64)
+    # A parent put together as it was only ends where it stands.
+    numbers = np.array([next(k for k, p in enumerate(parents) if p is end) for end in own])
+    same = driver == numbers[guide][:, None]
+    spread_by = np.where(same, MUTATIONS[-1], np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)][:, None])
+    return _best(rows, places + spread_by[:, :, None] * rng.standard_normal(places.shape))
+
+
+def _best(rows: PoseRows, tries: Array) -> Array:
+    """Return the best try of each child: places (count, n) of (count, tries, n)."""
+    places = rows.wrapped(tries.reshape(-1, tries.shape[2]))
+    worth = rows.begun(rows.without_middle(places))[1].reshape(tries.shape[:2])
+    return np.asarray(places.reshape(tries.shape)[np.arange(len(tries)), np.argmin(worth, axis=1)], np.float64)
 
 
 def _descended(
-    rows: PoseRows, kind: int, places: Array, size: Size, stop: Callable[[], bool]
+    rows: PoseRows, kind: int, places: Array, classes: _Classes, size: Size, stop: Callable[[], bool]
 ) -> tuple[list[_End], int]:
-    """Where descents from some places end, the worse half given up after a heat; and how many looks that took."""
+    """Where descents from some places end, the worse half given up after a heat; and how many looks that took.
+
+    Each class of swings has its own worse half.
+    """
     if not len(places):
         return [], 0
     many = Abreast(rows, rows.without_middle(places))
     many.advance(size.heat, stop)
-    many.keep(np.argsort(many.worth, kind="stable")[: -(-len(places) // 2)])
+    own = classes.of(rows.own.swings(rows.own.placed(many.places)))
+    order = np.argsort(many.worth, kind="stable")
+    better = [some[: -(-len(some) // 2)] for some in (order[own[order] == number] for number in range(CLASSES))]
+    many.keep(np.sort(np.concatenate(better)))
     many.advance(size.steps - size.heat, stop)
     designs, there = rows.designs(many.places, many.x), rows.with_middle(many.places)
+    swings = rows.own.swings(designs)
     known = np.flatnonzero(many.worth < STUCK)
-    return [_End(float(many.worth[k]), kind, there[k], designs[k]) for k in known], many.looks
+    return [_End(float(many.worth[k]), kind, there[k], designs[k], float(swings[k])) for k in known], many.looks
+
+
+class _Classes(NamedTuple):
+    """Classes of swings, equal on a log scale between those of useful mechanisms; beyond these are the outer ones."""
+
+    low: float
+    high: float
+
+    @classmethod
+    def between(cls, swings: Array) -> _Classes:
+        """Return the classes from the smallest to the largest of some swings."""
+        known = swings[swings > SMALLEST]
+        return cls(float(known.min(initial=math.inf)), float(known.max(initial=0.0)))
+
+    def of(self, swings: Array) -> NDArray[np.intp]:
+        """Return the class (k,) of each swing."""
+        if not self.low < self.high:
+            return np.zeros(len(swings), np.intp)
+        # numpy's logarithm depends on the processor, that of the C library does not
+        place = np.array([math.log(max(x, SMALLEST) / self.low) for x in swings.tolist()])
+        place *= CLASSES / math.log(self.high / self.low)
+        return np.asarray(np.clip(place, 0.0, CLASSES - 1.0), np.intp)
 
 
 def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[_End]:
-    """Return the best ends, at most so many of the same signs,
+    """Return the best ends, half as many as said of the same signs, and the best of each class of swings,
     no two of which have the same value or nearly the same guide.
 
-    Else the many that stopped on their way down one valley would take the places of all others.
+    Else the many that stopped on their way down one valley would take the places of all others, and guides that
+    suit large swings those of all that suit small ones.
     """
     found: list[_End] = []
+    beside: Counter[tuple[int, int]] = Counter()
+    first: Counter[int] = Counter()
     least = NICHE * math.sqrt(int(guide.sum()) / 6.0)
-    for end in sorted(ends, key=lambda end: end.worth):
+    useful = sorted(ends, key=lambda end: end.worth)
+    useful = [end for end in useful if end.worth < USELESS * useful[0].worth]
+    swings = np.array([end.swing for end in useful])
+    classes = dict(zip(map(id, useful), _Classes.between(swings).of(swings).tolist(), strict=True))
+    for end in useful:
         own = [p for p in found if p.kind == end.kind]
         alike = any(
             abs(end.worth - p.worth) <= 2.0 * AGREE * abs(p.worth)
             or math.sqrt(float(((end.place - p.place)[guide] ** 2).sum())) < least
             for p in own
         )
-        if not alike and len(own) < most and end.worth < USELESS * (found or [end])[0].worth:
+        place = (end.kind, classes[id(end)])
+        if not alike and (first[end.kind] < most // 2 or beside[place] < -(-most // (2 * CLASSES))):
+            first[end.kind] += 1
+            beside[place] += 1
             found.append(end)
     return found
 
@@ -203,7 +276,7 @@ def bred(
     enough : asked after every six of them whether they tell enough
     size : of each
     """
-    task, ended, found = _Population(linear, tuple(signs), seed, size), itertools.count(1), list[Bred]()
+    task, ended, found = Population(linear, tuple(signs), seed, size), itertools.count(1), list[Bred]()
     say("global search", 0, most, "populations")
     for first in range(0, most, TOGETHER):
         numbers = list(range(first, min(first + TOGETHER, most)))

@@ -10,6 +10,7 @@ import numpy as np
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, unsaid
+from sweep.optimise.certificate import Result
 from sweep.optimise.filling import kinds
 from sweep.optimise.generations import TOGETHER, Bred, bred
 from sweep.optimise.linear import NEEDED, Elimination, elimination
@@ -76,8 +77,7 @@ def proportion_starts(
         new = [one.designs[0] for one in found[-TOGETHER:] if len(one.designs)]
         if not new:
             return False
-        task = SearchTask(holding(study, problem, np.array(new)), np.array(new), settings.looks)
-        ends.extend(r.objective for r in spread_over(task, list(range(len(new))), stop, jobs) if r.feasible)
+        ends.extend(r.objective for r in searched(study, problem, np.array(new), settings, stop, jobs) if r.feasible)
         return settled(ends, settings.unseen)
 
     most = max(1, count - len(own))
@@ -101,6 +101,14 @@ def proportion_starts(
         allowed = "proportions with which the mechanism turns"
         raise InputError("design space", study.space.count, allowed, str(study.path))
     return Begun(holding(study, problem, found), starts, tuple([k for k, _ in first] + [-1] * len(own)))
+
+
+def searched(
+    study: Study, problem: Problem, designs: Array, settings: OptimiseSettings, stop: Callable[[], bool], jobs: int
+) -> list[Result]:
+    """Return where the local search ends from designs (k, P), by which populations are told apart."""
+    task = SearchTask(holding(study, problem, designs), designs, settings.looks)
+    return spread_over(task, list(range(len(designs))), stop, jobs)
 
 
 def insensitive(

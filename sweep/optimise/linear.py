@@ -95,12 +95,12 @@ class Elimination:
         motion, bounds, need, least, price = self._posed(designs)
         bound = float(bounds.max(initial=0.0))
         x, t, v = _minimised(motion, bounds, need, least, price)
-        out = self._finished(designs, x)
+        out = self.finished(designs, x)
         if self.sigma is not None and self.bound is not None:
             for _ in range(PASSES):
                 across, along = self._rooms(out, motion)
                 x, t, v = _minimised(motion, bounds - across, need + along, least, price)
-                out = self._finished(designs, x)
+                out = self.finished(designs, x)
             # What counts is the room that this solution needs, not the one before.
             across, along = self._rooms(out, motion)
             off = np.abs((motion.across * x[:, None, :]).sum(axis=2)) + across - bound
@@ -148,8 +148,8 @@ class Elimination:
         rows = [by, bx, dy, dx, offset] if across else [bx, -by, dx, -dy, zero]
         return np.ascontiguousarray(np.stack(rows, axis=2))
 
-    def _finished(self, designs: Array, x: Array) -> Array:
-        """Designs with the point, line and scale that belong to the unknowns."""
+    def finished(self, designs: Array, x: Array) -> Array:
+        """Return designs (n, P) with the point, line and scale that belong to the unknowns (n, 5)."""
         scale: Array = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
         scale[scale < SMALLEST] = np.nan  # a guide without size is no solution, and its poses are undefined
         along, aside, line, offset = (

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kernels import status as st
-from sweep.optimise.candidates import from_sample
+from sweep.optimise.candidates import from_sample, from_samples
 from sweep.optimise.certificate import Result
 from sweep.optimise.eliminate import on_locus
 from sweep.optimise.problem import Problem
-from sweep.optimise.solve import minimise, ranked
+from sweep.optimise.solve import explore, minimise, ranked
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings
@@ -27,7 +27,7 @@ def optimum(
     jobs: int = 1,
 ) -> list[Result]:
     """Return the best designs of a problem:
-    equations eliminated where they can be, a sample, local searches from the best of it.
+    equations eliminated where they can be, samples, local searches from the best of each.
 
     Where no start becomes feasible the equations may give way as well: a second search, in the parameters themselves,
     begins from the least infeasible design and a sample; of both searches the smallest relaxation comes first.
@@ -36,7 +36,7 @@ def optimum(
     ----------
     problem : in the parameters themselves
     signs : combinations of the parameters that are not varied, as ``[{"branch": 1.0}, {"branch": -1.0}]``
-    settings : the most starts of each search, seed of the sample, what ends a search earlier
+    settings : the most starts of each search, seed of the samples, what ends a search earlier
     stop, jobs : as for ``minimise``
 
     Returns
@@ -49,8 +49,10 @@ def optimum(
         if there is no start, or a name of the problem is unknown.
     """
     searched = on_locus(problem)
-    starts = from_sample(searched, signs, settings.starts, settings.seed)
-    results = minimise(searched, starts, settings, stop, jobs) if len(starts) or searched is problem else []
+    starts, samples = from_samples(searched, signs, settings.starts, settings.seed)
+    results: list[Result] = []
+    if len(starts) or searched is problem:
+        results, _ = explore(searched, starts, settings, stop, jobs, samples=samples)
     if searched is problem or any(result.status != st.LIMIT_EXCEEDED for result in results):
         return results
     near = [result.design for result in results[:1]]

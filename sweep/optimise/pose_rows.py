@@ -57,6 +57,25 @@ class _Curve:
     at: str = "every"
 
 
+@dataclass(frozen=True)
+class _Part:
+    """Rows of some curves: the pose outputs they need, and which of them go around a turn."""
+
+    curves: tuple[_Curve, ...]
+    outputs: frozenset[str]
+    turns: Turns
+
+    @classmethod
+    def of(cls, curves: tuple[_Curve, ...], others: frozenset[str]) -> _Part:
+        """Return the part of these curves; ``others`` are outputs that are needed beside theirs."""
+        turns, r = [np.arange(POSES), np.arange(POSES, 2 * POSES)], 2 * POSES
+        for curve in curves:
+            count = POSES if curve.at == "every" else 1
+            turns += [np.arange(r, r + count)] if count == POSES else []
+            r += count
+        return cls(curves, others | {curve.output for curve in curves}, Turns.of(np.array(turns)))
+
+
 class PoseRows:
     """The rows of a problem at fixed poses, as functions of places between 0 and 1 and of the five linear unknowns.
 
@@ -81,7 +100,9 @@ class PoseRows:
                 for bound, upper in ((limit.minimum, False), (limit.maximum, True)):
                     if bound is not None:
                         curves += _rows_of(found, found.to_inner(float(bound)), upper, off)
-        self.curves = tuple(curves)
+        basic = frozenset({self.objective, linear.position})
+        self.whole = _Part.of(tuple(curves), basic)
+        self.turns = self.whole.turns
         names = problem.family.parameter_names
         self.links = [names.index(name) for name in linear.links]
         self.fitted = [linear.column(n) for n in (*linear.guide.arms, linear.guide.direction, linear.guide.offset)]
@@ -90,38 +111,35 @@ class PoseRows:
             for name in linear.links
             for k in [problem.variables.index(name)]
         ]
-        self.outputs = frozenset({self.objective, linear.position, *(c.output for c in curves)})
-        # Rows whose size is a length grow with the linear unknowns: they belong into the linear program.
         # Places of stage 1, those of them that may change their side, and that of the angle between the stages.
         self.driving = np.array([c < len(self.own.driver.parameters) for c in self.own.columns])
         own = self.own
         self.mirrored = self.driving & (own.low == -own.high)
         self.turning = own.columns.index(own.offset) if own.offset >= 0 else -1
+        # Rows whose size is a length grow with the linear unknowns: they belong into the linear program.
+        units = {o.name: o.unit for o in self.family.pose_outputs}
+        grow = [c for c in curves if units[c.output] == "length" and c.output not in self.loops]
+        self.mended = _Part.of(tuple(c for c in grow if c.at in ("every", "range")), basic)
         self._sort_rows()
 
     def _sort_rows(self) -> None:
-        """Which rows the linear unknowns can mend by themselves: those of lengths, at every pose or for a range."""
-        units = {o.name: o.unit for o in self.family.pose_outputs}
+        """Which rows of the linear part are bounds that may be missed, and which are needs."""
         soft: list[int] = []
         above: list[float] = []
         need: list[tuple[int, float]] = []
-        turns = [np.arange(POSES), np.arange(POSES, 2 * POSES)]
         r = 2 * POSES
-        for curve in self.curves:
+        for curve in self.mended.curves:
             count = POSES if curve.at == "every" else 1
-            if units[curve.output] == "length" and curve.output not in self.loops and curve.at in ("every", "range"):
-                if curve.at == "range" and curve.sign < 0.0:
-                    need.append((r, -curve.bound / curve.size))
-                else:
-                    soft += range(r, r + count)
-                    above += [curve.bound / curve.size] * count
-            turns += [np.arange(r, r + count)] if count == POSES else []
+            if curve.at == "range" and curve.sign < 0.0:
+                need.append((r, -curve.bound / curve.size))
+            else:
+                soft += range(r, r + count)
+                above += [curve.bound / curve.size] * count
             r += count
         for _ in self.lengths:
             soft += [r, r + 1]
             above += [-1.0, 1.0]
             r += 2
-        self.turns = Turns.of(np.array(turns))
         self.soft, self.above = np.array(soft, np.intp), np.array(above)
         self.needed = np.array([k for k, _ in need], np.intp)
         self.need = np.array([x for _, x in need])
@@ -148,16 +166,7 @@ class PoseRows:
 
     def designs(self, places: Array, x: Array) -> Array:
         """Designs (k, P) at places (k, n) with linear unknowns (k, 5)."""
-        linear, out = self.linear, self.own.placed(places)
-        scale = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
-        arm = out[:, self.links[1]] / scale
-        out[:, self.links] *= scale[:, None]
-        along, aside, line, offset = self.fitted
-        out[:, along] = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * arm
-        out[:, aside] = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * arm
-        out[:, line] = linear.turned(np.array([math.atan2(-v, u) for u, v in x[:, :2]]))
-        out[:, offset] = x[:, 4]
-        return out
+        return self.linear.finished(self.own.placed(places), x)
 
     def tangents(self, places: Array, x: Array) -> Array:
         """Return derivatives (k, n + 5, P) of the designs by their places and linear unknowns."""
@@ -189,37 +198,40 @@ class PoseRows:
         """Return the linear unknowns (k, 5) that are best for some proportions, nan where nothing is."""
         return self.linear.unknowns(self.own.placed(places))
 
-    def rows(self, places: Array, x: Array, linear_part: bool = False) -> Rows:
-        """Rows of designs at places (k, n) with unknowns (k, 5), and gradients by both or by the unknowns alone."""
-        k, n = places.shape
-        tangents = self.tangents(places, x)[:, n if linear_part else 0 :]
-        m = tangents.shape[1]
+    def rows(self, places: Array, x: Array) -> Rows:
+        """Rows of designs at places (k, n) with unknowns (k, 5), and their gradients by both."""
+        return self._rows(places, x, self.tangents(places, x), self.whole)
+
+    def _rows(self, places: Array, x: Array, tangents: Array, part: _Part) -> Rows:
+        """Rows of a part, and their gradients along ``tangents`` (k, m, P)."""
+        k, m = tangents.shape[:2]
         real = self.designs(places, x)
         designs = np.repeat(real, m, axis=0).astype(np.complex128)
         designs.imag = STEP * tangents.reshape(k * m, -1)
         with np.errstate(all="ignore"):  # what does not turn has nan, and is worth nothing
-            found = self.family.poses(np.ascontiguousarray(designs), COMPLEX_TURN, self.outputs)
-            columns = {name: found[name].real[::m] for name in self.outputs}
-            moved = {name: found[name].imag.reshape(k, m, -1) / STEP for name in self.outputs}
-            for name, loop in self.loops.items():
+            found = self.family.poses(np.ascontiguousarray(designs), COMPLEX_TURN, part.outputs)
+            columns = {name: found[name].real[::m] for name in part.outputs}
+            moved = {name: found[name].imag.reshape(k, m, -1) / STEP for name in part.outputs}
+            for name in part.outputs.intersection(self.loops):
                 # Products of numpy's complex numbers depend on the processor, those of Python's do not.
-                scale = loop.scale(designs.astype(object)).astype(np.complex128).reshape(k, m, 1)
+                scale = self.loops[name].scale(designs.astype(object)).astype(np.complex128).reshape(k, m, 1)
                 columns[name] = columns[name] / scale.real[:, 0]
                 moved[name] = (moved[name] - columns[name][:, None] * (scale.imag / STEP)) / scale.real
-            ends = self._ends(columns)
-            values = np.concatenate(self._pieces(columns, real, ends, 1.0), axis=1)
-            turned = {name: moved[name].reshape(k * m, -1) for name in self.outputs}
+            ends = self._ends(columns, part)
+            values = np.concatenate(self._pieces(columns, real, ends, 1.0, part), axis=1)
+            turned = {name: moved[name].reshape(k * m, -1) for name in part.outputs}
             every = {name: (high.repeated(m), low.repeated(m)) for name, (high, low) in ends.items()}
-            pieces = self._pieces(turned, tangents.reshape(k * m, -1), every, 0.0)
+            pieces = self._pieces(turned, tangents.reshape(k * m, -1), every, 0.0, part)
         slopes = np.ascontiguousarray(np.concatenate(pieces, axis=1).reshape(k, m, -1).transpose(0, 2, 1))
-        sharp = self.turns.sharpened(values, slopes)
+        sharp = part.turns.sharpened(values, slopes)
         return Rows(sharp, slopes, -sharp[:, : 2 * POSES].min(axis=1))
 
     def solved(self, places: Array, x: Array) -> Array:
         """Return the best linear unknowns (k, 5) of some proportions,
         limits that bend taken for straight about ``x``.
         """
-        slopes = self.rows(places, x, linear_part=True).slopes
+        own = self.tangents(places, x)[:, places.shape[1] :]
+        slopes = self._rows(places, x, own, self.mended).slopes
         k = len(places)
         bound = np.repeat(np.stack([np.full(len(self.above), np.inf), self.above])[None], k, axis=0)
         found, t, v = np.empty((k, UNKNOWNS)), np.empty(k), np.empty(k)
@@ -238,20 +250,21 @@ class PoseRows:
     def begun(self, places: Array) -> tuple[Array, Array]:
         """Return the best linear unknowns (k, 5) of some proportions, and what the designs are worth (k,)."""
         x = self.unknowns(places)
-        known = np.asarray(np.isfinite(x).all(axis=1), np.bool_)
+        known, worth = np.asarray(np.isfinite(x).all(axis=1), np.bool_), np.full(len(places), np.inf)
         x = np.where(known[:, None], x, 1.0)
-        return x, np.asarray(np.where(known, self.worth(places, x), np.inf), np.float64)
+        worth[known] = self.worth(places[known], x[known])
+        return x, worth
 
     def values(self, places: Array, x: Array) -> Array:
         """Values of the rows (k, r), those of the objective for t = 0."""
         designs = self.designs(places, x)
         with np.errstate(all="ignore"):
-            found = self.family.poses(np.ascontiguousarray(designs), REAL_TURN, self.outputs)
-            columns = {name: np.asarray(found[name], np.float64) for name in self.outputs}
+            found = self.family.poses(np.ascontiguousarray(designs), REAL_TURN, self.whole.outputs)
+            columns = {name: np.asarray(found[name], np.float64) for name in self.whole.outputs}
             for name, loop in self.loops.items():
                 columns[name] = columns[name] / loop.scale(designs)[:, None]
             return self.turns.sharpened(
-                np.concatenate(self._pieces(columns, designs, self._ends(columns), 1.0), axis=1)
+                np.concatenate(self._pieces(columns, designs, self._ends(columns, self.whole), 1.0, self.whole), axis=1)
             )
 
     def judged(self, values: Array) -> Array:
@@ -262,13 +275,18 @@ class PoseRows:
         turns = np.isfinite(worth) & (margins > 0.0)
         return np.asarray(np.where(turns, worth, LOCKED * (2.0 - np.maximum(np.nan_to_num(margins, nan=-1e3), -1e3))))
 
-    def _ends(self, columns: Mapping[str, Array]) -> dict[str, tuple[End, End]]:
+    def _ends(self, columns: Mapping[str, Array], part: _Part) -> dict[str, tuple[End, End]]:
         """Where outputs are highest and lowest, of those whose ends are limited."""
-        limited = {curve.output for curve in self.curves if curve.at != "every"}
+        limited = {curve.output for curve in part.curves if curve.at != "every"}
         return {name: (End.of(-columns[name]), End.of(columns[name])) for name in limited}
 
     def _pieces(
-        self, columns: Mapping[str, Array], designs: Array, ends: Mapping[str, tuple[End, End]], one: float
+        self,
+        columns: Mapping[str, Array],
+        designs: Array,
+        ends: Mapping[str, tuple[End, End]],
+        one: float,
+        part: _Part,
     ) -> list[Array]:
         """Return the rows (k, .) one limit after the other, those of the objective first, of outputs and designs.
 
@@ -276,7 +294,7 @@ class PoseRows:
         """
         own = columns[self.objective]
         out = [-own, own]
-        for curve in self.curves:
+        for curve in part.curves:
             y = columns[curve.output]
             if curve.at != "every":
                 high, low = (end.value(y) for end in ends[curve.output])

@@ -14,7 +14,7 @@ from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.candidates import ranking
 from sweep.optimise.coordinates import LocusCoordinates
 from sweep.optimise.discrete import listed
-from sweep.optimise.filling import filled
+from sweep.optimise.filling import apart, filled
 from sweep.optimise.globally import Begun, holding, proportion_starts
 from sweep.optimise.problem import Problem
 from sweep.optimise.starts import ALIKE, best_rows, diverse, drawn, of_task
@@ -132,9 +132,10 @@ def problem_and_starts(
 ) -> tuple[OptimiseSettings, Begun]:
     """Return settings, problem and starts: the diverse best of the dataset, filled up from samples if too few.
 
-    Where no row of the dataset is feasible, the first starts are the best of random designs.  The mechanisms that do
-    the study's [task] come before all others.  With ``optimise.global = "proportions"`` five of six starts come from
-    the search over proportions instead, in ``jobs`` processes; ``stop`` ends it early.
+    On the locus half of the starts come from samples in any case.  Where no row of the dataset is feasible, the first
+    starts are the best of random designs.  The mechanisms that do the study's [task] come before all others.  With
+    ``optimise.global = "proportions"`` five of six starts come from the search over proportions instead, in ``jobs``
+    processes; ``stop`` ends it early.
     """
     settings, begun = _problem_and_starts(study, folder, stop, jobs, say)
     first = of_task(study, settings.starts, settings.seed)
@@ -190,8 +191,13 @@ def _problem_and_starts(
         return settings, proportion_starts(study, settings, problem_of(study, known), known, merit, stop, jobs, say)
     if len(designs):
         problem = problem_of(study, designs)
-        own = diverse(problem, designs, merit, count, ALIKE)
-        return settings, Begun(problem, filled(study, problem, own, count, seed))
+        # On the locus samples cost next to nothing, and reach the bounds, where a sweep may have no design at all.
+        sampled = count // 2 if problem.coordinates is not None and study.fit is None else 0
+        own = diverse(problem, designs, merit, count - sampled, ALIKE)
+        starts = filled(study, problem, own, count, seed)
+        if len(starts) < count:
+            starts = apart(problem, starts, diverse(problem, designs, merit, count, ALIKE), count)
+        return settings, Begun(problem, starts)
     designs = drawn(study, count, seed)
     if not len(designs):
         raise _nothing(study)

@@ -74,17 +74,25 @@ class Proportions:
         low, wide = self.low[self.log], np.array([math.log(x) for x in self.high[self.log] / self.low[self.log]])
         # numpy's exponential depends on the processor, that of the C library does not
         grown = [math.exp(x) for x in (places[:, self.log] * wide).ravel()]
-        values[:, self.log] = low * np.reshape(grown, (len(places), -1))
+        values[:, self.log] = low * np.reshape(grown, (len(places), len(wide)))
         designs = np.repeat(self.base[None, :], len(places), axis=0)
         designs[:, self.columns] = values
         return designs
 
     def middles(self, designs: Array) -> Array:
         """Middle of the guide's input angles (k,) for an offset of zero, which only stage 1 decides; 0 without one."""
+        return self._driven(designs)[0]
+
+    def swings(self, designs: Array) -> Array:
+        """Return the range (k,) of the guide's input angles; 0 where stage 1 does not turn."""
+        return self._driven(designs)[1]
+
+    def _driven(self, designs: Array) -> tuple[Array, Array]:
         upstream = np.ascontiguousarray(designs[:, : len(self.driver.parameters)])
         found = design_outputs(self.driver, upstream, ("psi_ext", "swing"), MIDDLE)
-        middle = np.asarray(found["psi_ext"], np.float64) + 0.5 * np.asarray(found["swing"], np.float64)
-        return np.asarray(np.nan_to_num(middle), np.float64)
+        swing = np.asarray(found["swing"], np.float64)
+        middle = np.asarray(found["psi_ext"], np.float64) + 0.5 * swing
+        return np.nan_to_num(middle), np.nan_to_num(np.abs(swing))
 
     def merit(self, places: Array) -> Array:
         """Return the least objective for these proportions, plus what missed limits cost (k,)."""

@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 
 from sweep.families.base import Array
 from sweep.optimise.certificate import Result
+from sweep.optimise.drawn_in import Levels, bounded, excesses, keyed, prices, with_room
 from sweep.optimise.form import Program
 from sweep.optimise.model import Model
 from sweep.optimise.parallel import spread_over
 from sweep.optimise.problem import Problem
-from sweep.optimise.rooms import Room, allowances, curves_with_room, rooms
 from sweep.optimise.search import search
-from sweep.optimise.sensitivity import sensitivities
+from sweep.optimise.shares import shared_out
 from sweep.optimise.survey import CUT
-from sweep.optimise.tolerance import SIGMAS, deviating, touched
+from sweep.optimise.tolerance import deviating
 
 if TYPE_CHECKING:
-    from sweep.study import Limit, OptimiseSettings, Tolerance
+    from sweep.study import OptimiseSettings, Tolerance
 
 SAMPLES = 8192  # a power of two: the share of 95 % is good to 0.25 %
 BOTH = 4.0  # ways in which a design misses a limit that know little of each other, to begin with
@@ -35,10 +35,15 @@ ROUNDS, CORRECTIONS = 4, 10  # of search with the room of the design before; of 
 ONCE = 2  # looks that say how good a design is
 STAYED = 1e-3  # step of a design that the room and the share agree on
 RADIUS = 0.15  # of the first rounds, in scaled variables
-CLOSE = 3.0  # rooms from its bound at which the slopes of a limit's room are still asked for
 SETTLED = 1e-5  # step of a round, in scaled variables
 NEARLY = 1e-4  # scaled violation of a design whose objective counts
 ALIKE = 0.02  # greatest distance in scaled variables of designs that are taken for one
+REACH, FADING = (
+    0.6,
+    0.7,
+)  # distance of two limits' numbers of standard deviations in the first correction; of later ones
+LEAP, AMPLE = 1.0, 4.0  # of a correction at most; standard deviations that hardly anything exceeds
+SAVED = 2e-6  # of the objective that another share-out should save, below which it is as good as it gets
 ENOUGH = 0.0005  # by so much the sampled share may exceed the wanted one; 0.003 cost 0.02 % of acceleration
 
 
@@ -65,12 +70,6 @@ def kept(problem: Problem, designs: Array) -> tuple[dict[str, Array], NDArray[np
     return {name: compared(name, np.asarray(found[name], np.float64)) for name in names}, good
 
 
-def bounded(problem: Problem) -> list[Limit]:
-    """Return the limits on outputs that leave room; those on parameters are about the drawing."""
-    own = [x for x in problem.limits if x.output not in problem.family.parameter_names]
-    return [x for x in own if x.minimum is None or x.minimum != x.maximum]
-
-
 def robust(
     problem: Problem,
     results: Sequence[Result],
@@ -83,10 +82,11 @@ def robust(
 ) -> Robust | None:
     """Return the best design of which the wanted share of toleranced mechanisms keeps all limits.
 
-    Every limit gives up the room that the tolerances need, a number of standard deviations: of curves it is followed
-    along the turn, and to first order as the design changes, so the search trades acceleration for insensitivity; of
-    other outputs it is a fixed amount.  Rounds of search with the room of the design before end where the design stays.
-    The number of standard deviations is corrected until the share of a sample holds.
+    Every limit gives up the room that the tolerances need, a number of standard deviations of its own: of curves it is
+    followed along the turn, and to first order as the design changes, so the search trades acceleration for
+    insensitivity; of other outputs it is a fixed amount.  Rounds of search with the room of the design before end where
+    the design stays.  The numbers are corrected until the share of a sample holds, and until no other way to spend what
+    may miss its limits is cheaper.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def robust(
     """
     heads: list[Result] = []
     for result in results:
-        if result.feasible and result.ended not in (*CUT, "left") and result.basin not in [h.basin for h in heads]:
+        if result.feasible and result.ended not in CUT and result.basin not in [h.basin for h in heads]:
             heads.append(result)
     heads = heads[:TRIED]
     number = 1 + max((r.start for r in results), default=-1)
@@ -177,7 +177,7 @@ class _Approach:
             start,
             self.designs[number],
             self.tolerance,
-            self.level,
+            dict.fromkeys(keyed(self.problem).values(), self.level),
             should_stop,
             ROUNDS,
             self.looks,
@@ -187,7 +187,7 @@ class _Approach:
 
 @dataclass(frozen=True)
 class _Calibrate:
-    """The rest of the way, and the number of standard deviations that the share needs: a task for processes."""
+    """The rest of the way, and how many standard deviations each limit gives up: a task for processes."""
 
     problem: Problem
     results: tuple[Result, ...]
@@ -197,35 +197,54 @@ class _Calibrate:
     looks: int
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Robust:
-        head, level, wanted = self.results[number], self.level, self.tolerance.robust or 0.0
-        best = Robust(head, self._share(head.design), True)
-        design, radius = head.design, RADIUS
+        head, wanted = self.results[number], self.tolerance.robust or 0.0
+        levels: Levels = dict.fromkeys(keyed(self.problem).values(), self.level)
+        best = Robust(head, _share(self.problem, head.design, self.tolerance, self.seed), True)
+        design, radius, reach = head.design, RADIUS, REACH
         for _ in range(CORRECTIONS):
             if should_stop():
                 return replace(best, cut=True)
             result, radius, step = _approached(
-                self.problem, head.start, design, self.tolerance, level, should_stop, ROUNDS, self.looks, radius
+                self.problem, head.start, design, self.tolerance, levels, should_stop, ROUNDS, self.looks, radius
             )
-            design, share = result.design, self._share(result.design)
+            design = result.design
+            values, share = self._made(design)
             better = share >= wanted and (best.share < wanted or result.objective < best.result.objective)
             if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
                 best = Robust(replace(result, agree=head.agree), share, result.ended in CUT)
-            if wanted <= share <= wanted + ENOUGH:
-                if step < STAYED:
-                    break
-            else:
-                level = max(level + _quantile(wanted + 0.5 * ENOUGH) - _quantile(share), 0.0)
+            levels, saved = self._corrected(design, levels, values, reach)
+            if wanted <= share <= wanted + ENOUGH and step < STAYED and saved < SAVED:
+                break
+            reach *= FADING
         nominal = Model(self.problem, Program(self.problem), best.result.design, _never)
         state = nominal.state(self.problem.scaled(best.result.design[None, :])[0])
         return replace(best, result=replace(best.result, violation=state.violation, relaxation={}))
 
-    def _share(self, design: Array) -> float:
-        return _share(self.problem, design, self.tolerance, self.seed)
+    def _corrected(
+        self, design: Array, levels: Levels, values: Mapping[str, Array], reach: float
+    ) -> tuple[Levels, float]:
+        """Return the numbers of standard deviations that share out what may miss best,
+        and by what part of itself the objective should fall.
+        """
+        known = prices(self.problem, design, self.tolerance, levels)
+        found = excesses(self.problem, values, known)
+        if not levels:
+            return levels, 0.0
+        keys, wanted = list(levels), (self.tolerance.robust or 0.0) + 0.5 * ENOUGH
+        excess = np.stack([found[key][1:] for key in keys], axis=1)
+        shifts, saved = shared_out(excess, np.array([known[key].price for key in keys]), wanted, reach)
+        out = {}
+        for key, shift in zip(keys, shifts.tolist(), strict=True):
+            # A limit that nothing presses against has more room than it was asked for.
+            now = levels[key] if known[key].price > 0.0 else max(levels[key], -float(found[key][0]))
+            out[key] = min(max(now + min(shift, LEAP), 0.0), AMPLE)
+        return out, saved
 
-
-def _quantile(share: float) -> float:
-    """Return standard deviations within which so large a share stays, if limits are missed in a few ways."""
-    return NormalDist().inv_cdf(1.0 - (1.0 - min(max(share, 0.5), 1.0 - 0.5 / SAMPLES)) / BOTH)
+    def _made(self, design: Array) -> tuple[dict[str, Array], float]:
+        """Return limited outputs of a design and of mechanisms about it, and the share of these that keeps limits."""
+        about = deviating(self.problem.family, design, self.tolerance, self.seed, SAMPLES)
+        values, good = kept(self.problem, np.concatenate([design[None, :], about]))
+        return values, float(good[1:].mean())
 
 
 def _approached(
@@ -233,7 +252,7 @@ def _approached(
     number: int,
     design: Array,
     tolerance: Tolerance,
-    level: float,
+    levels: Levels,
     asked: Callable[[], bool],
     rounds: int,
     looks: int,
@@ -247,7 +266,7 @@ def _approached(
     """
     total, step, room_of, before = 0, math.inf, design, np.zeros(len(problem.variables))
     for _ in range(rounds):
-        result = search(number, _with_room(problem, design, tolerance, level, radius), design, asked, looks)
+        result = search(number, with_room(problem, design, tolerance, levels, radius), design, asked, looks)
         total += result.looks
         move = (problem.scaled(result.design[None, :]) - problem.scaled(design[None, :]))[0]
         step, room_of, design = float(np.abs(move).max()), design, result.design
@@ -260,75 +279,13 @@ def _approached(
             radius = min(2.0 * radius, RADIUS)
         before = move
     # Bounds of the last round may hold the design where those of the problem do not.
-    whole = search(number, _with_room(problem, room_of, tolerance, level, None), design, asked, ONCE)
+    whole = search(number, with_room(problem, room_of, tolerance, levels, None), design, asked, ONCE)
     kept_ended = result.ended if whole.ended == "looks" else whole.ended
     return replace(whole, looks=total, ended=kept_ended), radius, step
 
 
-def _with_room(problem: Problem, design: Array, tolerance: Tolerance, level: float, radius: float | None) -> Problem:
-    """Return the problem with the room that this design needs taken from its limits,
-    within a distance in scaled variables.
-    """
-    sigma = touched(problem.family, tolerance) / SIGMAS
-    along = curves_with_room(problem)
-    curves = rooms(problem, design, sigma, level, set(along.values()))
-    fixed = _fixed_rooms(problem, design, sigma, level, _others(problem, along, curves))
-    limits = tuple(_drawn_in(x, fixed) for x in problem.limits)
-    close = [x.output for x in problem.limits if x.output in fixed and _close(x, *fixed[x.output])]
-    given = allowances(
-        problem, design, lambda row: {k: v[0] for k, v in _fixed_rooms(problem, row, sigma, level, close).items()}
-    )
-    lower, upper = problem.lower, problem.upper
-    if radius is not None:
-        place = np.clip(problem.scaled(design[None, :])[0], 0.0, 1.0)
-        lower = problem.lower + np.maximum(place - radius, 0.0) * problem.span
-        upper = problem.lower + np.minimum(place + radius, 1.0) * problem.span
-    return replace(problem, limits=limits, rooms=curves, allowances=given, lower=lower, upper=upper)
-
-
-def _others(problem: Problem, along: dict[str, str], curves: Mapping[str, Room]) -> list[str]:
-    """Return limited outputs whose room is no curve along the turn."""
-    followed = {name for name, curve in along.items() if curve in curves}
-    names = dict.fromkeys(x.output for x in bounded(problem))
-    return [name for name in names if name not in followed and not name.startswith("rotatable")]
-
-
-def _close(limit: Limit, room: float, value: float) -> bool:
-    """Return whether a limit is so near that how its room changes may matter."""
-    low = limit.minimum is not None and value - CLOSE * room < limit.minimum
-    return low or (limit.maximum is not None and value + CLOSE * room > limit.maximum)
-
-
-def _fixed_rooms(
-    problem: Problem, design: Array, sigma: Array, level: float, names: Sequence[str]
-) -> dict[str, tuple[float, float]]:
-    """Return the room of limited outputs, from exact derivatives by every toleranced dimension, and their values."""
-    if not names:
-        return {}
-    rows = sensitivities(problem.family, design, names, problem.window)
-    spread = dict(zip(problem.family.parameter_names, sigma, strict=True))
-    variance, values = dict.fromkeys(names, 0.0), dict.fromkeys(names, math.nan)
-    kinds = ("parameter", "output", "value", "growing", "shrinking")
-    for name, output, value, up, down in zip(*(rows[k] for k in kinds), strict=True):
-        steep = max(abs(up), abs(down)) * spread[name]
-        variance[output] += steep * steep if math.isfinite(steep) else 0.0
-        values[output] = value
-    return {name: (level * math.sqrt(v), values[name]) for name, v in variance.items()}
-
-
 def _share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> float:
     return float(kept(problem, deviating(problem.family, design, tolerance, seed, SAMPLES))[1].mean())
-
-
-def _drawn_in(limit: Limit, rooms: dict[str, tuple[float, float]]) -> Limit:
-    if limit.output not in rooms:
-        return limit
-    room = rooms[limit.output][0]
-    low = None if limit.minimum is None else limit.minimum + room
-    high = None if limit.maximum is None else limit.maximum - room
-    if low is not None and high is not None and low > high:  # the band is narrower than what the tolerances need
-        low = high = 0.5 * (low + high)
-    return replace(limit, minimum=low, maximum=high)
 
 
 def yields(problem: Problem, designs: Array, tolerance: Tolerance, seed: int) -> list[float]:

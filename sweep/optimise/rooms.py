@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,7 +100,14 @@ def curves_with_room(problem: Problem) -> dict[str, str]:
     """
     program = Program(problem)
     measures = [program.objective, *(r.measure for r in program.requirements)]
-    plain = {m.name: m.series[0].output for m in measures if m.kind in ("max_abs", "max", "min") and len(m.series) == 1}
+    # The room pushes maxima up and minima down: a largest value that has to be large needs it the other way.
+    inward = {
+        r.measure.name
+        for r in program.requirements
+        if (r.maximum if r.measure.kind == "min" else r.minimum) is not None
+    }
+    kinds = ("max_abs", "max", "min")
+    plain = {m.name for m in measures if m.kind in kinds and len(m.series) == 1 and m.name not in inward}
     others = {s.output for m in measures if m.name not in plain for s in m.series}
     limits = {r.measure.name: r.measure.series[0] for r in program.requirements if r.measure.name in plain}
     return {
@@ -110,27 +117,26 @@ def curves_with_room(problem: Problem) -> dict[str, str]:
     }
 
 
-def rooms(problem: Problem, design: Array, sigma: Array, level: float, outputs: set[str]) -> dict[str, Room]:
-    """Return ``level`` standard deviations of pose outputs along the turn, and how they change with the variables.
+def rooms(problem: Problem, design: Array, sigma: Array, levels: Mapping[str, float]) -> dict[str, Room]:
+    """Return standard deviations of pose outputs along the turn, and how they change with the variables.
 
     Parameters
     ----------
     problem : its variables are the ones that may change
     design : (P,)
     sigma : (P,) standard deviations of the dimensions
-    level : of them
-    outputs : names of pose outputs
+    levels : how many standard deviations of each pose output; what is not finite is left out
     """
     n = len(problem.variables)
     # Parameters that follow from coordinates move together: the slopes by the parameters that reproduce those seen.
     designs, moved = _around(problem, design)
     turn: Array = np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
-    found = changes(problem.family, designs, sigma, tuple(outputs), turn)
+    found = changes(problem.family, designs, sigma, tuple(levels), turn)
     columns = tuple(problem.columns)
     waves = np.array([_summed(row[None, :], turn)[0] for row in np.eye(2 * HARMONICS + 1)])
     weights = waves * (np.where(np.arange(len(waves)) == 0, 1.0, 2.0) / POSES)[:, None]
     out = {}
-    for name in outputs:
+    for name, level in levels.items():
         spread = level * np.sqrt((found[name] ** 2).sum(axis=1))
         if not np.isfinite(spread).all():
             continue

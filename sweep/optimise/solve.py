@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 BATCH = 6  # starts between two looks at whether more are needed: the same for any number of jobs
 SERIAL_LOOKS = 800  # of a search before processes are worth their start, about a second
-TRIAL = 2000  # looks of a first heat, where only the best starts go on
 Tell = Callable[[int, int], None]
 
 
@@ -54,6 +53,7 @@ def explore(
     jobs: int = 1,
     tell: Tell | None = None,
     origins: Sequence[int] | None = None,
+    samples: Sequence[int] | None = None,
 ) -> tuple[list[Result], Survey]:
     """Return the smallest objective under the limits from one start after the other,
     until enough is known of the basins.
@@ -62,14 +62,14 @@ def explore(
     ----------
     problem : what to minimise
     starts : (k, P) designs; their signs are kept, their variables are the starting points
-    settings : ``looks`` are allowed to each start; with ``finalists`` all starts have a first heat of 2000 looks and
-        only so many of the best go on, otherwise starts end when ``unseen`` and the best basin are as asked (see
+    settings : ``looks`` are allowed to each start; starts end when ``unseen`` and the best basin are as asked (see
         :class:`sweep.optimise.survey.Survey`); ``time_budget`` [s] or None is an emergency brake
     stop : asked often; when it answers true, or at Ctrl-C, the search ends and each start in progress keeps its best
         design so far
     jobs : processes the starts are spread over, once the search turns out to be long; results do not depend on it
     tell : called with the number of starts that are done and the most there will be
     origins : see :func:`sweep.optimise.survey.survey`; with them all starts are searched
+    samples : see there
 
     Returns
     -------
@@ -93,20 +93,17 @@ def explore(
         def asked() -> bool:
             return time.monotonic() >= end or bool(own) or (stop is not None and stop())
 
-        results, ended = _first(problem, starts, settings, asked, jobs, tell, origins is None)
-        if settings.finalists is not None and ended == "starts":
-            results, whole = _final(problem, starts, results, settings, asked, jobs)
-            ended = "starts" if whole else "time"
+        results, ended = _in_batches(problem, starts, settings, asked, jobs, tell, origins is None, samples)
     if own.signal_number is not None:
         results = [replace(r, ended="interrupted") if r.ended == "time" else r for r in results]
         if own.signal_number == signal.SIGTERM:
             signal.raise_signal(signal.SIGTERM)
     if ended == "time" and (own.signal_number is not None or any(r.ended == "interrupted" for r in results)):
         ended = "interrupted"
-    return ranked(results), survey(problem, starts, results, settings, ended, origins)
+    return ranked(results), survey(problem, starts, results, settings, ended, origins, samples)
 
 
-def _first(
+def _in_batches(
     problem: Problem,
     starts: Array,
     settings: OptimiseSettings,
@@ -114,23 +111,23 @@ def _first(
     jobs: int,
     tell: Tell | None,
     early: bool,
+    samples: Sequence[int] | None,
 ) -> tuple[list[Result], str]:
-    """Results of the starts in batches, or of their first heat where there are finalists; and what ended it.
+    """Return results of the starts in batches, and what ended it.
 
     ``early``: the search ends as soon as enough is known.
     """
     results: list[Result] = []
-    heat = settings if settings.finalists is None else replace(settings, looks=min(TRIAL, settings.looks))
     numbers = list(range(len(starts)))
     for first in range(0, len(starts), BATCH):
         batch = numbers[first : first + BATCH]
-        results += _batch(problem, starts, batch, results, heat, asked, jobs)
+        results += _batch(problem, starts, batch, results, settings, asked, jobs)
         if tell is not None:
             tell(len(results), len(starts))
         last = batch[-1] == numbers[-1]
         if _cut(results, first + len(batch)) or (not last and asked()):
             return results, "time"
-        if early and settings.finalists is None and survey(problem, starts, results, settings, "").enough:
+        if early and survey(problem, starts, results, settings, "", samples=samples).enough:
             return results, "enough"
     return results, "starts"
 
@@ -138,37 +135,6 @@ def _first(
 def _cut(results: Sequence[Result], count: int) -> bool:
     """Return whether a search was stopped before so many results were there, or within one."""
     return len(results) < count or any(r.ended in CUT for r in results)
-
-
-def _final(
-    problem: Problem,
-    starts: Array,
-    results: list[Result],
-    settings: OptimiseSettings,
-    asked: Callable[[], bool],
-    jobs: int,
-) -> tuple[list[Result], bool]:
-    """Return the best of the starts that a first heat has left on their way, searched to their end;
-    and whether all were.
-
-    In a long curved valley the value after so many looks tells how far down it leads.
-    """
-    left = sorted((r for r in results if r.ended == "looks"), key=lambda r: (not r.feasible, _rank(r), r.start))
-    chosen = [r.start for r in left[: settings.finalists]]
-    where = starts.copy()
-    for r in left:
-        where[r.start] = r.design
-    ends: list[Result] = []
-    for first in range(0, len(chosen), BATCH):
-        batch = chosen[first : first + BATCH]
-        ends += _batch(problem, where, batch, [*results, *ends], settings, asked, jobs)
-        if _cut(ends, first + len(batch)):
-            break
-    before = {r.start: r.looks for r in results}
-    ends = [replace(r, looks=r.looks + before[r.start]) for r in ends]
-    known = {r.start for r in ends}
-    others = [replace(r, ended="left") if r.ended == "looks" else r for r in results if r.start not in known]
-    return [*ends, *others], not _cut(ends, len(chosen))
 
 
 @contextmanager

@@ -41,17 +41,20 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: f
     return ranked[spread(problem.scaled(ranked), kind.reshape(-1), count, least)]
 
 
-def spread(place: Array, kind: NDArray[np.intp], count: int, least: float = 0.0) -> list[int]:
+def spread(place: Array, kind: NDArray[np.intp], count: int, least: float = 0.0, first: int = 0) -> list[int]:
     """Return numbers of at most ``count`` rows of ``place`` (k, n), ranked best first,
     that keep a distance from each other.
 
     ``kind`` (k,): rows of different kinds are never neighbours.  The distance is never less than ``least``, a share of
-    the average one of two random designs.
+    the average one of two random designs.  The ``first`` rows are taken in any case.
     """
     distance = 0.5 * np.sqrt(place.shape[1] / 6.0)  # half of what two random designs keep on average
     taken: list[int] = []
     for _ in range(12):
-        taken, free = [], np.ones(len(place), dtype=np.bool_)
+        taken, free = list(range(first)), np.ones(len(place), dtype=np.bool_)
+        for row in taken:
+            free &= ~((np.linalg.norm(place - place[row], axis=1) < distance) & (kind == kind[row]))
+        free[:first] = False
         while len(taken) < count and free.any():
             best = int(np.argmax(free))
             taken.append(best)

@@ -33,7 +33,7 @@ class Survey:
     asked : the most starts that the study allows
     offered : starts that there were
     basins : different values the feasible ones ended at; values within 1e-4 count as one basin
-    best : starts from distinct valleys that ended in the best basin
+    best : starts from distinct valleys or distinct samples that ended in the best basin
     unseen : estimated share of basins, by their volume, that no start has met; 1 where no start became feasible
     wanted : what ``unseen`` should fall below
     ended : "enough" where the rule was fulfilled, "starts" where none was left, "time" or "interrupted"
@@ -116,6 +116,7 @@ def survey(
     settings: OptimiseSettings,
     ended: str,
     origins: Sequence[int] | None = None,
+    samples: Sequence[int] | None = None,
 ) -> Survey:
     """Return what the results of a search tell of it.
 
@@ -128,6 +129,8 @@ def survey(
     ended : how the search ended
     origins : (k,) number of the global search that each start comes from, -1 for none; without them every start stands
         for itself.  Of one global search the best result counts, and no other: it has chosen its ends itself.
+    samples : (k,) number of the sample that each start comes from.  Starts of different samples are distinct wherever
+        they stand: the samples know nothing of each other.
 
     Notes
     -----
@@ -138,13 +141,12 @@ def survey(
     Of populations the next one matters where it ends at something better than the best: see :attr:`Survey.better`.
     """
     whole = [r for r in results if r.ended not in CUT]
-    # What was left after the first heat has not reached the bottom of any basin.
-    numbered = with_basins([r for r in whole if r.ended != "left"])
+    numbered = with_basins(whole)
     drawn = numbered if origins is None else _best_of_each(numbered, origins)
     met = Counter(r.basin for r in drawn if r.basin)
     n, w = sum(met.values()), len(met)
     ends = [r.start for r in drawn if r.basin == 1]
-    best = _distinct(problem, starts, ends) if origins is None else len(ends)
+    best = _distinct(problem, starts, ends, samples) if origins is None else len(ends)
     return Survey(
         len(whole), settings.starts, len(starts), w, best, _unseen(n, met), settings.unseen, ended,
         _kinds(problem, starts, numbered), populations=0 if origins is None else n,
@@ -201,15 +203,18 @@ def _unseen(n: int, met: Counter[Any]) -> float:
     return min(1.0, max(once / n, w * (w + 1) / (n * (n - 1))))
 
 
-def _distinct(problem: Problem, starts: Array, numbers: list[int]) -> int:
-    """Return how many of some starts stand in distinct valleys."""
+def _distinct(problem: Problem, starts: Array, numbers: list[int], samples: Sequence[int] | None) -> int:
+    """Return how many of some starts stand in distinct valleys, or come from distinct samples."""
+    of = samples or [0] * len(starts)
     place = problem.scaled(starts)
     others = [c for c in range(starts.shape[1]) if c not in problem.columns]
     least = DISTINCT * math.sqrt(place.shape[1] / 6.0)
     taken: list[int] = []
     for k in sorted(numbers):
         near = (
-            np.linalg.norm(place[k] - place[j]) < least and np.array_equal(starts[k, others], starts[j, others])
+            np.linalg.norm(place[k] - place[j]) < least
+            and of[k] == of[j]
+            and np.array_equal(starts[k, others], starts[j, others])
             for j in taken
         )
         if not any(near):

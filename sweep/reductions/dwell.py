@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.families.base import Array, Family
+from sweep.reductions.density import denser
 from sweep.reductions.refine import EPS
 from sweep.reductions.sampling import TWO_PI, blocks, sample_turn
 from sweep.reductions.window import Window, edges
@@ -31,8 +32,10 @@ def window_angle(family: Family, designs: Array, window: Window) -> tuple[Array,
     angle, err = np.full(len(designs), np.nan), np.full(len(designs), np.nan)
     open_end = np.full(len(designs), np.inf)
     names = (family.position, family.derivative_of[family.position])
-    for rows in blocks(np.flatnonzero(np.isfinite(window.err)), SAMPLES):
-        columns, _, _ = sample_turn(family, designs[rows], SAMPLES, names)
+    samples, known = SAMPLES * denser(family, designs), np.isfinite(window.err)
+    every = (rows for m in np.unique(samples[known]) for rows in blocks(np.flatnonzero(known & (samples == m)), int(m)))
+    for rows in every:
+        columns, _, _ = sample_turn(family, designs[rows], int(samples[rows[0]]), names)
         above, own = np.zeros((2, rows.size)), np.zeros(rows.size)
         for side, level in enumerate((window.low, window.high)):
             start = columns[family.position][:, 0] >= level[rows]

@@ -12,6 +12,7 @@ from sweep.families.base import Accuracy, Array, Columns, Event, Family
 from sweep.families.domain import Interval
 from sweep.quantities.names import error_of
 from sweep.reductions.closing import variable
+from sweep.reductions.density import denser
 from sweep.reductions.extrema import DESIGN_STATUS
 from sweep.reductions.sampling import TWO_PI, Index, Status, blocks, pose_columns, sample_turn
 
@@ -62,10 +63,12 @@ def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) ->
     """Return the first angle of the event and its error, how often it happens, and status, each (n,)."""
     n = len(designs)
     phi, err, number, status = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n), np.zeros(n, np.uint8)
-    pending, samples = np.arange(n), accuracy.samples or START
-    while pending.size:
+    samples = accuracy.samples or START
+    fewest = samples if accuracy.samples is not None else np.minimum(START * denser(family, designs), LIMIT)
+    pending = np.ones(n, np.bool_)
+    while pending.any():
         doubtful = np.zeros(n, np.bool_)
-        for rows in blocks(pending, samples):
+        for rows in blocks(np.flatnonzero(pending & (fewest <= samples)), samples):
             columns, worst, _ = sample_turn(family, designs[rows], samples, [event.of])
             status[rows] = DESIGN_STATUS[worst]
             good = status[rows] == st.OK
@@ -74,7 +77,8 @@ def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) ->
             unsure = np.zeros(rows.size, np.bool_)
             scan.grazes(values, np.full(rows.size, event.level), unsure)
             doubtful[rows] = unsure
-        pending, samples = np.flatnonzero(doubtful), 2 * samples
+        pending = doubtful | (pending & (fewest > samples))
+        samples *= 2
         if accuracy.samples is not None:
             break
         if samples > LIMIT:

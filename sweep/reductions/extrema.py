@@ -13,10 +13,11 @@ import numpy as np
 
 from kernels import status as st
 from sweep.families.base import Array, Family
+from sweep.families.pace import crossed
 from sweep.reductions import fused, panels
 from sweep.reductions import search as one_search
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
-from sweep.reductions.sampling import Status, blocks
+from sweep.reductions.sampling import Mask, Status, blocks
 from sweep.reductions.search import LIMIT, START
 from sweep.reductions.window import Window
 
@@ -60,14 +61,17 @@ def true_extrema(
     difference of its samples exceeds a tenth of their size, if they stand wider than a twelfth of the distance of the
     nearest complex zero of a discriminant, or if refinement moved the peak by more than 5 % of its height.
     """
+    jumping = np.zeros(len(designs), np.bool_) if anywhere else crossed(family, designs)
+    if jumping.any() and not jumping.all():
+        return _apart(family, designs, requests, target, locate, window, jumping)
     found: dict[Request, Extremum] = {}
     status = np.zeros(len(designs), np.uint8)
     left, kinked = [], []
     for request in requests:
-        if not anywhere and panels.has_kinks(family, request):
+        if not anywhere and panels.has_kinks(family, request, bool(jumping.any())):
             kinked.append(request)
             continue
-        curve = None if locate or request.place or request.windowed else fused.curve_of(family, request, anywhere)
+        curve = None if locate or request.windowed else fused.curve_of(family, request, anywhere)
         if curve is None:
             left.append(request)
             continue
@@ -89,6 +93,22 @@ def true_extrema(
     for extremum in found.values():
         for column in extremum:
             column[(status != st.OK) & (status != st.NOT_CONVERGED)] = np.nan
+    return found, status
+
+
+def _apart(
+    family: Family, designs: Array, requests: Sequence[Request], target: float, locate: bool, window: Window | None,
+    apart: Mask,
+) -> tuple[dict[Request, Extremum], Status]:  # fmt: skip
+    """As `true_extrema`, of the designs that jump and of the others by themselves."""
+    found = {request: Extremum.unknown(len(designs)) for request in requests}
+    status = np.zeros(len(designs), np.uint8)
+    for rows in (np.flatnonzero(apart), np.flatnonzero(~apart)):
+        part = None if window is None else Window(*(column[rows] for column in window))
+        some, status[rows] = true_extrema(family, designs[rows], requests, target, locate=locate, window=part)
+        for request, extremum in some.items():
+            for column, values in zip(found[request], extremum, strict=True):
+                column[rows] = values
     return found, status
 
 

@@ -14,9 +14,10 @@ from kernels.series.curves import MARGIN
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries
 from sweep.families.chain import Chain
-from sweep.reductions.refine import EPS, SHRINK, Peaks, confirmed
+from sweep.reductions.refine import EPS, SHRINK, Peaks, confirmed, polished
 from sweep.reductions.request import Extremum, Request
 from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, pose_columns, turn
+from sweep.reductions.search import TIE
 
 sampling_tables = lru_cache(series.sampling_tables)
 
@@ -61,9 +62,11 @@ class FusedCurve:
         assert opens is not None
         opens(designs, opening, distance)
         made_of = np.ascontiguousarray(self.made_of(stage.designs(designs)))
+        # Which of several is the highest decides on the place.
+        tie = TIE if self.request.place else -1.0
         status, found = np.empty(n, np.uint8), np.empty((6, n))
         series.find_extrema(_chained(self.forms), self.order)(
-            designs, opening, distance, *sampling_tables(), made_of, self.request.mode, target, status, found
+            designs, opening, distance, *sampling_tables(), made_of, self.request.mode, target, tie, status, found
         )
         value, phi, err, err_phi, scale, spacing = found
         if self.scale is not None:
@@ -73,6 +76,11 @@ class FusedCurve:
         rounded = np.flatnonzero(status == series.ROUNDED)
         if rounded.size:
             self._confirm(designs, extremum, rounded, target * scale[rounded], spacing[rounded])
+        if self.request.place:
+            top = np.flatnonzero((status == st.OK) | (status == series.ROUNDED))
+            slope, known = self.family.derivative_of[self.request.pose], (phi[top], err_phi[top])
+            places, err_phi[top] = polished(self.family, designs[top], slope, *known)
+            phi[top] = np.mod(places, TWO_PI)
         undecided = status == series.OPEN
         # A discriminant is known also where the links do not reach, which is for the slower search to say.
         if self.order == MARGIN:
@@ -123,7 +131,7 @@ def curve_of(family: Family, request: Request, anywhere: bool) -> FusedCurve | N
     if anywhere:
         return _least_discriminant(chain, forms, request)
     output, last = chain.pose_output[request.pose], chain.stages[-1]
-    if output.stage not in ("", str(last.number)):
+    if output.stage not in ("", str(last.number)) or (request.place and request.pose not in chain.derivative_of):
         return None
     # Derivatives that carry the number of their stage are not with respect to the crank angle of the chain.
     curve: Curve | None = forms[-1].curves.get(output.base)

@@ -14,10 +14,13 @@ import numpy as np
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Accuracy, Array, Columns, Family
+from sweep.families.pace import Singular, crossed, singular_curves
+from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
-from sweep.numerics.singularities import Singularities, crowded, turn_edges
+from sweep.numerics.singularities import Singularities, crowded, steps, turn_edges
+from sweep.reductions.cuts import ends
+from sweep.reductions.density import denser, nearest
 from sweep.reductions.extrema import DESIGN_STATUS, LIMIT, START
-from sweep.reductions.precise import nearest
 from sweep.reductions.sampling import (
     TWO_PI,
     Index,
@@ -30,10 +33,13 @@ from sweep.reductions.sampling import (
 
 EPS = 2.0**-53
 KINKED = 1e-2  # relative change of a mean from which on its convergence tells kinks from smooth curves
+SHIFT = 0.37  # of their spacing: how far samples stand aside that tell whether two grids agree by chance
 NEAR = 0.3  # distance of a singularity [rad] as samples see it, from which on it is looked at closely
 PER_SINGULARITY = 12.0  # samples per distance of it, below which two grids may agree and both miss a peak
 PANEL = 1.0  # length of the first panels against that distance; the rule of 15 points errs by 1e-13 there
 PANELS_AT_ONCE = 1024
+LOOKS = 512  # samples among which a curve with kinks or jumps is searched for what cuts it
+EVEN = 16  # first panels of a curve with kinks or jumps, beside those between its known ones
 PREFIX = "rms_"
 
 
@@ -76,6 +82,10 @@ def _refined(family: Family, designs: Array, poses: Sequence[str], target: float
     near = _singularities(family, designs[alive])
     needed = np.zeros(n)
     needed[alive] = PER_SINGULARITY / near.rho.min(axis=1, initial=np.inf)
+    needed = np.maximum(needed, START * denser(family, designs))
+    kinks = any(family.pose_output[pose].kinks or family.pose_output[pose].jumps for pose in poses)
+    jumping = np.full(n, kinks) | crossed(family, designs)
+    needed[jumping] = np.inf
     unresolved = _by_grids(family, designs, poses, target, found, err, status, needed)
     settled = np.setdiff1d(np.flatnonzero(status == st.OK), unresolved)
     rounding = _rounding(family, designs[settled], poses, near.only(np.searchsorted(alive, settled)))
@@ -87,6 +97,10 @@ def _refined(family: Family, designs: Array, poses: Sequence[str], target: float
     for k in range(0, unresolved.size, PANELS_AT_ONCE):
         rows = unresolved[k : k + PANELS_AT_ONCE]
         edges = turn_edges(near.only(np.searchsorted(alive, rows)), PANEL)
+        if jumping[rows].any():
+            cut = ends(family, designs[rows[jumping[rows]]], EVEN, LOOKS)
+            which = np.repeat(np.flatnonzero(jumping[rows]), cut.shape[1])
+            edges = with_events(edges, which, cut.ravel())
         found[rows], err[rows], status[rows] = _on_panels(family, designs[rows], poses, edges, target)
     lost = (status != st.OK) & (status != st.NOT_CONVERGED)
     found[lost], err[lost] = np.nan, np.nan
@@ -119,8 +133,15 @@ def _by_grids(
         found[pending], status[pending] = now, state
         err[pending] = change + 4.0 * EPS * now
         before[pending] = now
-        unsettled = change > np.maximum(target * now, 16.0 * EPS * now)
+        allowed = np.maximum(target * now, 16.0 * EPS * now)
+        unsettled = change > allowed
         unsettled |= (needed[pending] > samples)[:, None]
+        # Grids of even samples agree by chance, about jumps, and both about waves as fast as they stand.
+        agreed = np.flatnonzero((state == st.OK) & ~unsettled.any(axis=1))
+        aside, _ = _on_grid(family, designs, pending[agreed], samples // 2, poses, SHIFT)
+        chance = np.abs(aside - now[agreed])
+        err[pending[agreed]] += chance
+        unsettled[agreed] = ~(chance <= 2.0 * allowed[agreed])
         first, second = changes[:, pending]
         # A smooth curve that is settled to a hundredth gains more than a factor of eight per doubling; a kink or jump
         # gains four or two.
@@ -183,7 +204,8 @@ def _blur(values: Array) -> Array:
     their variation times that.
     """
     squares = values * values
-    variation: Array = np.abs(squares - np.roll(squares, 1, axis=1)).sum(axis=1)
+    # One after the other: repeated angles add nothing, however many there are.
+    variation: Array = np.cumsum(np.abs(squares - np.roll(squares, 1, axis=1)), axis=1)[:, -1]
     return 2.0 * EPS * TWO_PI * variation
 
 
@@ -191,7 +213,9 @@ def _singularities(family: Family, designs: Array) -> Singularities:
     """Return the nearest singularities: as a few samples see them, and closely where they may matter."""
     n, names = len(designs), discriminants(family)
     rows = np.arange(n)
-    if names and n:
+    if family.every(Singular):
+        rows = np.arange(n)  # samples of these are not among those of a turn
+    elif names and n:
         distance, one = np.full(n, np.inf), np.empty(n)
         for part in blocks(rows, START, len(names)):
             columns, _, _ = sample_turn(family, designs[part], START, names)
@@ -202,7 +226,7 @@ def _singularities(family: Family, designs: Array) -> Singularities:
     far = nearest(family, designs[:0])
     width = far.phi.shape[1]
     phi, rho = np.tile(np.arange(1.0, 1.0 + width), (n, 1)), np.full((n, width), np.pi)
-    for part in blocks(rows, START, width):
+    for part in blocks(rows if singular_curves(family) else rows[:0], START, width):
         close = nearest(family, designs[part])
         phi[part], rho[part] = close
     return Singularities(phi, rho)
@@ -218,8 +242,9 @@ def _rounding(family: Family, designs: Array, poses: Sequence[str], near: Singul
     if not n:
         return out
     precise = family.precise()
-    alike = np.argsort(near.rho.min(axis=1))  # the nearest of a block decides how many angles it takes
-    for part in blocks(alike, 4 * START, len(names)):
+    own = steps(near, PANEL)  # designs with as many angles together: sums have the same bits in any company
+    alike = (np.flatnonzero(own == number) for number in np.unique(own))
+    for part in (part for rows in alike for part in blocks(rows, 4 * START, len(names))):
         angles = crowded(near.only(part), PANEL)
         width = 0.5 * np.mod(np.roll(angles, -1, axis=1) - np.roll(angles, 1, axis=1), TWO_PI)
         columns, _ = pose_columns(family, designs[part], angles, names)
@@ -238,16 +263,19 @@ def _rounding(family: Family, designs: Array, poses: Sequence[str], near: Singul
     return out
 
 
-def _on_grid(family: Family, designs: Array, rows: Index, samples: int, poses: Sequence[str]) -> tuple[Array, Status]:
+def _on_grid(
+    family: Family, designs: Array, rows: Index, samples: int, poses: Sequence[str], shift: float = 0.0
+) -> tuple[Array, Status]:
     found, status = np.full((rows.size, len(poses)), np.nan), np.empty(rows.size, np.uint8)
     names = list(dict.fromkeys(poses))
     for part in blocks(np.arange(rows.size), samples, len(names)):
-        columns, worst, winds = sample_turn(family, designs[rows[part]], samples, names)
+        columns, worst, winds = sample_turn(family, designs[rows[part]], samples, names, shift)
         state = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst]).astype(np.uint8)
         status[part] = state
         for k, pose in enumerate(poses):
             values = columns[pose]
-            mean = np.sqrt(np.einsum("ij,ij->i", values, values) / samples)
+            # Not by einsum: from 8192 samples on it adds up one row otherwise than several.
+            mean = np.sqrt(np.square(values).sum(axis=1) / samples)
             found[part, k] = np.where(state == st.OK, mean, np.nan)
     return found, status
 

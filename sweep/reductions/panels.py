@@ -19,7 +19,7 @@ from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
 from sweep.numerics.chebyshev import NODES, at_nodes, basis, product, rising
-from sweep.numerics.events import sign_changes, with_events
+from sweep.reductions.cuts import ends
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
 from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, blocks, discriminants, pose_columns
 
@@ -33,7 +33,7 @@ LATELY = 0.25  # of what the polynomial before was wrong by: halving takes a kin
 NARROWEST = 1e-11  # width of a panel [rad] that can only hold a jump
 EDGE = 2.0**17  # times EPS of the size: what a curve that rises by six sizes a radian may do in a quarter of that
 CROWD = 48  # panels of one curve beyond which rounding alone is halved
-ALLOWED = 1.0 / 16.0  # of the target: what two successive polynomials may differ by
+ALLOWED = 1.0 / 32.0  # of the target: what two successive polynomials may differ by
 AGAIN = 8.0  # times that difference is claimed: poses see a kink between them as low as that
 SLOPE = 2.0 * (NODES - 1) ** 2  # of a polynomial bounded by 1 on a panel of width 1 (Markov)
 EPS = 2.0**-53
@@ -70,10 +70,10 @@ class Top(NamedTuple):
     err_phi: Array
 
 
-def has_kinks(family: Family, request: Request) -> bool:
-    """Return whether an extremum is to be searched for on panels."""
+def has_kinks(family: Family, request: Request, jumps: bool = False) -> bool:
+    """Return whether an extremum is to be searched for on panels; ``jumps``: all curves of these designs may jump."""
     output = family.pose_output[request.pose]
-    return output.kinks and not output.wraps and not request.windowed
+    return (output.kinks or jumps) and not output.wraps and not request.windowed
 
 
 def extrema(
@@ -129,28 +129,11 @@ def _block(
 
 
 def _cut(family: Family, designs: Array) -> tuple[Index, Array, Array]:
-    """Return design and ends of the first panels: even ones, cut where followers reverse."""
-    n = len(designs)
-    edges = np.tile(np.linspace(0.0, TWO_PI, PANELS + 1), (n, 1))
-    speeds = reversing(family)
-    if speeds:
-
-        def functions(rows: Index, phi: Array) -> Array:
-            columns, _ = pose_columns(family, designs[rows], phi, speeds)
-            return np.nan_to_num(np.stack([columns[name] for name in speeds], axis=2))
-
-        phi = np.arange(PANELS * NODES) * (TWO_PI / (PANELS * NODES))
-        edges = with_events(edges, *sign_changes(functions, np.tile(phi, (n, 1))))
+    """Return design and ends of the first panels."""
+    edges = ends(family, designs, PANELS, PANELS * NODES)
     low, high = edges[:, :-1], edges[:, 1:]
     row, column = np.nonzero(high - low > NARROWEST)
     return row, low[row, column], high[row, column]
-
-
-def reversing(family: Family) -> tuple[str, ...]:
-    """Return the pose outputs whose zeros cut the turn: the speeds of all positions of the family."""
-    speeds = set(family.derivative_of.values())
-    dear = set(family.dear)
-    return tuple(rate for of, rate in family.derivative_of.items() if of not in speeds and rate not in dear)
 
 
 def _climbed(
@@ -165,9 +148,9 @@ def _climbed(
     tops: list[Top] = []
     while panels.row.size:
         panels = panels.only(_upper(panels, request.mode) >= best[panels.row])
-        crowded = np.bincount(panels.row, minlength=n)[panels.row] > CROWD
-        # Even first panels may all be within the target of each other: a constant.
-        crowded &= panels.high - panels.low < 0.25 * TWO_PI / PANELS
+        # Even first panels may all be within the target of each other: a constant, or a dwell.
+        crowded = panels.high - panels.low < 0.25 * TWO_PI / PANELS
+        crowded &= np.bincount(panels.row[crowded], minlength=n)[panels.row] > CROWD
         tops.append(_given_up(panels.only(crowded), request.mode))
         panels = panels.only(~crowded)
         halves, miss = _halved(family, designs, panels, request)

@@ -6,9 +6,10 @@ import numpy as np
 
 from kernels import scan
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
-from sweep.numerics.singularities import Curve, Singularities, crowded, singularities
+from sweep.numerics.singularities import crowded
+from sweep.reductions.density import nearest
 from sweep.reductions.refine import EPS, Peaks, confirmed, first_peaks, polish_places
-from sweep.reductions.sampling import TWO_PI, Index, blocks, discriminants, pose_columns
+from sweep.reductions.sampling import TWO_PI, Index, blocks, pose_columns
 
 SPACING = 1.0 / 6.0  # of poses, against the distance of the nearest singularity
 RIVAL = 0.9  # share of the highest pose above which a local maximum may turn out the highest
@@ -48,16 +49,6 @@ def sharpen_maxima(
         value[rows], err[rows] = peaks.height, peaks.err_height
         if place in columns:
             columns[place][rows], columns[f"err_{place}"][rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
-
-
-def nearest(family: Family, designs: Array) -> Singularities:
-    """Return the nearest singularities of a family's designs, from its most accurate discriminants."""
-    precise = family.precise()
-
-    def curve(name: str) -> Curve:
-        return lambda rows, phi: pose_columns(precise, designs[rows], phi, [name])[0][name]
-
-    return singularities([curve(name) for name in discriminants(family)], len(designs))
 
 
 def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target: float, locate: bool) -> Peaks:

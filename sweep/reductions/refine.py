@@ -8,21 +8,27 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kernels import scan
-from sweep.families.base import Array
-from sweep.reductions.sampling import Index, Mask
+from sweep.families.base import Array, Family
+from sweep.reductions.sampling import Index, Mask, pose_columns
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""
 
 OFFSETS = np.arange(-2.0, 3.0)
 SHRINK = 0.125
-PASSES = 12
+SHRINK_KINKED = 0.25  # the quartic misplaces the tip of a kink by up to a quarter of a step
+PASSES = 20
 POLISHES = 3
 NARROW, WIDE = 1e-8, 1e-4  # secants [rad]: shorter ones would see the rounding of the crank angle
 # The quartic over a five-point window errs in proportion to at least the fourth power of its width, so one pass to the
 # next divides the error by at least 8^4; a sixty-fourth of the last change is claimed, which leaves a factor of 64.
 CLAIM = 1.0 / 64.0
 RIPPLE = 0.25  # of the fourth difference: eight times the noise of one sample on average, and what a quartic leaves out
+# Second differences of five samples that follow a smooth top are nearly equal.  Where they are not, a kink may lie
+# between them: there a fourth difference vanishes by chance, and halving the window halves the error, no more.
+BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences against the largest, of first samples and of later ones
+LEARNT = 0.8  # of the error before: what a narrower window about a kink leaves of it at most
+SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # of the spacing of the samples: steps of the last windows
 VARIES = 8.0  # times the rounding at one pose: what that of its neighbours may be
 EPS = 2.0**-53
 
@@ -63,7 +69,8 @@ def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
     # One fourth difference may vanish by chance where the curve is not yet resolved; three in a row do not.
     fourth = np.abs(around[:, :3] + around[:, 4:] - 4.0 * (around[:, 1:4] + around[:, 3:6]) + 6.0 * around[:, 2:5])
     widest = fourth.max(axis=1)
-    err_height = np.where(np.abs(place) < 2.0, RIPPLE * widest + 4.0 * EPS * np.abs(height), np.inf)
+    error = RIPPLE * widest + 4.0 * EPS * np.abs(height) + _kink(around[:, 1:6], BENT)
+    err_height = np.where(np.abs(place) < 2.0, error, np.inf)
     err_phi = spacing * np.minimum(blur * widest / np.maximum(ripple, EPS * EPS), 2.0)
     return Peaks(centre + spacing * place, height, err_phi, err_height, height, spacing, SHRINK * spacing)
 
@@ -85,27 +92,35 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
     followed.
     """
     phi, height, err_phi, err_height, guess, spacing, step = (column.copy() for column in peaks)
+    looked = step.copy()  # widths of the last windows that held their peaks
     active = np.flatnonzero((err_height > tolerance) | (err_phi > locate))
     for _ in range(PASSES):
         if not active.size:
             break
         u = step[active]
-        place, top, ripple, blur = _quartic(sample(active, phi[active, None] + u[:, None] * OFFSETS))
+        values = sample(active, phi[active, None] + u[:, None] * OFFSETS)
+        place, top, ripple, blur = _quartic(values)
+        kink = _kink(values, CLOSELY_BENT)
         inside = np.abs(place) < 2.0
         claim = np.where(inside, CLAIM, 1.0)
         # Samples that no longer follow a quartic are noise, and noise does not shrink with the window.
-        error = claim * np.abs(top - height[active]) + RIPPLE * ripple + 4.0 * EPS * np.abs(top)
+        error = claim * np.abs(top - height[active]) + RIPPLE * ripple + 4.0 * EPS * np.abs(top) + kink
         # Too small a window sees only noise: it may sharpen the height but must not spoil the place.
         err_place = u * (claim * np.abs(place) + blur) + 4.0 * EPS * np.pi
-        sharper = ~inside | (err_place < err_phi[active])
+        # At a kink the error shrinks with the window.  Noise looks bent too, but stays: nothing is learnt from it.
+        noisy = inside & (kink > 0.0) & (error >= LEARNT * err_height[active]) & (u < looked[active])
+        looked[active] = np.where(inside, u, looked[active])
+        sharper = ~inside | (((err_place < err_phi[active]) | (kink > 0.0)) & ~noisy)
         phi[active[sharper]] += (u * place)[sharper]
         height[active] = top
         err_height[active] = error
         err_phi[active[sharper]] = err_place[sharper]
         enough = inside & (error <= tolerance[active]) & ((err_phi[active] <= locate[active]) | ~sharper)
         # A window that has lost its peak was too small for its place.
-        step[active] = np.where(inside, SHRINK * u, np.minimum(u / SHRINK, SHRINK * spacing[active]))
-        active = active[~enough & (step[active] > 1e-6 * spacing[active])]
+        shrink = np.where(kink > 0.0, SHRINK_KINKED, SHRINK)
+        step[active] = np.where(inside, shrink * u, np.minimum(u / SHRINK, SHRINK * spacing[active]))
+        shortest = np.where(kink > 0.0, SHORTEST_KINKED, SHORTEST)
+        active = active[~enough & ~noisy & (step[active] > shortest * spacing[active])]
     return Peaks(phi, height, err_phi, err_height, guess, spacing, step)
 
 
@@ -124,7 +139,7 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, ro
         by chance, and the place may be spoilt all the same
     """
     before = peaks.height
-    peaks = _attained(sample, peaks, np.arange(peaks.phi.size))
+    peaks = attained(sample, peaks, np.arange(peaks.phi.size))
     rounded = np.abs(peaks.height - before)
     again = np.flatnonzero((peaks.err_height > tolerance) | (peaks.err_phi > locate))
     # The same rounding has moved the places; it varies along the curve, and one pose sees one value of it.
@@ -138,7 +153,7 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, ro
         step = np.maximum(peaks.step, np.minimum(err_phi, fresh))
         rough = peaks._replace(step=step, err_phi=err_phi).only(again)
         sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, tolerance[again], locate[again])
-        sharper = _attained(sample, sharper, again)
+        sharper = attained(sample, sharper, again)
         # Both heights are attained, so the higher one is nearer; a narrow window may see noise, or another peak.
         rougher = peaks.only(again)
         lower = np.maximum(rougher.height - sharper.height, 0.0)
@@ -152,7 +167,7 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, ro
     return peaks
 
 
-def _attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
+def attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
     """Return heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
     height = sample(which, peaks.phi[:, None])[:, 0]
     return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
@@ -186,6 +201,27 @@ def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Ar
         err_phi[better] = 4.0 * np.maximum(np.abs(move), last)[better] + 8.0 * EPS * np.pi
         last = SHRINK * np.abs(move)
     return phi, err_phi
+
+
+def polished(family: Family, designs: Array, slope: str, phi: Array, err_phi: Array) -> tuple[Array, Array]:
+    """Return places of tops, one of each design, as `polish_places` does; ``slope`` is the pose output that is zero.
+
+    A top is flat, its slope is steep there; the family's most accurate poses give it.
+    """
+    precise = family.precise()
+
+    def sample(active: Index, angles: Array) -> Array:
+        return pose_columns(precise, designs[active], angles, [slope])[0][slope]
+
+    return polish_places(sample, phi, err_phi)
+
+
+def _kink(values: Array, bent: float) -> Array:
+    """Return by how much a kink between five samples (k, 5) may hide the top; 0 where they bend alike."""
+    bends = np.diff(values, 2, axis=1)
+    change = np.abs(np.diff(bends, axis=1)).max(axis=1)
+    found: Array = np.where(change > bent * np.abs(bends).max(axis=1), change, 0.0)
+    return found
 
 
 def _quartic(values: Array) -> tuple[Array, Array, Array, Array]:

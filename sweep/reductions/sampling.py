@@ -23,13 +23,11 @@ TWO_PI = 2.0 * np.pi
 
 
 @lru_cache(maxsize=32)
-def turn(samples: int) -> Angles:
-    """Return the equidistant crank angles of one turn, from 0, shape (1, samples)."""
-    phi: Array = np.arange(samples, dtype=np.float64)[None, :] * (TWO_PI / samples)
-    angles = Angles.of(phi)
-    for column in angles:
-        column.flags.writeable = False
-    return angles
+def turn(samples: int, shift: float = 0.0) -> Angles:
+    """Return the equidistant crank angles of one turn, from 0 or a share of their spacing, shape (1, samples)."""
+    # Not locked: kernels would be compiled once more, for arrays that cannot be written.
+    phi: Array = (np.arange(samples, dtype=np.float64)[None, :] + shift) * (TWO_PI / samples)
+    return Angles.of(phi)
 
 
 def blocks(rows: Index, samples: int, columns: int = 1) -> Iterator[Index]:
@@ -45,9 +43,11 @@ def discriminants(family: Family) -> tuple[str, ...]:
 
 
 def sample_turn(
-    family: Family, designs: Array, samples: int, names: Sequence[str]
+    family: Family, designs: Array, samples: int, names: Sequence[str], shift: float = 0.0
 ) -> tuple[dict[str, Array], Status, Mask]:
     """Return pose outputs over one turn, (n, samples), with angles made continuous.
+
+    The first crank angle is 0, or that share of the spacing by which all are shifted.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def sample_turn(
     worst : (n,) gravest status of the turn
     winds : (n,) whether a wanted follower's angle makes full turns, so that it has no extremum
     """
-    columns, status = _evaluate(family, designs, turn(samples), names)
+    columns, status = _evaluate(family, designs, turn(samples, shift), names)
     worst = np.empty(len(designs), np.uint8)
     scan.worst_status(status, worst)
     winds = np.zeros(len(designs), np.bool_)

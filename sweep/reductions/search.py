@@ -10,10 +10,21 @@ import numpy as np
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
-from sweep.families.capabilities import Assembly
 from sweep.reductions.breaks import jumps, level, near_jumps, search
-from sweep.reductions.refine import EPS, SHRINK, Peaks, Sampler, confirmed, first_peaks, polish_places, sharpen
+from sweep.reductions.density import denser
+from sweep.reductions.refine import (
+    EPS,
+    SHRINK,
+    Peaks,
+    Sampler,
+    attained,
+    confirmed,
+    first_peaks,
+    polished,
+    sharpen,
+)
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
+from sweep.reductions.rounding import order_of, rounding_share, tells
 from sweep.reductions.sampling import (
     TWO_PI,
     Index,
@@ -72,7 +83,8 @@ class Search:
         self.found = {request: Extremum.unknown(n) for request in self.requests}
         self.status = np.zeros(n, np.uint8)
         # Samples that each request still needs of each design; 0 once it is found.
-        self.undone = np.full((len(self.requests), n), START)
+        fewest = (START * denser(self.family, self.designs)).astype(np.int64)
+        self.undone = np.tile(fewest, (len(self.requests), 1))
         # A discriminant is a smooth function whatever its sign; the motion is not where it vanishes.
         self.guards = [] if self.anywhere else list(discriminants(self.family))
         position = [self.family.position] if self.window is not None else []
@@ -162,7 +174,7 @@ class Search:
         for name in self.guards:
             one, largest = np.empty(count), columns[name].max(axis=1)
             scan.nearest_singularity(columns[name], one)
-            distance = np.where(_tells(largest), np.minimum(distance, one), distance)
+            distance = np.where(tells(largest), np.minimum(distance, one), distance)
         # The first looks see a near zero only roughly: at most eight times as many samples at once.
         wanted = np.minimum(PER_SINGULARITY / np.maximum(distance, 1e-300), 8.0 * samples)
         samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
@@ -193,8 +205,10 @@ class Search:
         peaks = sharpen(sample, first, tolerance, place)
         share = self._rounding(rows, columns, candidates, self.guards)
         peaks = peaks._replace(err_height=peaks.err_height + share * np.abs(peaks.height))
-        if self.family.precise_poses is not None:
-            self._confirm(rows, columns, candidates, peaks, size, share)
+        if self.family.precise_poses is None:
+            # A quartic may say less than nothing of what touches zero; a value at a pose is one that there is.
+            return attained(sample, peaks, np.arange(row.size))
+        self._confirm(rows, columns, candidates, peaks, size, share)
         return peaks
 
     def _confirm(
@@ -254,24 +268,10 @@ class Search:
         return sample
 
     def _rounding(self, rows: Index, columns: dict[str, Array], candidates: Candidates, guards: list[str]) -> Array:
-        """Return the share of a value that rounding may have changed alike at neighbouring poses,
-        where it leaves no ripple.
-
-        A pose near a dead point amplifies the rounding of its discriminant (docs/extrema.md).  What is rounded are
-        terms of the size that the discriminant has where the links meet at a right angle: a tiny crank may keep it far
-        below that over the whole turn.
-        """
-        number, row, column, _ = candidates
-        amplified = np.ones(row.size)
-        sizes = {loop.discriminant: loop.scale for loop in self.family.every(Assembly)}
-        for name in guards:
-            here, largest = columns[name][row, column], columns[name].max(axis=1)[row]
-            if name in sizes:
-                largest = np.maximum(largest, sizes[name](self.designs[rows])[row])
-            amplified += np.divide(largest, here, out=np.ones(row.size), where=_tells(largest) & (here > 0.0))
-        derivatives = set(self.family.derivative_of.values())
-        derived = np.array([request.pose in derivatives for request in self.requests])[number]
-        return 4.0 * EPS * np.where(derived, amplified, np.sqrt(amplified))
+        """Return the share of a value that rounding may have changed alike at neighbouring poses."""
+        given = self.designs[rows], columns, candidates.row, candidates.column
+        orders = np.array([order_of(self.family, request.pose) for request in self.requests])
+        return rounding_share(self.family, *given, guards, orders[candidates.request])
 
     def _within_window(
         self, rows: Index, columns: dict[str, Array], request: Request, row: Index, peaks: Peaks, resolved: Mask
@@ -318,25 +318,10 @@ class Search:
         phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
         slope = self.family.derivative_of.get(request.pose)
         if (self.locate or request.place) and slope is not None and not request.windowed:
-            phi, err_phi = self._polish(rows[has], slope, phi, err_phi)
+            phi, err_phi = polished(self.family, self.designs[rows[has]], slope, phi, err_phi)
         found.phi[rows[has]] = np.mod(phi, TWO_PI)
         found.err[rows[has]] = peaks.err_height[chosen]
         found.err_phi[rows[has]] = err_phi
         moved = np.zeros(rows.size)
         moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
         return moved
-
-    def _polish(self, rows: Index, slope: str, phi: Array, err_phi: Array) -> tuple[Array, Array]:
-        """Return places of flat tops from the zero of the derivative, which is steep there."""
-        precise = self.family.precise()
-
-        def sample(active: Index, angles: Array) -> Array:
-            return pose_columns(precise, self.designs[rows[active]], angles, [slope])[0][slope]
-
-        return polish_places(sample, phi, err_phi)
-
-
-def _tells(discriminant: Array) -> Mask:
-    """Return whether a discriminant is a number to rely on: at scales such as 1e100 or 1e-80 it leaves float64."""
-    usable: Mask = (discriminant > 1e-280) & (discriminant < 1e280)
-    return usable

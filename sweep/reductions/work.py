@@ -23,6 +23,7 @@ POSES_MEAN = 110.0
 POSES_EVENT = 340.0
 POSES_SEARCH = 180.0
 POSES_PEAK = 30.0
+POSES_PLACE = 240.0  # of a place after a fused search: nine precise poses take as long as so many others
 
 
 def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy) -> float:
@@ -42,6 +43,7 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
     assert accuracy.target is not None
     quick = {request for request in requests if curve_of(family, request, False) is not None}
     fused = _stages(family) * nanoseconds("work", "fused extremum") * len(quick)
+    fused += POSES_PLACE * pose * sum(request.place for request in quick)
     if quick == requests:
         return fused
     peaks = (0.5 - np.log10(accuracy.target) / 16.0) * len(requests - quick)

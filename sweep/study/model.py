@@ -155,7 +155,6 @@ class OptimiseSection(Section):
     seed: Seed = Field(0, description="a whole number, 0 or greater")
     unseen: str = Field("2 %", description='a share as a text, as "2 %"')
     looks: Annotated[int, Field(ge=100, le=10_000_000)] = Field(20_000, description="a whole number, 100 to 10000000")
-    finalists: Annotated[int, Field(ge=1, le=100_000)] | None = Field(None, description="a whole number, 1 to 100000")
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
     variables: Literal["parameters", "locus"] | None = Field(None, description='"parameters" or "locus"')
     globally: Literal["none", "proportions"] = Field("none", alias="global", description='"none" or "proportions"')

@@ -12,12 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.sobol import BITS, RUN, TABLE_BITS, sobol_points
 from sweep.families.base import Array
 
-BITS = 52
 INDEX_BITS = 40
-_TABLE_BITS = 10
-_RUN = 2**_TABLE_BITS
 
 # Primitive polynomial (leading and last coefficient included) and first direction integers of each dimension:
 # S. Joe and F. Y. Kuo, Constructing Sobol sequences with better two-dimensional projections, SIAM J. Sci. Comput. 30
@@ -77,7 +75,7 @@ class Sobol:
     def __init__(self, dimensions: int, seed: int | None) -> None:
         # Raw output of PCG64 is fixed by numpy's promise on bit streams, that of Generator methods is not.
         source = None if seed is None else np.random.PCG64(seed)
-        self._shift = np.zeros(dimensions, np.uint64)
+        self._shift = np.zeros(dimensions, np.int64)
         self._centre = 0.0 if seed is None else 0.5
         tables = []
         for k in range(dimensions):
@@ -87,42 +85,48 @@ class Sobol:
                 directions = [_mix(v, raw) for v in directions]
                 self._shift[k] = raw[BITS] >> (64 - BITS)
             tables.append(_xor_tables(directions))
-        self._tables = np.array(tables, np.uint64).reshape(dimensions, INDEX_BITS // _TABLE_BITS, _RUN)
-        low = np.arange(2 * _RUN)
+        self._tables = np.array(tables, np.int64).reshape(dimensions, INDEX_BITS // TABLE_BITS, RUN)
+        low = np.arange(2 * RUN)
         # The digit above the lowest ones changes the highest of their Gray code.
-        self._first_runs = self._tables[:, 0, (low ^ (low >> 1)) & (_RUN - 1)].reshape(dimensions, 2, _RUN)
+        gray = (low ^ (low >> 1)) & (RUN - 1)
+        self._first_runs = np.ascontiguousarray(self._tables[:, 0, gray].reshape(dimensions, 2, RUN))
 
     def points(self, start: int, stop: int, which: Sequence[int] | None = None) -> Array:
         """Return points start to stop - 1, one row per dimension; with ``which`` of those dimensions only."""
-        if stop - start < _RUN:
-            return self.at(np.arange(start, stop, dtype=np.int64), which)
-        # Numbers that differ in the lowest digits alone make a run.  Their Gray codes are those of the first run, or of
-        # the second, with other high digits.
-        runs = np.arange(start // _RUN, (stop - 1) // _RUN + 1)
-        high, low = runs ^ (runs >> 1), start % _RUN
         chosen = range(len(self._shift)) if which is None else which
-        out = np.empty((len(chosen), stop - start))
-        for row, k in zip(out, chosen, strict=True):
-            x = self._first_runs[k, runs & 1]
-            x ^= self._upper(k, high)[:, None]
-            row[:] = x.reshape(-1)[low : low + row.size]
-        return self._scaled(out)
+        out = np.empty((stop - start, len(chosen)))
+        self.fill(start, stop, chosen, [(0.0, 1.0)] * len(chosen), range(len(chosen)), out)
+        return out.T
+
+    def fill(
+        self, start: int, stop: int, which: Sequence[int], ends: Sequence[tuple[float, float]], columns: Sequence[int],
+        out: Array,
+    ) -> None:  # fmt: skip
+        """Write points start to stop - 1 in some dimensions, stretched to between two ends each.
+
+        ``out`` is (stop - start, P); ``columns`` says where in it each dimension of ``which`` goes.
+        """
+        low, high = np.array(ends, np.float64).reshape(len(which), 2).T.copy()
+        chosen, places = np.array(which, np.int64), np.array(columns, np.int64)
+        sobol_points(
+            start, stop, self._first_runs, self._tables, self._shift, self._centre, chosen, low, high, places, out
+        )
 
     def at(self, index: NDArray[np.int64], which: Sequence[int] | None = None) -> Array:
         """Return the points of these numbers, in any order, with the same bits as `points`."""
         gray = index ^ (index >> 1)
-        first, high = gray & (_RUN - 1), gray >> _TABLE_BITS
+        first, high = gray & (RUN - 1), gray >> TABLE_BITS
         chosen = range(len(self._shift)) if which is None else which
         out = np.empty((len(chosen), index.size))
         for row, k in zip(out, chosen, strict=True):
             row[:] = self._upper(k, high) ^ self._tables[k, 0, first]
         return self._scaled(out)
 
-    def _upper(self, k: int, high: NDArray[np.int64]) -> NDArray[np.uint64]:
+    def _upper(self, k: int, high: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return what the shift of dimension k and all digits of a Gray code but the lowest make of it."""
         x = np.full(high.size, self._shift[k])
         for part, table in enumerate(self._tables[k, 1:]):
-            x ^= table[(high >> (part * _TABLE_BITS)) & (_RUN - 1)]
+            x ^= table[(high >> (part * TABLE_BITS)) & (RUN - 1)]
         return x
 
     def _scaled(self, out: Array) -> Array:
@@ -156,11 +160,11 @@ def _mix(direction: int, raw: list[int]) -> int:
     return mixed
 
 
-def _xor_tables(directions: list[int]) -> NDArray[np.uint64]:
+def _xor_tables(directions: list[int]) -> NDArray[np.int64]:
     """Return for every group of index digits the exclusive or of the direction numbers of each combination."""
-    tables = np.zeros((INDEX_BITS // _TABLE_BITS, _RUN), np.uint64)
+    tables = np.zeros((INDEX_BITS // TABLE_BITS, RUN), np.int64)
     for j, direction in enumerate(directions):
-        part, bit = divmod(j, _TABLE_BITS)
+        part, bit = divmod(j, TABLE_BITS)
         half = 1 << bit
-        tables[part, half : 2 * half] = tables[part, :half] ^ np.uint64(direction)
+        tables[part, half : 2 * half] = tables[part, :half] ^ np.int64(direction)
     return tables

@@ -70,9 +70,8 @@ class OptimiseSettings:
     ``variables`` is "locus" for what [locus] prescribes, "parameters" for the links, None for what suits the study.
     ``unseen`` is the estimated share of unseen basins below which no more starts are made once the best basin was met
     often enough; ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from
-    a search over what is not linear; ``finalists`` is the number of starts that go on after a first heat,
-    None for all.  ``time_budget`` [s] is an emergency brake: what it stops says so, and no result that was not stopped
-    depends on it.  ``prove`` asks for a proof that nothing in the space is better.
+    a search over what is not linear.  ``time_budget`` [s] is an emergency brake: what it stops says so, and no result
+    that was not stopped depends on it.  ``prove`` asks for a proof that nothing in the space is better.
     """
 
     starts: int = 20
@@ -82,7 +81,6 @@ class OptimiseSettings:
     unseen: float = 0.02
     looks: int = 20_000
     globally: Literal["none", "proportions"] = "none"
-    finalists: int | None = None
     prove: ProveSettings | None = None
 
 

@@ -91,15 +91,20 @@ def fit_line(
     set_here = np.array([column[f"{name}{suffix}"] for name in guided.fitted])
     scaled = np.array([column[f"{name}{suffix}"] for name in guided.scaled])
     limits = np.array(window or (0.0, 1.0), dtype=np.float64)
+    links, values, travel = (
+        designs[np.ix_(alive, own)],
+        np.empty((len(guided.fitted), alive.size)),
+        np.empty(alive.size),
+    )
     rows = max(1, BLOCK // share.size)
     for begin in range(0, alive.size, rows):
-        some = alive[begin : begin + rows]
+        part = slice(begin, begin + rows)
+        some = alive[part]
         angles = _input_angles(family, designs[some], start[some, None] + swing[some, None] * share)
-        matrix = np.ascontiguousarray(fitted[np.ix_(some, own)])
-        values, travel, status[some] = _fitted(guide, guided, matrix, angles, fit, limits)
-        fitted[np.ix_(some, set_here)] = values.T
-        if fit.stroke is not None:
-            fitted[np.ix_(some, scaled)] *= (fit.stroke / travel)[:, None]
+        values[:, part], travel[part], status[some] = _fitted(guide, guided, links[part], angles, fit, limits)
+    fitted[np.ix_(alive, set_here)] = values.T
+    if fit.stroke is not None:
+        fitted[np.ix_(alive, scaled)] *= (fit.stroke / travel)[:, None]
     return fitted, status
 
 

@@ -43,7 +43,8 @@ PHI0, STEEP = (
 class Row:
     """What the page says of one specification: angles [deg], processor times [s] of each seed and of all searches.
 
-    ``searches`` are the starts of the three seeds, ``optima`` those that ended at a local optimum.
+    ``searches`` are the starts of the three seeds, ``optima`` those that ended at a local optimum, ``relaxed`` those
+    that ended outside of the limits where these are missed by the least around.
     """
 
     swing: float
@@ -58,6 +59,7 @@ class Row:
     searches: int
     optima: int
     active: tuple[str, ...]
+    relaxed: int = 0
 
 
 @dataclass(frozen=True)
@@ -91,9 +93,10 @@ class Outcome:
         swing, phi0, pressure = (math.degrees(limit.maximum or 0.0) for limit in self.problem.limits)
         missed = sum(behind(results[0], self.best) > AGREE for results in self.found)
         ends = [r.ended for results in self.found for r in results]
+        relaxed = sum(r.ended == "infeasible" and r.kkt_residual <= KKT for results in self.found for r in results)
         return Row(
             swing, phi0, pressure, self.ours.objective, self.gap, missed, self.ours.kkt_residual, self.cpu, self.whole,
-            len(ends), ends.count("converged"), self.ours.active,
+            len(ends), ends.count("converged"), self.ours.active, relaxed,
         )  # fmt: skip
 
 
@@ -210,7 +213,8 @@ def page(rows: Sequence[Row], seed: int) -> str:
         "",
         f"Processor time per specification and seed: {times[0]:.1f} to {times[-1]:.1f} s, median "
         f"{statistics.median(times):.1f} s, nine of ten below {times[int(0.9 * (len(times) - 1))]:.1f} s. Of the "
-        f"{searches} starts of these searches {optima} ended at a local optimum (KKT residual at most {KKT:g}).",
+        f"{searches} starts of these searches {optima} ended at a local optimum (KKT residual at most {KKT:g}), "
+        f"{sum(row.relaxed for row in rows)} at the smallest relaxation of limits that they could not keep.",
         "",
         "| swing [deg] | phi0 [deg] | pressure angle <= [deg] | max abs d2psi of the worst seed | best better by "
         "| seeds that missed | KKT residual | CPU of the slowest seed [s] | active |",
@@ -247,7 +251,8 @@ def main() -> None:
             with options.keep.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(asdict(rows[-1])) + "\n")
         row = rows[-1]
-        text = f"best better by {row.gap:.1e}, {row.missed} seeds missed, {row.optima} of {row.searches} starts settled"
+        settled = row.optima + row.relaxed
+        text = f"best better by {row.gap:.1e}, {row.missed} seeds missed, {settled} of {row.searches} starts settled"
         print(f"{len(rows)} of {options.count}: {text}, CPU {row.whole:.1f} s", flush=True)
     text = page(rows, options.seed)
     if options.out is None:

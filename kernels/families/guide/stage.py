@@ -105,25 +105,28 @@ def _dip(c: Constants, u: Any, v: Any) -> tuple[Any, Any, Any]:
 
 
 @inline
-def _travel_blur(c: Constants, u: Any, v: Any, x1: Any, x2: Any) -> tuple[Any, ...]:
+def _travel_blur(c: Constants, u: Any, v: Any, x1: Any, x2: Any, x3: Any) -> tuple[Any, ...]:
     """Errors of psi and its derivatives as of the crank-rocker's, times the arm by which they move the point."""
     at = place(c, u, v)
     t = c.branch * math.sqrt(largest(at.delta, 1e-300))
     per_t, per_rr = 1.0 / t, 1.0 / at.rr
     first = velocity(c, at, -(at.x * at.w + at.y * t) * per_rr, (at.y * at.w - at.x * t) * per_rr, per_t)
-    p, q, per_t = abs(first.p), abs(acceleration(c, at, first, per_t)), abs(per_t)
+    second = acceleration(c, at, first, per_t)
+    p, q, j, per_t = abs(first.p), abs(second), abs(jerk(at, first, second, t, per_t)), abs(per_t)
     tolerance = 4.0 * EPS * (abs(at.x) * c.x_size + abs(at.y) * c.a + abs(at.w) * c.w_size)
     share = tolerance * per_t * per_t
     angle = 4.0 * EPS * (c.x_size + c.a + c.w_size) * per_t
     terms = (2.0 * EPS * (2.0 * c.a + abs(c.k2)) + c.a * angle) * per_t
     b0, b1 = angle + 4.0 * EPS, p * (1.5 * share + 8.0 * EPS) + terms
-    b2 = q * (2.5 * share + 8.0 * EPS) + terms * (1.0 + c.a * per_t)
+    more = 1.0 + c.a * per_t
+    b2, b3 = q * (2.5 * share + 8.0 * EPS) + terms * more, j * (3.5 * share + 8.0 * EPS) + terms * (more * more)
     arm, crank = abs(c.q_along) + abs(c.q_across), abs(c.p_along) + abs(c.p_across)
-    bend = q + p * p
+    bend, twist = q + p * p, j + p * (p * p + 3.0 * q)
     e0 = arm * b0 + 4.0 * EPS * (arm + crank + abs(c.along0) + abs(c.across0))
     e1 = arm * (b1 + p * b0) + 8.0 * EPS * (crank + arm * p)
     e2 = arm * (b2 + 2.0 * p * b1 + bend * b0) + 8.0 * EPS * (crank + arm * bend)
-    return e0, e1, e2, e0, e1, e2, tolerance * c.per_square
+    e3 = arm * (b3 + 3.0 * p * b2 + 3.0 * bend * b1 + twist * b0) + 8.0 * EPS * (crank + arm * twist)
+    return e0, e1, e2, e3, e0, e1, e2, e3, tolerance * c.per_square
 
 
 FORM = Form("guide", 9, 15, _constants, _put, _get, None, _travel, _dip, None, _travel_blur)

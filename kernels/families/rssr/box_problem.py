@@ -85,7 +85,7 @@ def take(rows: Room, count: int, form: int, kind: int, theta: float, sign: float
     for j in range(last):
         rows.forms[count, j] = sign * rows.at[form, j]
     rows.forms[count, last] = rows.at[form, last]
-    rows.kinds[count], rows.theta[count], rows.objective[count] = kind, theta, ABOVE <= kind <= BELOW
+    rows.kinds[count], rows.theta[count], rows.objective[count] = kind, theta, kind in (ABOVE, BELOW)
     # a form without a bound says nothing, and would spoil the linear program
     return count + 1 if rows.at[form, last] < LARGE else count
 

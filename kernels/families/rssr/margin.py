@@ -29,18 +29,17 @@ from kernels.families.rssr.block import (
     new_block,
 )
 from kernels.families.rssr.closure import EPS, Array, Status
+from kernels.reduce import largest, smallest
 from kernels.verdict import turning_status
 
 
 @inline
-def _angle(at: Array, k: int) -> float:
-    """Return the pressure angle at the least Delta;
-    an arctangent, because an arccosine loses half the digits of a small angle.
-    """
+def _ball(at: Array, k: int) -> tuple[float, float]:
+    """Return the squares of the cosine and the sine of the pressure angle at the least Delta, each times (b/a)^2."""
     u, v = at[k + COS], at[k + SIN]
     radial = at[k + ROCKER] - (at[k + K0] + at[k + K1] * v - at[k + K2] * u)
     axial = at[k + Z0] - at[k + SA] * v
-    return math.atan2(math.sqrt(radial * radial + axial * axial), math.sqrt(at[k + DELTA]))
+    return at[k + DELTA], radial * radial + axial * axial
 
 
 @kernel
@@ -52,6 +51,7 @@ def margin(
     max_pressure_angle: Array | None,
     phi_min: Array | None,
     error: Array | None,
+    angle_error: Array | None = None,
 ) -> None:
     """Compute rotatability, margin and largest pressure angle of every design, exact.
 
@@ -64,6 +64,7 @@ def margin(
     max_pressure_angle : (n,) out [rad]; nan unless rotatable
     phi_min : (n,) out [rad], crank angle in (-pi, pi] of the least Delta
     error : (n,) out, bound of the rounding error of ``margin``
+    angle_error : (n,) out [rad], what ``error``, which it needs, does to ``max_pressure_angle``; nan as that is
 
     Notes
     -----
@@ -89,10 +90,21 @@ def margin(
             if error is not None:
                 per_square = 1.0 / (at[k + COUPLER] * at[k + COUPLER])
                 error[i] = (at[k + TOLERANCE] + 4.0 * EPS * abs(delta)) * per_square if known else math.nan
+        if angle_error is not None and error is not None:
+            for k in range(count):
+                i = start + k
+                square, across = _ball(at, k)
+                # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
+                linear = error[i] * (square + across) / (2.0 * math.sqrt(largest(square * across, 0.0)))
+                far = smallest(linear, math.sqrt(error[i])) + 8.0 * EPS
+                angle_error[i] = far if status[i] == st.OK else math.nan
         # What needs a call comes last: only without one a loop over designs vectorises.
         if max_pressure_angle is not None:
             for k in range(count):
-                max_pressure_angle[start + k] = _angle(at, k) if status[start + k] == st.OK else math.nan
+                # An arctangent, because an arccosine loses half the digits of a small angle.
+                square, across = _ball(at, k)
+                angle = math.atan2(math.sqrt(across), math.sqrt(square)) if status[start + k] == st.OK else math.nan
+                max_pressure_angle[start + k] = angle
         if phi_min is not None:
             for k in range(count):
                 known = status[start + k] != st.INVALID_INPUT

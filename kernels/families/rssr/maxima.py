@@ -222,14 +222,14 @@ def true_maxima(
         padded = (count + 7) & ~7
         begin_at_vertex(padded, m)
         refine(0, padded, m, rounds, max_abs_dpsi, max_abs_d2psi)
-        finish(0, padded, m, order, target, max_abs_dpsi, max_abs_d2psi)
+        finish(0, padded, m, order, target, max_abs_dpsi, max_abs_d2psi, error, phi_error)
         for i in range(block):
             begin, end = first_peak[i], first_peak[i + 1]
             worst = max(m[begin + ERROR], m[end - 1 + ERROR]) if end > begin else math.inf
             for peak in range(begin + 1, end - 1):
                 worst = max(worst, m[peak + ERROR])
             if end > begin and not worst < math.inf:
-                worst = settle(begin, end, m, order, target, max_abs_dpsi, max_abs_d2psi)
+                worst = settle(begin, end, m, order, target, max_abs_dpsi, max_abs_d2psi, error, phi_error)
             if worst < math.inf:
                 result = _highest(begin, end, m)
             else:

@@ -100,10 +100,11 @@ def refine(begin: int, end: int, m: Array, rounds: int, first: Array | None, sec
 
 @inline
 def finish(
-    begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None
-) -> None:
+    begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None,
+    error: Array | None, phi_error: Array | None,
+) -> None:  # fmt: skip
     """Compute the peak of the parabola through the last point, what it adds as an error estimate,
-    and the rounding error.
+    and, where an estimate is wanted, the rounding error and that of the place.
     """
     for i in range(begin, end):
         y, dy, d2y = _jet(m, i, first, second)
@@ -118,32 +119,30 @@ def finish(
         trusted = trusted & (peak - m[i + _LEFT] >= _NEXT * bend * before * before)
         trusted = trusted & (peak - m[i + _RIGHT] >= _NEXT * bend * after * after)
         m[i + ERROR] = rise if trusted else math.inf
-        relative, slope = rounding(
-            order,
-            m[i + _E],
-            m[i + _Y0],
-            m[i + _CA],
-            m[i + _K0],
-            m[i + _K1],
-            m[i + _K2],
-            m[i + _SIZE],
-            m[i + _U],
-            m[i + _V],
-            peak,
-        )
-        m[i + ROUNDING] = relative
-        # What a step of Newton's method leaves is quadratic, the step before shows how much; that of the jerk has a
-        # slope good to a thousandth.
-        last, across = m[i + LAST], math.sqrt(abs(y / d2y))
-        left = 4.0 * largest(abs(step) / width, step * step / (last * last + 1e-300)) + (1e-3 if order == 3 else 0.0)
+        if error is not None or phi_error is not None:
+            _estimate(m, i, order, peak, step, math.sqrt(abs(y / d2y)))
         m[i + HEIGHT], m[i + LAST] = peak, step
-        m[i + REACH] = left * abs(step) + 4.0 * across * (relative + across * slope) + _TURNED
+
+
+@inline
+def _estimate(m: Array, i: int, order: int, peak: float, step: float, across: float) -> None:
+    """Write the relative rounding error of a peak and the error of its place; ``across`` is its width."""
+    e, y0, ca, k0, k1, k2 = m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2]
+    relative, slope = rounding(order, e, y0, ca, k0, k1, k2, m[i + _SIZE], m[i + _U], m[i + _V], peak)
+    # What a step of Newton's method leaves is quadratic, the step before shows how much; that of the jerk has a slope
+    # good to a thousandth.
+    last = m[i + LAST]
+    left = 4.0 * largest(abs(step) / m[i + _WIDTH], step * step / (last * last + 1e-300))
+    left += 1e-3 if order == 3 else 0.0
+    m[i + ROUNDING] = relative
+    m[i + REACH] = left * abs(step) + 4.0 * across * (relative + across * slope) + _TURNED
 
 
 @kernel
 def settle(
-    begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None
-) -> float:
+    begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None,
+    error: Array | None, phi_error: Array | None,
+) -> float:  # fmt: skip
     """Take more steps for the maxima not trusted yet;
     return the largest error estimate of all, infinite if one still is not.
     """
@@ -151,6 +150,6 @@ def settle(
     for i in range(begin, end):
         if not m[i + ERROR] < math.inf:
             refine(i, i + 1, m, 3, first, second)
-            finish(i, i + 1, m, order, target, first, second)
+            finish(i, i + 1, m, order, target, first, second, error, phi_error)
         worst = max(worst, m[i + ERROR])
     return worst

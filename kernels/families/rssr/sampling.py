@@ -18,7 +18,7 @@ from kernels.families.rssr.peaks import MOST_PEAKS, append
 from kernels.reduce import largest
 
 FEWEST, MOST = 16, 1024
-_FLOOR, MARKS = (FEWEST + 2) * BLOCK, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
+_FLOOR, MARKS = FEWEST + 2, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
 GRID_SIZE = (FEWEST + 4) * BLOCK
 # Numbers below 2048 and "and" this are themselves, and the compiler sees that they are not negative.  Otherwise it
 # would handle indices that count from the end, and gather samples one by one: twice the time.
@@ -47,6 +47,15 @@ def sample(
 
 
 @inline
+def _row(size: Array, i: int) -> Array:
+    """Return row i of the samples of a block.
+
+    An index into a row is seen not to be negative; one that is a sum is not, and would be written to one by one.
+    """
+    return size[i * BLOCK : (i + 1) * BLOCK]
+
+
+@inline
 def sample_block(
     count: int, at: Array, cos: Array, sin: Array, size: Array, first: Array | None, second: Array | None
 ) -> None:
@@ -54,29 +63,33 @@ def sample_block(
     angle i of design k at (i + 1) BLOCK + k.
     """
     for i in range(FEWEST):
-        u, v, row = cos[i], sin[i], (1 + i) * BLOCK
+        u, v, here = cos[i], sin[i], _row(size, 1 + i)
         for k in range(count):
             e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
             p, q, j, _ = follower(e, y0, ca, k0, k1, k2, u, v)
-            size[row + k] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
+            here[k] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
+    before, begin, end, after = _row(size, 0), _row(size, 1), _row(size, FEWEST), _row(size, FEWEST + 1)
     for k in range(count):
-        size[k], size[(FEWEST + 1) * BLOCK + k] = size[FEWEST * BLOCK + k], size[BLOCK + k]
+        before[k], after[k] = end[k], begin[k]
 
 
 @inline
 def mark_peaks(count: int, size: Array) -> None:
     """Mark the local maxima of at least 60 % among the samples of :func:`sample_block`, as a sum of powers of two."""
+    floor, marks = _row(size, _FLOOR), _row(size, MARKS // BLOCK)
     for k in range(count):
-        size[_FLOOR + k], size[MARKS + k] = 0.0, 0.0
+        floor[k], marks[k] = 0.0, 0.0
     for i in range(1, FEWEST + 1):
+        here = _row(size, i)
         for k in range(count):
-            size[_FLOOR + k] = largest(size[_FLOOR + k], 0.6 * size[i * BLOCK + k])
+            floor[k] = largest(floor[k], 0.6 * here[k])
     mark = 1.0
     for i in range(1, FEWEST + 1):
+        before, here, after = _row(size, i - 1), _row(size, i), _row(size, i + 1)
         for k in range(count):
-            y, before, after = size[i * BLOCK + k], size[(i - 1) * BLOCK + k], size[(i + 1) * BLOCK + k]
-            peak = (y >= size[_FLOOR + k]) & (y > before) & (y >= after)
-            size[MARKS + k] += mark if peak else 0.0
+            y = here[k]
+            peak = (y >= floor[k]) & (y > before[k]) & (y >= after[k])
+            marks[k] += mark if peak else 0.0
         mark *= 2.0
 
 

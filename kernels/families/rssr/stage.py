@@ -93,12 +93,14 @@ def _dip(c: Constants, u: Any, v: Any) -> tuple[Any, Any, Any]:
 
 
 @inline
-def _turn_blur(c: Constants, u: Any, v: Any, d1: Any, d2: Any) -> tuple[Any, Any, Any]:
+def _turn_blur(c: Constants, u: Any, v: Any, d1: Any, d2: Any, d3: Any) -> tuple[Any, Any, Any, Any]:
     """As :func:`kernels.families.rssr.careful.rounding` has it, of the angle itself too."""
     share, angle, terms, per_t, _ = _roundings(c, u, v)
+    more = 1.0 + per_t
     first = abs(d1) * (1.5 * share + 8.0 * EPS) + terms
-    second = abs(d2) * (2.5 * share + 8.0 * EPS) + terms * (1.0 + per_t)
-    return angle + 4.0 * EPS, first, second
+    second = abs(d2) * (2.5 * share + 8.0 * EPS) + terms * more
+    third = abs(d3) * (3.5 * share + 8.0 * EPS) + terms * (more * more)
+    return angle + 4.0 * EPS, first, second, third
 
 
 @inline
@@ -114,10 +116,10 @@ def _roundings(c: Constants, u: Any, v: Any) -> tuple[Any, Any, Any, Any, Any]:
 
 
 @inline
-def _travel_blur(c: Constants, u: Any, v: Any, d1: Any, d2: Any) -> tuple[Any, ...]:
-    angle, first, second = _turn_blur(c, u, v, d1, d2)
+def _travel_blur(c: Constants, u: Any, v: Any, d1: Any, d2: Any, d3: Any) -> tuple[Any, ...]:
+    angle, first, second, third = _turn_blur(c, u, v, d1, d2, d3)
     _, _, _, _, tolerance = _roundings(c, u, v)
-    return angle, first, second, 0.0, 0.0, 0.0, tolerance * c.per_square
+    return angle, first, second, third, 0.0, 0.0, 0.0, 0.0, tolerance * c.per_square
 
 
 FORM = Form("rssr", 8, 10, _constants, _put, _get, _turn, _travel, _dip, _turn_blur, _travel_blur)

@@ -27,7 +27,6 @@ def read_values(reading: Reading) -> None:
         unseen=reading.share(search.unseen, ("optimise", "unseen")),
         looks=search.looks,
         globally=search.globally,
-        finalists=search.finalists,
         prove=_prove(reading, search.prove),
     )
     reading.fields["optimise"] = settings if "optimise" in reading.data else None

@@ -1,0 +1,49 @@
+"""Outputs that a kernel of poses computes together.
+
+Such a kernel is compiled for every set of outputs that it gives: what is not in the set is not in the machine code.
+That takes a quarter of a second per set, and a study with an optimum asks for dozens of sets, most of them on a few
+thousand poses.  Here a set on few poses is taken from the set of all outputs, and gets machine code of its own as soon
+as it is asked for on many.  The bits are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import update_wrapper
+
+import numpy as np
+
+from sweep.families.base import Angles, Array, Columns, PoseFunction
+
+MANY = 2**13  # poses of one call: half a block of a sweep, or the price of an output being measured
+# Poses of all calls so far.  All outputs take 30 to 100 ns more per pose than a few: for so many, as long as compiling.
+PAID = 2**22
+
+
+class Together:
+    """Poses whose kernel gives the outputs ``names``; ``poses`` calls it for exactly the wanted ones."""
+
+    def __init__(self, poses: PoseFunction, names: Sequence[str]) -> None:
+        update_wrapper(self, poses)
+        self._poses = poses
+        self._all = frozenset(names)
+        self._asked: dict[tuple[frozenset[str], bool], int] = {}
+
+    def __reduce__(self) -> str:
+        """By its name, as a function: a process that gets it has its own."""
+        return self._poses.__qualname__
+
+    def __call__(self, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+        """Return the wanted outputs and the status of every design at its angles, each (n, m)."""
+        count = len(designs) * angles.cos.shape[1]
+        key = wanted, np.iscomplexobj(angles.cos) or np.iscomplexobj(designs)
+        self._asked[key] = self._asked.get(key, 0) + count
+        if count >= MANY or self._asked[key] > PAID:
+            return self._poses(designs, angles, wanted)
+        found = self._poses(designs, angles, self._all)
+        return {name: found[name] for name in (*wanted, "status")}
+
+
+def together(*names: str) -> Callable[[PoseFunction], PoseFunction]:
+    """Decorate poses whose kernel gives these outputs."""
+    return lambda poses: Together(poses, names)

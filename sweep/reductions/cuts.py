@@ -1,0 +1,54 @@
+"""Where a turn is cut into panels: at known angles, where outputs pass levels, and where followers reverse."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.families.base import Array, Family
+from sweep.families.pace import Crossing, switches, waves
+from sweep.numerics.events import sign_changes, with_events
+from sweep.numerics.singularities import crowded
+from sweep.reductions.density import nearest
+from sweep.reductions.sampling import TWO_PI, Index, pose_columns
+
+FAR, CLOSE = 10.0, 0.1  # distances of singularities [rad]; from the latter on panels crowd about one
+PER_PANEL = 0.25  # waves that a first panel may hold
+
+
+def ends(family: Family, designs: Array, even: int, looks: int) -> Array:
+    """Return ends of panels of a turn in rising order, (n, p + 1).
+
+    There are ``even`` panels, and more about singularities.  They are cut at angles known beforehand, and where one of
+    ``looks`` samples or the next shows that a pose output passes its level, or that a follower reverses.
+    """
+    n = len(designs)
+    edges = np.tile(np.linspace(0.0, TWO_PI, even + 1), (n, 1))
+    known = switches(family, designs)
+    edges = with_events(edges, np.repeat(np.arange(n), known.shape[1]), known.ravel())
+    fast = np.ceil(waves(family, designs) / PER_PANEL).astype(np.int64)  # even ends of so many panels
+    more = np.repeat(np.arange(n), np.where(fast > even, fast, 0))
+    place = np.arange(more.size) - np.searchsorted(more, more)
+    edges = with_events(edges, more, TWO_PI * place / fast[more])
+    near = nearest(family, designs)
+    close = np.flatnonzero(near.rho.min(axis=1, initial=FAR) < CLOSE)
+    about = crowded(near.only(close), 1.0)
+    edges = with_events(edges, np.repeat(close, about.shape[1]), about.ravel())
+    speeds, crossings = reversing(family), family.every(Crossing)
+    if speeds or crossings:
+        names = list(dict.fromkeys([*speeds, *(crossing.of for crossing in crossings)]))
+
+        def functions(rows: Index, phi: Array) -> Array:
+            columns, _ = pose_columns(family, designs[rows], phi, names)
+            passed = [columns[crossing.of] - crossing.level(designs[rows])[:, None] for crossing in crossings]
+            return np.nan_to_num(np.stack([*(columns[name] for name in speeds), *passed], axis=2))
+
+        phi = np.arange(looks) * (TWO_PI / looks)
+        edges = with_events(edges, *sign_changes(functions, np.tile(phi, (n, 1))))
+    return edges
+
+
+def reversing(family: Family) -> tuple[str, ...]:
+    """Return the pose outputs whose zeros cut the turn: the speeds of all positions of the family."""
+    speeds = set(family.derivative_of.values())
+    dear = set(family.dear)
+    return tuple(rate for of, rate in family.derivative_of.items() if of not in speeds and rate not in dear)

@@ -1,0 +1,55 @@
+"""What rounding may have changed at a pose near a dead point, alike at its neighbours, so that it leaves no ripple."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.families.base import Array, Family
+from sweep.families.capabilities import Assembly
+from sweep.reductions.refine import EPS
+from sweep.reductions.sampling import Index, Mask
+
+
+def rounding_share(
+    family: Family, designs: Array, columns: dict[str, Array], row: Index, column: Index, guards: list[str],
+    order: Index,
+) -> Array:  # fmt: skip
+    """Return the share of values that rounding may have changed (docs/extrema.md, section 3).
+
+    Parameters
+    ----------
+    family, designs : the (n, P) design matrix
+    columns : the discriminants ``guards`` over one turn, (n, m) each
+    row, column : (k,) design and sample of each value
+    order : (k,) of the derivative that each value is, as of :func:`order_of`
+
+    Notes
+    -----
+    A pose near a dead point amplifies the rounding of its discriminant.  What is rounded are terms of the size that
+    the discriminant has where the links meet at a right angle: a tiny crank may keep it far below that over the whole
+    turn.
+    """
+    amplified = np.ones(row.size)
+    sizes = {loop.discriminant: loop.scale for loop in family.every(Assembly)}
+    for name in guards:
+        here, largest = columns[name][row, column], columns[name].max(axis=1)[row]
+        if name in sizes:
+            largest = np.maximum(largest, sizes[name](designs)[row])
+        amplified += np.divide(largest, here, out=np.ones(row.size), where=tells(largest) & (here > 0.0))
+    # A derivative of order n grows like the power 1/2 - n of the discriminant.
+    found: Array = 4.0 * EPS * np.where(order == 0, np.sqrt(amplified), np.where(order < 3, amplified, 2.0 * amplified))
+    return found
+
+
+def order_of(family: Family, pose: str) -> int:
+    """Return the order of the derivative that a pose output is; 3 for what may be made of any: a magnitude, a force."""
+    lower = {derivative: of for of, derivative in family.derivative_of.items()}
+    if pose not in lower:
+        return 0 if pose in family.derivative_of else 3
+    return 1 + order_of(family, lower[pose])
+
+
+def tells(discriminant: Array) -> Mask:
+    """Return whether a discriminant is a number to rely on: at scales such as 1e100 or 1e-80 it leaves float64."""
+    usable: Mask = (discriminant > 1e-280) & (discriminant < 1e280)
+    return usable
