@@ -72,24 +72,27 @@ def differentiate(lanes: int, a: Array, order: int, reach: Array, share: Array, 
     bounds : 4 rows out; the first two are bounds of the derivative of noise and tail, as
         :func:`kernels.enclosure.remainders` has them, the others are scratch
     """
-    scale, power = 2 * LANES, 3 * LANES
+    # Rows as parts of their own: of a sum the compiler does not know that it is no index that counts from the end.
+    of_noise, of_tail, scale, power = (
+        bounds[:LANES], bounds[LANES : 2 * LANES], bounds[2 * LANES : 3 * LANES], bounds[3 * LANES : 4 * LANES],
+    )  # fmt: skip
     for i in range(lanes):
         per = 1.0 / reach[i]
-        bounds[scale + i] = (
-            per if order == 1 else (per * per if order == 2 else (per * per * per if order == 3 else 1.0))
-        )
-        bounds[power + i], bounds[i], bounds[LANES + i] = 1.0, 0.0, 0.0
+        scale[i] = per if order == 1 else (per * per if order == 2 else (per * per * per if order == 3 else 1.0))
+        power[i], of_noise[i], of_tail[i] = 1.0, 0.0, 0.0
     for k in range(order, ORDER + 1):
-        factor, row, at = _FACTORS[order, k], (k - order) * LANES, k * LANES
+        factor, row = _FACTORS[order, k], k - order
+        these, to = a[k * LANES : (k + 1) * LANES], y[row * LANES : (row + 1) * LANES]
         for i in range(lanes):
-            y[row + i] = a[at + i] * (factor * bounds[scale + i])
+            to[i] = these[i] * (factor * scale[i])
     for k in range(order, 2 * ORDER):
         factor, late = _FACTORS[order, k], 1.0 if k > ORDER else 0.0
         for i in range(lanes):
-            here = factor * bounds[power + i]
-            bounds[i] = largest(bounds[i], here)
-            bounds[LANES + i] = largest(bounds[LANES + i], late * here)
-            bounds[power + i] *= share[i]
+            here = factor * power[i]
+            of_noise[i] = largest(of_noise[i], here)
+            of_tail[i] = largest(of_tail[i], late * here)
+            power[i] *= share[i]
+    noise, tail = a[NOISE * LANES : (NOISE + 1) * LANES], a[TAIL * LANES : (TAIL + 1) * LANES]
     for i in range(lanes):
-        bounds[i] *= a[NOISE * LANES + i] * bounds[scale + i] * GUARD
-        bounds[LANES + i] *= a[TAIL * LANES + i] * bounds[scale + i] * GUARD
+        of_noise[i] *= noise[i] * scale[i] * GUARD
+        of_tail[i] *= tail[i] * scale[i] * GUARD

@@ -73,10 +73,12 @@ def read(path: Path) -> Space:
     asked = json.loads(table.schema.metadata[b"question"])
     names = tuple(asked["free"])
     units = np.array([1.0 if name in "efg" else np.degrees(1.0) for name in names])
-    ends = [np.column_stack([table[f"{name}_{end}"].to_numpy() for name in names]) * units for end in ("low", "high")]
+    low, high = (
+        np.column_stack([table[f"{name}_{end}"].to_numpy() for name in names]) * units for end in ("low", "high")
+    )
     pairs = zip(table["outcome"].to_pylist(), table["kinds"].to_pylist(), strict=True)
     reasons = np.array([_reason(outcome, kinds) for outcome, kinds in pairs])
-    return Space(names, *ends, reasons, np.column_stack([asked["low"], asked["high"]]) * units[:, None])
+    return Space(names, low, high, reasons, np.column_stack([asked["low"], asked["high"]]) * units[:, None])
 
 
 def _map(axes: Axes, space: Space, reach: float) -> None:
@@ -95,7 +97,7 @@ def _map(axes: Axes, space: Space, reach: float) -> None:
 
 def shares(space: Space, k: int) -> tuple[Array, Array]:
     """Return the edges of strips across coordinate k, and the share of each strip by reason, (STRIPS, reasons)."""
-    edges = np.linspace(*space.ends[k], STRIPS + 1)
+    edges = np.linspace(space.ends[k, 0], space.ends[k, 1], STRIPS + 1)
     width = space.high - space.low
     others = np.prod(np.delete(width / np.diff(space.ends)[:, 0], k, axis=1), axis=1)
     found = np.zeros((STRIPS, len(COLOURS)))

@@ -35,7 +35,7 @@ def test_page_says_which_seeds_find_the_best_known() -> None:
     late = [row(k, 1.01 * BEST, seed=3) for k in range(3)]  # not at its end yet
     text = page([*found, *missed, *late])
     lines = [line for line in text.splitlines() if line.startswith("| links of stage 2")]
-    assert [line.split(" | ")[6] for line in lines] == ["yes", "**no**", "**no**"]
+    assert [line.split(" | ")[6] for line in lines] == ["yes", "**no**", "not yet"]
     assert [line.split(" | ")[4] for line in lines] == ["5", "none", "none"]
     assert f"{BEST:.4f} (1), {1.01 * BEST:.4f} (11)" in lines[0] and "at least 12 populations" in text
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -94,6 +96,14 @@ def test_gradients_with_room_equal_differences() -> None:
 
 def test_only_limits_on_largest_values_have_a_room_along_the_turn() -> None:
     assert curves_with_room(problem()) == {"max_abs_dev": "dev"}  # the stroke is a difference, the objective no limit
+
+
+def test_largest_value_that_has_to_be_large_has_no_room_along_the_turn() -> None:
+    """The room lifts maxima, which would make such a limit easier, not harder: it gives up an amount instead."""
+    below = replace(problem(), limits=(Limit("max_abs_dev", 1.0, None),))
+    assert curves_with_room(below) == {}
+    sides = replace(problem(), limits=(Limit("max_dev", None, 4.0), Limit("min_dev", -4.0, None)))
+    assert curves_with_room(sides) == {"max_dev": "dev", "min_dev": "dev"}
 
 
 def test_trigonometric_sum_and_its_slope_equal_numpys() -> None:

@@ -13,6 +13,7 @@ import pytest
 from sweep.families.base import Angles, Family, Output, Parameter
 from sweep.optimise import Problem, minimise
 from sweep.optimise import robust as robust_search
+from sweep.optimise.drawn_in import excesses, prices, with_room
 from sweep.optimise.robust import robust
 from sweep.optimise.shares import shared_out
 from sweep.study import Limit, OptimiseSettings, Tolerance
@@ -124,6 +125,22 @@ PROBLEM = Problem(
     (Limit("max_abs_u", None, 1.0), Limit("max_abs_v", None, 1.0)),
 )  # fmt: skip
 TOLERANCE = Tolerance(lengths=3.0 * SIGMA, angles=0.0, robust=SHARE)
+
+
+def test_price_of_room_is_what_the_objective_pays_for_a_standard_deviation_of_it() -> None:
+    levels = {"u": 2.0, "v": 1.0}
+    design = np.array([1.0 - 2.0 * SIGMA, 1.0 - SIGMA, 1.0])
+    held = with_room(PROBLEM, design, TOLERANCE, levels, None)
+    (result,) = minimise(held, design[None, :], OptimiseSettings(starts=1))
+    found = prices(PROBLEM, result.design, TOLERANCE, levels)
+    # Sixteen harmonics of |cos phi| miss its height by 1 %, and |cos 2 phi| by 2 %: the room is so much smaller.
+    for key, dear in (("u", DEAR), ("v", 1.0)):
+        assert found[key].price == pytest.approx(dear * SIGMA / result.objective, rel=0.05)
+        assert found[key].spread == pytest.approx(SIGMA, rel=0.05)
+    excess = excesses(PROBLEM, {"max_abs_u": np.array([1.0 + SIGMA, 1.0, np.nan]), "max_abs_v": np.array([0.9] * 3),
+                                "max_abs_load": np.ones(3)}, found)  # fmt: skip
+    assert excess["u"][0] == pytest.approx(1.0, rel=0.05) and excess["u"][1] == 0.0 and np.isinf(excess["u"][2])
+    assert (excess["v"] < -5.0).all()
 
 
 def room() -> tuple[float, float]:

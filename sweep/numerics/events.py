@@ -41,6 +41,7 @@ def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
 
     dip = (np.abs(values) <= np.abs(left)) & (np.abs(values) <= np.abs(right))
     dip &= ((values < 0.0) == (left < 0.0)) & ((values < 0.0) == (right < 0.0))
+    dip &= (left != 0.0) | (right != 0.0)  # a dwell goes nowhere
     row, column, which = np.nonzero(dip)
     near = _reaches(values, left, right, row, column, which)
     row, column, which = row[near], column[near], which[near]

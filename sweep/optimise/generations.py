@@ -268,7 +268,7 @@ def bred(
     ----------
     linear : the linear part of the problem
     signs : combinations of the parameters that are not varied
-    most : populations at most; each takes some 18 000 looks
+    most : populations at most; each takes some 14 000 looks
     seed : of samples and children
     stop : true ends the populations where they are
     jobs : processes; the ends do not depend on it

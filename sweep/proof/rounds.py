@@ -156,11 +156,13 @@ def explored(
             return joined([*done, todo]), judged, True
         most = max(int(asked.boxes * share) // UNITS, 1)
         unit = Unit(question, target, _split(todo, question), most, asked.smallest, folder, number)
-        for _ in _run(unit, cores):
-            known = [_read(path) for path in _finished(unit)]
-            here = sum(count for _, count in known)
-            further = int(asked.boxes * sum(SHARES[number + 1 :])) if any(x.open.any() for x, _ in known) else 0
-            tell(judged + here, judged + here * UNITS // len(known) + further)
+        counts = [_read(path)[1] for path in _finished(unit)]  # of a run that was stopped
+        for _, count in _run(unit, cores):
+            counts.append(count)
+            here = sum(counts)
+            # A unit that judged as many as it may has boxes left.
+            further = int(asked.boxes * sum(SHARES[number + 1 :])) if max(counts) == most else 0
+            tell(judged + here, judged + here * UNITS // len(counts) + further)
         if cores.stop:
             return joined([*done, todo]), judged, True
         results = [_read(path) for path in _finished(unit)]

@@ -218,9 +218,11 @@ def polished(family: Family, designs: Array, slope: str, phi: Array, err_phi: Ar
 
 def _kink(values: Array, bent: float) -> Array:
     """Return by how much a kink between five samples (k, 5) may hide the top; 0 where they bend alike."""
-    bends = np.diff(values, 2, axis=1)
-    change = np.abs(np.diff(bends, axis=1)).max(axis=1)
-    found: Array = np.where(change > bent * np.abs(bends).max(axis=1), change, 0.0)
+    a, b, c, d, e = values.T
+    left, middle, right = a - 2.0 * b + c, b - 2.0 * c + d, c - 2.0 * d + e
+    change = np.maximum(np.abs(middle - left), np.abs(right - middle))
+    largest = np.maximum(np.maximum(np.abs(left), np.abs(right)), np.abs(middle))
+    found: Array = np.where(change > bent * largest, change, 0.0)
     return found
 
 

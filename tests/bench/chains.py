@@ -30,7 +30,10 @@ from tests.bench.kernels import FLAGS, measure
 from tests.turn_designs import NEEDLE, needle_drives
 
 DESIGNS, MANY, SAMPLES, ROUNDS = 2048, 16384, 360, 15
-WANTED = (["max_abs_d2s"], ["max_abs_dev"], ["max_abs_d2s", "max_abs_dev"], ["stroke"], ["margin2"])
+WANTED = (
+    ["max_abs_d2s"], ["max_abs_dev"], ["max_abs_d2s", "max_abs_dev"], ["max_abs_d3s"], ["phi_max_abs_d2s"],
+    ["stroke"], ["margin2"],
+)  # fmt: skip
 PROVEN = ("max_abs_ds", "max_abs_d2s")
 FINE, SURE = Accuracy(target=1e-8), Accuracy(target=1e-8, certify=True)
 

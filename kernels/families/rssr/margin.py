@@ -76,28 +76,35 @@ def margin(
         count = min(BLOCK, designs.shape[0] - start)
         load_block(designs, start, count, at)
         least_delta(count, at)
+        # Parts of the outputs, of which the index is that of the loop alone: else each number is written by itself.
+        codes = status[start : start + count]
         for k in range(count):
-            i, delta = start + k, at[k + DELTA]
-            code = turning_status(delta, at[k + TOLERANCE], at[k + VALID] != 0.0)
-            status[i] = code
-            known = code != st.INVALID_INPUT
-            if margin is not None:
-                margin[i] = delta / (at[k + COUPLER] * at[k + COUPLER]) if known else math.nan
-            if rotatable is not None:
-                turns = 1.0 if delta > 0.0 else 0.0
-                rotatable[i] = turns if known & (code != st.UNDECIDABLE) else math.nan
-            # The bound of Delta, plus the rounding of the quotient by the square of the coupler.
-            if error is not None:
-                per_square = 1.0 / (at[k + COUPLER] * at[k + COUPLER])
-                error[i] = (at[k + TOLERANCE] + 4.0 * EPS * abs(delta)) * per_square if known else math.nan
-        if angle_error is not None and error is not None:
+            codes[k] = turning_status(at[k + DELTA], at[k + TOLERANCE], at[k + VALID] != 0.0)
+        if margin is not None:
+            least = margin[start : start + count]
             for k in range(count):
-                i = start + k
-                square, across = _ball(at, k)
-                # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
-                linear = error[i] * (square + across) / (2.0 * math.sqrt(largest(square * across, 0.0)))
-                far = smallest(linear, math.sqrt(error[i])) + 8.0 * EPS
-                angle_error[i] = far if status[i] == st.OK else math.nan
+                value = at[k + DELTA] / (at[k + COUPLER] * at[k + COUPLER])
+                least[k] = value if codes[k] != st.INVALID_INPUT else math.nan
+        if rotatable is not None:
+            turns = rotatable[start : start + count]
+            for k in range(count):
+                known = (codes[k] != st.INVALID_INPUT) & (codes[k] != st.UNDECIDABLE)
+                turns[k] = (1.0 if at[k + DELTA] > 0.0 else 0.0) if known else math.nan
+        if error is not None:
+            bound = error[start : start + count]
+            for k in range(count):
+                # The bound of Delta, plus the rounding of the quotient by the square of the coupler.
+                per_square = 1.0 / (at[k + COUPLER] * at[k + COUPLER])
+                value = (at[k + TOLERANCE] + 4.0 * EPS * abs(at[k + DELTA])) * per_square
+                bound[k] = value if codes[k] != st.INVALID_INPUT else math.nan
+            if angle_error is not None:
+                of_angle = angle_error[start : start + count]
+                for k in range(count):
+                    square, across = _ball(at, k)
+                    # d(angle) = d(cos^2)/sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
+                    linear = bound[k] * (square + across) / (2.0 * math.sqrt(largest(square * across, 0.0)))
+                    far = smallest(linear, math.sqrt(bound[k])) + 8.0 * EPS
+                    of_angle[k] = far if codes[k] == st.OK else math.nan
         # What needs a call comes last: only without one a loop over designs vectorises.
         if max_pressure_angle is not None:
             for k in range(count):
