@@ -136,6 +136,7 @@ def test_number_of_starts_does_not_depend_on_jobs() -> None:
 def test_warnings_name_what_was_not_reached() -> None:
     found = Survey(4, 20, 4, 2, 1, 0.5, 0.02, "starts")
     assert found.warnings[0] == "only 4 starts of the 20 asked: no more were found in the design space"
+    assert (found.shortcomings, found.doubts) == (found.warnings[:1], found.warnings[1:])
     assert "1 of the 3 distinct valleys" in found.warnings[1] and "estimated at 50 %, not the 2 %" in found.warnings[1]
     late = replace(found, offered=12, ended="time", starts=5, asked=12)
     assert late.warnings == ("time ran out: 5 of 12 starts",)

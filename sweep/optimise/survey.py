@@ -87,6 +87,11 @@ class Survey:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader has to know before trusting the result."""
+        return (*self.shortcomings, *self.doubts)
+
+    @property
+    def shortcomings(self) -> tuple[str, ...]:
+        """What the search did not do that it was asked for."""
         found = []
         if self.ended in CUT:
             why = "time ran out" if self.ended == "time" else "interrupted"
@@ -97,6 +102,12 @@ class Survey:
             found.append(
                 f"only {started(self.starts)} of the {self.asked} asked: no more were found in the design space"
             )
+        return tuple(found)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why there may be something better than what the search found."""
+        found = []
         if self.ended == "starts" and self.basins and not self.enough:
             of = "populations" if self.populations else "distinct valleys"
             rare = f"the best basin was met from {self.best} of the {MET} {of} wanted"

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from kernels import status as codes
 from sweep.chunks.cascade import compared
+from sweep.report import proof
 from sweep.report.front import front_sentence
 from sweep.report.limits import LimitState, Row, limit_state, limit_states, limited, value_of
-from sweep.report.proof import proof_sentence
 from sweep.report.quantities import Quantity, change, number, quantity
 from sweep.report.tables import fates, parameter_rows
 
@@ -165,7 +165,11 @@ def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
 
 def search_warnings(data: Dataset) -> list[str]:
     """Return what a reader has to know before trusting the optimum: time that ran out, fewer starts than asked."""
-    found = [] if data.survey is None else [f"{text[0].upper()}{text[1:]}." for text in data.survey.warnings]
+    found = (
+        []
+        if data.survey is None
+        else [f"{text[0].upper()}{text[1:]}." for text in proof.search_warnings(data, data.survey)]
+    )
     front = data.front_steps
     return found if front is None else [*found, f"Time ran out: {front} steps of the front."]
 
@@ -179,7 +183,7 @@ def _proof(data: Dataset, found: Scan) -> str:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
     starts, agree = data.starts, value_of(data.optimum, "agree")
     kind = "" if found.feasible else "random "
-    proven = proof_sentence(data)
+    proven = proof.proof_sentence(data)
     head = f"{proven[0].upper()}{proven[1:]}. The" if proven else f"{NO_PROOF}: the"
     text = f"{head} optimiser started from {starts} {kind}design{'s' if starts != 1 else ''}"
     populations = 0 if data.survey is None else data.survey.populations

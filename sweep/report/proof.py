@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from sweep.dataset import store
 from sweep.proof import read_proof
 from sweep.proof.certificate import PROOF
 from sweep.proof.words import proof_words
 from sweep.report.dataset import Dataset
 from sweep.report.quantities import quantity
+
+if TYPE_CHECKING:
+    from sweep.optimise.survey import Survey
 
 
 def proof_sentence(data: Dataset) -> str:
@@ -17,3 +22,10 @@ def proof_sentence(data: Dataset) -> str:
         return ""
     shown = quantity(found.objective, data.units.get(found.objective, found.unit))
     return proof_words(found, shown.words, shown.show)
+
+
+def search_warnings(data: Dataset, found: Survey) -> tuple[str, ...]:
+    """Return what a reader has to know of a search; a proof of the whole space leaves no doubt of something better."""
+    proof = read_proof(store.beside(data.folder) / PROOF)
+    without_doubt = proof is not None and proof.settled and not proof.exceptions
+    return found.shortcomings if without_doubt else found.warnings

@@ -19,7 +19,7 @@ from sweep.optimise import read_survey
 from sweep.optimise.survey import started
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.limits import bound_words, limit_states, limited
-from sweep.report.proof import proof_sentence
+from sweep.report.proof import proof_sentence, search_warnings
 from sweep.report.quantities import quantity
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def ending(folder: Path) -> Ending:
             lines.append(f"search: {started(found.starts)}, {found.words}")
             kinds = [f"{words}: {started(n)}, {b} basin{'' if b == 1 else 's'}" for words, n, b in found.kinds]
             lines += [f"signs: {'; '.join(kinds)}"] if kinds else []
-            lines += [f"warning: {text}" for text in found.warnings]
+            lines += [f"warning: {text}" for text in search_warnings(data, found)]
         lines += [sentence] if (sentence := proof_sentence(data)) else []
     else:
         missed = feasible == 0
