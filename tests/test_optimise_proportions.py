@@ -124,7 +124,7 @@ def test_guides_that_the_program_shrinks_to_nothing_are_no_solution() -> None:
     study = study_from_data(study.data | {"tolerance": study.data["tolerance"] | {"robust": "95 %"}}, study.path)
     made = elimination(problem_of(study, accepted()), study.tolerance)
     assert made is not None and made.sigma is not None and made.level > 1.9
-    finished = made._finished(accepted(), np.array([[0.0, 0.0, 1.0, 1.0, 0.0], [1.0, 0.0, 1.0, 1.0, 0.0]]))
+    finished = made.finished(accepted(), np.array([[0.0, 0.0, 1.0, 1.0, 0.0], [1.0, 0.0, 1.0, 1.0, 0.0]]))
     assert np.isnan(finished[0]).any() and np.isfinite(finished[1]).all()
     # With all the room that the tolerances need the least acceleration is larger, and the stroke reaches further.
     spoiled = accepted()[:1]

@@ -141,7 +141,8 @@ def _by_grids(
         aside, _ = _on_grid(family, designs, pending[agreed], samples // 2, poses, SHIFT)
         chance = np.abs(aside - now[agreed])
         err[pending[agreed]] += chance
-        unsettled[agreed] = ~(chance <= 2.0 * allowed[agreed])
+        # A mean that has left float64 gets no better by more samples.
+        unsettled[agreed] = ~(chance <= 2.0 * allowed[agreed]) & np.isfinite(now[agreed])
         first, second = changes[:, pending]
         # A smooth curve that is settled to a hundredth gains more than a factor of eight per doubling; a kink or jump
         # gains four or two.
