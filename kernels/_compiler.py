@@ -26,7 +26,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import codegen, types
+from numba.core import codegen
 from numba.core.compiler import CompilerBase, compile_result
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
@@ -146,11 +146,6 @@ class Kernel(CPUDispatcher):
         with global_compiler_lock, _without_collector(), plainly():
             return super().compile(sig)
 
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Return how it is called with such types; a number that is written there is a number like others."""
-        named = {name: types.unliteral(kind) for name, kind in kws.items()}
-        return super().get_call_template(tuple(types.unliteral(kind) for kind in args), named)
-
     def __reduce__(self) -> Any:
         """By its name where it has one: numba would send the source, and the process that gets it compile it anew."""
         home = sys.modules.get(self.py_func.__module__)
@@ -163,10 +158,6 @@ class Part(Kernel):
 
     compiler = _PartCompiler
     _callable: Any = None  # the kernel for calls from Python
-
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Return how it is called with such types; its loops may be those of a number that is written there."""
-        return CPUDispatcher.get_call_template(self, args, kws)
 
     def add_overload(self, cres: Any) -> None:
         """Take compiled code in for callers among the kernels; for Python there is nothing to call."""
