@@ -6,9 +6,11 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from studies import proof_space
 from sweep.cli import main
 from sweep.dataset import store
 from sweep.jobs.executors import Here
@@ -16,6 +18,7 @@ from sweep.jobs.signals import Stop
 from sweep.nights.carry import carry, searched
 from sweep.proof import known_proof, prove_study, read_proof
 from sweep.proof.rounds import Cores
+from sweep.report import write_report
 from sweep.study import load_study
 
 # A rocker that swings 60 degrees, the crank angle of the extended position and phi0 free.
@@ -195,3 +198,24 @@ def test_limits_that_the_proof_does_not_use_are_named(tmp_path: Path) -> None:
     code, text = ran(written(tmp_path, limits="max_abs_dpsi = { max = 5 }"))
     assert code == 0
     assert "makes no use of the limits on max_abs_dpsi" in text
+
+
+def test_page_states_the_proof_by_itself_and_no_doubt_beside_it(again: Path) -> None:
+    page = write_report(again / "designs").read_text(encoding="utf-8")
+    assert "<li>Proven: no design of this space has a largest acceleration below" in page
+    assert "<li>The optimiser started from" in page and "no proof of a global optimum" not in page
+
+
+def test_figure_of_the_space_accounts_for_all_of_it_and_shows_the_optimum_in_its_box(done: Path) -> None:
+    space = proof_space.read(done / "_proof.parquet")
+    assert space.excluded.sum() == pytest.approx(1.0) and space.names == ("phi0", "phi_ext")
+    for k in range(2):
+        _, by_strip = proof_space.shares(space, k)
+        np.testing.assert_allclose(by_strip.sum(axis=1), 1.0, rtol=1e-9)
+    inside = ((space.low <= space.optimum) & (space.optimum <= space.high)).all(axis=1)
+    # c at its bound: what excludes the boxes about the optimum is the length or the acceleration
+    words = {list(proof_space.COLOURS)[k] for k in space.reasons[inside]}
+    assert words and words <= {"links outside their limits", "acceleration not below the bound"}
+    figure = proof_space.draw(space, 75.0)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels[-1] == "the optimum" and any(label.startswith("pressure angle above its limit: ") for label in labels)
