@@ -170,8 +170,9 @@ def draw(space: Space, reach: float) -> Figure:
             for (word, colour), share in zip(COLOURS.items(), space.excluded, strict=True)
             if share > 0.0
         ]
-        style = {"marker": "o", "linestyle": ""} if n == 2 else {"linestyle": ":"}
-        handles += [Line2D([], [], color=INK, label="the optimum", **style)] if np.isfinite(space.optimum).all() else []
+        if np.isfinite(space.optimum).all():
+            marker, line = ("o", "") if n == 2 else ("", ":")
+            handles.append(Line2D([], [], color=INK, marker=marker, linestyle=line, label="the optimum"))
         figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
     return figure
 
