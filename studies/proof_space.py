@@ -171,8 +171,8 @@ def draw(space: Space, reach: float) -> Figure:
             if share > 0.0
         ]
         if np.isfinite(space.optimum).all():
-            marker, line = ("o", "") if n == 2 else ("", ":")
-            handles.append(Line2D([], [], color=INK, marker=marker, linestyle=line, label="the optimum"))
+            dot = Line2D([], [], color=INK, marker="o", linestyle="", label="the optimum")
+            handles.append(dot if n == 2 else Line2D([], [], color=INK, linestyle=":", label="the optimum"))
         figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
     return figure
 
