@@ -60,7 +60,7 @@ class Space:
     def excluded(self) -> Array:
         """Share of the space that each of COLOURS excludes."""
         volumes = np.prod((self.high - self.low) / np.diff(self.ends)[:, 0], axis=1)
-        return np.bincount(self.reasons, volumes, len(COLOURS))
+        return np.array([volumes[self.reasons == k].sum() for k in range(len(COLOURS))])
 
 
 def _reason(outcome: str, kinds: list[int]) -> int:
