@@ -60,15 +60,16 @@ def singularities(discriminants: Sequence[Curve], n: int, within: float = FAR) -
 
 def _dips(curve: Curve, n: int, number: int, within: float) -> Singularities:
     spacing = TWO_PI / SAMPLES
-    turn: Array = (np.arange(SAMPLES) * spacing)[None]  # one row for all designs: its cosines and sines are taken once
-    values = np.broadcast_to(curve(np.arange(n), turn), (n, SAMPLES))
+    turn = np.arange(SAMPLES, dtype=np.float64) * spacing
+    # One row of angles for all designs: its cosines and sines are taken once.
+    values = np.broadcast_to(curve(np.arange(n), turn[None]), (n, SAMPLES))
     before, after = np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
     half_bend = 0.5 * (before + after) - values
     dip = (values <= before) & (values <= after) & (half_bend > 0.0)
     nearness = np.where(dip, values / np.where(dip, half_bend, 1.0), np.inf)
     column = np.argsort(nearness, axis=1)[:, :NEAREST]
     row, which = np.nonzero(np.take_along_axis(dip, column, axis=1))
-    phi: Array = column[row, which] * spacing
+    phi = turn[column[row, which]]
     rho = np.minimum(spacing * np.sqrt(np.maximum(nearness[row, column[row, which]], 0.0)), FAR)
     places, distances = _elsewhere(n, number)
     places[row, which], distances[row, which] = phi, rho
