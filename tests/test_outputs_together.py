@@ -11,7 +11,7 @@ import pytest
 
 from sweep.families import family, rssr
 from sweep.families.base import Angles, Array, Columns
-from sweep.families.together import MANY, PAID, Together
+from sweep.families.together import MANY, PAID, Together, own_code
 from sweep.reductions.sampling import turn
 from tests.rssr_designs import random_designs
 
@@ -67,6 +67,14 @@ def test_a_set_that_is_asked_for_often_gets_code_of_its_own_and_no_other_does() 
     poses(ONE, few, frozenset("ab"))
     poses(ONE.astype(complex), few, A)  # other code than that of float64
     assert asked[-2:] == [ALL, ALL]
+
+
+def test_own_code_is_taken_at_once_where_a_time_is_measured() -> None:
+    poses, asked = recorded()
+    with own_code():
+        poses(ONE, angles(4), A)
+    poses(ONE, angles(4), A)
+    assert asked == [A, ALL]
 
 
 @pytest.mark.parametrize("complex_step", [False, True], ids=["float", "complex"])

@@ -95,7 +95,7 @@ def _grid(table: pd.DataFrame) -> str:
     return (
         f"**A fixed grid pays for every digit.** {USUAL:.0f} crank angles miss the largest acceleration by"
         f" {sig(error.median())} of it (median), by {sig(error.max())} in the worst family ({error.idxmax()}), and take"
-        f" {sig(ratio.median())} times as long as `accuracy={power(FINE)}`. The error falls with the square of their"
+        f" {ratio.median():.1f} times as long as `accuracy={power(FINE)}`. The error falls with the square of their"
         " number: one digit more takes three times as many."
     )
 

@@ -16,7 +16,7 @@ from sweep.numerics.quadrature import Array, Index
 TWO_PI = 2.0 * np.pi
 
 Curve: TypeAlias = Callable[[Index, Array], Array]
-"""``f(rows, phi)``: values (k, m) of a discriminant of the designs ``rows`` (k,) at crank angles (k, m)."""
+"""``f(rows, phi)``: values of a discriminant of the designs ``rows`` (k,) at crank angles (k, m), or (1, m) for all."""
 
 SAMPLES = 64  # of a discriminant, which is smooth whatever the motion does
 NEAREST = 3  # dips of each discriminant that count
@@ -45,31 +45,50 @@ class Singularities(NamedTuple):
         return nearest.reshape(phi.shape)
 
 
-def singularities(discriminants: Sequence[Curve], n: int) -> Singularities:
+def singularities(discriminants: Sequence[Curve], n: int, within: float = FAR) -> Singularities:
     """Return the nearest complex zeros of the discriminants of n designs, from their dips over the turn.
 
     A dip D + D''/2 x^2 vanishes at x = +- i rho with rho^2 = D/(D''/2).  The parabola through three samples is taken
-    again ever closer to the dip.
+    again ever closer to the dip, unless the first one puts the zero farther away than ``within`` [rad]: such zeros
+    are as good as the samples.
     """
     if not discriminants:
         return Singularities(np.ones((n, 1)), np.full((n, 1), FAR))
-    found = [_dips(curve, n, number) for number, curve in enumerate(discriminants)]
+    found = [_dips(curve, n, number, within) for number, curve in enumerate(discriminants)]
     return Singularities(*(np.concatenate(parts, axis=1) for parts in zip(*found, strict=True)))
 
 
-def _dips(curve: Curve, n: int, number: int) -> Singularities:
+def _dips(curve: Curve, n: int, number: int, within: float) -> Singularities:
     spacing = TWO_PI / SAMPLES
-    turn = np.tile(np.arange(SAMPLES) * spacing, (n, 1))
-    values = curve(np.arange(n), turn)
+    turn = np.arange(SAMPLES, dtype=np.float64) * spacing
+    # One row of angles for all designs: its cosines and sines are taken once.
+    values = np.broadcast_to(curve(np.arange(n), turn[None]), (n, SAMPLES))
     before, after = np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
     half_bend = 0.5 * (before + after) - values
     dip = (values <= before) & (values <= after) & (half_bend > 0.0)
     nearness = np.where(dip, values / np.where(dip, half_bend, 1.0), np.inf)
     column = np.argsort(nearness, axis=1)[:, :NEAREST]
     row, which = np.nonzero(np.take_along_axis(dip, column, axis=1))
-    phi = column[row, which] * spacing
+    phi = turn[column[row, which]]
+    rho = np.minimum(spacing * np.sqrt(np.maximum(nearness[row, column[row, which]], 0.0)), FAR)
+    places, distances = _elsewhere(n, number)
+    places[row, which], distances[row, which] = phi, rho
+    close = np.flatnonzero(rho <= within)
+    row, which = row[close], which[close]
+    places[row, which], distances[row, which] = _closer(curve, row, phi[close])
+    return Singularities(places, distances)
+
+
+def _elsewhere(n: int, number: int) -> tuple[Array, Array]:
+    """Return places for dips that are not there, no two of the same angle, far away."""
+    return np.tile(np.arange(1.0, 1.0 + NEAREST) + 0.1 * number, (n, 1)), np.full((n, NEAREST), FAR)
+
+
+def _closer(curve: Curve, row: Index, phi: Array) -> tuple[Array, Array]:
+    """Return places and distances of the zeros of designs ``row`` near dips at ``phi``, (k,)."""
+    spacing = TWO_PI / SAMPLES
     rho, step = np.full(phi.size, FAR), np.full(phi.size, spacing)
-    for _ in range(PASSES):
+    for _ in range(PASSES if phi.size else 0):
         left, here, right = curve(row, phi[:, None] + step[:, None] * np.arange(-1.0, 2.0)).T
         bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
         usable = bend > 0.0
@@ -77,13 +96,9 @@ def _dips(curve: Curve, n: int, number: int) -> Singularities:
         move = np.clip(-0.5 * slope * per_bend, -1.0, 1.0)
         lowest = np.maximum(here - 0.25 * slope * slope * per_bend, 0.0)
         rho = np.where(usable, np.maximum(step * np.sqrt(lowest * per_bend), SHORTEST), rho)
-        phi += step * move
+        phi = phi + step * move
         step = np.maximum(CLOSER * step, np.maximum(CLOSER * np.minimum(rho, spacing), SHORTEST))
-    # Where there are fewer dips the others stand somewhere, each elsewhere: no two of their angles coincide.
-    places = np.tile(np.arange(1.0, 1.0 + NEAREST) + 0.1 * number, (n, 1))
-    distances = np.full((n, NEAREST), FAR)
-    places[row, which], distances[row, which] = phi, np.minimum(rho, FAR)
-    return Singularities(places, distances)
+    return phi, np.minimum(rho, FAR)
 
 
 def crowded(near: Singularities, share: float) -> Array:

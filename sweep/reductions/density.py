@@ -30,21 +30,25 @@ def denser(family: Family, designs: Array) -> Array:
         shortest = np.where(gaps > 1e-9, gaps, TWO_PI).min(axis=1)
         factor = np.maximum(factor, TWO_PI / (SHARES * shortest))
     if family.every(Singular):
-        rho = nearest(family, designs).rho.min(axis=1)
+        # Zeros twice as far away as those that matter need not be known better than the samples show them.
+        rho = nearest(family, designs, 2.0 * PER_SINGULARITY / FEWEST).rho.min(axis=1)
         factor = np.where(rho < FAR, np.maximum(factor, PER_SINGULARITY / (FEWEST * rho)), factor)
     found: Array = np.exp2(np.ceil(np.log2(np.minimum(factor, MOST))))
     return found
 
 
-def nearest(family: Family, designs: Array) -> Singularities:
-    """Return the nearest singularities of a family's designs, from its most accurate poses."""
+def nearest(family: Family, designs: Array, within: float = FAR) -> Singularities:
+    """Return the nearest singularities of a family's designs, from its most accurate poses.
+
+    Those farther away than ``within`` [rad] are as good as even samples show them.
+    """
     curves = singular_curves(family.precise())
 
     def of_rows(some: Index, curve: SingularCurve) -> Curve:
         return lambda rows, phi: curve(designs[some[rows]], Angles.of(phi))
 
     parts = [
-        singularities([of_rows(some, curve) for curve in curves], some.size)
+        singularities([of_rows(some, curve) for curve in curves], some.size, within)
         for some in blocks(np.arange(len(designs)), SAMPLES, len(curves))
     ]
     if not parts:

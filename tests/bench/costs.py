@@ -23,6 +23,7 @@ from sweep.families import family
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.capabilities import InSeries
 from sweep.families.chain import Chain
+from sweep.families.together import own_code
 from sweep.reductions.size import size_step
 from sweep.reductions.travel import certified_travel
 from sweep.reductions.work import POSES_EVENT, POSES_PEAK, POSES_SEARCH
@@ -188,7 +189,8 @@ def main() -> None:
     parser.add_argument("--dry", action="store_true", help="print the figures, write nothing")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="of which the fastest counts")
     given = parser.parse_args()
-    sections, was = measured(given.rounds), table()
+    with own_code():
+        sections, was = measured(given.rounds), table()
     for section, rows in sections.items():
         print(f"\n{section:40s} {'ns':>10s} {'was':>10s}")
         for row, ns in rows.items():
