@@ -113,7 +113,7 @@ def main() -> None:
     print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
     for free, name in enumerate(NAMES, 2):
         for label, each, wide, parts in measured(name):
-            shown = [", ".join(f"{w[k]:.3g}" for w in wide) for k in range(len(WANTED))]
+            shown = [", ".join(f"{w[k]:.3g}".replace("inf", "none") for w in wide) for k in range(len(WANTED))]
             ends = ["", ""] if parts is None else [f"{parts:.0f}", f"{parts * each:.3g}"]
             ends = [f"above {MOST}", ""] if parts == np.inf else ends
             print(f"| {' | '.join([str(free), label, f'{each:.3g}', *shown, *ends])} |", flush=True)
