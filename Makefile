@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-extrema bench-first-use bench-optimise bench-basins help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-enclosures bench-extrema bench-first-use bench-optimise bench-basins help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -122,6 +122,9 @@ bench-estimates: $(VENV)/ready  ## what sweep check expects of every study again
 
 bench-extrema: $(VENV)/ready  ## errors and times of the search for true extrema, as in docs/extrema.md
 	$(BIN)/python -m tests.bench.extrema
+
+bench-enclosures: $(VENV)/ready  ## Taylor models of the proofs against intervals and balls, as in docs/proof.md; about 2 minutes
+	$(BIN)/python -m tests.bench.enclosures
 
 bench-first-use: $(VENV)/ready  ## from an empty cache of kernels to the first number; caches of its own, about 2 minutes
 	$(BIN)/python -m tests.bench.first_use

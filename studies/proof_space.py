@@ -7,13 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
+import sweep
 from sweep.report.figures import WIDTH, house_style, new_figure, save
 
 Array = NDArray[np.float64]
@@ -35,7 +40,9 @@ WORDS = {
     "alpha": "angle between the axes [deg]",
     "f": "offset f of the crank [mm]",
 }
+INK = "#1d2127"
 STRIPS = 120
+QUARTER, WIDE = 90.0, 180.0  # ticks of an axis wider than WIDE degrees
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,13 @@ class Space:
     high: Array
     reasons: NDArray[np.int64]
     ends: Array  # (n, 2) of the whole space
+    optimum: Array  # (n,) of the study, nan where it found none
+
+    @property
+    def excluded(self) -> Array:
+        """Share of the space that each of COLOURS excludes."""
+        volumes = np.prod((self.high - self.low) / np.diff(self.ends)[:, 0], axis=1)
+        return np.array([volumes[self.reasons == k].sum() for k in range(len(COLOURS))])
 
 
 def _reason(outcome: str, kinds: list[int]) -> int:
@@ -78,7 +92,19 @@ def read(path: Path) -> Space:
     )
     pairs = zip(table["outcome"].to_pylist(), table["kinds"].to_pylist(), strict=True)
     reasons = np.array([_reason(outcome, kinds) for outcome, kinds in pairs])
-    return Space(names, low, high, reasons, np.column_stack([asked["low"], asked["high"]]) * units[:, None])
+    ends = np.column_stack([asked["low"], asked["high"]]) * units[:, None]
+    return Space(names, low, high, reasons, ends, _optimum(path.with_name("_optimum.parquet"), names) * units)
+
+
+def _optimum(path: Path, names: tuple[str, ...]) -> Array:
+    """Return the study's optimum in the coordinates of the space."""
+    rows = pd.read_parquet(path)
+    best = rows[(rows["role"] == "optimum") & (rows["status"] == 0)].reset_index(drop=True)
+    if best.empty:
+        return np.full(len(names), np.nan)
+    design = best[["a", "b", "c", "e", "f", "g", "alpha", "branch"]]
+    places = design.join(sweep.summarise("rssr", design, ["phi_ext", "phi0", "psi_ext"]))
+    return places[list(names)].iloc[0].to_numpy(np.float64)
 
 
 def _map(axes: Axes, space: Space, reach: float) -> None:
@@ -93,6 +119,7 @@ def _map(axes: Axes, space: Space, reach: float) -> None:
     axes.set_ylim(*space.ends[y])
     axes.set_xlabel(WORDS[space.names[x]])
     axes.set_ylabel(WORDS[space.names[y]])
+    axes.plot(*space.optimum[[x, y]], marker="o", markersize=5, color=INK, clip_on=False)
 
 
 def shares(space: Space, k: int) -> tuple[Array, Array]:
@@ -117,8 +144,11 @@ def _strips(axes: Axes, space: Space, k: int) -> None:
         axes.stairs(top, edges, baseline=base, fill=True, color=colour, linewidth=0.0)
         base = top
     axes.set_xlim(*space.ends[k])
+    axes.axvline(space.optimum[k], color=INK, linewidth=1.2, linestyle=":", clip_on=False)
     axes.set_ylim(0.0, 100.0)
-    axes.set_xlabel(WORDS[space.names[k]])
+    axes.set_xlabel(WORDS[space.names[k]].replace(" of the ", " of the\n", 1))
+    if np.diff(space.ends[k])[0] > WIDE and space.names[k] != "f":
+        axes.xaxis.set_major_locator(MultipleLocator(QUARTER))
 
 
 def draw(space: Space, reach: float) -> Figure:
@@ -135,7 +165,14 @@ def draw(space: Space, reach: float) -> Figure:
                 _strips(axes, space, k)
                 if k % columns == 0:
                     axes.set_ylabel("share of the space [%]")
-        handles = [Patch(color=c, label=w) for k, (w, c) in enumerate(COLOURS.items()) if (space.reasons == k).any()]
+        handles: list[Artist] = [
+            Patch(color=colour, label=f"{word}: {100.0 * share:.2g} %")
+            for (word, colour), share in zip(COLOURS.items(), space.excluded, strict=True)
+            if share > 0.0
+        ]
+        if np.isfinite(space.optimum).all():
+            dot = Line2D([], [], color=INK, marker="o", linestyle="", label="the optimum")
+            handles.append(dot if n == 2 else Line2D([], [], color=INK, linestyle=":", label="the optimum"))
         figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
     return figure
 

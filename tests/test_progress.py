@@ -78,7 +78,7 @@ def test_proof_expects_no_more_boxes_than_it_comes_to_need(tmp_path: Path) -> No
     question = question_of(study)
     asked = replace(study.optimise.prove, boxes=1_000_000)
     least = question.in_kernel(1e-3)  # far below what any design reaches: proven soon
-    leaves, judged, cut = explored(
+    leaves, judged, cut, _ = explored(
         question, least, asked, tmp_path, Cores(Here(), 1, Stop()), lambda *t: told.append(t)
     )
     assert not cut and not leaves.open.any()

@@ -36,11 +36,10 @@ def small(name: str = "crank-rocker-proof"):
 def proven(question, folder, cores=None, settings=None, target=TARGET):
     """The certificate of a question, written into a folder."""
     settings = settings or ProveSettings(0.014, 20_000)
-    leaves, judged, cut = explored(
-        question, target, settings, folder / "parts", cores or Cores(Here(), 1, Stop()), lambda *_: None
-    )
-    proof = concluded(question, leaves, BEST, settings.gap, judged, 0.0, cut)
-    write(folder / "_proof.parquet", question, leaves, proof, target, "key")
+    place = cores or Cores(Here(), 1, Stop())
+    found = explored(question, target, settings, folder / "parts", place, lambda *_: None)
+    proof = concluded(question, found, BEST, settings.gap)
+    write(folder / "_proof.parquet", question, found.leaves, proof, target, "key")
     return proof
 
 
@@ -116,5 +115,5 @@ def test_family_without_a_provable_locus_is_refused():
     study = load_study(STUDIES / "crank-rocker-proof")
     assert isinstance(study.family, Family)
     bare = replace(study, locus=None)
-    with pytest.raises(InputError, match="provable locus"):
+    with pytest.raises(InputError, match="proven optimum"):
         question_of(bare)

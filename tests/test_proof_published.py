@@ -83,10 +83,8 @@ def bound(tmp_path: Path, swing: float, phi0: float, crank: float, target: float
     question = question_of(load_study(tmp_path / "study.toml"))
     settings = ProveSettings(1e-5, 20_000)
     best, cores = np.radians(target), Cores(Here(), 1, Stop())
-    leaves, judged, cut = explored(
-        question, question.in_kernel(best), settings, tmp_path / "parts", cores, lambda *_: None
-    )
-    proof = concluded(question, leaves, best, settings.gap, judged, 0.0, cut)
+    found = explored(question, question.in_kernel(best), settings, tmp_path / "parts", cores, lambda *_: None)
+    proof = concluded(question, found, best, settings.gap)
     return float(np.degrees(proof.bound)), proof.open + proof.exceptions
 
 

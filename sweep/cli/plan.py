@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 POSES = 100.0
 ADVISED = 64
 NAMED = 24  # outputs that are not computed
+SECONDS_PER_BOX = 20e-6  # of a proof, docs/proof.md
 
 
 def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]) -> list[str]:
@@ -53,6 +54,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
         what = "unseen basins" if settings.globally == "none" else "basins that are unseen and better"
         rule = f"fewer if the estimated share of {what} falls to {100.0 * settings.unseen:g} %"
         lines += [f"optimiser: at most {settings.starts} starts of {settings.looks} looks, {rule}{brake}"]
+    lines += _proof(study)
     lines += _front(study)
     lines += ["", "estimated cost, without the first compilation of the kernels"]
     lines += aligned(
@@ -161,6 +163,22 @@ def _front(study: Study) -> list[str]:
     return [
         f"front: the same with {name} {side} {ends}, {len(bounds)} bounds; "
         f"up to {searches(study.pareto)} searches besides those of the optimiser{time}"
+    ]
+
+
+def _proof(study: Study) -> list[str]:
+    """Return what is to be proven of which space, and with which budget."""
+    from sweep.proof.question import question_of
+
+    if study.optimise is None or study.optimise.prove is None:
+        return []
+    asked, question = study.optimise.prove, question_of(study)
+    brake = "" if asked.seconds is None else f"; emergency brake after {duration(asked.seconds)}"
+    unused = f"; no use is made of the limits on {', '.join(question.left_out)}" if question.left_out else ""
+    return [
+        f"proof: that no design is better than the optimum by more than {100.0 * asked.gap:g} %, over "
+        f"{', '.join(question.names)}; at most {asked.boxes} boxes, "
+        f"{duration(asked.boxes * SECONDS_PER_BOX)} of processor time{brake}{unused}"
     ]
 
 

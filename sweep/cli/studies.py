@@ -82,10 +82,12 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
     """
     from sweep.cli.plan import plan_lines
     from sweep.engine.estimate import check_budget, estimate, other_accuracies
+    from sweep.engine.proving import refuse_unprovable
     from sweep.jobs.progress import Phases
     from sweep.study import load_study
 
     model = load_study(study, smoke=smoke)
+    refuse_unprovable(model)
     with Phases(show=True) as phases:
         cost = estimate(model, jobs, lambda done, of: phases.say("planning", done, of))
         others = other_accuracies(model, jobs, lambda done, of: phases.say("other accuracies", done, of))

@@ -11,6 +11,7 @@ from pathlib import Path
 PLAN, RUNS, LOCK, BAD, OLD = "_plan.json", "_runs.jsonl", "_lock", "_bad", "_old"
 OPTIMUM, CURVES = "_optimum.parquet", "_curves.parquet"
 SENSITIVITY, TOLERANCE, PARETO = "_sensitivity.parquet", "_tolerance.parquet", "_pareto.parquet"
+PROOF = "_proof.parquet"
 TEMPORARY = "_tmp-"
 
 DESIGNS = "designs"

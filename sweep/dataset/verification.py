@@ -25,7 +25,7 @@ DEFAULT_DESIGNS = 32
 
 ANEW = "the next run moves it to _bad/ and computes it anew"
 UNSEEN = "a run takes it as finished; move it away, then the next run computes it anew"
-SIDE_FILES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO)
+SIDE_FILES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO, store.PROOF)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from sweep.dataset import store
 from sweep.dataset.tables import TABLES, altered, digests, metadata
 from sweep.engine.log import circumstances, command
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
-from sweep.engine.proving import prove
+from sweep.engine.proving import prove, refuse_unprovable
 from sweep.errors import Interrupted, SearchCutShort, StoreError, TimeUsedUp, WorkerDied
 from sweep.jobs.executors import at_work, executor, for_tasks
 from sweep.jobs.progress import Phases, Progress
@@ -92,6 +92,7 @@ def run(
 
     place = executor(backend, jobs)  # refuses what there is not
     model = _model(study, smoke, accuracy, certify)
+    refuse_unprovable(model)
     with Phases(progress) as phases:
         warm(model, lambda done, total: phases.say("compiling", done, total))
         _check_budget(model, jobs, force, lambda done, total: phases.say("planning", done, total))
@@ -111,9 +112,11 @@ def _search(study: Study, folder: Path, jobs: int, backend: str, progress: bool)
     """Compute optimum, proof and front, as far as the study asks for them."""
     if study.optimise is not None:
         _optimise(replace(study, pareto=None), folder, jobs, progress)
-    prove(study, folder, jobs, backend, progress)
+    proof_cut_short = prove(study, folder, jobs, backend, progress)
     _front(study, folder, jobs, progress)
     _raise_if_cut_short(folder)
+    if proof_cut_short:
+        raise SearchCutShort(folder, f"{folder}: optimise.prove.time ran out; run again, and the proof goes on")
 
 
 @contextmanager

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 REPORT, FIGURES, SURVIVORS = "report.html", "figures", "survivors.parquet"
-TABLES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO)
+TABLES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO, store.PROOF)
 
 
 @dataclass(frozen=True)
@@ -77,19 +77,23 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
 
 
 def searched(study: Study, folder: Path) -> bool:
-    """Return whether optimum and front in a folder, as far as the study asks for them,
+    """Return whether optimum, proof and front in a folder, as far as the study asks for them,
     are its own and of these sources.
 
     A search that time has cut short is made again.
     """
     from sweep.optimise import read_survey
     from sweep.optimise.front import saved
+    from sweep.proof import known_proof
 
     note = store.read_plan(folder / store.DESIGNS) or {}
     if study.optimise is not None and note.get("optimised") != optimum_key(replace(study, pareto=None), note):
         return False
     found = read_survey(folder / store.OPTIMUM)
     if found is not None and found.ended == "time":
+        return False
+    asked = study.optimise is not None and study.optimise.prove is not None
+    if asked and known_proof(study, folder / store.DESIGNS) is None:
         return False
     if study.pareto is None:
         return True

@@ -6,4 +6,5 @@ reads what was proven.
 
 from sweep.proof.certificate import Proof as Proof
 from sweep.proof.certificate import read_proof as read_proof
+from sweep.proof.study import known_proof as known_proof
 from sweep.proof.study import prove_study as prove_study

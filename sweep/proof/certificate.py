@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from sweep.dataset import store
+from sweep.dataset.tables import metadata
 from sweep.families.base import Array
 from sweep.proof.question import Question, described
-from sweep.proof.rounds import BOUND, EMPTY, OPEN, OUTCOMES, TOO_SMALL, Leaves
-
-PROOF = "_proof.parquet"
+from sweep.proof.rounds import BOUND, EMPTY, OPEN, OUTCOMES, TOO_SMALL, Explored, Leaves
 
 
 @dataclass(frozen=True)
@@ -24,9 +23,9 @@ class Proof:
     No design of the space outside the ``exceptions`` has less than ``bound``; ``best`` is the feasible design that the
     study found, nan where it found none.  ``exceptions`` boxes were too small to be halved again; together they are the
     share ``exceptional`` of the space, and lie between ``exception_low`` and ``exception_high``.  ``open`` boxes were
-    left when their number or the time was used up; the bound holds for them too.  ``empty_share`` of the space was
-    proven to hold no feasible design.  ``reasons`` counts the boxes by what proves them.  ``floor`` is what no motion
-    from rest to rest can be below; without a bound of its own, the ``bound`` is that.
+    left when their number or the time was used up (``cut_short``: the time, or a signal); the bound holds for them too.
+    ``empty_share`` of the space was proven to hold no feasible design.  ``reasons`` counts the boxes by what proves
+    them.  ``floor`` is what no motion from rest to rest can be below; without a bound of its own ``bound`` is that.
     """
 
     objective: str
@@ -43,7 +42,6 @@ class Proof:
     exception_high: tuple[float, ...]
     free: tuple[str, ...]
     empty_share: float
-    seconds: float
     cut_short: bool
     reasons: tuple[tuple[str, int], ...]
     left_out: tuple[str, ...]
@@ -60,10 +58,9 @@ class Proof:
         return self.open == 0
 
 
-def concluded(
-    question: Question, leaves: Leaves, best: float, wanted_gap: float, boxes: int, seconds: float, cut_short: bool
-) -> Proof:
-    """Return what follows from the leaves."""
+def concluded(question: Question, found: Explored, best: float, wanted_gap: float) -> Proof:
+    """Return what follows from the leaves of a search."""
+    leaves = found.leaves
     outcome, bounds = leaves.outcome, np.where(leaves.outcome == EMPTY, np.inf, leaves.bound)
     volume = np.prod((leaves.high - leaves.low) / (question.high - question.low), axis=1)
     small = outcome == TOO_SMALL
@@ -76,7 +73,7 @@ def concluded(
         bound=question.outside(least) if np.isfinite(least) else least,
         best=best,
         wanted_gap=wanted_gap,
-        boxes=boxes,
+        boxes=found.judged,
         leaves=len(outcome),
         open=int((outcome == OPEN).sum()),
         exceptions=int(small.sum()),
@@ -85,8 +82,7 @@ def concluded(
         exception_high=tuple(float(x) for x in ends[1]),
         free=question.names,
         empty_share=float(volume[outcome == EMPTY].sum()),
-        seconds=seconds,
-        cut_short=cut_short,
+        cut_short=found.cut_short,
         reasons=_reasons(question, leaves),
         left_out=question.left_out,
         floor=question.outside(question.floor),
@@ -138,12 +134,11 @@ def write(path: Path, question: Question, leaves: Leaves, proof: Proof, target: 
 
 
 def read_proof(path: Path) -> Proof | None:
-    """Return what a certificate says; None where there is no such file."""
-    import pyarrow.parquet as pq
-
-    if not path.is_file():
+    """Return what a certificate says; None where there is no such file, or it is damaged."""
+    content = json.loads(metadata(path).get(b"proof", b"null"))
+    if content is None:
         return None
-    content = json.loads(pq.read_schema(path).metadata[b"proof"])
+    content = {name: content[name] for name in Proof.__dataclass_fields__}  # earlier versions said more
     lists = ("exception_low", "exception_high", "free", "left_out")
     return Proof(
         **content

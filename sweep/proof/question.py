@@ -111,7 +111,7 @@ def question_of(study: Study) -> Question:
     place = f"{study.path}: optimise.prove"
     provable = None if isinstance(study.family, Chain) or study.locus is None else _suited(study)
     if provable is None:
-        allowed = "a study of one mechanism with a provable locus (see sweep families) and a table [locus]"
+        allowed = "a study of one mechanism with 'proven optimum' in sweep families, and with a table [locus]"
         raise InputError("optimise.prove", study.family.name, allowed, place)
     assert study.objective is not None
     if study.objective.output not in provable.objectives:

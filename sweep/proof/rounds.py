@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,18 @@ def joined(parts: list[Leaves]) -> Leaves:
     return Leaves(*(np.concatenate([getattr(p, n) for p in parts]) for n in Leaves.__dataclass_fields__))
 
 
+class Explored(NamedTuple):
+    """Leaves of a search, the number of boxes judged, whether time or a signal cut it short, and what it took.
+
+    ``seconds`` is processor time of the boxes, over all runs of a search that was stopped.
+    """
+
+    leaves: Leaves
+    judged: int
+    cut_short: bool
+    seconds: float
+
+
 @dataclass(frozen=True)
 class Cores:
     """Where work units run: the executor, its workers, and the flag that stops them."""
@@ -107,27 +119,31 @@ class Unit:
             asked.tube(self.target), (mine.low, mine.high, mine.bound), asked.high - asked.low, asked.free,
             asked.given, self.smallest, self.most,
         )  # fmt: skip
-        filled, judged = provable.explore(searched, tuple(getattr(leaves, n) for n in Leaves.__dataclass_fields__))
-        _write(self.path(number), leaves.taken(np.arange(filled)), judged)
+        out = tuple(getattr(leaves, n) for n in Leaves.__dataclass_fields__)
+        provable.explore(replace(searched, most=0), out)  # judges nothing, but compiles what is not compiled yet
+        begin = time.thread_time()
+        filled, judged = provable.explore(searched, out)
+        _write(self.path(number), leaves.taken(np.arange(filled)), judged, time.thread_time() - begin)
         return number, judged
 
 
-def _write(path: Path, leaves: Leaves, judged: int) -> None:
+def _write(path: Path, leaves: Leaves, judged: int, seconds: float) -> None:
     import io
 
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, judged=judged, **{n: getattr(leaves, n) for n in Leaves.__dataclass_fields__})
+    buffer, columns = io.BytesIO(), {n: getattr(leaves, n) for n in Leaves.__dataclass_fields__}
+    np.savez_compressed(buffer, judged=judged, seconds=seconds, **columns)
     store.write_atomically(path, buffer.getvalue())
 
 
-def _read(path: Path) -> tuple[Leaves, int]:
+def _read(path: Path) -> Explored:
     with np.load(path) as data:
-        return Leaves(*(data[name] for name in Leaves.__dataclass_fields__)), int(data["judged"])
+        leaves = Leaves(*(data[name] for name in Leaves.__dataclass_fields__))
+        return Explored(leaves, int(data["judged"]), False, float(data["seconds"]))
 
 
 def explored(
     question: Question, target: float, asked: ProveSettings, folder: Path, cores: Cores, tell: Tell
-) -> tuple[Leaves, int, bool]:
+) -> Explored:
     """Halve boxes until all is proven or as many as asked were judged.
 
     Parameters
@@ -142,21 +158,21 @@ def explored(
 
     Returns
     -------
-    All leaves, the number of boxes judged, and whether time or a signal cut it short.
+    All leaves, what they took, and whether time or a signal cut it short.
     """
     done: list[Leaves] = []
     start = empty(1, len(question.names))
     start.low[0], start.high[0] = question.low, question.high
     start.bound[0] = question.floor
-    todo, judged, begin = start, 0, time.monotonic()
+    todo, judged, seconds, begin = start, 0, 0.0, time.monotonic()
     for number, share in enumerate(SHARES):
         if not len(todo.bound):
             break
         if cores.stop or (asked.seconds is not None and time.monotonic() - begin > asked.seconds):
-            return joined([*done, todo]), judged, True
+            return Explored(joined([*done, todo]), judged, True, seconds)
         most = max(int(asked.boxes * share) // UNITS, 1)
         unit = Unit(question, target, _split(todo, question), most, asked.smallest, folder, number)
-        counts = [_read(path)[1] for path in _finished(unit)]  # of a run that was stopped
+        counts = [_read(path).judged for path in _finished(unit)]  # of a run that was stopped
         for _, count in _run(unit, cores):
             counts.append(count)
             here = sum(counts)
@@ -164,14 +180,15 @@ def explored(
             further = int(asked.boxes * sum(SHARES[number + 1 :])) if max(counts) == most else 0
             tell(judged + here, judged + here * UNITS // len(counts) + further)
         if cores.stop:
-            return joined([*done, todo]), judged, True
+            return Explored(joined([*done, todo]), judged, True, seconds)
         results = [_read(path) for path in _finished(unit)]
-        judged += sum(count for _, count in results)
-        found = joined([leaves for leaves, _ in results])
+        judged += sum(result.judged for result in results)
+        seconds += sum(result.seconds for result in results)
+        found = joined([result.leaves for result in results])
         done.append(found.taken(~found.open))
         todo = found.taken(found.open)
         todo = todo.taken(np.lexsort((*todo.low.T, todo.bound)))
-    return joined([*done, todo]), judged, False
+    return Explored(joined([*done, todo]), judged, False, seconds)
 
 
 def _split(boxes: Leaves, question: Question) -> Leaves:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +13,9 @@ import numpy as np
 from kernels import status as st
 from kernels._cache import source_hash
 from sweep.dataset import store
+from sweep.dataset.tables import metadata
 from sweep.errors import InputError
-from sweep.proof.certificate import PROOF, Proof, concluded, read_proof, write
+from sweep.proof.certificate import Proof, concluded, read_proof, write
 from sweep.proof.question import Question, described, question_of
 from sweep.proof.rounds import SHARES, UNITS, Cores, Tell, explored
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from sweep.study import ProveSettings, Study
 
 NEVER = 1e300  # the target where no feasible design is known: then only emptiness can be proven
+PARTS = "_proof"  # folder of finished work units; it goes when the proof has ended
+EVENT = "proof"  # in ``_runs.jsonl``
 
 
 def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lambda _, __: None) -> Proof:
@@ -37,7 +39,7 @@ def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lam
 
     Returns
     -------
-    What is proven; the certificate is ``_proof.parquet`` beside the dataset.
+    What is proven; the certificate is ``_proof.parquet`` beside the dataset, and ``_runs.jsonl`` says what it took.
 
     Raises
     ------
@@ -46,26 +48,48 @@ def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lam
     KeyboardInterrupt
         if it was stopped; finished work units are kept.
     """
-    if study.optimise is None or study.optimise.prove is None:
-        raise InputError("optimise.prove", None, '{ gap = "1 %", boxes = 1000000 }', str(study.path))
-    asked = study.optimise.prove
-    question, side = question_of(study), store.beside(Path(folder))
-    best = _best(side / store.OPTIMUM, question)
-    target = question.in_kernel(best / (1.0 + asked.gap)) if np.isfinite(best) else NEVER
-    key = _key(question, target, asked)
-    known = read_proof(side / PROOF)
-    if known is not None and not known.cut_short and _known_key(side / PROOF) == key:
+    known = known_proof(study, folder)
+    if known is not None:
         return known
-    parts = side / "_proof" / key
-    begin = time.monotonic()
-    leaves, judged, cut_short = explored(question, target, asked, parts, cores, tell)
-    proof = concluded(question, leaves, best, asked.gap, judged, time.monotonic() - begin, cut_short)
-    write(side / PROOF, question, leaves, proof, target, key)
+    asked, question, target, key = _asked(study, Path(folder))
+    side = store.beside(Path(folder))
+    found = explored(question, target, asked, side / PARTS / key, cores, tell)
+    proof = concluded(question, found, _best(side / store.OPTIMUM, question), asked.gap)
+    write(side / store.PROOF, question, found.leaves, proof, target, key)
     if cores.stop:
         raise KeyboardInterrupt
-    if not cut_short:
-        shutil.rmtree(side / "_proof", ignore_errors=True)
+    store.append_run(Path(folder), {"event": EVENT, "boxes": proof.boxes, "processor_seconds": round(found.seconds, 3)})
+    if not proof.cut_short:
+        shutil.rmtree(side / PARTS, ignore_errors=True)
     return proof
+
+
+def known_proof(study: Study, folder: str | Path) -> Proof | None:
+    """Return what the certificate beside a dataset says, if it answers what the study asks and no time cut it short.
+
+    Raises
+    ------
+    InputError
+        if the study asks for what cannot be proven.
+    """
+    path = store.beside(Path(folder)) / store.PROOF
+    found = read_proof(path)
+    if found is None or found.cut_short:
+        return None
+    *_, key = _asked(study, Path(folder))
+    return found if metadata(path).get(b"key") == key.encode() else None
+
+
+def _asked(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, str]:
+    """Return settings, question, target in the unit of the proof's rows, and what the certificate depends on."""
+    if study.optimise is None or study.optimise.prove is None:
+        raise InputError("optimise.prove", None, '{ gap = "1 %", boxes = 1000000 }', str(study.path))
+    asked, question = study.optimise.prove, question_of(study)
+    best = _best(store.beside(folder) / store.OPTIMUM, question)
+    target = question.in_kernel(best / (1.0 + asked.gap)) if np.isfinite(best) else NEVER
+    what = [described(question), target, asked.gap, asked.boxes, asked.smallest, UNITS, SHARES, source_hash()]
+    key = hashlib.sha256(json.dumps(what, default=str, sort_keys=True).encode()).hexdigest()[:16]
+    return asked, question, target, key
 
 
 def _best(path: Path, question: Question) -> float:
@@ -75,16 +99,3 @@ def _best(path: Path, question: Question) -> float:
     table = pq.read_table(path, columns=["role", "status", question.objective]).to_pylist()
     first = next(row for row in table if row["role"] == "optimum")
     return float(first[question.objective]) if first["status"] != st.LIMIT_EXCEEDED else float("nan")
-
-
-def _key(question: Question, target: float, asked: ProveSettings) -> str:
-    """Return what the certificate depends on."""
-    what = [described(question), target, asked.gap, asked.boxes, asked.smallest, UNITS, SHARES, source_hash()]
-    return hashlib.sha256(json.dumps(what, default=str, sort_keys=True).encode()).hexdigest()[:16]
-
-
-def _known_key(path: Path) -> str | None:
-    import pyarrow.parquet as pq
-
-    found = (pq.read_schema(path).metadata or {}).get(b"key")
-    return None if found is None else found.decode()

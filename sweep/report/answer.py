@@ -45,6 +45,8 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
     second = data.second
     if second is not None and _is_number(data.result, second):
         sentences.append(_comparison(data, second))
+    proven = proof.proof_sentence(data)
+    sentences += [f"{proven[0].upper()}{proven[1:]}."] if proven else []
     sentences += further
     sentences += [] if cut else search_warnings(data)
     # What [locus] prescribes as an axis is a space that was searched; as a value it holds by construction.
@@ -54,7 +56,7 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
     sentences.append(front_sentence(data))
     sentences += _against_reference(data)
     sentences += not_achieved(data, found)
-    sentences.append(_proof(data, found))
+    sentences.append(_search(data, found, proven=bool(proven)))
     return [s for s in sentences if s]
 
 
@@ -178,20 +180,21 @@ def _residual(value: float) -> str:
     return "its KKT residual does not exist" if math.isnan(value) else f"KKT residual {number(value, 3)}"
 
 
-def _proof(data: Dataset, found: Scan) -> str:
+def _search(data: Dataset, found: Scan, *, proven: bool) -> str:
+    """Return how the optimum was searched, and that this proves nothing where there is no proof besides."""
     if data.optimum is None:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
     starts, agree = data.starts, value_of(data.optimum, "agree")
     kind = "" if found.feasible else "random "
-    proven = proof.proof_sentence(data)
-    head = f"{proven[0].upper()}{proven[1:]}. The" if proven else f"{NO_PROOF}: the"
+    head = "The" if proven else f"{NO_PROOF}: the"
     text = f"{head} optimiser started from {starts} {kind}design{'s' if starts != 1 else ''}"
     populations = 0 if data.survey is None else data.survey.populations
     text += f", ends of {populations} global searches and designs of the sweep" if populations else " of the sweep"
     if math.isfinite(agree) and not populations:  # of those the survey tells more
         text += f", {number(agree)} of which ended at this value"
     if data.survey is not None:
-        text += f"; {data.survey.words}"
+        # What comes from one valley is one meeting, so the survey may count fewer than ended at the value.
+        text += f"; {'' if populations else 'counting distinct valleys, '}{data.survey.words}"
     residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
     words = "" if math.isnan(residual) else f"{_residual(residual)}, "
     return f"{text}. {words}{'l' if words else 'L'}argest violation of a limit {number(violation, 3)}."

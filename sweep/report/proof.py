@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from sweep.dataset import store
 from sweep.proof import read_proof
-from sweep.proof.certificate import PROOF
+from sweep.proof.study import EVENT
 from sweep.proof.words import proof_words
 from sweep.report.dataset import Dataset
 from sweep.report.quantities import quantity
@@ -17,15 +17,16 @@ if TYPE_CHECKING:
 
 def proof_sentence(data: Dataset) -> str:
     """Return one sentence; empty where the study asked for no proof."""
-    found = read_proof(store.beside(data.folder) / PROOF)
+    found = read_proof(store.beside(data.folder) / store.PROOF)
     if found is None:
         return ""
     shown = quantity(found.objective, data.units.get(found.objective, found.unit))
-    return proof_words(found, shown.words, shown.show)
+    took = [run["processor_seconds"] for run in data.runs if run.get("event") == EVENT]
+    return proof_words(found, shown.words, shown.show, took[-1] if took else None)
 
 
 def search_warnings(data: Dataset, found: Survey) -> tuple[str, ...]:
     """Return what a reader has to know of a search; a proof of the whole space leaves no doubt of something better."""
-    proof = read_proof(store.beside(data.folder) / PROOF)
+    proof = read_proof(store.beside(data.folder) / store.PROOF)
     without_doubt = proof is not None and proof.settled and not proof.exceptions
     return found.shortcomings if without_doubt else found.warnings
