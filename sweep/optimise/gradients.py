@@ -9,8 +9,9 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.optimise.passages import PASSING
-from sweep.optimise.points import CROSSING, STEP, Curves, Points
+from sweep.optimise.points import STEP, Curves, Points
 from sweep.optimise.problem import Problem
+from sweep.optimise.scanned import CROSSING
 
 # Mixed derivative of the slope: complex step in the variable, fourth-order difference in the crank angle.
 OFFSET = 1e-3
