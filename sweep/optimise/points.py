@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.families.base import Angles, Array
-from sweep.optimise.edges import bending, edges, may_bend, poses_needed
+from sweep.optimise.edges import bending, distances, edges, followed, may_bend, poses_needed
 from sweep.optimise.passages import PASSING, passages
 from sweep.optimise.problem import Problem
-from sweep.optimise.scanned import CROSSING, STATIC, STATIONARY, Row, extrema, tops
+from sweep.optimise.scanned import CROSSING, EDGE, STATIC, STATIONARY, Row, extrema, tops
 from sweep.reductions.closing import on_closed_turn
 from sweep.reductions.differentiable import differentiable
 from sweep.reductions.measures import Series
@@ -37,7 +37,8 @@ class Points:
 
     ``series`` numbers the curve, ``phi`` is the crank angle, ``sense`` +1 for a maximum and -1 for a minimum; ``how``
     says what holds the point: stationary, the crossing of the window's edge at the fraction ``level`` of the stroke, a
-    fixed angle, or the place where the curve passes ``level``, upwards for ``sense`` +1.  ``value`` is the curve there,
+    fixed angle, an edge of the curve (``level`` says which one, and on which side), or the place where the curve
+    passes ``level``, upwards for ``sense`` +1.  ``value`` is the curve there,
     ``slope`` and ``curvature`` are its derivatives with respect to phi;
     ``pace`` is the slope of the position.
     """
@@ -132,7 +133,7 @@ class Curves:
         found = Points.of(rows)
         points = self.follow(design, found, stride=2.0 * math.pi / samples)
         if self.may_bend and turns:
-            points = self._with_edges(design, columns, found, points)
+            points = self._with_edges(design, columns, found, points, 2.0 * math.pi / samples)
         if windowed and turns:
             edge_rows: list[Row] = []
             for n in windowed:
@@ -140,24 +141,29 @@ class Curves:
             points = self.follow(design, Points.joined(points, Points.of(edge_rows)), stride=2.0 * math.pi / samples)
         return _without_repetition(points), turns
 
-    def _with_edges(self, design: Array, columns: dict[str, Any], found: Points, points: Points) -> Points:
-        """Return the points with those at edges of curves;
-        one that fell off an edge on its way up stays where it began.
-        """
+    def _with_edges(
+        self, design: Array, columns: dict[str, Any], found: Points, points: Points, stride: float
+    ) -> Points:
+        """Return points and those at edges of curves; ``found`` is where the points began, samples ``stride`` apart."""
         names = bending(self.problem.family, design, self.plain)
         if not names:
             return points
         bent = [n for n, s in enumerate(self.series) if _is_plain(s) and s.output in {self.plain[k] for k in names}]
-        fell = (points.sense * (found.value - points.value) > 0.0) & np.isin(points.series, bent)
-        held = replace(found, how=np.where(fell, STATIC, found.how))
-        sides = edges(self.problem.family, design)
+        sides, which = edges(self.problem.family, design)
         there = self.poses(design[None, :], sides.ravel())
         rows = []
         for n in bent:
             values = self.curve(self.series[n], there)[0].reshape(sides.shape)
-            rows += tops(n, sides, values, self.curve(self.series[n], columns)[0])
-        kept = Points.joined(points.take(~fell), held.take(fell))
-        return Points.joined(kept, self.follow(design, Points.of(rows)))
+            rows += tops(n, sides, which, values, self.curve(self.series[n], columns)[0])
+        # A top beside an edge stands for the edge; from elsewhere none may end lower than it began.
+        own = np.isin(points.series, bent)
+        fell = own & (points.sense * (found.value - points.value) > 0.0)
+        phi = np.where(fell, found.phi, points.phi)
+        beside = own & (distances(sides.mean(axis=0), phi) <= np.where(fell, stride, NEIGHBOUR))
+        held = replace(found, how=np.full(len(found), STATIC)).take(fell & ~beside)
+        kept = Points.joined(points.take(~fell & ~beside), held)
+        at_edges = Points.of(rows)
+        return Points.joined(kept, replace(at_edges, value=self.values(design[None, :], at_edges)[0]))
 
     def curve(self, series: Series, columns: dict[str, Any]) -> Any:
         """Return values of a series (n, m) out of pose outputs on a set of angles."""
@@ -189,8 +195,10 @@ class Curves:
         """
         if not len(points):
             return points
-        held, passing = points.how == STATIONARY, points.how == PASSING
+        held, passing, edge = points.how == STATIONARY, points.how == PASSING, points.how == EDGE
         phi = points.phi.copy()
+        if edge.any():
+            phi[edge] = followed(self.problem.family, design[None, :], phi[edge], points.level[edge])[0]
         reach, uphill = np.full(len(phi), stride), np.zeros(len(phi))
         for _ in range(12):
             slope, curvature, pace, place, value = self._local(design, phi, points)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sweep.families.base import Array
 
-STATIONARY, CROSSING, STATIC = 0, 1, 2  # how a point is held, beside what sweep.optimise.passages names
+STATIONARY, CROSSING, STATIC, EDGE = 0, 1, 2, 4  # how a point is held; 3 is PASSING of sweep.optimise.passages
 
 Row: TypeAlias = tuple[int, float, float, int, float, float]
 
@@ -38,23 +38,26 @@ def extrema(
     return [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
 
 
-def tops(n: int, phi: Array, values: Array, curve: Array) -> list[Row]:
+def tops(n: int, phi: Array, which: Array, values: Array, curve: Array) -> list[Row]:
     """Return rows of points at the higher side of every edge for maxima, at the lower one for minima.
+
+    Their level says what the edge is, negative for a point before it.
 
     Parameters
     ----------
     n : number of the series
     phi, values : (2, k) both sides of the edges, and the curve there
+    which : (k,) what each edge is
     curve : (m,) the curve over the turn: as elsewhere, only what is in its upper half can be a maximum that matters
     """
     if not np.isfinite(values).all():
         return []
     every = np.concatenate([curve, values.ravel()])
     middle = 0.5 * (float(every.max()) + float(every.min()))
-    rows = []
+    rows: list[Row] = []
     for sense in (1.0, -1.0):
         side = np.argmax(sense * values, axis=0)
         for k, x in enumerate(np.take_along_axis(values, side[None, :], axis=0)[0].tolist()):
             if sense * (x - middle) >= 0.0:
-                rows.append((n, float(phi[side[k], k]), sense, STATIC, math.nan, x))
+                rows.append((n, float(phi[side[k], k]), sense, EDGE, (2.0 * float(side[k]) - 1.0) * float(which[k]), x))
     return rows
