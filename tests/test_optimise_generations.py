@@ -189,13 +189,15 @@ def test_populations_are_made_until_they_tell_enough(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(generations, "spread_over", numbered)
     asked = []
 
-    def enough(found: list[Bred]) -> bool:
+    def further(found: list[Bred]) -> int:
         asked.append(len(found))
-        return len(found) >= 4
+        return {2: 1, 3: 2, 5: 0}[len(found)]
 
     linear = eliminated(8.0)
-    assert [one.looks for one in bred(linear, SIGNS, 6, 5, enough=enough)] == [0, 1, 2, 3]
-    assert asked == [2, 4]
+    assert [one.looks for one in bred(linear, SIGNS, 9, 5, further=further)] == [0, 1, 2, 3, 4]
+    assert asked == [2, 3, 5]
+    # What is there when no more are allowed is not asked about.
+    assert [one.looks for one in bred(linear, SIGNS, 3, 5, further=further)] == [0, 1, 2] and asked[3:] == [2]
     assert [one.looks for one in bred(linear, SIGNS, 3, 5)] == [0, 1, 2]
 
 
@@ -209,10 +211,8 @@ def test_populations_in_processes_are_those_of_one_process() -> None:
 
 
 def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(generations, "TOGETHER", 2)
-    monkeypatch.setattr(globally, "settled", lambda values, wanted: True)
     monkeypatch.setattr(globally, "bred", partial(bred, size=SMALL))
-    study = record(8.0, starts=4, seed=3, looks=100)
+    study = record(8.0, starts=4, populations=2, seed=3, looks=100)
     assert study.optimise is not None
     known = drawn(study, 1, 3)
     begun = proportion_starts(study, study.optimise, problem_of(study, known), known[:0], np.empty(0), lambda: False, 1)
@@ -229,7 +229,7 @@ def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_three_populations_of_any_seed_find_the_record(seed: int) -> None:
-    study = record(seed=seed, starts=3, looks=2000)
+    study = record(seed=seed, starts=3, populations=3, looks=2000)
     assert study.optimise is not None
     known = drawn(study, 1, seed)
     problem = problem_of(study, known)

@@ -14,7 +14,8 @@ from sweep.optimise import Problem
 from sweep.optimise.form import Program
 from sweep.optimise.gradients import gradients, scalar_gradient, stepped
 from sweep.optimise.model import Model
-from sweep.optimise.points import STATIC, Curves, Points
+from sweep.optimise.points import Curves, Points
+from sweep.optimise.scanned import STATIC
 from sweep.reductions.measures import Series
 from sweep.study import Limit
 

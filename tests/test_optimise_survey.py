@@ -12,7 +12,7 @@ import pytest
 from kernels import status as st
 from sweep.optimise import Problem, Result, Survey, explore
 from sweep.optimise.solve import BATCH
-from sweep.optimise.survey import settled, survey, with_basins
+from sweep.optimise.survey import further, settled, survey, with_basins
 from sweep.study import OptimiseSettings, load_study
 from tests.optimise_family import FAMILY
 from tests.test_optimise_study import STUDY
@@ -56,11 +56,10 @@ def test_of_a_global_search_the_best_end_counts_alone() -> None:
     # Three searches, all of which ended in the best basin; their other ends, and a start of the sweep, do not count.
     found = survey(bowl(), starts(7), ends, ASKED, "starts", (0, 1, 2, 0, 1, 2, -1))
     assert (found.basins, found.best, found.starts) == (1, 3, 7) and found.unseen == pytest.approx(2 / 6)
-    assert found.populations == 3 and found.better == pytest.approx(1 / 6) and not found.enough
-    assert found.words == (
-        "1 basin met by 3 populations, the best 3 times, estimated unseen 33 %, unseen and better 17 %"
-    )
-    assert "the share of unseen better basins is estimated at 17 %, not the 2 % asked" in found.warnings[-1]
+    assert found.populations == 3 and not found.enough
+    assert found.words == "1 basin met by 3 populations, the best 3 times, estimated unseen 33 %"
+    asked = "the share of unseen basins is estimated at 33 %, not the 2 % asked: more populations may find a better one"
+    assert found.warnings[-1] == asked
     twice = survey(bowl(), starts(7), ends, ASKED, "starts", (0, 0, 0, 1, 1, 1, -1))
     assert (twice.basins, twice.best) == (2, 1) and twice.unseen == 1.0
 
@@ -76,30 +75,41 @@ def test_starts_of_different_samples_are_distinct_wherever_they_stand() -> None:
     assert (len(found), told.best, told.ended) == (12, 3, "enough")
 
 
-def test_populations_are_enough_where_few_unseen_basins_can_be_better() -> None:
-    # Twelve of which ten ended at the best: 1/12 unseen, of three ranks the first is one in three.
-    assert not settled([1.0] * 10 + [1.1, 1.2], 0.02)
-    # Two met twice: 3 * 4 / (12 * 11) unseen, a quarter of it better; where values nearly agree it is one basin.
-    assert not settled([1.0] * 8 + [1.1, 1.1, 1.2, 1.2], 0.02)
-    assert settled([1.0] * 8 + [1.1, 1.10001, 1.09999, 1.10002], 0.02)
-    assert settled([1.0] * 15 + [1.1, 1.2, 1.3], 0.05) and not settled([1.0] * 2 + [1.1] * 16, 0.02)
+def test_populations_are_enough_by_the_same_rule_as_starts() -> None:
+    # One basin: 2 / (11 * 10) is below 2 %; two: 6 / (18 * 17); three: 12 / (25 * 24) is 2 %.
+    assert settled([1.0] * 11, 0.02) and not settled([1.0] * 10, 0.02)
+    assert settled([1.0] * 16 + [1.1] * 2, 0.02) and not settled([1.0] * 15 + [1.1] * 2, 0.02)
+    assert settled([1.0] * 19 + [1.1] * 3 + [1.2] * 3, 0.02) and not settled([1.0] * 18 + [1.1] * 3 + [1.2] * 3, 0.02)
+    # Values that nearly agree are one basin; what was met once is a share of 1/25; the best has to be met three times.
+    assert settled([1.0] * 8 + [1.1, 1.10001, 1.09999, 1.10002] + [1.0] * 6, 0.02)
+    assert not settled([1.0] * 22 + [1.1] * 2 + [1.2], 0.02)
+    assert not settled([1.0] * 2 + [1.1] * 23, 0.02)
     assert not settled([], 0.02) and not settled([1.0], 1.0)
 
 
-def test_chance_of_a_better_basin_is_what_random_searches_find() -> None:
-    # Six basins of random volumes and ranks; 18 searches each.  The estimate is no smaller than what happens.
+def test_as_many_more_populations_are_made_as_are_enough_if_they_meet_nothing_new() -> None:
+    assert further([1.0] * 6, 0.02, 6) == 5  # eleven of one basin
+    assert further([1.0] * 11, 0.02, 6) == 0
+    assert further([1.0] * 10 + [1.1] * 2, 0.02, 6) == 6  # eighteen of two
+    assert further([1.0] * 10 + [1.1] * 6 + [1.2] * 2, 0.02, 6) == 6
+    assert further([1.0] * 14 + [1.1] * 8 + [1.2] * 2, 0.02, 6) == 1  # the twenty-fifth of three
+    # The one that was met once, and the best where it was met twice, may be met again by the next.
+    assert further([1.0] * 30 + [1.1], 0.02, 6) == further([1.0] * 2 + [1.1] * 29, 0.02, 6) == 1
+    assert further([], 0.02, 6) == 6
+
+
+def test_unseen_share_is_no_smaller_than_what_random_searches_leave() -> None:
+    # Six basins of random volumes, 18 searches each: what none of them met.
     rng = np.random.default_rng(8)
     estimated, happened = [], []
     for _ in range(1000):
         volumes = rng.dirichlet(np.ones(6))
-        ends = rng.choice(6, 18, p=volumes)  # basin 0 is the best
-        first = int(ends.min())
-        if (ends == first).sum() >= 3:
-            found = survey(bowl(), starts(18), [result(k, 1.0 + x) for k, x in enumerate(ends)], ASKED, "starts",
-                           tuple(range(18)))  # fmt: skip
-            estimated.append(found.better)
-            happened.append(volumes[:first].sum())
-    assert np.mean(estimated) >= 0.9 * np.mean(happened)
+        ends = rng.choice(6, 18, p=volumes)
+        found = survey(bowl(), starts(18), [result(k, 1.0 + x) for k, x in enumerate(ends)], ASKED, "starts",
+                       tuple(range(18)))  # fmt: skip
+        estimated.append(found.unseen)
+        happened.append(1.0 - volumes[np.unique(ends)].sum())
+    assert np.mean(estimated) >= np.mean(happened)
 
 
 def test_starts_beside_each_other_count_once() -> None:
@@ -152,6 +162,6 @@ def test_signs_have_basins_of_their_own() -> None:
 
 
 def test_every_key_of_the_search_arrives(tmp_path: Path) -> None:
-    keys = 'starts = 7\nseed = 3\nunseen = "5 %"\nlooks = 900\ntime_budget = "2 s"\nglobal = "none"\n'
+    keys = 'starts = 7\nseed = 3\nunseen = "5 %"\nlooks = 900\ntime_budget = "2 s"\nglobal = "none"\npopulations = 9\n'
     (tmp_path / "study.toml").write_text(STUDY.format(swing=40).replace("starts = 3\nseed = 1\n", keys))
-    assert load_study(tmp_path).optimise == OptimiseSettings(7, 3, 2.0, None, 0.05, 900, "none")
+    assert load_study(tmp_path).optimise == OptimiseSettings(7, 3, 2.0, None, 0.05, 900, "none", 9)

@@ -51,9 +51,11 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     if study.optimise is not None:
         settings = study.optimise
         brake = "" if settings.time_budget is None else f"; emergency brake after {duration(settings.time_budget)}"
-        what = "unseen basins" if settings.globally == "none" else "basins that are unseen and better"
-        rule = f"fewer if the estimated share of {what} falls to {100.0 * settings.unseen:g} %"
-        lines += [f"optimiser: at most {settings.starts} starts of {settings.looks} looks, {rule}{brake}"]
+        rule = f"fewer if the estimated share of unseen basins falls to {100.0 * settings.unseen:g} %"
+        most = f"at most {settings.starts} starts of {settings.looks} looks"
+        if settings.globally != "none":
+            most = f"{settings.starts} starts of {settings.looks} looks from at most {settings.populations} populations"
+        lines += [f"optimiser: {most}, {rule}{brake}"]
     lines += _proof(study)
     lines += _front(study)
     lines += ["", "estimated cost, without the first compilation of the kernels"]

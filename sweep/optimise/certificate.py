@@ -90,9 +90,10 @@ class Result:
     active limit (of sin^2 of a pressure angle, of a margin itself; per width between the bounds of a variable), not
     negative but for equations.  Where infeasible, they are changes of the smallest relaxation per relative change of
     each limit, and ``kkt_residual`` is that of the smallest relaxation.  ``status`` is OK, LIMIT_EXCEEDED (infeasible)
-    or NOT_CONVERGED, and ``ended`` says how the search ended: "converged", "stalled", "infeasible", "looks",
-    "time" or "interrupted".  ``basin`` numbers the values that starts ended at, 1 for the best, 0 where infeasible;
-    ``looks`` counts the evaluations.
+    or NOT_CONVERGED, and ``ended`` says how the search ended: "converged", "stalled", "differs" (from what
+    ``summarise`` finds, see :mod:`sweep.optimise.confirmed`), "infeasible", "looks", "time" or "interrupted".
+    ``basin`` numbers the values that starts ended at, 1 for the best, 0 where infeasible; ``looks`` counts the
+    evaluations.
     """
 
     start: int

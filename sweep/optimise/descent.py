@@ -15,9 +15,10 @@ from sweep.optimise.certificate import ACTIVE
 from sweep.optimise.eliminate import in_parameters
 from sweep.optimise.form import Program
 from sweep.optimise.model import FEASIBLE, Model, State
-from sweep.optimise.points import STATIC, Points
+from sweep.optimise.points import Points
 from sweep.optimise.problem import Problem
 from sweep.optimise.rows import Form
+from sweep.optimise.scanned import STATIC
 
 ROUNDS, CYCLES = 60, 3
 PATIENCE, AGAIN = 8, 2  # rounds of learnt curvature that may halve a violation, at first and after Newton rounds

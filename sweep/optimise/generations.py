@@ -33,7 +33,7 @@ TRIES, STRANGERS = 64, 256  # of every child, the best of which descends; of one
 DRIVERS = 4  # among the tries of a child
 MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations, one of which a child is varied by
 NICHE = 0.15  # of the average distance of two random guides: nearer ones are alike
-TOGETHER = 6  # populations between two looks at whether more are needed: the same for any number of jobs
+TOGETHER = 6  # populations between two looks at whether more are needed, at most: the same for any number of jobs
 CLASSES = 5  # of swings, each of which has parents
 SMALLEST = 1e-3  # swing that is none [rad]
 USELESS = 1.3  # times the best value: worse ends are no parents
@@ -259,10 +259,10 @@ def bred(
     stop: Callable[[], bool] = lambda: False,
     jobs: int = 1,
     say: Say = unsaid,
-    enough: Callable[[list[Bred]], bool] = lambda found: False,
+    further: Callable[[list[Bred]], int] = lambda found: TOGETHER,
     size: Size = FULL,
 ) -> list[Bred]:
-    """Return the ends of populations that know nothing of each other, six at a time until they tell enough.
+    """Return the ends of populations that know nothing of each other, at most six at a time until they tell enough.
 
     Parameters
     ----------
@@ -273,14 +273,16 @@ def bred(
     stop : true ends the populations where they are
     jobs : processes; the ends do not depend on it
     say : called with how many populations have ended, and how many there are at most
-    enough : asked after every six of them whether they tell enough
+    further : asked how many more are to be made after those that are there; 0 where they tell enough
     size : of each
     """
     task, ended, found = Population(linear, tuple(signs), seed, size), itertools.count(1), list[Bred]()
     say("global search", 0, most, "populations")
-    for first in range(0, most, TOGETHER):
-        numbers = list(range(first, min(first + TOGETHER, most)))
+    more = TOGETHER
+    while more and len(found) < most:
+        numbers = list(range(len(found), min(len(found) + more, most)))
         found += spread_over(task, numbers, stop, jobs, lambda: say("global search", next(ended), most, "populations"))
-        if stop() or numbers[-1] == most - 1 or enough(found):
+        if stop():
             break
+        more = further(found) if len(found) < most else 0
     return found

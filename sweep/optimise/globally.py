@@ -18,7 +18,7 @@ from sweep.optimise.parallel import SearchTask, spread_over
 from sweep.optimise.problem import Problem
 from sweep.optimise.proportions import from_proportions, widened
 from sweep.optimise.starts import ALIKE, diverse
-from sweep.optimise.survey import settled
+from sweep.optimise.survey import further
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study, Tolerance
@@ -55,7 +55,7 @@ def proportion_starts(
     Parameters
     ----------
     study, settings, problem : what is searched; populations are made until they tell enough (``settings.unseen``), at
-        most one for each start that the sweep does not give
+        most ``settings.populations``
     known, merit : designs (k, P) of the sweep, and what they are worth (k,), empty where none is feasible
     stop : true ends the global search early
     jobs : processes; the starts do not depend on it
@@ -71,17 +71,19 @@ def proportion_starts(
     own = diverse(problem, known, merit, count // SWEPT, ALIKE) if len(merit) else known[:0]
     signs = kinds(study, problem, own)
     ends: list[float] = []
+    seen = 0
 
-    def enough(found: list[Bred]) -> bool:
-        """Whether the best ends tell enough once they are searched on: the poses alone take one valley for several."""
-        new = [one.designs[0] for one in found[-TOGETHER:] if len(one.designs)]
-        if not new:
-            return False
-        ends.extend(r.objective for r in searched(study, problem, np.array(new), settings, stop, jobs) if r.feasible)
-        return settled(ends, settings.unseen)
+    def more(found: list[Bred]) -> int:
+        """How many more populations are needed, by where their best ends lead: poses take one valley for several."""
+        nonlocal seen
+        new = [one.designs[0] for one in found[seen:] if len(one.designs)]
+        seen = len(found)
+        if new:
+            reached = searched(study, problem, np.array(new), settings, stop, jobs)
+            ends.extend(r.objective for r in reached if r.feasible)
+        return further(ends, settings.unseen, TOGETHER)
 
-    most = max(1, count - len(own))
-    populations = bred(linear, signs, most, settings.seed, stop, jobs, say, enough)
+    populations = bred(linear, signs, settings.populations, settings.seed, stop, jobs, say, more)
     first = [(k, found.designs[0]) for k, found in enumerate(populations) if len(found.designs)]
     met = [float(found.worth[0]) for found in populations if len(found.worth)]
     others = sorted(

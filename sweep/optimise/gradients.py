@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from sweep.families.base import Array
+from sweep.families.base import Angles, Array
+from sweep.optimise.edges import followed
 from sweep.optimise.passages import PASSING
-from sweep.optimise.points import CROSSING, STEP, Curves, Points
+from sweep.optimise.points import STEP, Curves, Points
 from sweep.optimise.problem import Problem
+from sweep.optimise.scanned import CROSSING, EDGE
 
 # Mixed derivative of the slope: complex step in the variable, fourth-order difference in the crank angle.
 OFFSET = 1e-3
+ALONG = 1e-5  # of the bounds of a variable, for differences between designs at their edges
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 
 # Twelve times the weights of the derivative at the first of five points, in their middle, and at the last.
@@ -63,6 +66,8 @@ def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tup
         # The root's implicit derivative; the curve itself stays at its level.
         moves[passing] = -values[passing] / points.slope[passing, None]
         values[passing] = 0.0
+    if (points.how == EDGE).any():
+        _at_edges(curves, designs, points, values, moves)
     edges = points.how == CROSSING
     low, high = curves.stroke(points) if edges.any() else (-1, -1)
     if low >= 0:
@@ -72,6 +77,20 @@ def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tup
         moves[edges] = (-(place[:, edges] - target).imag / STEP / points.pace[edges]).T
         values[edges] += points.slope[edges, None] * moves[edges]
     return values, moves
+
+
+def _at_edges(curves: Curves, designs: Any, points: Points, values: Array, moves: Array) -> None:
+    """Fill in the derivatives at the edges of curves, which move: differences between designs, each at its own edge."""
+    base, direction = designs[0].real, designs.imag / STEP
+    both = np.concatenate([base + ALONG * direction, base - ALONG * direction])
+    which, n = np.flatnonzero(points.how == EDGE), len(direction)
+    phi = followed(curves.problem.family, both, points.phi[which], points.level[which])
+    columns = curves.family.poses(both, Angles.of(phi), curves.wanted)
+    moves[which] = ((phi[:n] - phi[n:]) / (2.0 * ALONG)).T
+    for number, series in enumerate(curves.series):
+        own = points.series[which] == number
+        x = curves.curve(series, columns)[:, own] if own.any() else np.zeros((2 * n, 0))
+        values[which[own]] = ((x[:n] - x[n:]) / (2.0 * ALONG)).T
 
 
 def reading_gradient(curves: Curves, designs: Any, output: str, phi: float, moves: Array) -> Array:

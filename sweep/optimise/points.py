@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.families.base import Angles, Array
+from sweep.optimise.edges import bending, distances, edges, followed, may_bend, poses_needed
 from sweep.optimise.passages import PASSING, passages
 from sweep.optimise.problem import Problem
+from sweep.optimise.scanned import CROSSING, EDGE, STATIC, STATIONARY, Row, extrema, tops
 from sweep.reductions.closing import on_closed_turn
 from sweep.reductions.differentiable import differentiable
 from sweep.reductions.measures import Series
@@ -27,7 +29,6 @@ STEP = 1e-30  # imaginary step: the error is of order STEP^2, there is no differ
 NEIGHBOUR = 3e-5  # distance of the slopes whose difference is the curvature; it only steers Newton [rad]
 SETTLED = 3e-6  # a Newton step this short leaves an error of its square [rad]
 STRIDE = 0.1  # longest single move of a followed point [rad]
-STATIONARY, CROSSING, STATIC = 0, 1, 2
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,8 @@ class Points:
 
     ``series`` numbers the curve, ``phi`` is the crank angle, ``sense`` +1 for a maximum and -1 for a minimum; ``how``
     says what holds the point: stationary, the crossing of the window's edge at the fraction ``level`` of the stroke, a
-    fixed angle, or the place where the curve passes ``level``, upwards for ``sense`` +1.  ``value`` is the curve there,
+    fixed angle, an edge of the curve (``level`` says which one, and on which side), or the place where the curve
+    passes ``level``, upwards for ``sense`` +1.  ``value`` is the curve there,
     ``slope`` and ``curvature`` are its derivatives with respect to phi;
     ``pace`` is the slope of the position.
     """
@@ -63,7 +65,7 @@ class Points:
         return replace(self, phi=self.phi + offset)
 
     @classmethod
-    def of(cls, rows: Iterable[tuple[int, float, float, int, float, float]]) -> Points:
+    def of(cls, rows: Iterable[Row]) -> Points:
         """Return points of (series, phi, sense, how, level, value)."""
         table = np.array(list(rows), dtype=np.float64).reshape(-1, 6)
         nothing = np.zeros(len(table))
@@ -94,6 +96,8 @@ class Curves:
         names = {s.output for s in series} | {s.pressure for s in series if s.pressure}
         self.wanted = frozenset(names)
         self.places = places
+        self.plain = tuple(s.output for s in series if _is_plain(s))
+        self.may_bend = may_bend(problem.family, self.plain)
         self.calls = 0
 
     def poses(self, designs: Any, phi: Any, wanted: frozenset[str] | None = None) -> dict[str, Any]:
@@ -113,10 +117,11 @@ class Curves:
         Only maxima in the upper half of a curve's range and minima in the lower half are kept.  A curve that is not
         defined over the whole turn has none.
         """
+        samples = max(samples, poses_needed(self.problem.family, design))
         phi: Array = np.arange(samples, dtype=np.float64) * (2.0 * math.pi / samples)
         columns = self.poses(design[None, :], phi)
         turns = not columns["status"].any()
-        rows: list[tuple[int, float, float, int, float, float]] = []
+        rows: list[Row] = []
         windowed = [n for n, s in enumerate(self.series) if s.window is not None]
         for n, s in enumerate(self.series):
             if s.passes is not None:
@@ -124,14 +129,41 @@ class Curves:
             elif n not in windowed:
                 x, room = self.curve(s, columns)[0], self._room(n, design[None, :], phi)[0]
                 for sense in (1.0, -1.0):
-                    rows += _extrema(n, phi, x + sense * room, s.wrapped, sense)
-        points = self.follow(design, Points.of(rows), stride=2.0 * math.pi / samples)
+                    rows += extrema(n, phi, x + sense * room, s.wrapped, sense)
+        found = Points.of(rows)
+        points = self.follow(design, found, stride=2.0 * math.pi / samples)
+        if self.may_bend and turns:
+            points = self._with_edges(design, columns, found, points, 2.0 * math.pi / samples)
         if windowed and turns:
-            edge_rows: list[tuple[int, float, float, int, float, float]] = []
+            edge_rows: list[Row] = []
             for n in windowed:
                 edge_rows += self._inside(n, design, phi, columns, points)
             points = self.follow(design, Points.joined(points, Points.of(edge_rows)), stride=2.0 * math.pi / samples)
         return _without_repetition(points), turns
+
+    def _with_edges(
+        self, design: Array, columns: dict[str, Any], found: Points, points: Points, stride: float
+    ) -> Points:
+        """Return points and those at edges of curves; ``found`` is where the points began, samples ``stride`` apart."""
+        names = bending(self.problem.family, design, self.plain)
+        if not names:
+            return points
+        bent = [n for n, s in enumerate(self.series) if _is_plain(s) and s.output in {self.plain[k] for k in names}]
+        sides, which = edges(self.problem.family, design)
+        there = self.poses(design[None, :], sides.ravel())
+        rows = []
+        for n in bent:
+            values = self.curve(self.series[n], there)[0].reshape(sides.shape)
+            rows += tops(n, sides, which, values, self.curve(self.series[n], columns)[0])
+        # A top beside an edge stands for the edge; from elsewhere none may end lower than it began.
+        own = np.isin(points.series, bent)
+        fell = own & (points.sense * (found.value - points.value) > 0.0)
+        phi = np.where(fell, found.phi, points.phi)
+        beside = own & (distances(sides.mean(axis=0), phi) <= np.where(fell, stride, NEIGHBOUR))
+        held = replace(found, how=np.full(len(found), STATIC)).take(fell & ~beside)
+        kept = Points.joined(points.take(~fell & ~beside), held)
+        at_edges = Points.of(rows)
+        return Points.joined(kept, replace(at_edges, value=self.values(design[None, :], at_edges)[0]))
 
     def curve(self, series: Series, columns: dict[str, Any]) -> Any:
         """Return values of a series (n, m) out of pose outputs on a set of angles."""
@@ -163,8 +195,10 @@ class Curves:
         """
         if not len(points):
             return points
-        held, passing = points.how == STATIONARY, points.how == PASSING
+        held, passing, edge = points.how == STATIONARY, points.how == PASSING, points.how == EDGE
         phi = points.phi.copy()
+        if edge.any():
+            phi[edge] = followed(self.problem.family, design[None, :], phi[edge], points.level[edge])[0]
         reach, uphill = np.full(len(phi), stride), np.zeros(len(phi))
         for _ in range(12):
             slope, curvature, pace, place, value = self._local(design, phi, points)
@@ -253,9 +287,7 @@ class Curves:
         target = base + level * (place[high] - base)
         move[edges] = -(place[edges] - target) / pace[edges]
 
-    def _inside(
-        self, n: int, design: Array, phi: Array, columns: dict[str, Any], points: Points
-    ) -> list[tuple[int, float, float, int, float, float]]:
+    def _inside(self, n: int, design: Array, phi: Array, columns: dict[str, Any], points: Points) -> list[Row]:
         """Return the extrema inside the window of series n, and both senses at every crossing of the window's edges."""
         series = self.series[n]
         low, high = self.stroke(points)
@@ -275,8 +307,12 @@ class Curves:
                 rows += [(n, start, sense, CROSSING, edge, x[j]) for sense in (1.0, -1.0)]
         inside = (share >= series.window[0] - 1e-12) & (share <= series.window[1] + 1e-12)
         for sense in (1.0, -1.0):
-            rows += _extrema(n, phi, x + sense * self._room(n, design[None, :], phi)[0], False, sense, inside)
+            rows += extrema(n, phi, x + sense * self._room(n, design[None, :], phi)[0], False, sense, inside)
         return rows
+
+
+def _is_plain(series: Series) -> bool:
+    return not (series.pressure or series.wrapped or series.passes) and series.window is None
 
 
 def _discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
@@ -291,29 +327,6 @@ def _discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
     cos = np.cos(np.take_along_axis(pressure_angle, best, axis=1))
     with np.errstate(invalid="ignore"):  # where nothing assembles the scale is nan, and so is all that needs it
         return np.take_along_axis(discriminant, best, axis=1) / (cos * cos)
-
-
-def _extrema(
-    n: int, phi: Array, x: Array, wrapped: bool, sense: float, inside: NDArray[np.bool_] | None = None
-) -> list[tuple[int, float, float, int, float, float]]:
-    """Return the maxima (sense +1) or minima (-1) of a curve."""
-    if not np.isfinite(x).all():
-        return []
-    if wrapped:
-        x = np.unwrap(x)
-        if abs(x[0] - x[-1] + math.remainder(x[-1] - x[0], 2.0 * math.pi)) > 1.0:
-            return []  # turns fully: no limit positions
-    counts = np.ones(len(x), dtype=np.bool_) if inside is None else inside
-    if not counts.any():
-        return []
-    top, bottom = float(x[counts].max()), float(x[counts].min())
-    if top - bottom <= 1e-13 * max(abs(top), abs(bottom)):
-        return [(n, float(phi[0]), sense, STATIC, math.nan, float(x[0]))]
-    before, after, middle = np.roll(x, 1), np.roll(x, -1), 0.5 * (top + bottom)
-    peak = counts & (sense * x > sense * before) & (sense * x >= sense * after)
-    if inside is None:
-        peak &= sense * (x - middle) >= 0.0  # in a window all count: a refused step cannot add those it met
-    return [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
 
 
 def _without_repetition(points: Points) -> Points:

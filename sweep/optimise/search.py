@@ -9,6 +9,7 @@ from dataclasses import replace
 from kernels import status as st
 from sweep.families.base import Array
 from sweep.optimise.certificate import Multipliers, Result, in_words, multipliers
+from sweep.optimise.confirmed import confirmed
 from sweep.optimise.descent import KKT, Descent
 from sweep.optimise.form import Program
 from sweep.optimise.model import LooksUsedUp, State, Stopped
@@ -42,7 +43,7 @@ def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool
         ended = "interrupted"
     looks = descent.model.looks
     descent.model.stop, descent.model.allowed = (lambda: False), math.inf
-    return replace(_result(number, problem, program, descent, ended), looks=looks)
+    return confirmed(problem, program, replace(_result(number, problem, program, descent, ended), looks=looks))
 
 
 def _after_first(asked: Callable[[], bool]) -> Callable[[], bool]:

@@ -39,7 +39,7 @@ class Survey:
     ended : "enough" where the rule was fulfilled, "starts" where none was left, "time" or "interrupted"
     kinds : starts and basins for each combination of signs, as ``(("branch = 1", 7, 3), ...)``
     late : whether all starts were searched, and time ran out over what follows them
-    populations : global searches that were counted, each with its best end; 0 where starts were
+    populations : global searches that were counted, each with its best end; 0 where starts were counted
     """
 
     starts: int
@@ -55,22 +55,9 @@ class Survey:
     populations: int = 0
 
     @property
-    def better(self) -> float:
-        """Estimated share of basins that are unseen and better than the best.
-
-        Nothing is known of the values of unseen basins, so each is as likely as any of the w seen ones to be the best.
-        """
-        return self.unseen / (self.basins + 1)
-
-    @property
-    def decides(self) -> float:
-        """The share that is to fall below the wanted one."""
-        return self.better if self.populations else self.unseen
-
-    @property
     def enough(self) -> bool:
         """Whether the best basin was met often enough and few basins are likely to be unseen."""
-        return self.best >= MET and self.decides <= self.wanted
+        return self.best >= MET and self.unseen <= self.wanted
 
     @property
     def words(self) -> str:
@@ -79,10 +66,8 @@ class Survey:
             return f"none of {started(self.starts)} became feasible"
         basins = f"{self.basins} basin{'s' if self.basins > 1 else ''} met"
         times = {1: "once", 2: "twice"}.get(self.best, f"{self.best} times")
-        if not self.populations:
-            return f"{basins}, the best {times}, estimated unseen {_percent(self.unseen)}"
-        share = f"estimated unseen {_percent(self.unseen)}, unseen and better {_percent(self.better)}"
-        return f"{basins} by {self.populations} populations, the best {times}, {share}"
+        by = f" by {self.populations} populations" if self.populations else ""
+        return f"{basins}{by}, the best {times}, estimated unseen {_percent(self.unseen)}"
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -112,11 +97,11 @@ class Survey:
             of = "populations" if self.populations else "distinct valleys"
             rare = f"the best basin was met from {self.best} of the {MET} {of} wanted"
             parts = [rare] if self.best < MET else []
-            if self.decides > self.wanted:
-                kind = "unseen better" if self.populations else "unseen"
-                parts.append(f"the share of {kind} basins is estimated at {_percent(self.decides)}, not the "
+            if self.unseen > self.wanted:
+                parts.append(f"the share of unseen basins is estimated at {_percent(self.unseen)}, not the "
                              f"{_percent(self.wanted)} asked")  # fmt: skip
-            found.append(f"{' and '.join(parts)}: more starts may find a better one")
+            more = "populations" if self.populations else "starts"
+            found.append(f"{' and '.join(parts)}: more {more} may find a better one")
         return tuple(found)
 
 
@@ -148,8 +133,7 @@ def survey(
     The unseen share is the larger of two estimates for n starts that met w basins, s of them once: s / n (Good and
     Turing) and w (w + 1) / (n (n - 1)) (Boender and Rinnooy Kan 1987, for unknown volumes).  Both suppose that starts
     are drawn at random; ours are the best of samples, so the estimate says how much to expect from more of their kind.
-
-    Of populations the next one matters where it ends at something better than the best: see :attr:`Survey.better`.
+    Populations are drawn at random: they differ by their seeds alone.
     """
     whole = [r for r in results if r.ended not in CUT]
     numbered = with_basins(whole)
@@ -166,13 +150,30 @@ def survey(
 
 def settled(values: Sequence[float], wanted: float) -> bool:
     """Return whether populations that ended at these values tell enough: the rule of :class:`Survey`."""
+    met = _counted(values)
+    n, w = len(values), len(met)
+    best = met[min(met)] if met else 0
+    return Survey(n, n, n, w, best, _unseen(n, met), wanted, "", populations=n).enough
+
+
+def further(values: Sequence[float], wanted: float, most: int) -> int:
+    """Return how many more populations to make before the next look, at most ``most``; 0 where these tell enough.
+
+    They are as many as will be enough if they meet no new basin, and again those that were met once.
+    """
+    if settled(values, wanted):
+        return 0
+    n, w = len(values), max(1, len(_counted(values)))
+    return next((more for more in range(1, most) if _by_volumes(n + more, w) <= wanted), most)
+
+
+def _counted(values: Sequence[float]) -> Counter[float]:
+    """Return how often each basin was met, by the lowest value of it."""
     first, met = -math.inf, Counter[float]()
     for value in sorted(values):
         first = value if not value - first <= AGREE * abs(value) else first
         met[first] += 1
-    n, w = len(values), len(met)
-    best = met[min(met)] if met else 0
-    return Survey(n, n, n, w, best, _unseen(n, met), wanted, "", populations=n).enough
+    return met
 
 
 def _best_of_each(ranked: Sequence[Result], origins: Sequence[int]) -> list[Result]:
@@ -208,10 +209,14 @@ def _objective(r: Result) -> float:
 
 
 def _unseen(n: int, met: Counter[Any]) -> float:
-    w, once = len(met), sum(1 for count in met.values() if count == 1)
-    if n < 2:
-        return 1.0
-    return min(1.0, max(once / n, w * (w + 1) / (n * (n - 1))))
+    """Return the larger of both estimates of the share of unseen basins."""
+    once = sum(1 for count in met.values() if count == 1)
+    return min(1.0, max(once / max(n, 1), _by_volumes(n, len(met))))
+
+
+def _by_volumes(n: int, w: int) -> float:
+    """Return the share by Boender and Rinnooy Kan of n searches that met w basins; 1 where they say nothing."""
+    return 1.0 if n < 2 else w * (w + 1) / (n * (n - 1))
 
 
 def _distinct(problem: Problem, starts: Array, numbers: list[int], samples: Sequence[int] | None) -> int:

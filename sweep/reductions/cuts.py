@@ -33,18 +33,26 @@ def ends(family: Family, designs: Array, even: int, looks: int) -> Array:
     close = np.flatnonzero(near.rho.min(axis=1, initial=FAR) < CLOSE)
     about = crowded(near.only(close), 1.0)
     edges = with_events(edges, np.repeat(close, about.shape[1]), about.ravel())
+    return with_events(edges, *events(family, designs, looks))
+
+
+def events(family: Family, designs: Array, looks: int) -> tuple[Index, Array]:
+    """Return designs (k,) and angles (k,) where a pose output passes its level, or a follower reverses.
+
+    They are looked for between ``looks`` samples of the turn.
+    """
     speeds, crossings = reversing(family), family.every(Crossing)
-    if speeds or crossings:
-        names = list(dict.fromkeys([*speeds, *(crossing.of for crossing in crossings)]))
+    if not speeds and not crossings:
+        return np.zeros(0, np.intp), np.zeros(0)
+    names = list(dict.fromkeys([*speeds, *(crossing.of for crossing in crossings)]))
 
-        def functions(rows: Index, phi: Array) -> Array:
-            columns, _ = pose_columns(family, designs[rows], phi, names)
-            passed = [columns[crossing.of] - crossing.level(designs[rows])[:, None] for crossing in crossings]
-            return np.nan_to_num(np.stack([*(columns[name] for name in speeds), *passed], axis=2))
+    def functions(rows: Index, phi: Array) -> Array:
+        columns, _ = pose_columns(family, designs[rows], phi, names)
+        passed = [columns[crossing.of] - crossing.level(designs[rows])[:, None] for crossing in crossings]
+        return np.nan_to_num(np.stack([*(columns[name] for name in speeds), *passed], axis=2))
 
-        phi = np.arange(looks) * (TWO_PI / looks)
-        edges = with_events(edges, *sign_changes(functions, np.tile(phi, (n, 1))))
-    return edges
+    phi = np.arange(looks) * (TWO_PI / looks)
+    return sign_changes(functions, np.tile(phi, (len(designs), 1)))
 
 
 def reversing(family: Family) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sweep.dataset import store
+from sweep.optimise.confirmed import DIFFERS
 from sweep.proof import read_proof
 from sweep.proof.study import EVENT
 from sweep.proof.words import proof_words
@@ -29,4 +30,13 @@ def search_warnings(data: Dataset, found: Survey) -> tuple[str, ...]:
     """Return what a reader has to know of a search; a proof of the whole space leaves no doubt of something better."""
     proof = read_proof(store.beside(data.folder) / store.PROOF)
     without_doubt = proof is not None and proof.settled and not proof.exceptions
-    return found.shortcomings if without_doubt else found.warnings
+    return (*_unconfirmed(data), *(found.shortcomings if without_doubt else found.warnings))
+
+
+def _unconfirmed(data: Dataset) -> tuple[str, ...]:
+    """Return that the search followed other extrema than the true ones, where it did."""
+    best = data.optimum
+    if best is None or best.get("ended") != DIFFERS:
+        return ()
+    apart = f"{100.0 * float(best['gap']):.2g} %"
+    return (f"the search took values that are up to {apart} beside the true ones, which are shown: better may be near",)

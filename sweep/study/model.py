@@ -158,6 +158,7 @@ class OptimiseSection(Section):
     time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
     variables: Literal["parameters", "locus"] | None = Field(None, description='"parameters" or "locus"')
     globally: Literal["none", "proportions"] = Field("none", alias="global", description='"none" or "proportions"')
+    populations: Annotated[int, Field(ge=1, le=10_000)] = Field(40, description="a whole number, 1 to 10000")
     prove: ProveTable | None = Field(None, description='{ gap = "1 %", boxes = 1000000, time = "10 min" }')
 
 

@@ -69,9 +69,10 @@ class OptimiseSettings:
 
     ``variables`` is "locus" for what [locus] prescribes, "parameters" for the links, None for what suits the study.
     ``unseen`` is the estimated share of unseen basins below which no more starts are made once the best basin was met
-    often enough; ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from
-    a search over what is not linear.  ``time_budget`` [s] is an emergency brake: what it stops says so, and no result
-    that was not stopped depends on it.  ``prove`` asks for a proof that nothing in the space is better.
+    often enough; ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from a
+    search over what is not linear, by at most ``populations`` that know nothing of each other.  ``time_budget`` [s] is
+    an emergency brake: what it stops says so, and no result that was not stopped depends on it.  ``prove`` asks for a
+    proof that nothing in the space is better.
     """
 
     starts: int = 20
@@ -81,6 +82,7 @@ class OptimiseSettings:
     unseen: float = 0.02
     looks: int = 20_000
     globally: Literal["none", "proportions"] = "none"
+    populations: int = 40
     prove: ProveSettings | None = None
 
 

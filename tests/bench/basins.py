@@ -16,11 +16,11 @@ from studies.accuracy.machine import description
 from sweep.optimise.certificate import AGREE
 from sweep.optimise.filling import kinds
 from sweep.optimise.generations import TOGETHER, Population
-from sweep.optimise.globally import SWEPT, searched
+from sweep.optimise.globally import searched
 from sweep.optimise.linear import elimination
 from sweep.optimise.posing import problem_of
 from sweep.optimise.starts import drawn
-from sweep.optimise.survey import settled
+from sweep.optimise.survey import further, settled
 from sweep.study import Study
 from tests.needle208_record import FOLDER, record
 
@@ -55,22 +55,26 @@ def best_known(problem: str) -> float:
 
 
 def most(study: Study) -> int:
-    """Populations at most: those of the study beside the starts that its sweep gives."""
+    """Populations at most."""
     assert study.optimise is not None
-    return study.optimise.starts - study.optimise.starts // SWEPT
+    return study.optimise.populations
 
 
 def told(study: Study, rows: Sequence[Row]) -> bool:
-    """Whether the populations of a seed are enough, by the study's own rule, which is asked after every six."""
+    """Whether the populations of a seed are enough, by the study's own rule, asked where the study asks."""
     assert study.optimise is not None
-    values = [row.value for row in rows if np.isfinite(row.value)]
-    return len(rows) >= most(study) or (len(rows) % TOGETHER == 0 and settled(values, study.optimise.unseen))
+    values = [row.value for row in rows]
+    looked, more = 0, TOGETHER
+    while more and looked < min(len(values), most(study)):
+        looked = min(looked + more, most(study))
+        more = further([x for x in values[:looked] if np.isfinite(x)], study.optimise.unseen, TOGETHER)
+    return looked <= len(values) and (not more or looked >= most(study))
 
 
 def fewest(study: Study) -> int:
     """Populations that the rule asks for at least, whatever they end at: those that all end at one value."""
     assert study.optimise is not None
-    numbers = range(TOGETHER, most(study), TOGETHER)
+    numbers = range(1, most(study))
     return next((n for n in numbers if settled([1.0] * n, study.optimise.unseen)), most(study))
 
 

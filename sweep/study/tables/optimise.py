@@ -27,6 +27,7 @@ def read_values(reading: Reading) -> None:
         unseen=reading.share(search.unseen, ("optimise", "unseen")),
         looks=search.looks,
         globally=search.globally,
+        populations=search.populations,
         prove=_prove(reading, search.prove),
     )
     reading.fields["optimise"] = settings if "optimise" in reading.data else None
