@@ -19,35 +19,58 @@ The classes derive from numba's at the places that numba has for it: dispatcher,
 
 from __future__ import annotations
 
-import gc
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import codegen
+from numba.core import codegen, types
+from numba.core.cgutils import normalize_ir_text
 from numba.core.compiler import CompilerBase, compile_result
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
 
 from kernels._frontend import KernelLowering, contexts, passes, plainly
+from kernels._garbage import nobody_looks
 
+FOR_PYTHON = "_ZN7cpython"  # how names of functions begin that numba makes for calls from Python
 PART = "part"  # kind of a library without machine code, in the cache on disk
+
+
+def _is_for_python(ir_module: Any) -> bool:
+    return any(f.name.startswith(FOR_PYTHON) and not f.is_declaration for f in ir_module.functions)
 
 
 class _Library(codegen.JITCodeLibrary):
     """The LLVM module of one compiled function."""
 
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self._for_python: list[Any] = []
+
     def _optimize_functions(self, ll_module: Any) -> None:
         ll_module.data_layout = self._codegen._data_layout
+        # Preparing passes takes longer than they run on most bodies, and a declaration has nothing to optimise.
+        passes, builder = self._codegen._function_pass_manager()
         for function in ll_module.functions:
-            # A declaration has nothing to optimise, but preparing its passes takes longer than most bodies do.
             if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager()
-                with self._recorded_timings.record(f"Function passes on {function.name!r}", builder):
-                    passes.run(function, builder)
+                passes.run(function, builder)
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Take LLVM code in; what Python calls waits, since it is not worth optimising: it reads arguments once."""
+        if not _is_for_python(ir_module):
+            super().add_ir_module(ir_module)
+            return
+        module = llvm.parse_assembly(normalize_ir_text(str(ir_module)))
+        module.verify()
+        self._for_python.append(module)
+
+    def _optimize_final_module(self) -> None:
+        super()._optimize_final_module()
+        for module in self._for_python:
+            self._final_module.link_in(module)
 
 
 class _PartLibrary(_Library):
@@ -120,31 +143,42 @@ class _PartCompiler(_KernelCompiler):
     lowering = _PartLowering
 
 
-@contextmanager
-def _without_collector() -> Iterator[None]:
-    """Keep Python from looking for garbage: of what a compiler makes, nearly all lives until it is done."""
-    if not gc.isenabled():
-        yield
-        return
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
-
-
 class Kernel(CPUDispatcher):
     """A function that Python and other kernels call; one set of machine code per set of types."""
 
     compiler: type[_KernelCompiler] = _KernelCompiler
+    _cache: Any
+    _compiler: Any
+    _cache_hits: Any
+    _cache_misses: Any
+    _can_compile: bool
+    _compiling_counter: Any
 
     def __init__(self, py_func: Callable[..., Any], locals: Any = None, targetoptions: dict[str, Any] | None = None):
         super().__init__(py_func, locals, targetoptions, self.compiler)
 
     def compile(self, sig: Any) -> Any:
         """Load or compile the code for types of arguments."""
-        with global_compiler_lock, _without_collector(), plainly():
-            return super().compile(sig)
+        if not self._can_compile:
+            raise RuntimeError("compilation disabled")
+        with global_compiler_lock, nobody_looks(), plainly(), self._compiling_counter:
+            args, result = normalize_signature(sig)
+            known = self.overloads.get(tuple(args)) or self._loaded(sig)
+            if known is None:
+                self._cache_misses[sig] += 1
+                known = self._compiler.compile(args, result)
+                self.add_overload(known)
+                self._cache.save_overload(sig, known)
+            return known.entry_point
+
+    def _loaded(self, sig: Any) -> Any:
+        """Return what the cache has for a signature, None where it has nothing."""
+        found = self._cache.load_overload(sig, self.targetctx)
+        if found is not None:
+            self._cache_hits[sig] += 1
+            self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+            self.add_overload(found)
+        return found
 
     def __reduce__(self) -> Any:
         """By its name where it has one: numba would send the source, and the process that gets it compile it anew."""
@@ -168,6 +202,15 @@ class Part(Kernel):
             options = {key: value for key, value in self.targetoptions.items() if key != "no_cpython_wrapper"}
             self._callable = Kernel(self.py_func, None, options)
         return self._callable._compile_for_args(*args, **kws)
+
+
+class Shared(Part):
+    """A part of which one code serves whatever numbers are written in its calls."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how a call is typed."""
+        plain = {name: types.unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(types.unliteral(kind) for kind in args), plain)
 
 
 def rebuilt_part(target: Any, payload: tuple[Any, ...]) -> Any:

@@ -29,6 +29,7 @@ from numba.core.compiler import DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.consts import ConstantInference
 from numba.core.cpu import CPUContext
+from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import (
     AnnotateTypes,
     DumpParforDiagnostics,
@@ -59,7 +60,7 @@ class _Typing(Context):
     def __init__(self, of: Context) -> None:
         self.__dict__ = of.__dict__
         self._known_values: dict[int, Any] = {}
-        self._known_operators: dict[Any, Any] = {}
+        self._known_calls: dict[Any, Any] = {}
 
     def resolve_value_type(self, val: Any) -> Any:
         """Return the type of a constant."""
@@ -71,13 +72,14 @@ class _Typing(Context):
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
         """Return the signature of a function for types of arguments."""
-        function = func.typing_key if isinstance(func, types.BaseFunction) else func
-        if id(function) not in _OPERATORS or kws:
+        if not isinstance(func, types.Function) or kws:
             return super().resolve_function_type(func, args, kws)
-        key = id(function), args
-        if key not in self._known_operators:
-            self._known_operators[key] = super().resolve_function_type(func, args, kws)
-        return self._known_operators[key]
+        # What numba itself compiles for a call has the flags of who asks first.
+        flags = ConfigStack.top_or_none()
+        key = func, args, None if flags is None else flags.fastmath.encode()
+        if key not in self._known_calls:
+            self._known_calls[key] = super().resolve_function_type(func, args, kws)
+        return self._known_calls[key]
 
 
 class _Target(CPUContext):
@@ -306,16 +308,41 @@ def passes(state: Any, writer: type[KernelLowering]) -> PassManager:
     return found
 
 
+# Neither these nor what they are made of are variables of numba's intermediate code.
+_NO_VARIABLES = (ir.Loc, str, int, float, bool, type(None))
+
+
+def _variables_in(self: Any, value: Any) -> list[Any]:
+    """Return the variables in an instruction, or in what it is made of, as `ir.Inst._rec_list_vars` does."""
+    if isinstance(value, ir.Var):
+        return [value]
+    if isinstance(value, ir.Inst):
+        return value.list_vars()  # type: ignore[no-any-return]
+    inside = value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else ()
+    found: list[Any] = []
+    for one in inside:
+        if type(one) is ir.Var:
+            found.append(one)
+        elif type(one) not in _NO_VARIABLES:
+            found += _variables_in(self, one)
+    return found
+
+
 @contextmanager
 def plainly() -> Iterator[None]:
-    """Let numba write its complaints, most of which nobody sees, without colours: each would set up the terminal."""
+    """Let numba list variables without asking each number and place for its own, and complain without colours.
+
+    Most complaints are caught, and colours would set up the terminal for each.
+    """
     kind: Any = type(errors.termcolor())
-    markup = vars(kind).get("_markup")
-    if markup is None:  # numba has no colours here
-        yield
-        return
-    kind._markup = lambda _self, text, *_style: text
+    instruction: Any = ir.Inst
+    listed, markup = instruction._rec_list_vars, vars(kind).get("_markup")
+    instruction._rec_list_vars = _variables_in
+    if markup is not None:  # numba has colours here
+        kind._markup = lambda _self, text, *_style: text
     try:
         yield
     finally:
-        kind._markup = markup
+        instruction._rec_list_vars = listed
+        if markup is not None:
+            kind._markup = markup

@@ -19,7 +19,7 @@ from types import FunctionType
 from typing import Any, TypeVar, cast
 
 from kernels._cache import kept
-from kernels._compiler import Kernel, Part
+from kernels._compiler import Kernel, Part, Shared
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -51,6 +51,16 @@ def inline(function: F) -> F:
     return _compiled(function, Part, forceinline=True, no_cpython_wrapper=True)
 
 
+def inline_once(function: F) -> F:
+    """As :func:`inline`, for a helper whose loops do not depend on numbers written in its calls: one code for all."""
+    return _compiled(function, Shared, forceinline=True, no_cpython_wrapper=True)
+
+
+def part(function: F) -> F:
+    """Compile a larger function that kernels call, as :func:`inline_once`; whether it is folded in is up to LLVM."""
+    return _compiled(function, Shared, no_cpython_wrapper=True)
+
+
 def inline_fused(helper: F) -> F:
     """Return the same helper again, for :func:`kernel_fused` loops: products and sums may be contracted in it too.
 
@@ -77,6 +87,11 @@ def generated(name: str, function: F) -> F:
 def generated_inline(name: str, function: F) -> F:
     """As :func:`inline`, for a function that a generator made; ``name`` as of :func:`generated`."""
     return _compiled(_named(name, function), Part, forceinline=True, no_cpython_wrapper=True)
+
+
+def generated_part(name: str, function: F) -> F:
+    """As :func:`part`, for a function that a generator made; ``name`` as of :func:`generated`."""
+    return part(_named(name, function))
 
 
 def _named(name: str, function: F) -> F:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 
 SIGNALLED = (130, 143)
 
-# New objects after which Python looks for garbage among them; its own 700 let a short run spend a tenth of its time on
-# looking again and again through what the compiler keeps.
-NEW_OBJECTS = 10_000
-
 
 def main() -> None:
     """Run the command line."""
-    gc.set_threshold(NEW_OBJECTS)
+    from kernels._garbage import program_of_our_own
     from sweep.cli import main as command_line
+
+    program_of_our_own()
 
     try:
         command_line()

@@ -106,6 +106,8 @@ def test_the_llvm_code_is_that_of_numbas_own_way(arguments: tuple[object, ...]) 
 
 def _body(text: str, name: str) -> str:
     """The LLVM code of a function, its symbols and blocks counted in the order in which they come."""
+    # Ours is optimised without numba's wrapper, so LLVM does not see that nobody compares addresses of it.
+    text = text.replace(" local_unnamed_addr", "")
     (body,) = re.findall(rf"^define [^\n]*@{re.escape(name)}\(.*?^}}", text, re.M | re.S)
     known: dict[str, str] = {}
     return re.sub(r"[@%!#][\w.$<>\"-]+", lambda found: known.setdefault(found[0], f"{found[0][0]}{len(known)}"), body)

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels._jit import generated, inline
+from kernels._jit import generated_part, inline
 from kernels.reduce import largest
 from kernels.series.curves import Curve
 from kernels.series.form import STRIDE, Helper
@@ -60,12 +60,12 @@ def begin_at_vertex(count: int, m: Array) -> None:
 
 
 def refiner(curve: Curve, get: Helper) -> Helper:
-    """Make the kernel ``refine(begin, end, m, rounds)``: Newton steps, uphill where the curve is not concave."""
+    """Make the part ``refine(count, m, rounds)``: Newton steps, uphill where the curve is not concave."""
     jet = curve.jet
 
-    def refine(begin: int, end: int, m: Array, rounds: int) -> None:
+    def refine(count: int, m: Array, rounds: int) -> None:
         for _ in range(rounds):
-            for i in range(begin, end):
+            for i in range(count):
                 _, dy, d2y = jet(get(m, i + CONSTANTS), m[i + A], m[i + B], m[i + C], m[i + U], m[i + V])
                 sign, width = m[i + _SIGN], m[i + WIDTH]
                 step = -dy / d2y if sign * d2y < 0.0 else math.copysign(width, sign * dy)
@@ -75,19 +75,19 @@ def refiner(curve: Curve, get: Helper) -> Helper:
                 m[i + U] = u
                 m[i + V] = v
 
-    return generated(f"refine_{curve.name}", refine)
+    return generated_part(f"refine_{curve.name}", refine)
 
 
 def finisher(curve: Curve, get: Helper) -> Helper:
-    """Make the kernel ``finish(begin, end, m, target)``: heights, what is left of the way to the tops, rounding errors.
+    """Make the part ``finish(count, m, target)``: heights, what is left of the way to the tops, rounding errors.
 
     A height is that of the parabola through the last point.  Its error is infinite where the maximum is not trusted:
     where it left its samples, rose too far above them, or does not fall towards them as a single top would.
     """
     jet, rounding = curve.jet, curve.rounding
 
-    def finish(begin: int, end: int, m: Array, target: float) -> None:
-        for i in range(begin, end):
+    def finish(count: int, m: Array, target: float) -> None:
+        for i in range(count):
             k: Any = get(m, i + CONSTANTS)
             y, dy, d2y = jet(k, m[i + A], m[i + B], m[i + C], m[i + U], m[i + V])
             sign, width, moved, scale = m[i + _SIGN], m[i + WIDTH], m[i + MOVED], m[i + SCALE]
@@ -106,4 +106,4 @@ def finisher(curve: Curve, get: Helper) -> Helper:
             # Rounding fixes the place of a top to the width at which it falls by as much.
             m[i + REACH] = 4.0 * abs(step) + 2.0 * math.sqrt(blur / largest(bend, 1e-300))
 
-    return generated(f"finish_{curve.name}", finish)
+    return generated_part(f"finish_{curve.name}", finish)

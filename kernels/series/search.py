@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import generated, inline
+from kernels._jit import generated, generated_part, inline
 from kernels.bits import lowest_bit
 from kernels.series.chain import Chained
 from kernels.series.curves import MARGIN, Curve, curve
@@ -96,16 +96,16 @@ def find_extrema(chain: Chained, order: int) -> Helper:
             enlist(designs, start, end, near, cos, sin, made_of, mode, m, first, status, values, guards)
             padded = (first[end - start] + 7) & ~7  # whole vectors; what stands in the surplus is never read
             begin_at_vertex(padded, m)
-            refine(0, padded, m, rounds)
-            finish(0, padded, m, target)
+            refine(padded, m, rounds)
+            finish(padded, m, target)
             for i in range(start, end):
                 if status[i] != st.OK:
                     continue
                 low, high = first[i - start], first[i - start + 1]
                 for peak in range(low, high):
                     if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
-                        refine(peak, peak + 1, m, SETTLING)
-                        finish(peak, peak + 1, m, target)
+                        refine(1, m[peak:], SETTLING)
+                        finish(1, m[peak:], target)
                 status[i] = _decide(low, high, m, mode, allowed * target, tie, i, found)
             # Now the list is free for those, one by one, whose tops were not single ones between their samples.
             for i in range(start, end):
@@ -114,8 +114,8 @@ def find_extrema(chain: Chained, order: int) -> Helper:
                     near[0] = min(rho, distance[i])
                     enlist(designs, i, i + 1, near, cos, sin, made_of, mode, m, first, status, values, guards)
                     begin_at_vertex(first[1], m)
-                    refine(0, first[1], m, rounds + SETTLING)
-                    finish(0, first[1], m, target)
+                    refine(first[1], m, rounds + SETTLING)
+                    finish(first[1], m, target)
                     if status[i] == st.OK:
                         status[i] = _decide(first[0], first[1], m, mode, allowed * target, tie, i, found)
                     rho /= MORE
@@ -150,7 +150,7 @@ def _decide(begin: int, end: int, m: Array, mode: int, rounding: float, tie: flo
 
 
 def _enlister(chain: Chained, of: Curve) -> Helper:
-    """Make the kernel ``enlist(designs, begin, end, near, ...)``: samples designs begin, ..., end - 1 and lists their
+    """Make the part ``enlist(designs, begin, end, near, ...)``: samples designs begin, ..., end - 1 and lists their
     local maxima.
 
     ``near`` has for each the distance of its nearest singularity, 0 for one that is left out; ``first`` gets for each
@@ -201,7 +201,7 @@ def _enlister(chain: Chained, of: Curve) -> Helper:
                 count = length
         first[end - begin] = count
 
-    return generated(f"enlist_{of.name}", enlist)
+    return generated_part(f"enlist_{of.name}", enlist)
 
 
 @inline

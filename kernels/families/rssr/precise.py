@@ -14,7 +14,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels import twofold as two
-from kernels._jit import inline, kernel
+from kernels._jit import inline, inline_once, kernel
 from kernels.families.rssr.closure import EPS, Array, Status, reduce_scaled, unit_scale
 from kernels.families.rssr.motion import Joints, put
 from kernels.twofold import Twofold
@@ -28,7 +28,7 @@ BAND = 4.0 * EPS  # what rounding the given numbers does to Delta: a dead point 
 _ROW = 64  # designs side by side; the constant stride lets the loop over them become vector code
 
 
-@inline
+@inline_once
 def _put(at: Array, column: int, k: int, x: Twofold) -> None:
     at[column * _ROW + k], at[(column + 1) * _ROW + k] = x
 
@@ -87,7 +87,7 @@ def precise_constants(designs: Array, out: Array) -> None:
                 out[start + k, column] = at[column * _ROW + k]
 
 
-@inline
+@inline_once
 def _get(constants: Array, row: int, i: int) -> Twofold:
     return constants[i, row], constants[i, row + 1]
 
