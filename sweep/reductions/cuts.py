@@ -1,25 +1,28 @@
-"""Where a turn is cut into panels: at known angles, where outputs pass levels, and where followers reverse."""
+"""Where a turn is cut into panels: at known angles, where outputs pass levels or bend, and where followers reverse."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sweep.families.base import Array, Family
-from sweep.families.pace import Crossing, switches, waves
-from sweep.numerics.events import sign_changes, with_events
+from sweep.families.base import Angles, Array, Family
+from sweep.families.pace import Bends, Crossing, bends, switches, waves
+from sweep.numerics.events import near_zeros, sign_changes, with_events
 from sweep.numerics.singularities import crowded
 from sweep.reductions.density import nearest
 from sweep.reductions.sampling import TWO_PI, Index, pose_columns
 
 FAR, CLOSE = 10.0, 0.1  # distances of singularities [rad]; from the latter on panels crowd about one
+BENDING = 128  # even samples among which functions of effects are seen to pass zero
+LOOK = 0.25  # spacing of further samples against the distance of a singularity
 PER_PANEL = 0.25  # waves that a first panel may hold
 
 
-def ends(family: Family, designs: Array, even: int, looks: int) -> Array:
-    """Return ends of panels of a turn in rising order, (n, p + 1).
+def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> Array:
+    """Return ends of panels of a turn for curves of a pose output, in rising order, (n, p + 1).
 
     There are ``even`` panels, and more about singularities.  They are cut at angles known beforehand, and where one of
-    ``looks`` samples or the next shows that a pose output passes its level, or that a follower reverses.
+    ``looks`` samples or the next shows that a pose output passes its level, that a follower reverses, or that a
+    function passes zero at which curves of the output bend.
     """
     n = len(designs)
     edges = np.tile(np.linspace(0.0, TWO_PI, even + 1), (n, 1))
@@ -33,18 +36,33 @@ def ends(family: Family, designs: Array, even: int, looks: int) -> Array:
     close = np.flatnonzero(near.rho.min(axis=1, initial=FAR) < CLOSE)
     about = crowded(near.only(close), 1.0)
     edges = with_events(edges, np.repeat(close, about.shape[1]), about.ravel())
-    speeds, crossings = reversing(family), family.every(Crossing)
-    if speeds or crossings:
-        names = list(dict.fromkeys([*speeds, *(crossing.of for crossing in crossings)]))
+    angles = crowded(near.only(close), LOOK)
+    # What reverses is felt by friction and loads, of effects; a family knows its own kinks.
+    speeds, crossings = reversing(family) if output in family.dear else (), family.every(Crossing)
+    names = list(dict.fromkeys([*speeds, *(crossing.of for crossing in crossings)]))
 
-        def functions(rows: Index, phi: Array) -> Array:
-            columns, _ = pose_columns(family, designs[rows], phi, names)
-            passed = [columns[crossing.of] - crossing.level(designs[rows])[:, None] for crossing in crossings]
-            return np.nan_to_num(np.stack([*(columns[name] for name in speeds), *passed], axis=2))
+    def functions(rows: Index, phi: Array) -> Array:
+        columns, _ = pose_columns(family, designs[rows], phi, names)
+        passed = [columns[crossing.of] - crossing.level(designs[rows])[:, None] for crossing in crossings]
+        return np.nan_to_num(np.stack([*(columns[name] for name in speeds), *passed], axis=2))
 
-        phi = np.arange(looks) * (TWO_PI / looks)
-        edges = with_events(edges, *sign_changes(functions, np.tile(phi, (n, 1))))
+    if names:
+        edges = with_events(edges, *sign_changes(functions, _looked(n, looks, close, angles)))
+    for bent in bends(family, output):
+
+        def bending(rows: Index, phi: Array, bent: Bends = bent) -> Array:
+            return np.nan_to_num(bent.curves(designs[rows], Angles.of(phi)))
+
+        looked = _looked(n, BENDING, close, angles)
+        places = near_zeros(bending, looked, CLOSE) if bent.squares else sign_changes(bending, looked)
+        edges = with_events(edges, *places)
     return edges
+
+
+def _looked(n: int, even: int, close: Index, angles: Array) -> Array:
+    """Return even angles of a turn, (n, m), and further ones of the designs ``close``."""
+    looked = np.tile(np.arange(even) * (TWO_PI / even), (n, 1))
+    return with_events(looked, np.repeat(close, angles.shape[1]), angles.ravel())
 
 
 def reversing(family: Family) -> tuple[str, ...]:
