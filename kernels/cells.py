@@ -156,7 +156,9 @@ def advance(lanes: int, walk: Array, curve: Array, good: Array, target: float, n
         stop = near if near < far else far
         to = end if end < stop else stop
         marching = (walk[MODE + i] == MARCH) & (good[i] != 0.0)
-        asked = marching & (curve[EDGE + i] < to)
+        # A bound that is infinite or no number closes nothing.
+        known = curve[OF_NOISE + i] + curve[OF_TAIL + i] < math.inf
+        asked = marching & known & (curve[EDGE + i] < to)
         held, partly = curve[WHOLE + i] <= limit, (curve[PART + i] <= limit) & (curve[MIDDLE + i] > curve[EDGE + i])
         closed = asked & (held | partly)
         bound = curve[WHOLE + i] if held else curve[PART + i]

@@ -195,7 +195,7 @@ def _cover(lane: int, walk: Array, curves: Array, target: float) -> None:
     here, blur = abs(curves[j, Y0 + lane]), curves[j, OF_NOISE + lane]
     best = here if first else max(here, curves[j, BEST + lane])
     limit = best * (1.0 + target) + (0.0 if first else max(blur, curves[j, BLUR + lane]))
-    if curves[j, WHOLE + lane] <= limit:
+    if curves[j, WHOLE + lane] <= limit and blur < math.inf:
         curves[j, UPPER + lane] = max(curves[j, UPPER + lane], (curves[j, WHOLE + lane] + blur) * GUARD)
         middle, half = walk[CENTRE + lane], SHARE * walk[REACH + lane]
         if first or here > curves[j, BEST + lane]:
