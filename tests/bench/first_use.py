@@ -76,9 +76,8 @@ def used(program: str, cache: Path) -> Use:
 
 def main() -> None:
     """Print the table."""
-    print(
-        f"{'processor time / wall time [s]':32}{'asked':>6}{'empty':>14}{'full':>14}{'kernels and parts':>19}{'memory, empty':>15}"
-    )
+    heads = f"{'asked':>6}{'empty':>14}{'full':>14}{'kernels and parts':>19}{'memory, empty':>15}"
+    print(f"{'processor time / wall time [s]':32}{heads}")
     for name, (program, asked) in PROGRAMS.items():
         with tempfile.TemporaryDirectory() as folder:
             cold = used(program, Path(folder))
