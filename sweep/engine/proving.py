@@ -47,7 +47,7 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
         by a signal; finished work is kept.
     """
     from sweep.jobs.progress import Progress
-    from sweep.proof import prove_study
+    from sweep.proof import known_proof, prove_study
     from sweep.proof.rounds import Cores
 
     place = store.beside(folder)
@@ -57,6 +57,8 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
     note = store.read_plan(folder) or {}
     if altered(place, note, [store.PROOF]):
         (place / store.PROOF).unlink(missing_ok=True)
+    if known_proof(study, folder) is not None:
+        return False
     boxes = study.optimise.prove.boxes
     with stop_on_signal() as stop, Progress("proof", boxes, 0, progress, unit="boxes") as shown:
 
