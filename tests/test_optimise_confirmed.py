@@ -60,6 +60,7 @@ def search(
     objective: str,
     limits: Sequence[Limit] = (),
     loads: Any = None,
+    window: tuple[float, float] | None = None,
 ) -> tuple[Result, pd.Series]:
     """One search, and what summarise says of the design that it ends at; ``varied`` are start and bounds by name."""
     plain, asked = family(name), [objective, *(limit.output for limit in limits)]
@@ -69,10 +70,10 @@ def search(
     fixed = {n: x for n, x in values.items() if n in full.parameter_names and n not in varied and x is not None}
     signs = {n: fixed.pop(n) for n in list(fixed) if n.startswith("branch")}
     start, low, high = np.array(list(varied.values())).T
-    problem = Problem(full, tuple(varied), low, high, fixed, objective, tuple(limits))
+    problem = Problem(full, tuple(varied), low, high, fixed, objective, tuple(limits), window)
     found = minimise(problem, problem.rows(start[None, :], **signs), ONCE)[0]
     table = dict(zip(full.parameter_names, found.design, strict=True))
-    return found, sweep.summarise(name, table, asked, accuracy=TARGET, loads=loads).iloc[0]
+    return found, sweep.summarise(name, table, asked, accuracy=TARGET, loads=loads, window=window).iloc[0]
 
 
 def assert_confirmed(found: Result, said: pd.Series, objective: str, limits: Sequence[Limit] = ()) -> None:
@@ -155,6 +156,14 @@ def test_limit_on_the_load_of_a_tool_that_pierces_is_kept_by_summarise() -> None
     found, said = search("guide", row, around(row, {"a": 0.2, "xi": 1.0}), "minus_stroke", limits)
     assert found.feasible and said["max_tool_load"] == pytest.approx(373.0, rel=1e-6)
     assert_confirmed(found, said, "minus_stroke", limits)
+
+
+def test_a_straightness_in_a_window_is_that_of_summarise_beside_a_tool_that_pierces() -> None:
+    """The ends of the stroke, which the window counts from, are edges where a tool jumps."""
+    row, limits = pierced(0.3), (Limit("max_abs_tool_load", None, 373.0),)
+    found, said = search("guide", row, around(row, {"a": 0.2, "xi": 1.0}), "max_abs_dev", limits, window=(0.0, 0.6))
+    assert_confirmed(found, said, "max_abs_dev", limits)
+    assert (found.ended, found.status) == ("converged", st.OK)
 
 
 def blind(monkeypatch: pytest.MonkeyPatch) -> None:

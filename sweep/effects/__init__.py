@@ -13,20 +13,17 @@ from functools import lru_cache, partial
 from importlib import import_module
 from types import MappingProxyType
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sweep.effects.base import CURVED, Effect
 from sweep.effects.evaluation import effect_poses, on_own_columns, run_design
+from sweep.effects.pace import bends, bent, paces, piercing
 from sweep.effects.placing import Placed, stages_of
 from sweep.errors import InputError
-from sweep.families.base import Accuracy, Array, Family, Output, Parameter, Step, Work
+from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work
 from sweep.families.chain import Chain
 from sweep.families.derived import of_family
 from sweep.families.members import Machine
-from sweep.families.pace import Crossing, of_order, of_table
 from sweep.families.relations import Reading
-from sweep.numerics.curves import Curve, TableCurve
+from sweep.numerics.curves import Curve
 from sweep.quantities.names import stem
 from sweep.quantities.reduction import reduced
 
@@ -269,48 +266,18 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
     return replace(
         family,
         parameters=(*family.parameters, *added),
-        pose_outputs=(*family.pose_outputs, *_bent(effects, curves)),
+        pose_outputs=(*family.pose_outputs, *bent(effects, curves)),
         poses=partial(effect_poses, family, effects, added, curves, own),
         precise_poses=family.precise_poses and partial(effect_poses, family.precise(), effects, added, curves, own),
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
-        capabilities=(*family.capabilities, *_paces(curves), *_piercing(family, added)),
+        capabilities=(
+            *family.capabilities,
+            *paces(curves),
+            *piercing(family, added),
+            *bends(family, effects, added, curves),
+        ),
         dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )
-
-
-def _bent(effects: tuple[Placed, ...], curves: Mapping[str, Curve]) -> list[Output]:
-    """Return pose outputs of effects: between the points of a table of loads they may have a narrow peak."""
-    tables = any(isinstance(curve, TableCurve) for curve in curves.values())
-    found = [o for placed in effects for o in placed.pose_outputs]
-    return [replace(o, kinks=not (o.wraps or o.jumps)) for o in found] if tables else found
-
-
-def _paces(curves: Mapping[str, Curve]) -> list[object]:
-    """Return where the tables among loads bend, and how many waves the series have."""
-    of = curves.values()
-    return [of_table(c.phi) if isinstance(c, TableCurve) else of_order(max(len(c.cos), len(c.sin))) for c in of]
-
-
-def _piercing(family: Family, added: tuple[Parameter, ...]) -> list[Crossing]:
-    """Return where a tool pierces: at a place of the follower of its stage."""
-    columns = {p.name: len(family.parameters) + k for k, p in enumerate(added)}
-    found = []
-    for stage, number in stages_of(family):
-        force, at = columns.get(f"pierce_force{number}"), columns.get(f"pierce_at{number}")
-        if force is not None and at is not None:
-            position = f"{stage.position}{number}"
-            found.append(Crossing(position, partial(_column, at), partial(_is_given, force)))
-    return found
-
-
-def _column(column: int, designs: Array) -> Array:
-    values: Array = designs[:, column]
-    return values
-
-
-def _is_given(column: int, designs: Array) -> NDArray[np.bool_]:
-    given: NDArray[np.bool_] = designs[:, column] != 0.0
-    return given
 
 
 def _design_ns(entry: Effect, accuracy: Accuracy) -> float:

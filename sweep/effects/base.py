@@ -14,6 +14,7 @@ from kernels import status as st
 from kernels.joints import PER_DESIGN, PER_POSE
 from kernels.links import PER_BODY, PER_LINE, Links
 from sweep.costs import nanoseconds
+from sweep.effects.bend import Bend
 from sweep.effects.places import tool_place
 from sweep.families import NAMES as FAMILY_NAMES
 from sweep.families import family as find_family
@@ -23,7 +24,7 @@ from sweep.families.chain import drive, driving_names
 from sweep.families.link_tree import LinkTree
 from sweep.numerics.curves import Curve
 
-# Loads that a curve over the turn of the crank can add to.
+# Loads that a curve over the turn can add to.
 CURVED = ("load_torque", "load_force", "tool_force", "tool_force_x", "tool_force_y", "tool_force_z")
 # Inputs that stand in [loads] of a study; the others but the speed stand in [bodies].
 LOADS = (*CURVED, "pierce_force", "pierce_at", "pierce_sense", "resisting_torque", "motor_slope", "thread_tension")
@@ -56,8 +57,8 @@ class Scene:
     """One block of designs at their crank angles, as the effects see it; what two effects share is computed once.
 
     In a chain it is one stage: ``after`` are the stages behind it, ``before`` the scene that drives it.  ``curves`` are
-    loads over the turn of the first crank, by the input they add to.  ``uneven`` are speed and acceleration of that
-    crank at the poses, (n, m); None where they are the constants among the inputs.
+    loads over the turn of the first crank, by the input they add to.  ``uneven`` are its speed and acceleration at the
+    poses, (n, m); None where they are the constants among the inputs.
     """
 
     family: Family
@@ -265,10 +266,10 @@ class Effect:
     further inputs where a tool can hang on the coupler and moves along a line, where it moves freely, and where it
     hangs on the tip of a rocker. ``least`` are pose outputs of which the least value over the turn counts, as a
     life, not the largest (:func:`sweep.effects.wanted.expanded`). ``tree`` is the tree of links of the one family
-    that it is for, if it is for one; ``carried_at`` the place of a tool that a family must have, if it must have
-    one. ``only_for`` are the outputs that need an input, by the input, where not all of them do: it is no input
-    where none of these is wanted. ``advise(scene)`` applies the effect's rule of negligibility to some designs over
-    a turn; None where none turns.
+    that it is for, if any; ``carried_at`` the place of a tool that a family must have, if any. ``only_for`` are the
+    outputs that need an input, by the input, where not all do: it is no input where none of these is wanted.
+    ``bends`` are where curves of outputs have kinks. ``advise(scene)`` applies the rule of negligibility to some
+    designs over a turn; None where none turns.
     """
 
     key: str
@@ -295,6 +296,7 @@ class Effect:
     tree: LinkTree | None = None
     carried_at: int | None = None
     only_for: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    bends: tuple[Bend, ...] = ()
 
     def inputs_of(self, family: Family) -> tuple[Parameter, ...]:
         """Return the inputs, with those of a tool where the family has a place that one can hang on."""
@@ -341,9 +343,7 @@ def no_poses(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def largest(scene: Scene, compute: ComputeFunction, name: str, quantity: str, threshold: float) -> Advice | None:
-    """Return the advice from the largest magnitude of one output over the turn,
-    of the designs where it is known all the way.
-    """
+    """Return the advice from the largest magnitude of one output, of the designs where it is known all the way."""
     found = np.abs(np.asarray(compute(scene, frozenset({name}))[name], np.float64))
     turning = np.isfinite(found).all(axis=1)
     return Advice(quantity, found[turning].max(axis=1), threshold) if turning.any() else None

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from kernels.effects import bearings, permissible
 from sweep.effects.base import ComputeFunction, Effect, Scene, largest, refuse
+from sweep.effects.bend import Bend
 from sweep.effects.loads import SPEED
 from sweep.effects.pressure import components
 from sweep.families.base import Array, Columns, Output, Parameter, filled
@@ -117,6 +118,33 @@ def together(scene: Scene, shaft: str) -> NDArray[np.bool_]:
     return same
 
 
+def _thrust(scene: Scene) -> Array:
+    """Return the component of the coupler direction along the shaft, of which the collar sees the magnitude."""
+    return components(scene)[0][2][:, :, None]
+
+
+def _formula(scene: Scene) -> Array:
+    """Return the same, and by how much the axial load exceeds the share e V of the radial one of its bearing."""
+    (t_tau, t_rho, t_k), _ = components(scene)
+    c, z1, z2 = (x[:, None] for x in (scene.records[1][:, 14], *_supports(scene)))
+    z = np.where(scene.inputs["axial_support"][:, None] == 1.0, z2, z1)
+    share = (scene.inputs["e_limit"] * scene.inputs["rotation_factor"])[:, None] / np.abs(z2 - z1)
+    return np.stack([t_k, np.abs(t_k) - share * np.hypot(z * t_tau, z * t_rho + c * t_k)], axis=2)
+
+
+def _eased(scene: Scene) -> Array:
+    """Return what vanishes where no force acts along the shaft, where none acts radially, and where theta1 does not
+    load one support: what the bearings permit has narrow peaks and kinks there.
+    """
+    (_, t_rho, t_k), _ = components(scene)
+    c, z1, z2 = (x[:, None] for x in (scene.records[1][:, 14], *_supports(scene)))
+    return np.stack([t_k, t_rho, c * t_k + z1 * t_rho, c * t_k + z2 * t_rho], axis=2)
+
+
+def _supports(scene: Scene) -> tuple[Array, Array]:
+    return scene.inputs["support_d1"], scene.inputs["support_d2"]
+
+
 def _pressures(scene: Scene) -> Array:
     return scene.table(tuple(p.name for p in PERMISSIBLE))
 
@@ -133,7 +161,7 @@ def permissible_load(scene: Scene, tail: str = "") -> Array:
 
 def _effect(
     name: str, title: str, inputs: tuple[Parameter, ...], results: tuple[Output, ...], compute: ComputeFunction,
-    kind: str = "",
+    bends: tuple[Bend, ...], kind: str = "",
 ) -> Effect:  # fmt: skip
     words = f"largest utilisation of the {kind} bearings"
     advise = partial(largest, compute=compute, name=f"{kind}_utilisation", quantity=words, threshold=0.5)
@@ -152,6 +180,7 @@ def _effect(
         negligible="other members govern: utilisation below 0.5",
         even_crank=SPEED in inputs,
         least=tuple(o.name for o in results if o.name.startswith(("life", "permissible", "theta1_reserve"))),
+        bends=bends,
         advise=advise if kind else None,
     )
 
@@ -161,19 +190,26 @@ _ROLLING = partial(_compute, bearings.rolling_bearings, ROLLING_INPUTS, ROLLING_
 _SLIDING_LIMITS = partial(_compute, permissible.sliding_limits, SLIDING_INPUTS, SLIDING_LIMITS, _pressures)
 _ROLLING_LIMITS = partial(_compute, permissible.rolling_limits, ROLLING_INPUTS, ROLLING_LIMITS, permissible_load)
 
+
+def _bent(results: tuple[Output, ...], curves: Callable[[Scene], Array]) -> Bend:
+    return Bend(tuple(o.name for o in results), curves)
+
+
 SLIDING = _effect(
     "sliding_bearings", "sliding bearings of the rocker: loads and mean pressures, massless estimate",
-    SLIDING_INPUTS, SLIDING_OUTPUTS, _SLIDING,
+    SLIDING_INPUTS, SLIDING_OUTPUTS, _SLIDING, (_bent(SLIDING_OUTPUTS, _thrust),),
 )  # fmt: skip
 ROLLING = _effect(
     "rolling_bearings", "rolling bearings of the rocker: equivalent loads and lives, massless estimate",
-    ROLLING_INPUTS, ROLLING_OUTPUTS, _ROLLING,
+    ROLLING_INPUTS, ROLLING_OUTPUTS, _ROLLING, (_bent(ROLLING_OUTPUTS, _formula),),
 )  # fmt: skip
 SLIDING_LIMIT = _effect(
     "sliding_limits", "utilisation of the sliding bearings and the pressure angle they permit",
-    (*SLIDING_INPUTS, *PERMISSIBLE), SLIDING_LIMITS, _SLIDING_LIMITS, "sliding",
+    (*SLIDING_INPUTS, *PERMISSIBLE), SLIDING_LIMITS, _SLIDING_LIMITS,
+    (_bent(SLIDING_LIMITS[:1], _thrust), _bent(SLIDING_LIMITS[1:], _eased)), "sliding",
 )  # fmt: skip
 ROLLING_LIMIT = _effect(
     "rolling_limits", "utilisation of the rolling bearings and the pressure angle they permit",
-    (*ROLLING_INPUTS, *LIFE), ROLLING_LIMITS, _ROLLING_LIMITS, "rolling",
+    (*ROLLING_INPUTS, *LIFE), ROLLING_LIMITS, _ROLLING_LIMITS,
+    (_bent(ROLLING_LIMITS[:1], _formula), _bent(ROLLING_LIMITS[1:], _eased)), "rolling",
 )  # fmt: skip

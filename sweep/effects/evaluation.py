@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from sweep.effects.base import Status, take_over
+from sweep.effects.bend import Bend
 from sweep.effects.placing import Placed, first_scene
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Parameter, Step
 from sweep.numerics.curves import Curve
@@ -127,6 +128,29 @@ def run_design(
             f"{e}{name}": whole[f"{e}{placed.own[name]}"] for e in ("", "err_") if f"{e}{placed.own[name]}" in whole
         }
     return columns
+
+
+def bend_curves(
+    family: Family,
+    placed: Placed,
+    bend: Bend,
+    inputs: tuple[Parameter, ...],
+    curves: Mapping[str, Curve],
+    own: int,
+    designs: Array,
+    angles: Angles,
+) -> Array:
+    """Return functions at whose zeros outputs of an effect bend, (n, m, q), block by block."""
+    bare, given = np.ascontiguousarray(designs[:, :own]), input_columns(inputs, designs, own)
+    shape = len(designs), angles.cos.shape[1]
+    found: list[Array] = []
+    for rows, poses in _blocks(shape, BLOCK):
+        part = {name: x[rows] for name, x in given.items()}
+        scene = first_scene(family, bare[rows], _part(angles, rows, poses), part, curves)
+        values = bend.curves(scene.stage(placed.stage))
+        found = found or [np.empty((*shape, values.shape[2]))]
+        found[0][rows, poses] = values
+    return found[0]
 
 
 def on_own_columns(step: Step, own: int) -> Step:

@@ -8,11 +8,12 @@ from functools import partial
 import numpy as np
 
 from kernels.effects.bearing_life import journal_pressures
-from sweep.effects import link_friction, links
+from sweep.effects import link_friction, link_stops, links
 from sweep.effects.base import DesignResult, Effect, Scene, Status, refuse, take_over
 from sweep.effects.bearings import CATALOGUE, REQUIRED_LIFE, permissible_load, together
+from sweep.effects.bend import Bend
 from sweep.effects.handed import FRICTION, LOADS
-from sweep.effects.shaft_life import BLOCK, Shaft, load_outputs, turn_outputs
+from sweep.effects.shaft_life import BLOCK, Shaft, bend, load_outputs, turn_outputs
 from sweep.effects.shaft_life import FORMULAS as LIFE_FORMULAS
 from sweep.effects.shaft_life import per_turn as turn_of_shaft
 from sweep.families import family
@@ -223,6 +224,7 @@ def sliding_of(name: str) -> Effect:
         takes_load=FRICTION,
         requires=LinkTree,
         tree=tree,
+        bends=link_stops.bends(tree, tuple(o.name for _, _, out in found.values() for o in out)),
     )
 
 
@@ -235,6 +237,7 @@ def rolling_of(name: str) -> Effect:
     lives: list[Output] = []
     inputs: list[Parameter] = []
     only: dict[str, tuple[str, ...]] = {}
+    bends: list[Bend] = []
     for joint in shafts(tree):
         own, life = _rolling_inputs(joint), _life(joint)
         out, turn = _rolling_outputs(joint), turn_outputs(joint.name, joint.text, EQUATION)
@@ -242,6 +245,7 @@ def rolling_of(name: str) -> Effect:
         poses += out
         lives += turn
         only |= {p.name: tuple(o.name for o in (*out, *turn)) for p in own} | {life.name: (out[-1].name,)}
+        bends.append(bend(_shaft(joint), out[-1].name))
     return Effect(
         key="B2",
         name=f"{name}_rolling_bearings",
@@ -259,5 +263,6 @@ def rolling_of(name: str) -> Effect:
         takes_load=LOADS,
         requires=LinkTree,
         tree=tree,
+        bends=tuple(bends),
         design_result=DesignResult(tuple(lives), rolling_turn, BLOCK),
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.effects import link_friction as kernel
-from sweep.effects import links
+from sweep.effects import link_stops, links
 from sweep.effects.base import Effect, Scene, largest, refuse, take_over
 from sweep.effects.bearings import together
 from sweep.effects.handed import FRICTION, behind
@@ -139,6 +139,7 @@ def friction_of(name: str) -> Effect:
         takes_load=FRICTION,
         requires=LinkTree,
         tree=tree,
+        bends=link_stops.bends(tree, tuple(o.name for o in found)),
         advise=partial(
             largest, compute=compute, name=PASSES, quantity="most passes of the friction iteration", threshold=4.0
         ),

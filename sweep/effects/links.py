@@ -158,11 +158,11 @@ def drive(scene: Scene, handed_back: Columns | None, name: str = "drive_torque")
 @lru_cache
 def joint_table(tree: LinkTree) -> Index:
     """Return the joints as the kernels take them, (Q, PER_JOINT)."""
-    rows = [(KINDS[j.kind], j.body, j.freedom, *j.lines, _rod(tree, j)) for j in tree.joints]
+    rows = [(KINDS[j.kind], j.body, j.freedom, *j.lines, rod(tree, j)) for j in tree.joints]
     return np.array(rows, np.int64)
 
 
-def _rod(tree: LinkTree, joint: LinkJoint) -> int:
+def rod(tree: LinkTree, joint: LinkJoint) -> int:
     """Return the slender body among those of a joint; -1 where there is none."""
     ends = (joint.body,) if joint.lines[1] == 0 else tree.ends[joint.lines[0]]
     return next((k for k in ends if k >= 0 and tree.bodies[k].slender), -1)

@@ -12,6 +12,7 @@ from kernels import status as st
 from kernels.effects.bearing_life import bearing_loads
 from sweep.effects.base import ComputeFunction, Rows, Scene, Status
 from sweep.effects.bearings import CATALOGUE
+from sweep.effects.bend import Bend
 from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Array, Columns, Output, filled
 from sweep.families.capabilities import Assembly
@@ -102,6 +103,11 @@ class Shaft:
         return filled(bearing_loads, arguments, names, wanted & frozenset(names), status)
 
 
+def bend(shaft: Shaft, *more: str) -> Bend:
+    """Return where the equivalent loads of a shaft's bearings, and outputs made of them, bend."""
+    return Bend((*load_names(shaft.name)[3:], *more), partial(formula, shaft=shaft))
+
+
 def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, shaft: Shaft) -> Columns:
     """Return mean loads and lives, on samples (no errors then) or with the integrals refined to the
     accuracy asked for.
@@ -173,6 +179,11 @@ def _switches(scene: Scene, shaft: Shaft) -> Array:
     radial = np.where(shaft.given(scene, "axial_support")[:, None] == 1.0, first, second)
     limit = (shaft.given(scene, "e_limit") * shaft.given(scene, "rotation_factor"))[:, None] * radial
     return np.stack([shaft.turning(scene), axial, np.abs(axial) - limit], axis=2)
+
+
+def formula(scene: Scene, shaft: Shaft) -> Array:
+    """Return what changes its sign where an equivalent load has a kink or jumps, (n, m, 2)."""
+    return _switches(scene, shaft)[:, :, 1:]
 
 
 def _discriminant(scene: Scene, rows: Rows, stage: int, name: str, which: Rows, phi: Array) -> Array:

@@ -72,6 +72,21 @@ class Crossing:
     matters: Callable[[Array], NDArray[np.bool_]]
 
 
+@dataclass(frozen=True)
+class Bends:
+    """Smooth functions of the crank angle at whose zeros the pose outputs ``of`` have kinks, jumps or narrow peaks.
+
+    ``curves(designs, angles)`` gives their values, (n, m, q).  A bearing's load changes its formula where the load
+    along the shaft passes a share of that across it, friction turns where a joint stops, and what a bearing permits
+    has a narrow peak where nothing acts along the shaft.  Of ``squares``, which are never negative, the places count
+    where they nearly vanish: the direction of a velocity turns at once there.
+    """
+
+    of: frozenset[str]
+    curves: Callable[[Array, Angles], Array]
+    squares: bool = False
+
+
 def waves(family: Family, designs: Array) -> Array:
     """Return how many waves one turn holds at least, (n,)."""
     most = np.ones(len(designs))
@@ -94,6 +109,11 @@ def crossed(family: Family, designs: Array) -> NDArray[np.bool_]:
     for known in family.every(Crossing):
         found = found | known.matters(designs)
     return found
+
+
+def bends(family: Family, output: str) -> tuple[Bends, ...]:
+    """Return what tells at which crank angles curves of a pose output bend."""
+    return tuple(known for known in family.every(Bends) if output in known.of)
 
 
 def singular_curves(family: Family) -> Sequence[SingularCurve]:
@@ -146,6 +166,7 @@ def of_members(members: Sequence[Member]) -> list[object]:
         if m.driver is None:
             found += [Switches(partial(_on_shaft, m, known.angles)) for known in m.family.every(Switches)]
         found += [_of_part(m, known) for known in m.family.every(Crossing)]
+        found += [_of_shaft(m, known) for known in m.family.every(Bends) if m.driver is None]
         for known in m.family.every(Singular):
             if known.needs:
                 names = {name: f"{m.name}.{name}" for name in known.needs}
@@ -156,6 +177,17 @@ def of_members(members: Sequence[Member]) -> list[object]:
 def _of_part(member: Member, known: Crossing) -> Crossing:
     level, matters = partial(_on_part, member.designs, known.level), partial(_on_part, member.designs, known.matters)
     return Crossing(f"{member.name}.{known.of}", level, matters)
+
+
+def _of_shaft(member: Member, known: Bends) -> Bends:
+    names = frozenset(f"{member.name}.{name}" for name in known.of)
+    return Bends(names, partial(_turned, member, known.curves), known.squares)
+
+
+def _turned(member: Member, curves: Callable[[Array, Angles], Array], designs: Array, angles: Angles) -> Array:
+    """Return functions of a member that the main shaft drives, at angles of the main shaft."""
+    phase = designs[:, member.columns.stop]
+    return curves(member.designs(designs), Angles.of(member.ratio * angles.phi + phase[:, None]))
 
 
 def _alike(angles: Array, designs: Array) -> Array:

@@ -11,8 +11,11 @@ from sweep.numerics.quadrature import Array, Index, Mask
 
 TWO_PI = 2.0 * np.pi
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-SECTIONS = 40
-BISECTIONS = 56
+SECTIONS = 12
+PARABOLAS = 4
+NARROWER = 1.0 / 16.0
+BISECTIONS = 120  # at most; a smooth function takes some eight steps, a jump one for each bit of the angle
+LAST = 2.0**-48  # width of the last brackets [rad]: four times the rounding of an angle
 
 Functions: TypeAlias = Callable[[Index, Array], Array]
 """``f(rows, phi)``: values (k, m, q) of q functions of the designs ``rows`` (k,) at crank angles (k, m)."""
@@ -47,18 +50,84 @@ def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
     row, column, which = row[near], column[near], which[near]
     low, high = before[row, column], after[row, column]
     sign = np.where(values[row, column, which] < 0.0, -1.0, 1.0)
-    bottom, lowest = _bottom(functions, row, which, sign, low, high)
+    bottom, lowest = _bottom(functions, row, which, sign, low, high, whole=False)
     through = lowest < 0.0
     row, which, low, high, bottom = row[through], which[through], low[through], high[through], bottom[through]
     brackets += [(row, which, low, bottom), (row, which, bottom, high)]
 
     rows, numbers, lows, highs = (np.concatenate(parts) for parts in zip(*brackets, strict=True))
-    negative = _one(functions, rows, numbers, lows) < 0.0
+    return rows, np.mod(_zeros(functions, rows, numbers, lows, highs), TWO_PI)
+
+
+def _zeros(functions: Functions, row: Index, which: Index, low: Array, high: Array) -> Array:
+    """Return places where functions change their signs between two places each, to the rounding of the angle.
+
+    Chandrupatla (1997): inverse parabolas where they are safe, else bisection, so a jump is found too.
+    """
+    found, left = 0.5 * (low + high), np.arange(low.size)
+    x1, x2, at1, at2 = low, high, _one(functions, row, which, low), _one(functions, row, which, high)
+    share = np.full(low.size, 0.5)
     for _ in range(BISECTIONS):
-        middle = 0.5 * (lows + highs)
-        same = (_one(functions, rows, numbers, middle) < 0.0) == negative
-        lows, highs = np.where(same, middle, lows), np.where(same, highs, middle)
-    return rows, np.mod(0.5 * (lows + highs), TWO_PI)
+        if not left.size:
+            break
+        x = x1 + share * (x2 - x1)
+        at = _one(functions, row[left], which[left], x)
+        same = (at < 0.0) == (at1 < 0.0)
+        x3, at3 = np.where(same, x1, x2), np.where(same, at1, at2)
+        x2, at2 = np.where(same, x2, x1), np.where(same, at2, at1)
+        x1, at1 = x, at
+        found[left] = np.where(np.abs(at1) < np.abs(at2), x1, x2)
+        least = LAST / np.maximum(np.abs(x2 - x1), LAST)
+        share = np.clip(_inverse(x1, x2, x3, at1, at2, at3), least, 1.0 - least)
+        more = (least < 0.5) & (at != 0.0)
+        left, share, x1, x2, at1, at2 = (y[more] for y in (left, share, x1, x2, at1, at2))
+    return found
+
+
+def _inverse(x1: Array, x2: Array, x3: Array, at1: Array, at2: Array, at3: Array) -> Array:
+    """Return the share of the way from x1 to x2 at which the inverse parabola through three points is zero;
+    a half where it is not safe.
+    """
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        place, height = (x1 - x2) / (x3 - x2), (at1 - at2) / (at3 - at2)
+        safe = (height * height < place) & ((1.0 - height) ** 2 < 1.0 - place)
+        first = at1 / (at2 - at1) * (at3 / (at2 - at3))
+        second = (x3 - x1) / (x2 - x1) * (at1 / (at3 - at1)) * (at2 / (at3 - at2))
+        share = first + second
+    found: Array = np.where(safe & np.isfinite(share), share, 0.5)
+    return found
+
+
+def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index, Array]:
+    """Return designs (k,) and crank angles (k,) where functions that are never negative nearly vanish.
+
+    Parameters
+    ----------
+    functions : squares of smooth ones, periodic in 2 pi
+    angles : (n, m) rising samples of one turn
+    reach : the largest distance of a complex zero from the real angles that counts [rad]
+
+    Notes
+    -----
+    A dip D + D''/2 x^2 has such a zero at the distance sqrt(2 D/D''): the angles of its bottom and of both places as
+    far beside it are returned.  Its bottom is found by golden sections.
+    """
+    before = np.concatenate([angles[:, -1:] - TWO_PI, angles[:, :-1]], axis=1)
+    after = np.concatenate([angles[:, 1:], angles[:, :1] + TWO_PI], axis=1)
+    values = functions(np.arange(len(angles)), angles)
+    left, right = np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
+    row, column, which = np.nonzero((values <= left) & (values < right))
+    sides = values[row, column, which], left[row, column, which], right[row, column, which]
+    # A parabola goes below its lowest sample by an eighth of the bend at most: what stays far above has no such zero.
+    near = sides[0] <= sides[1] + sides[2] - 2.0 * sides[0]
+    row, which, low, high = row[near], which[near], before[row, column][near], after[row, column][near]
+    bottom, lowest = _bottom(functions, row, which, np.ones(row.size), low, high, whole=True)
+    step = 0.125 * (high - low)
+    beside = 0.5 * (_one(functions, row, which, bottom - step) + _one(functions, row, which, bottom + step))
+    rise = np.maximum(beside - lowest, np.finfo(float).tiny)
+    away = step * np.sqrt(np.maximum(lowest, 0.0) / rise)
+    row, bottom, away = (x[away < reach] for x in (row, bottom, away))
+    return np.tile(row, 3), np.mod(np.concatenate([bottom - away, bottom, bottom + away]), TWO_PI)
 
 
 def _one(functions: Functions, row: Index, which: Index, phi: Array) -> Array:
@@ -77,18 +146,51 @@ def _reaches(values: Array, left: Array, right: Array, row: Index, column: Index
 
 
 def _bottom(
-    functions: Functions, row: Index, which: Index, sign: Array, low: Array, high: Array
+    functions: Functions, row: Index, which: Index, sign: Array, low: Array, high: Array, whole: bool
 ) -> tuple[Array, Array]:
-    inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    at_inner, at_outer = (sign * _one(functions, row, which, x) for x in (inner, outer))
+    """Return places and values of the bottoms of dips: golden sections, then parabolas ever closer.
+
+    Unless ``whole``, a dip is followed until it is known whether it goes below zero.
+    """
+    place, lowest = 0.5 * (low + high), np.full(low.size, np.inf)
+    left = np.arange(low.size)
+
+    def at(x: Array) -> Array:
+        return sign[left] * _one(functions, row[left], which[left], x)
+
+    def keep(x: Array, value: Array) -> None:
+        better = value < lowest[left]
+        place[left[better]], lowest[left[better]] = x[better], value[better]
+
+    # Both ends, both places between them, and the values at all four.
+    four = np.stack([low, high - GOLDEN * (high - low), low + GOLDEN * (high - low), high])
+    values = np.stack([at(x) for x in four])
     for _ in range(SECTIONS):
-        left = at_inner < at_outer
-        low, high = np.where(left, low, inner), np.where(left, outer, high)
-        middle = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
-        value = sign * _one(functions, row, which, middle)
-        inner, outer = np.where(left, middle, outer), np.where(left, inner, middle)
-        at_inner, at_outer = np.where(left, value, at_outer), np.where(left, at_inner, value)
-    return np.where(at_inner < at_outer, inner, outer), np.minimum(at_inner, at_outer)
+        first = values[1] < values[2]
+        keep(np.where(first, four[1], four[2]), np.minimum(values[1], values[2]))
+        if not whole:
+            best = lowest[left]
+            open_ = (best >= 0.0) & (best <= values[0] + values[3] - 2.0 * best)
+            left, first, four, values = left[open_], first[open_], four[:, open_], values[:, open_]
+        if not left.size:
+            return place, lowest
+        four, values = (np.where(first, x[[0, 0, 1, 2]], x[[1, 2, 3, 3]]) for x in (four, values))
+        x = np.where(first, four[3] - GOLDEN * (four[3] - four[0]), four[0] + GOLDEN * (four[3] - four[0]))
+        four[1], four[2] = np.where(first, x, four[1]), np.where(first, four[2], x)
+        value = at(x)
+        values[1], values[2] = np.where(first, value, values[1]), np.where(first, values[2], value)
+    step = 0.5 * (four[3] - four[0])
+    for _ in range(PARABOLAS):
+        around = [np.clip(place[left] + k * step, low[left], high[left]) for k in (-1.0, 0.0, 1.0)]
+        before, here, after = (at(x) for x in around)
+        for x, value in zip(around, (before, here, after), strict=True):
+            keep(x, value)
+        bend = before + after - 2.0 * here
+        share = np.divide(0.5 * (before - after), bend, out=np.zeros(left.size), where=bend > 0.0)
+        x = np.clip(around[1] + step * np.clip(share, -1.0, 1.0), low[left], high[left])
+        keep(x, at(x))
+        step = NARROWER * step
+    return place, lowest
 
 
 def with_events(edges: Array, rows: Index, phi: Array) -> Array:

@@ -80,7 +80,10 @@ def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tup
 
 
 def _at_edges(curves: Curves, designs: Any, points: Points, values: Array, moves: Array) -> None:
-    """Fill in the derivatives at the edges of curves, which move: differences between designs, each at its own edge."""
+    """Fill in the derivatives at the edges of curves, which move: differences between designs, each at its own edge.
+
+    What tolerances add to the curves there counts as constant.
+    """
     base, direction = designs[0].real, designs.imag / STEP
     both = np.concatenate([base + ALONG * direction, base - ALONG * direction])
     which, n = np.flatnonzero(points.how == EDGE), len(direction)

@@ -180,7 +180,7 @@ class Curves:
 
     def stroke(self, points: Points) -> tuple[int, int]:
         """Return the points with the smallest and the largest position."""
-        own = np.flatnonzero((points.series == self.position) & (points.how == STATIONARY))
+        own = np.flatnonzero((points.series == self.position) & np.isin(points.how, (STATIONARY, EDGE)))
         low, high = own[points.sense[own] < 0], own[points.sense[own] > 0]
         if not len(low) or not len(high):
             return -1, -1

@@ -1,25 +1,28 @@
-"""Where a turn is cut into panels: at known angles, where outputs pass levels, and where followers reverse."""
+"""Where a turn is cut into panels: at known angles, where outputs pass levels or bend, and where followers reverse."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sweep.families.base import Array, Family
-from sweep.families.pace import Crossing, switches, waves
-from sweep.numerics.events import sign_changes, with_events
+from sweep.families.base import Angles, Array, Family
+from sweep.families.pace import Bends, Crossing, bends, switches, waves
+from sweep.numerics.events import near_zeros, sign_changes, with_events
 from sweep.numerics.singularities import crowded
 from sweep.reductions.density import nearest
 from sweep.reductions.sampling import TWO_PI, Index, pose_columns
 
 FAR, CLOSE = 10.0, 0.1  # distances of singularities [rad]; from the latter on panels crowd about one
+BENDING = 128  # even samples among which functions of effects are seen to pass zero
+LOOK = 0.25  # spacing of further samples against the distance of a singularity
 PER_PANEL = 0.25  # waves that a first panel may hold
 
 
-def ends(family: Family, designs: Array, even: int, looks: int) -> Array:
-    """Return ends of panels of a turn in rising order, (n, p + 1).
+def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> Array:
+    """Return ends of panels of a turn for curves of a pose output, in rising order, (n, p + 1).
 
     There are ``even`` panels, and more about singularities.  They are cut at angles known beforehand, and where one of
-    ``looks`` samples or the next shows that a pose output passes its level, or that a follower reverses.
+    ``looks`` samples or the next shows that a pose output passes its level, that a follower reverses, or that a
+    function passes zero at which curves of the output bend.
     """
     n = len(designs)
     edges = np.tile(np.linspace(0.0, TWO_PI, even + 1), (n, 1))
@@ -33,15 +36,33 @@ def ends(family: Family, designs: Array, even: int, looks: int) -> Array:
     close = np.flatnonzero(near.rho.min(axis=1, initial=FAR) < CLOSE)
     about = crowded(near.only(close), 1.0)
     edges = with_events(edges, np.repeat(close, about.shape[1]), about.ravel())
-    return with_events(edges, *events(family, designs, looks))
+    angles = crowded(near.only(close), LOOK)
+    # What reverses is felt by friction and loads, of effects; a family knows its own kinks.
+    speeds = reversing(family) if output in family.dear else ()
+    edges = with_events(edges, *_passed(family, designs, speeds, _looked(n, looks, close, angles)))
+    for bent in bends(family, output):
+
+        def bending(rows: Index, phi: Array, bent: Bends = bent) -> Array:
+            return np.nan_to_num(bent.curves(designs[rows], Angles.of(phi)))
+
+        looked = _looked(n, BENDING, close, angles)
+        places = near_zeros(bending, looked, CLOSE) if bent.squares else sign_changes(bending, looked)
+        edges = with_events(edges, *places)
+    return edges
 
 
 def events(family: Family, designs: Array, looks: int) -> tuple[Index, Array]:
     """Return designs (k,) and angles (k,) where a pose output passes its level, or a follower reverses.
 
-    They are looked for between ``looks`` samples of the turn.
+    They are looked for between ``looks`` even samples of the turn.
     """
-    speeds, crossings = reversing(family), family.every(Crossing)
+    even = np.arange(looks) * (TWO_PI / looks)
+    return _passed(family, designs, reversing(family), np.tile(even, (len(designs), 1)))
+
+
+def _passed(family: Family, designs: Array, speeds: tuple[str, ...], looked: Array) -> tuple[Index, Array]:
+    """Return designs and angles where an output passes its level or a speed passes zero, as seen at ``looked``."""
+    crossings = family.every(Crossing)
     if not speeds and not crossings:
         return np.zeros(0, np.intp), np.zeros(0)
     names = list(dict.fromkeys([*speeds, *(crossing.of for crossing in crossings)]))
@@ -51,8 +72,13 @@ def events(family: Family, designs: Array, looks: int) -> tuple[Index, Array]:
         passed = [columns[crossing.of] - crossing.level(designs[rows])[:, None] for crossing in crossings]
         return np.nan_to_num(np.stack([*(columns[name] for name in speeds), *passed], axis=2))
 
-    phi = np.arange(looks) * (TWO_PI / looks)
-    return sign_changes(functions, np.tile(phi, (len(designs), 1)))
+    return sign_changes(functions, looked)
+
+
+def _looked(n: int, even: int, close: Index, angles: Array) -> Array:
+    """Return even angles of a turn, (n, m), and further ones of the designs ``close``."""
+    looked = np.tile(np.arange(even) * (TWO_PI / even), (n, 1))
+    return with_events(looked, np.repeat(close, angles.shape[1]), angles.ravel())
 
 
 def reversing(family: Family) -> tuple[str, ...]:

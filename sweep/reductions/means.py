@@ -14,7 +14,7 @@ import numpy as np
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.families.pace import Singular, crossed, singular_curves
+from sweep.families.pace import Singular, Switches, crossed, singular_curves
 from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import Singularities, crowded, steps, turn_edges
@@ -40,6 +40,7 @@ PANEL = 1.0  # length of the first panels against that distance; the rule of 15 
 PANELS_AT_ONCE = 1024
 LOOKS = 512  # samples among which a curve with kinks or jumps is searched for what cuts it
 EVEN = 16  # first panels of a curve with kinks or jumps, beside those between its known ones
+KNOWN = 4  # of one all of whose kinks are known
 PREFIX = "rms_"
 
 
@@ -98,7 +99,8 @@ def _refined(family: Family, designs: Array, poses: Sequence[str], target: float
         rows = unresolved[k : k + PANELS_AT_ONCE]
         edges = turn_edges(near.only(np.searchsorted(alive, rows)), PANEL)
         if jumping[rows].any():
-            cut = ends(family, designs[rows[jumping[rows]]], EVEN, LOOKS)
+            even = KNOWN if family.every(Switches) and poses[0] not in family.dear else EVEN
+            cut = ends(family, designs[rows[jumping[rows]]], even, LOOKS, poses[0])
             which = np.repeat(np.flatnonzero(jumping[rows]), cut.shape[1])
             edges = with_events(edges, which, cut.ravel())
         found[rows], err[rows], status[rows] = _on_panels(family, designs[rows], poses, edges, target)

@@ -18,6 +18,7 @@ from numpy.polynomial import chebyshev
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
+from sweep.families.pace import Bends, bends
 from sweep.numerics.chebyshev import NODES, at_nodes, basis, product, rising
 from sweep.reductions.cuts import ends
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
@@ -98,8 +99,18 @@ def extrema(
     found = {request: Extremum.unknown(n) for request in requests}
     status: Status = np.zeros(n, np.uint8)
     for rows in blocks(np.arange(n), 2 * PANELS * NODES, len(requests)):
-        status[rows] = _block(family.precise(), designs, rows, target, found, locate)
+        for some in _cut_alike(family, requests):
+            now = _block(family.precise(), designs, rows, target, {request: found[request] for request in some}, locate)
+            status[rows] = np.where(status[rows] == st.OK, now, status[rows])
     return found, status
+
+
+def _cut_alike(family: Family, requests: Sequence[Request]) -> list[list[Request]]:
+    """Return the requests in groups for which the turn is cut at the same places: a cut is nobody else's matter."""
+    groups: dict[tuple[Bends, ...], list[Request]] = {}
+    for request in requests:
+        groups.setdefault(bends(family, request.pose), []).append(request)
+    return list(groups.values())
 
 
 def _block(
@@ -108,7 +119,7 @@ def _block(
     """Search the curves of some designs; fill ``found`` and return their status."""
     guards = discriminants(family)
     names = list(dict.fromkeys([*(request.pose for request in found), *guards]))
-    row, low, high = _cut(family, designs[rows])
+    row, low, high = _cut(family, designs[rows], names[0])
     poses, each = pose_columns(family, designs[rows[row]], _places(low, high), names)
     status = _worst(row, each, rows.size)
     good = status[row] == st.OK
@@ -128,9 +139,9 @@ def _block(
     return status
 
 
-def _cut(family: Family, designs: Array) -> tuple[Index, Array, Array]:
-    """Return design and ends of the first panels."""
-    edges = ends(family, designs, PANELS, PANELS * NODES)
+def _cut(family: Family, designs: Array, output: str) -> tuple[Index, Array, Array]:
+    """Return design and ends of the first panels for curves of a pose output."""
+    edges = ends(family, designs, PANELS, PANELS * NODES, output)
     low, high = edges[:, :-1], edges[:, 1:]
     row, column = np.nonzero(high - low > NARROWEST)
     return row, low[row, column], high[row, column]

@@ -19,6 +19,21 @@ from sweep.reductions.closing import on_closed_turn
 from tests.turn_designs import guided_four_bars
 
 CHAINS = ("rssr+guide", "rssr+rssp", "rssr+rssr", "four_bar+slider_crank")
+# Several members on one shaft, with a distance between two of them and whatever else is asked of them.
+MACHINES: dict[str, tuple[dict[str, object], tuple[str, ...]]] = {
+    "machine": (
+        {"needle": ["rssr", "guide"], "looper": {"family": "rssr", "ratio": 2, "tip": [30.0, 1.0, -2.0]}},
+        ("clearance", "needle.d2s", "looper.d2psi", "looper.dtip_x"),
+    ),
+    "machine of a cam": (
+        {"needle": "slider_crank", "thread": {"family": "cam", "ratio": -3}},
+        ("clearance", "needle.d2s", "thread.d2s"),
+    ),
+    "machine with friction": (
+        {"needle": "slider_crank", "looper": {"family": "swivel", "ratio": -2}},
+        ("clearance", "looper.drive_torque_friction", "looper.force_b"),
+    ),
+}
 KINDS = ("ordinary", "wide", "edge", "tiny", "long", "peaky")
 PEAKS = 1440  # poses of a turn by which a design is called peaky
 WALK = 60
@@ -65,6 +80,8 @@ def subjects() -> dict[str, Callable[[], Subject]]:
     for name in EFFECTS:
         if effect(name).outputs:
             made[name] = lambda name=name: _effect(name)
+    for name in MACHINES:
+        made[name] = lambda name=name: _machine(name)
     return made
 
 
@@ -79,6 +96,37 @@ def _effect(name: str) -> Subject:
     outputs = tuple(o.name for o in entry.outputs)
     full = extended(bare, outputs)
     return Subject(name, full, len(bare.parameters), outputs, ordinary(full, 1)[0])
+
+
+def _machine(name: str) -> Subject:
+    members, outputs = MACHINES[name]
+    points = [f"{member}.{'tip' if 'tip' in str(how) else _POINTS[_family_of(how)]}" for member, how in members.items()]
+    full = extended(family(sweep.machine(members, {"clearance": {"distance": points}})), outputs)
+    centre = np.zeros(len(full.parameters))
+    for member, how in members.items():
+        part = family(_family_of(how))
+        names = [p for p in full.parameter_names if p.startswith(f"{member}.")]
+        own = extended(part, [o.removeprefix(f"{member}.") for o in outputs if o.startswith(f"{member}.")])
+        values = dict(zip(own.parameter_names, _regular(own), strict=True))
+        for p in names:
+            at = full.parameter_names.index(p)
+            default = full.parameters[at].default
+            centre[at] = values.get(p.removeprefix(f"{member}."), 0.0 if default is None else default)
+    return Subject(name, full, len(full.parameters), outputs, centre)
+
+
+_POINTS = {"slider_crank": "c", "swivel": "p", "cam": "r", "rssr+guide": "point"}
+
+
+def _family_of(how: object) -> str:
+    """Return the name of a member's family, or chain."""
+    named = how["family"] if isinstance(how, dict) else how
+    return named if isinstance(named, str) else "+".join(named)
+
+
+def _regular(full: Family) -> Array:
+    """Return a regular design of a member: as of a chain or family alone, with inputs of its effects."""
+    return ordinary(full, 1)[0] if full.dear else _centre(full.name, full)
 
 
 def _centre(name: str, full: Family) -> Array:

@@ -30,6 +30,7 @@ from tests.search.brute import TWO_PI, Best, climbed, dense, poses
 from tests.search.subjects import KINDS, Subject, all_at_once, random_designs, subjects
 
 TARGETS = (1e-4, 1e-8)
+WINDOWS = ((0.0, 0.6), (0.3, 0.35), (0.9, 1.0))  # shares of the stroke
 ROUNDING = 1e-13  # of a curve's size: what a pose may be wrong by anyhow
 BLUR = 8.0  # times what rounding the inputs moved a value by in eight tries
 
@@ -135,6 +136,28 @@ def faults_of_others(full: Family, designs: Array, curves: set[str], timeout: fl
             yield from faults("itself", name, target, ok & ~(off <= allowed), value, true, err, allowed, off)
 
 
+def faults_of_window(full: Family, designs: Array, output: str, curve: Array, place: Array) -> Iterator[Fault]:
+    """Yield what is wrong about the part of a curve inside a window of the stroke, against the poses of its grid.
+
+    A window ends between two poses of the grid: there the curve may be higher by what one step changes.
+    """
+    least, most = place.min(axis=1, keepdims=True), place.max(axis=1, keepdims=True)
+    for part in WINDOWS:
+        low, high = (least + share * (most - least) for share in part)
+        values = np.where((place >= low) & (place <= high), np.abs(curve), -np.inf)
+        highest, step = values.max(axis=1), np.abs(np.diff(curve, axis=1)).max(axis=1)
+        for target in TARGETS:
+            name = f"max_abs_{output}"
+            got = design_outputs(full, designs, [name], Accuracy(target=target), part)
+            ok, value, err = got["status"] == st.OK, np.asarray(got[name]), np.asarray(got[error_of(name)])
+            slack = err + step  # the grid's own window is that of the highest and lowest of its poses
+            yield from faults("window low", name, target, ok & ~(highest <= value + slack), value, highest, err, slack,
+                              highest - value)  # fmt: skip
+            slack = err + 2.0 * step
+            yield from faults("window high", name, target, ok & ~(value <= highest + slack), value, highest, err, slack,
+                              value - highest)  # fmt: skip
+
+
 def search(subject: Subject, kind: str, n: int, seed: int) -> list[Fault]:
     """Return all faults of some designs of one kind."""
     designs = random_designs(subject, kind, n, seed)
@@ -149,6 +172,8 @@ def search(subject: Subject, kind: str, n: int, seed: int) -> list[Fault]:
             found.append(Fault(kind="nan", name=output, target=0.0, design=-1))
             continue
         found += faults_of_curve(subject, full, designs, output, curves[output])
+        if full.pose_output[output].windowed and full.position in curves:
+            found += faults_of_window(full, designs, output, curves[output], curves[full.position])
     if len(designs):
         found += faults_of_others(full, designs, set(subject.outputs), 30.0)
     for fault in found:
