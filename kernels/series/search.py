@@ -19,7 +19,7 @@ from kernels._jit import generated, inline
 from kernels.series.chain import Chained
 from kernels.series.curves import MARGIN, curve
 from kernels.series.form import BLOCK, STRIDE, Helper
-from kernels.series.listing import enlister, new_room
+from kernels.series.listing import aligned, enlister, new_room
 from kernels.series.look import FEWEST, MOST, OPEN, TURN
 from kernels.series.peaks import (
     CONSTANTS,
@@ -27,6 +27,7 @@ from kernels.series.peaks import (
     HEIGHT,
     LAST,
     MOVED,
+    PLACE,
     REACH,
     ROUNDING,
     SCALE,
@@ -76,7 +77,7 @@ def find_extrema(chain: Chained, order: int) -> Helper:
         designs: Array, opening: Status, distance: Array, cos: Array, sin: Array, made_of: Array, mode: int,
         target: float, tie: float, status: Status, found: Array,
     ) -> None:  # fmt: skip
-        m, near, span, room = np.zeros(rows), np.empty(BLOCK), np.empty((BLOCK, 3), np.int64), new_room(guarded, wide)
+        m, near, span, room = aligned(rows), np.empty(BLOCK), np.empty((BLOCK, 3), np.int64), new_room(guarded, wide)
         rounds = 2 if target > 1e-4 else 3
         for start in range(0, designs.shape[0], BLOCK):
             end = min(start + BLOCK, designs.shape[0])
@@ -92,7 +93,7 @@ def find_extrema(chain: Chained, order: int) -> Helper:
                     continue
                 own, low, high = span[i - start, 0], span[i - start, 1], span[i - start, 2]
                 for slot in range(low - 1, high):
-                    peak = own if slot < low else slot
+                    peak = (own if slot < low else slot) & PLACE
                     if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
                         refine(peak, peak + 1, m, SETTLING)
                         finish(peak, peak + 1, m, target)
@@ -125,8 +126,10 @@ def _decide(
 
     Return OK, ROUNDED, UNTRUSTED, or OPEN where it is not sure which is highest.
     """
+    own = own & PLACE
     winner, trusted = own, m[own + ERROR] < math.inf
-    for peak in range(begin, end):
+    for slot in range(begin, end):
+        peak = slot & PLACE
         trusted = trusted & (m[peak + ERROR] < math.inf)
         winner = peak if m[peak + HEIGHT] > m[winner + HEIGHT] else winner
     height, blur, scale = m[winner + HEIGHT], m[winner + ROUNDING], m[winner + SCALE]
@@ -134,7 +137,7 @@ def _decide(
     apart = RIVALS if code == ROUNDED else tie
     if apart >= 0.0:
         for slot in range(begin - 1, end):
-            peak = own if slot < begin else slot
+            peak = (own if slot < begin else slot) & PLACE
             if peak != winner and m[peak + HEIGHT] + m[peak + ROUNDING] >= height - blur - apart * scale:
                 code = OPEN
     place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
