@@ -45,8 +45,9 @@ class Record:
 class Driving:
     """Some stages in a row, the last of which drives another.
 
-    ``turn(c, u, v)`` gives the output angle as `Turned` by the crank angle of the chain and the discriminants of all
-    stages, ``blur(c, u, v)`` the same `Turned` and the rounding errors of its angle and first three derivatives.
+    ``turn(c, kappa, u, v)`` gives the output angle, in that sense, as `Turned` by the crank angle of the chain and the
+    discriminants of all stages; ``blur(c, kappa, u, v)`` the same `Turned` and the rounding errors of its angle and
+    first three derivatives.
     """
 
     record: Record
@@ -91,12 +92,12 @@ def _first(form: Form) -> Driving:
     turn_alone, blur_alone = form.turn, form.turn_blur
     assert turn_alone is not None and blur_alone is not None
 
-    def turn(c: Any, u: Any, v: Any) -> Any:
-        m = turn_alone(c, u, v)
+    def turn(c: Any, kappa: Any, u: Any, v: Any) -> Any:
+        m = turn_alone(c, kappa, u, v)
         return m, (m.delta,)
 
-    def blur(c: Any, u: Any, v: Any) -> Any:
-        m = turn_alone(c, u, v)
+    def blur(c: Any, kappa: Any, u: Any, v: Any) -> Any:
+        m = turn_alone(c, kappa, u, v)
         b0, b1, b2, b3 = blur_alone(c, u, v, m.d1, m.d2, m.d3)
         return m, b0, b1, b2, b3
 
@@ -112,17 +113,17 @@ def _longer(driving: Driving, form: Form) -> Driving:
     turn_before, blur_before, turn_here, blur_here = driving.turn, driving.blur, form.turn, form.turn_blur
     assert turn_here is not None and blur_here is not None
 
-    def turn(c: Any, u: Any, v: Any) -> Any:
-        m, deltas = turn_before(c[0], u, v)
+    def turn(c: Any, kappa: Any, u: Any, v: Any) -> Any:
+        m, deltas = turn_before(c[0], c[1].kappa, u, v)
         t = enter(c[1], m)
-        n = turn_here(c[2], t.u, t.v)
+        n = turn_here(c[2], kappa, t.u, t.v)
         d1, d2, d3, d4 = through(t, n.d1, n.d2, n.d3, n.d4)
         return Turned(n.cos, n.sin, d1, d2, d3, d4, n.delta), (*deltas, n.delta)
 
-    def blur(c: Any, u: Any, v: Any) -> Any:
-        m, b0, b1, b2, b3 = blur_before(c[0], u, v)
+    def blur(c: Any, kappa: Any, u: Any, v: Any) -> Any:
+        m, b0, b1, b2, b3 = blur_before(c[0], c[1].kappa, u, v)
         t = enter(c[1], m)
-        n = turn_here(c[2], t.u, t.v)
+        n = turn_here(c[2], kappa, t.u, t.v)
         e = blur_here(c[2], t.u, t.v, n.d1, n.d2, n.d3)
         b0, b1, b2, b3 = blurred_through(t, b0, b1, b2, b3, n.d1, n.d2, n.d3, n.d4, e)
         d1, d2, d3, d4 = through(t, n.d1, n.d2, n.d3, n.d4)
@@ -137,7 +138,7 @@ def _ended(driving: Driving, form: Form, stages: int) -> Chained:
     travel_here, dip_here, blur_here = form.travel, form.dip, form.travel_blur
 
     def drive(c: Any, u: Any, v: Any) -> Any:
-        m, deltas = turn_before(c[0], u, v)
+        m, deltas = turn_before(c[0], c[1].kappa, u, v)
         return enter(c[1], m), deltas
 
     def land(c: Any, t: Any) -> Any:
@@ -158,7 +159,7 @@ def _ended(driving: Driving, form: Form, stages: int) -> Chained:
         return y, t.t1 * d1, t.t2 * d1 + t.t1 * t.t1 * d2
 
     def blur(c: Any, u: Any, v: Any) -> Any:
-        m, b0, b1, b2, b3 = blur_before(c[0], u, v)
+        m, b0, b1, b2, b3 = blur_before(c[0], c[1].kappa, u, v)
         t = enter(c[1], m)
         n = travel_here(c[2], t.u, t.v)
         e0, e1, e2, e3, f0, f1, f2, f3, g = blur_here(c[2], t.u, t.v, n.x1, n.x2, n.x3)

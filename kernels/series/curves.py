@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from kernels._jit import generated_inline
+from kernels._jit import generated_inline, inline
 from kernels.series.chain import Chained
 from kernels.series.form import Helper
 from kernels.series.links import Input
@@ -52,12 +52,14 @@ class Curve:
     rounding: Helper
 
 
-def curve(chain: Chained, order: int) -> Curve:
-    """Return the derivative of that order, 0 to 3, or the `MARGIN`."""
-    kind = "margin" if order == MARGIN else f"order{order}"
+def curve(chain: Chained, order: int, along: bool) -> Curve:
+    """Return the derivative of that order, 0 to 3, or the `MARGIN`; with ``along`` b is 0 for all designs."""
+    kind = "margin" if order == MARGIN else f"{'along' if along else 'order'}{order}"
     name = f"{kind}_{chain.record.name}"
     derivatives = (_position, _velocity, _acceleration, _jerk)
-    jet, sample, rounding = _margin(chain) if order == MARGIN else derivatives[order](chain)
+    jet, sample, rounding = (
+        _margin(chain) if order == MARGIN else derivatives[order](chain, _along if along else _in_frame)
+    )
     hand, take = _handing(max(order, 0))
     jet, sample, hand, take, rounding = (
         generated_inline(f"{f.__name__}_{name}", f) for f in (jet, sample, hand, take, rounding)
@@ -87,16 +89,26 @@ def _handing(order: int) -> tuple[Helper, Helper]:
     return hand, take
 
 
-def _position(chain: Chained) -> tuple[Helper, Helper, Helper]:
+@inline
+def _in_frame(a: Any, b: Any, x: Any, y: Any) -> Any:
+    return a * x + b * y
+
+
+@inline
+def _along(a: Any, b: Any, x: Any, y: Any) -> Any:
+    return a * x  # then nothing of y is computed
+
+
+def _position(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
     travel, land, blur = chain.travel, chain.land, chain.blur
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         m, _ = travel(k, u, v)
-        return a * m.x0 + b * m.y0 + c, a * m.x1 + b * m.y1, a * m.x2 + b * m.y2
+        return made(a, b, m.x0, m.y0) + c, made(a, b, m.x1, m.y1), made(a, b, m.x2, m.y2)
 
     def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
         m = land(k, t)
-        return a * m.x0 + b * m.y0 + c, m.delta
+        return made(a, b, m.x0, m.y0) + c, m.delta
 
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         e0, _, _, _, f0, _, _, _, _ = blur(k, u, v)
@@ -105,16 +117,16 @@ def _position(chain: Chained) -> tuple[Helper, Helper, Helper]:
     return jet, sample, rounding
 
 
-def _velocity(chain: Chained) -> tuple[Helper, Helper, Helper]:
+def _velocity(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
     travel, land, blur = chain.travel, chain.land, chain.blur
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         m, _ = travel(k, u, v)
-        return a * m.x1 + b * m.y1, a * m.x2 + b * m.y2, a * m.x3 + b * m.y3
+        return made(a, b, m.x1, m.y1), made(a, b, m.x2, m.y2), made(a, b, m.x3, m.y3)
 
     def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
         m = land(k, t)
-        return a * m.x1 + b * m.y1, m.delta
+        return made(a, b, m.x1, m.y1), m.delta
 
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         _, e1, _, _, _, f1, _, _, _ = blur(k, u, v)
@@ -123,16 +135,16 @@ def _velocity(chain: Chained) -> tuple[Helper, Helper, Helper]:
     return jet, sample, rounding
 
 
-def _acceleration(chain: Chained) -> tuple[Helper, Helper, Helper]:
+def _acceleration(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
     travel, land, blur = chain.travel, chain.land, chain.blur
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         m, _ = travel(k, u, v)
-        return a * m.x2 + b * m.y2, a * m.x3 + b * m.y3, a * m.x4 + b * m.y4
+        return made(a, b, m.x2, m.y2), made(a, b, m.x3, m.y3), made(a, b, m.x4, m.y4)
 
     def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
         m = land(k, t)
-        return a * m.x2 + b * m.y2, m.delta
+        return made(a, b, m.x2, m.y2), m.delta
 
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         _, _, e2, _, _, _, f2, _, _ = blur(k, u, v)
@@ -141,18 +153,18 @@ def _acceleration(chain: Chained) -> tuple[Helper, Helper, Helper]:
     return jet, sample, rounding
 
 
-def _jerk(chain: Chained) -> tuple[Helper, Helper, Helper]:
+def _jerk(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
     travel, land, blur = chain.travel, chain.land, chain.blur
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         m, _ = travel(k, u, v)
         n, _ = travel(k, *rotate(u, v, AHEAD))
-        slope = a * m.x4 + b * m.y4
-        return a * m.x3 + b * m.y3, slope, (a * n.x4 + b * n.y4 - slope) / AHEAD
+        slope = made(a, b, m.x4, m.y4)
+        return made(a, b, m.x3, m.y3), slope, (made(a, b, n.x4, n.y4) - slope) / AHEAD
 
     def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
         m = land(k, t)
-        return a * m.x3 + b * m.y3, m.delta
+        return made(a, b, m.x3, m.y3), m.delta
 
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         _, _, _, e3, _, _, _, f3, _ = blur(k, u, v)

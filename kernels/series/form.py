@@ -8,10 +8,10 @@ from typing import Any, NamedTuple, TypeAlias
 
 Helper: TypeAlias = Callable[..., Any]
 
-# The search keeps the constants of a stage for each of its candidates, in rows of so many numbers.  Rows are 56 numbers
-# longer than a power of two, so that they do not evict each other from the cache.
-STRIDE = 256 + 56
-BLOCK = 32  # designs together
+# The search keeps the constants of a stage for each of its candidates, in rows of so many numbers, 9 for each design of
+# a block.  Rows are an odd number of lines of the cache long, so that they do not evict each other.
+STRIDE = 616
+BLOCK = 64  # designs together
 
 
 class Turned(NamedTuple):
@@ -63,7 +63,7 @@ class Form:
         of those two; a tuple of floats with a field ``doubt``: a bound of the rounding error of ``delta`` at any pose,
         nan for what is not a valid design
     put, get : (array, place, c) and (array, place) -> c: constants in rows of `STRIDE` numbers
-    turn : (c, u, v) -> `Turned`; None for a family that drives nothing
+    turn : (c, kappa, u, v) -> `Turned`, of kappa times the output angle; None for a family that drives nothing
     travel : (c, u, v) -> `Travel`
     dip : (c, u, v) -> squared cosine of the pressure angle where the links reach, and its first two derivatives
     turn_blur : (c, u, v, d1, d2, d3) -> estimates of the rounding errors of the output angle and its first three

@@ -52,11 +52,9 @@ def get_link(at: Any, place: int) -> Link:
 
 @inline
 def enter(link: Link, m: Turned) -> Input:
-    """Return the input angle of the next stage from the output angle of this one; (1)."""
-    k = link.kappa
-    s = k * m.sin
-    u, v = m.cos * link.cos - s * link.sin, s * link.cos + m.cos * link.sin
-    return Input(u, v, k * m.d1, k * m.d2, k * m.d3, k * m.d4)
+    """Return the input angle of the next stage from kappa times the output angle of this one; (1)."""
+    u, v = m.cos * link.cos - m.sin * link.sin, m.sin * link.cos + m.cos * link.sin
+    return Input(u, v, m.d1, m.d2, m.d3, m.d4)
 
 
 @inline

@@ -29,14 +29,16 @@ from kernels.series.curves import Curve
 from kernels.series.form import BLOCK, Helper
 from kernels.series.halves import HANDED
 from kernels.series.look import FEWEST, GUARD_ROW, LOOKING, MOST, OPEN, SHARE, TURN, looker, samples_for
-from kernels.series.peaks import CAPACITY, CONSTANTS, MOST_PEAKS, A, B, C, append
+from kernels.series.peaks import CAPACITY, CONSTANTS, MOST_PEAKS, PLACE, A, B, C, append
 
 Array: TypeAlias = NDArray[np.float64]
 Status: TypeAlias = NDArray[np.uint8]
 Counts: TypeAlias = NDArray[np.int64]
 
 CHUNK = FEWEST  # samples whose peaks are looked for together
-ABREAST = MOST + 4  # where the samples of a block begin, behind those of one design
+ANGLE = 2**15 - 1  # as `kernels.series.peaks.PLACE`, for samples and crank angles
+LINE = 8  # numbers in a line of the cache
+ABREAST = MOST + LINE  # where the samples of a block begin, behind those of one design
 
 
 class Room(NamedTuple):
@@ -56,12 +58,20 @@ class Room(NamedTuple):
 
 
 @inline
+def aligned(numbers: int) -> Array:
+    """Return memory that begins where a line of the cache does: a vector that lies across two is fetched twice."""
+    memory = np.empty(numbers + LINE)
+    begin = -(memory.ctypes.data // memory.itemsize) % LINE
+    return memory[begin : begin + numbers]
+
+
+@inline
 def new_room(guarded: int, wide: int) -> Room:
     """Return the memory for a curve that so many later stages enter, and for designs of so many columns."""
     stages = max(guarded, 1)
     return Room(
-        np.zeros(ABREAST + SAMPLES), np.zeros(stages * GUARD_ROW), np.zeros(stages * DIPS),
-        np.zeros(LOW + stages * BLOCK), np.zeros(wide * BLOCK), np.zeros(HANDED), np.zeros(BLOCK, np.int64),
+        aligned(ABREAST + SAMPLES), aligned(stages * GUARD_ROW), aligned(stages * DIPS), aligned(LOW + stages * BLOCK),
+        aligned(wide * BLOCK), aligned(HANDED), np.zeros(BLOCK, np.int64),
     )  # fmt: skip
 
 
@@ -106,7 +116,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
                 continue
             while n * distance < per_rho:
                 n *= 2
-            own = places[i - begin]
+            own = places[i - begin] & PLACE
             k: Any = get(m, own + CONSTANTS)
             limits: Any = doubts(k)
             status[i] = LOOKING if limits[last] < math.inf else OPEN
@@ -126,11 +136,11 @@ def enlister(chain: Chained, of: Curve) -> Helper:
             for chunk in range(2, n + 2, CHUNK):
                 peaks = _peaks(chunk, values, up, down, floor) if alone else int(said[MARKS + own])
                 while peaks != 0:
-                    j = chunk + lowest_bit(peaks)
+                    j = chunk + (lowest_bit(peaks) & PLACE)
                     peaks &= peaks - 1
-                    place = own if many == 0 else length
-                    if (many < MOST_PEAKS) & (place < CAPACITY):
-                        angle, at = n - FEWEST + j - 2, first + j * stride
+                    place = (own if many == 0 else length) & PLACE
+                    if (many == 0) | ((many < MOST_PEAKS) & (length < CAPACITY)):
+                        angle, at = (n - FEWEST + j - 2) & ANGLE, (first + j * stride) & ANGLE
                         sign = up if values[at] >= 0.0 else down
                         left, z, right = sign * values[at - stride], sign * values[at], sign * values[at + stride]
                         append(m, place, cos[angle], sin[angle], width, (j - 2) * width, left, z, right, sign, scale)

@@ -17,14 +17,14 @@ from kernels import status as st
 from kernels._jit import generated_inline, inline
 from kernels.reduce import largest, smallest
 from kernels.series.curves import Curve
-from kernels.series.form import BLOCK, Helper
+from kernels.series.form import Helper
 from kernels.series.halves import TOGETHER, handed_rows, keepers
 
 Array: TypeAlias = NDArray[np.float64]
 
 OPEN = 255  # instead of a status: nothing is decided here, a slower search is to be asked
 LOOKING = 252  # more samples are needed
-FEWEST, MOST = BLOCK, 8192
+FEWEST, MOST = 32, 8192
 AT_ONCE = 8.0  # times as many samples at most: the first look sees a near zero only roughly
 SHARE = 0.6  # a peak below this share of the best sample is not refined
 ROUGH = 0.5  # fourth difference against the size of the curve; at a pole a twelfth of a turn of samples away it is 0.6

@@ -20,9 +20,11 @@ from kernels.trigpoly import rotate
 
 Array: TypeAlias = NDArray[np.float64]
 
-
 MOST_PEAKS = 16  # of one design; with more it is left to the slower search
 CAPACITY = STRIDE - 8  # a list is padded to whole vectors
+# Places "and" this are themselves, and the compiler sees that they are not negative.  Otherwise it would look at each
+# index whether it counts from the end.
+PLACE = 1023
 EPS = 2.0**-53
 # What a maximum is made of, place and spacing of its samples, three samples times the sign, results.
 (

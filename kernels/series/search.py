@@ -19,7 +19,7 @@ from kernels._jit import generated, inline
 from kernels.series.chain import Chained
 from kernels.series.curves import MARGIN, curve
 from kernels.series.form import BLOCK, STRIDE, Helper
-from kernels.series.listing import enlister, new_room
+from kernels.series.listing import aligned, enlister, new_room
 from kernels.series.look import FEWEST, MOST, OPEN, TURN
 from kernels.series.peaks import (
     CONSTANTS,
@@ -27,6 +27,7 @@ from kernels.series.peaks import (
     HEIGHT,
     LAST,
     MOVED,
+    PLACE,
     REACH,
     ROUNDING,
     SCALE,
@@ -50,11 +51,11 @@ VALUE, PHI, VALUE_ERROR, PHI_ERROR, SCALE_ROW, SPACING = range(6)
 
 
 @lru_cache(maxsize=64)
-def find_extrema(chain: Chained, order: int) -> Helper:
+def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
     """Make the kernel ``find(designs, opening, distance, cos, sin, made_of, mode, target, tie, status, found)``.
 
     It finds one extremum over the turn of a curve of a chain, one of `kernels.series.curves`, of that order or the
-    `MARGIN`.
+    `MARGIN`; with ``along`` of curves whose number b is 0, by fewer operations and with the same bits.
 
     Its arguments: designs (n, P); opening (n,), OK where the first stage turns, NOT_ROTATABLE where it does not;
     distance (n,) [rad] of its nearest singularity from the real axis; `sampling_tables`; made_of (n, 3), the numbers a,
@@ -67,7 +68,7 @@ def find_extrema(chain: Chained, order: int) -> Helper:
     The status is OK; ROUNDED, where rounding may have moved a single highest peak by more than its share of the target;
     NOT_ROTATABLE, where a stage does not reach; OPEN, where nothing is decided.  With the last two the others are nan.
     """
-    of = curve(chain, order)
+    of = curve(chain, order, along)
     get, rows = chain.record.get, CONSTANTS + chain.record.numbers * STRIDE
     per_rho, guarded, wide, allowed = of.samples, of.guarded, chain.record.wide, 1.0 if order == MARGIN else PLAIN
     enlist, refine, finish = enlister(chain, of), refiner(of, get), finisher(of, get)
@@ -76,7 +77,7 @@ def find_extrema(chain: Chained, order: int) -> Helper:
         designs: Array, opening: Status, distance: Array, cos: Array, sin: Array, made_of: Array, mode: int,
         target: float, tie: float, status: Status, found: Array,
     ) -> None:  # fmt: skip
-        m, near, span, room = np.zeros(rows), np.empty(BLOCK), np.empty((BLOCK, 3), np.int64), new_room(guarded, wide)
+        m, near, span, room = aligned(rows), np.empty(BLOCK), np.empty((BLOCK, 3), np.int64), new_room(guarded, wide)
         rounds = 2 if target > 1e-4 else 3
         for start in range(0, designs.shape[0], BLOCK):
             end = min(start + BLOCK, designs.shape[0])
@@ -92,7 +93,7 @@ def find_extrema(chain: Chained, order: int) -> Helper:
                     continue
                 own, low, high = span[i - start, 0], span[i - start, 1], span[i - start, 2]
                 for slot in range(low - 1, high):
-                    peak = own if slot < low else slot
+                    peak = (own if slot < low else slot) & PLACE
                     if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
                         refine(1, m[peak:], SETTLING)
                         finish(1, m[peak:], target)
@@ -125,8 +126,10 @@ def _decide(
 
     Return OK, ROUNDED, UNTRUSTED, or OPEN where it is not sure which is highest.
     """
+    own = own & PLACE
     winner, trusted = own, m[own + ERROR] < math.inf
-    for peak in range(begin, end):
+    for slot in range(begin, end):
+        peak = slot & PLACE
         trusted = trusted & (m[peak + ERROR] < math.inf)
         winner = peak if m[peak + HEIGHT] > m[winner + HEIGHT] else winner
     height, blur, scale = m[winner + HEIGHT], m[winner + ROUNDING], m[winner + SCALE]
@@ -134,7 +137,7 @@ def _decide(
     apart = RIVALS if code == ROUNDED else tie
     if apart >= 0.0:
         for slot in range(begin - 1, end):
-            peak = own if slot < begin else slot
+            peak = (own if slot < begin else slot) & PLACE
             if peak != winner and m[peak + HEIGHT] + m[peak + ROUNDING] >= height - blur - apart * scale:
                 code = OPEN
     place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]

@@ -181,24 +181,27 @@ def design_outputs(
     for route in ways:
         assert route.run is not None
         # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
-        alive = np.flatnonzero(GOES_ON[status])
-        of_these = designs if alive.size == n else designs[alive]
+        alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None is all of them
+        of_these = designs if alive is None or alive.size == n else designs[alive]
         with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
             found = route.run(of_these, accuracy, window)
         for name in route.outputs:
             for key in (name, error_of(name)) if accuracy.target is not None else (name,):
                 columns[key] = _spread(found[key], alive, n)
         now = found["status"].astype(np.uint8)
-        status[alive] = np.where(status[alive] == st.OK, now, status[alive])
+        if alive is None:
+            status = now
+        else:
+            status[alive] = np.where(status[alive] == st.OK, now, status[alive])
     if isinstance(family.domain, Interval):
         status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
     chosen = {name: columns[name] for name in dict.fromkeys(_with_errors(wanted, accuracy))}
     return explained(chosen | {"status": status}, dict.fromkeys(wanted))
 
 
-def _spread(values: NDArray[np.generic], rows: Index, n: int) -> NDArray[np.generic]:
-    """Return values of some rows as a whole column: False or nan in the others."""
-    if rows.size == n:
+def _spread(values: NDArray[np.generic], rows: Index | None, n: int) -> NDArray[np.generic]:
+    """Return values of some rows, or of all, as a whole column: False or nan in the others."""
+    if rows is None or rows.size == n:
         return values
     whole: NDArray[np.generic] = np.zeros(n, np.bool_) if values.dtype == np.bool_ else np.full(n, np.nan)
     whole[rows] = values

@@ -90,9 +90,11 @@ def true_extrema(
         slow, now = _searched(family, designs, left, target, locate, anywhere, window)
         found |= slow
         status = np.where(status == st.OK, now, status)
-    for extremum in found.values():
-        for column in extremum:
-            column[(status != st.OK) & (status != st.NOT_CONVERGED)] = np.nan
+    lost = (status != st.OK) & (status != st.NOT_CONVERGED)
+    if lost.any():
+        for extremum in found.values():
+            for column in extremum:
+                column[lost] = np.nan
     return found, status
 
 

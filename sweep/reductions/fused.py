@@ -65,7 +65,9 @@ class FusedCurve:
         # Which of several is the highest decides on the place.
         tie = TIE if self.request.place else -1.0
         status, found = np.empty(n, np.uint8), np.empty((6, n))
-        series.find_extrema(_chained(self.forms), self.order)(
+        # Positions along and across a line are often asked for together: they share a kernel, which has to be compiled.
+        along = self.order >= 1 and not made_of[:, 1].any()
+        series.find_extrema(_chained(self.forms), self.order, along)(
             designs, opening, distance, *sampling_tables(), made_of, self.request.mode, target, tie, status, found
         )
         value, phi, err, err_phi, scale, spacing = found

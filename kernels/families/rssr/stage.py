@@ -70,20 +70,20 @@ def _get(at: Array, i: int) -> Constants:
 
 
 @inline
-def _turn(c: Constants, u: Any, v: Any) -> Turned:
+def _turn(c: Constants, kappa: Any, u: Any, v: Any) -> Turned:
     at = place(c.e, c.y0, c.ca, c.k0, c.k1, c.k2, u, v)
     t = math.sqrt(largest(at.delta, 1e-300))
     to = rocker(at, t, 1.0 / (at.rr * t))
     first = velocity(c.k1, c.k2, to, at)
     second = acceleration(to, at, first)
     third = jerk(to, at, first, second)
-    fourth, sign = snap(to, at, first, second, third), c.branch
+    fourth, sign = snap(to, at, first, second, third), c.branch * kappa
     return Turned(-to.c, -sign * to.s, -sign * first.p, -sign * second.q, sign * third, sign * fourth, at.delta)
 
 
 @inline
 def _travel(c: Constants, u: Any, v: Any) -> Travel:
-    m = _turn(c, u, v)
+    m = _turn(c, 1.0, u, v)
     return Travel(math.nan, m.d1, m.d2, m.d3, m.d4, 0.0, 0.0, 0.0, 0.0, 0.0, m.delta)
 
 
