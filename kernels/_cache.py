@@ -202,7 +202,7 @@ _said: set[str] = set()
 
 
 @contextmanager
-def _locked() -> Iterator[None]:
+def locked() -> Iterator[None]:
     """Let one process at a time write.  Where the file system has no locks nothing is kept, and one warning says so."""
     try:
         with FileLock(CACHE_DIR / "_lock", fallback_to_soft=False):
@@ -286,14 +286,14 @@ class KernelCache(FunctionCache):
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except DAMAGED:
-            with suppress(OSError), _locked():
+            with suppress(OSError), locked():
                 self.flush()  # type: ignore[no-untyped-call]
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the compiled code of one signature; one process at a time."""
         # A disk that is full takes no code; what was compiled serves this process all the same.
-        with suppress(OSError, *DAMAGED), _locked():
+        with suppress(OSError, *DAMAGED), locked():
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 

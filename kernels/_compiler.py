@@ -32,6 +32,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
+from kernels._claims import claimed
 from kernels._frontend import KernelLowering, contexts, passes, plainly
 from kernels._garbage import nobody_looks
 
@@ -164,12 +165,18 @@ class Kernel(CPUDispatcher):
         with global_compiler_lock, nobody_looks(), plainly(), self._compiling_counter:
             args, result = normalize_signature(sig)
             known = self.overloads.get(tuple(args)) or self._loaded(sig)
+            return (known or self._made(sig, args, result)).entry_point
+
+    def _made(self, sig: Any, args: Any, result: Any) -> Any:
+        """Compile the code of a signature, or wait for the process that does so already."""
+        with claimed(f"{self.py_func.__module__}.{self.py_func.__qualname__}", args) as shared:
+            known = self._loaded(sig) if shared else None
             if known is None:
                 self._cache_misses[sig] += 1
                 known = self._compiler.compile(args, result)
                 self.add_overload(known)
                 self._cache.save_overload(sig, known)
-            return known.entry_point
+            return known
 
     def _loaded(self, sig: Any) -> Any:
         """Return what the cache has for a signature, None where it has nothing."""

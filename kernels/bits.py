@@ -1,12 +1,13 @@
-"""Sets of small numbers as the bits of an integer: the lowest of them in one instruction."""
+"""Bits of numbers: the lowest bit of an integer, in one instruction, and the binade of a float, without a call."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 
 
 @intrinsic
@@ -21,3 +22,38 @@ def _lowest_bit(typingctx: Any, bits: Any) -> Any:
 
 
 lowest_bit: Any = _lowest_bit
+
+
+_EXPONENT = 0x7FF0000000000000  # the bits of a float64 that hold its exponent
+
+
+def power_below(x: Any) -> Any:
+    """Return the largest power of two that is not above abs(x), for a float of 2^-1022 at least.
+
+    Below that it is 0, of what is not finite infinity.  In kernels it is vector code, which `math.frexp` is not.
+    """
+    if not math.isfinite(x):
+        return math.inf
+    return 0.0 if abs(x) < 2.0**-1022 else math.ldexp(0.5, math.frexp(x)[1])
+
+
+@intrinsic
+def _exponent_of(typingctx: Any, x: Any) -> Any:
+    """Return the float64 that has the exponent of x and nothing else."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        bits = builder.bitcast(args[0], ir.IntType(64))
+        return builder.bitcast(builder.and_(bits, ir.Constant(ir.IntType(64), _EXPONENT)), ir.DoubleType())
+
+    return types.float64(types.float64), codegen
+
+
+_exponent_alone: Any = _exponent_of
+
+
+@overload(power_below)
+def _power_below_typed(x: Any) -> Any:
+    def power(x: Any) -> Any:
+        return _exponent_alone(x)
+
+    return power

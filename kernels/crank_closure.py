@@ -8,13 +8,13 @@ the assembly mode +1 (psi, f -> -psi, -f together with cos(alpha) -> -cos(alpha)
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels._jit import inline
+from kernels.bits import power_below
 from kernels.sincos import sincos
 
 Array: TypeAlias = NDArray[np.float64]
@@ -65,10 +65,7 @@ def within_unit_range(c: float) -> bool:
 @inline
 def unit_scale(c: float) -> float:
     """Return the power of two that brings a rocker of length c to the unit range; 1 where it is near enough."""
-    if within_unit_range(c):
-        return 1.0
-    _, exponent = math.frexp(c)
-    return math.ldexp(1.0, -exponent)
+    return 1.0 if within_unit_range(c) else 0.5 / power_below(c)
 
 
 @inline

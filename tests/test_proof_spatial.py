@@ -109,4 +109,5 @@ def test_bound_of_any_motion_is_stated_where_the_boxes_do_not_suffice(tmp_path):
     proof = proven(question_of(study), tmp_path, BEST / 1.001, boxes=64)
     # 60 degrees in 170 degrees of the crank: half of the way at full acceleration, half at full deceleration
     assert proof.bound == pytest.approx(4.0 * np.radians(60.0) / np.radians(170.0) ** 2)
-    assert proof.open > 0 and "which any motion needs" in proof_words(proof, "acceleration", lambda x: f"{x:.4f}")
+    words = proof_words(proof, "acceleration", lambda x: f"{x:.4f}")
+    assert proof.open > 0 and "what any motion from rest to rest needs" in words

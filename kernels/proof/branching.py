@@ -24,6 +24,8 @@ Flags = NDArray[np.uint8]
 
 MOST_ROWS = 40
 COMBINED = 7  # rows that a proof combines at most: two more than the linear program may have variables
+# What became of a box: not decided, not decided and too small to be halved, no design below the target, none feasible.
+OPEN, TOO_SMALL, BOUND, EMPTY = range(4)
 
 
 @inline

@@ -28,8 +28,9 @@ SOLVED, IMPOSSIBLE, STALLED = 0, 1, 2
 
 @inline
 def _row(number: int, rows: Array, count: int, objective: NDArray[np.uint8], half: Array, out: Array) -> float:
-    """Return coefficients of a constraint out .
-    (d, t) >= b, and b: the rows, then d_k >= -half, -d_k >= -half, t >= 0.
+    """Compute the coefficients of one constraint, out . (d, t) >= b, and return b.
+
+    The rows come first, then d_k >= -half_k, -d_k >= -half_k, and t >= 0 at the end.
     """
     n = half.shape[0]
     out[:] = 0.0
@@ -50,8 +51,9 @@ def _row(number: int, rows: Array, count: int, objective: NDArray[np.uint8], hal
 def _most_violated(
     rows: Array, count: int, objective: NDArray[np.uint8], half: Array, scale: float, z: Array, row: Array
 ) -> int:
-    """Return the number of the constraint that z misses most, each in the unit of what it may cost;
-    -1 where all are kept.
+    """Return the number of the constraint that the place z = (d, t) misses most; -1 where all are kept.
+
+    Ends of a variable count in units of the rows, so that misses can be compared.
     """
     n = half.shape[0]
     entering, worst = -1, ROUNDING * scale

@@ -7,7 +7,8 @@ Over the box |x_k - c_k| <= h_k, with xi_k = (x_k - c_k)/h_k between -1 and 1, a
 (K. Makino and M. Berz, Taylor models and other validated functional inclusion methods, Int. J. Pure Appl. Math. 4,
 2003).  Terms of third and higher order go into R, and so does all rounding: coefficients are ordinary numbers, and
 every operation adds to R more than its coefficients can have lost.  What several terms of a formula have in common
-cancels in the coefficients, where intervals would add their widths.
+cancels in the coefficients, where intervals would add their widths.  ``make bench-enclosures`` compares them with
+intervals and balls (docs/proof.md).
 
 Forms lie in the rows of one array: F0, L, Q (k, l = 11, 12, ..., 22, ...), R.  Where nothing can be enclosed, an
 operation answers false.  A number that leaves the range of float64 makes R infinite or nan, and every question about

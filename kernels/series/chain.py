@@ -10,10 +10,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from kernels._jit import generated_inline
-from kernels.series.form import STRIDE, Form, Helper, Travel, Turned
+from kernels.series.form import BLOCK, STRIDE, Form, Helper, Travel, Turned
 from kernels.series.links import NUMBERS, blurred_through, enter, get_link, link_of, put_link, through
 
+LIBRARY = 2  # rows of a block before the columns of a stage: what comes from the library
 COUPLING = 2  # columns kappa and offset of the design matrix behind those of each stage but the first
 
 
@@ -21,13 +24,18 @@ COUPLING = 2  # columns kappa and offset of the design matrix behind those of ea
 class Record:
     """The constants of some stages in a row, as nested tuples: (stage 1), ((stage 1), link, stage 2), ...
 
-    ``doubts(c)`` gives for each stage a bound of the rounding error of its discriminant, nan where it is not valid.
+    ``constants(designs, i)`` gives those of a design.  So does ``loaded(block, k)``, as vector code, from what
+    ``load(designs, i, block, k)`` has written to place k of a block of ``wide`` rows.  ``doubts(c)`` gives for each
+    stage a bound of the rounding error of its discriminant, nan where it is not valid.
     """
 
     name: str
     columns: int
+    wide: int
     numbers: int
     constants: Helper
+    load: Helper
+    loaded: Helper
     put: Helper
     get: Helper
     doubts: Helper
@@ -55,16 +63,18 @@ class Chained:
     stages : how many
     record : its constants
     travel : (c, u, v) -> `Travel` by the crank angle of the chain, discriminants of all stages
-    dip : (c, u, v) -> squared cosine of the last stage's pressure angle and its first two derivatives
-    before : (c, u, v) -> discriminants of the stages before the last
+    drive : (c, u, v) -> `Input` of the last stage, discriminants of those before
+    land : (c, input) -> `Travel` by the crank angle of the chain
+    dip : (c, input) -> squared cosine of the last stage's pressure angle and its first two derivatives
     blur : (c, u, v) -> rounding errors of x, x', x'', x''', y, y', y'', y''' and of that squared cosine
     """
 
     stages: int
     record: Record
     travel: Helper
+    drive: Helper
+    land: Helper
     dip: Helper
-    before: Helper
     blur: Helper
 
 
@@ -93,9 +103,7 @@ def _first(form: Form) -> Driving:
     def doubts(c: Any) -> Any:
         return (c.doubt,)
 
-    record = Record(
-        form.name, form.columns, form.numbers, form.constants, form.put, form.get, _made("doubts", form.name, doubts)
-    )
+    record = _recorded_first(form, _made("doubts", form.name, doubts))
     return Driving(record, _made("turn", form.name, turn), _made("blur", form.name, blur))
 
 
@@ -128,23 +136,26 @@ def _ended(driving: Driving, form: Form, stages: int) -> Chained:
     turn_before, blur_before = driving.turn, driving.blur
     travel_here, dip_here, blur_here = form.travel, form.dip, form.travel_blur
 
-    def travel(c: Any, u: Any, v: Any) -> Any:
+    def drive(c: Any, u: Any, v: Any) -> Any:
         m, deltas = turn_before(c[0], u, v)
-        t = enter(c[1], m)
+        return enter(c[1], m), deltas
+
+    def land(c: Any, t: Any) -> Any:
         n = travel_here(c[2], t.u, t.v)
         x1, x2, x3, x4 = through(t, n.x1, n.x2, n.x3, n.x4)
         y1, y2, y3, y4 = through(t, n.y1, n.y2, n.y3, n.y4)
-        return Travel(n.x0, x1, x2, x3, x4, n.y0, y1, y2, y3, y4, n.delta), (*deltas, n.delta)
+        return Travel(n.x0, x1, x2, x3, x4, n.y0, y1, y2, y3, y4, n.delta)
 
-    def dip(c: Any, u: Any, v: Any) -> Any:
-        m, _ = turn_before(c[0], u, v)
-        t = enter(c[1], m)
+    drive, land = (_made(f.__name__, f"{record.name}_ended", f) for f in (drive, land))
+
+    def travel(c: Any, u: Any, v: Any) -> Any:
+        t, deltas = drive(c, u, v)
+        n = land(c, t)
+        return n, (*deltas, n.delta)
+
+    def dip(c: Any, t: Any) -> Any:
         y, d1, d2 = dip_here(c[2], t.u, t.v)
         return y, t.t1 * d1, t.t2 * d1 + t.t1 * t.t1 * d2
-
-    def before(c: Any, u: Any, v: Any) -> Any:
-        _, deltas = turn_before(c[0], u, v)
-        return deltas
 
     def blur(c: Any, u: Any, v: Any) -> Any:
         m, b0, b1, b2, b3 = blur_before(c[0], u, v)
@@ -156,19 +167,47 @@ def _ended(driving: Driving, form: Form, stages: int) -> Chained:
         _, slope, _ = dip_here(c[2], t.u, t.v)
         return e0, e1, e2, e3, f0, f1, f2, f3, g + abs(slope) * b0
 
-    made = [_made(f.__name__, f"{record.name}_ended", f) for f in (travel, dip, before, blur)]
-    return Chained(stages, record, *made)
+    travel, dip, blur = (_made(f.__name__, f"{record.name}_ended", f) for f in (travel, dip, blur))
+    return Chained(stages, record, travel, drive, land, dip, blur)
+
+
+def _recorded_first(form: Form, doubts: Helper) -> Record:
+    """Return the constants of a first stage."""
+    constants, load, loaded = _from_columns(form, form.name, 0, 0)
+    return Record(
+        form.name,
+        form.columns,
+        LIBRARY + form.columns,
+        form.numbers,
+        constants,
+        load,
+        loaded,
+        form.put,
+        form.get,
+        doubts,
+    )
 
 
 def _recorded(before: Record, form: Form) -> Record:
     """Return the constants of some stages and of one more, coupled to them."""
-    start, end = before.columns, before.columns + form.columns
+    end, link = before.columns + form.columns, before.wide + LIBRARY + form.columns
     link_row, stage_row = before.numbers * STRIDE, (before.numbers + NUMBERS) * STRIDE
     constants_before, put_before, get_before, doubts_before = before.constants, before.put, before.get, before.doubts
-    constants_here, put_here, get_here = form.constants, form.put, form.get
+    load_before, loaded_before, put_here, get_here = before.load, before.loaded, form.put, form.get
+    name = f"{before.name}_{form.name}"
+    constants_here, load_here, loaded_here = _from_columns(form, f"last_{name}", before.columns, before.wide)
 
     def constants(designs: Any, i: int) -> Any:
-        return constants_before(designs, i), link_of(designs, i, end), constants_here(designs[:, start:end], i)
+        return constants_before(designs, i), link_of(designs[i, end], designs[i, end + 1]), constants_here(designs, i)
+
+    def load(designs: Any, i: int, block: Any, k: int) -> None:
+        load_before(designs, i, block, k)
+        load_here(designs, i, block, k)
+        block[link * BLOCK + k], block[(link + 1) * BLOCK + k] = designs[i, end], designs[i, end + 1]
+
+    def loaded(block: Any, k: int) -> Any:
+        coupling = link_of(block[link * BLOCK + k], block[(link + 1) * BLOCK + k])
+        return loaded_before(block, k), coupling, loaded_here(block, k)
 
     def put(at: Any, place: int, c: Any) -> None:
         put_before(at, place, c[0])
@@ -181,9 +220,40 @@ def _recorded(before: Record, form: Form) -> Record:
     def doubts(c: Any) -> Any:
         return (*doubts_before(c[0]), c[2].doubt + 0.0 * c[1].kappa)
 
-    name = f"{before.name}_{form.name}"
-    made = [_made(f.__name__, name, f) for f in (constants, put, get, doubts)]
-    return Record(name, end + COUPLING, before.numbers + NUMBERS + form.numbers, *made)
+    made = [_made(f.__name__, name, f) for f in (constants, load, loaded, put, get, doubts)]
+    return Record(name, end + COUPLING, link + COUPLING, before.numbers + NUMBERS + form.numbers, *made)
+
+
+def _from_columns(form: Form, name: str, start: int, row: int) -> tuple[Helper, ...]:
+    """Return ``constants``, ``load`` and ``loaded`` of one stage, as of a `Record`.
+
+    Its columns begin at ``start``.  In a block they begin at row ``row``, behind what comes from the library.
+    """
+    constants_here, columns, first = form.constants, form.columns, row + LIBRARY
+    angle = start + (form.angle or 0)
+
+    def nothing(designs: Any, i: int) -> tuple[float, float]:
+        return 1.0, 0.0
+
+    def turned(designs: Any, i: int) -> tuple[float, float]:
+        return np.cos(designs[i, angle]), np.sin(designs[i, angle])
+
+    called = _made("library", name, nothing if form.angle is None else turned)
+
+    def constants(designs: Any, i: int) -> Any:
+        cos, sin = called(designs, i)
+        return constants_here(designs[i], start, 1, cos, sin)
+
+    def load(designs: Any, i: int, block: Any, k: int) -> None:
+        block[row * BLOCK + k], block[(row + 1) * BLOCK + k] = called(designs, i)
+        for column in range(columns):
+            block[(first + column) * BLOCK + k] = designs[i, start + column]
+
+    def loaded(block: Any, k: int) -> Any:
+        cos, sin = block[row * BLOCK + k], block[(row + 1) * BLOCK + k]
+        return constants_here(block, first * BLOCK + k, BLOCK, cos, sin)
+
+    return tuple(_made(f.__name__, name, f) for f in (constants, load, loaded))
 
 
 def _made(what: str, chain: str, function: Helper) -> Helper:

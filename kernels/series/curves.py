@@ -12,6 +12,7 @@ from typing import Any
 from kernels._jit import generated_inline
 from kernels.series.chain import Chained
 from kernels.series.form import Helper
+from kernels.series.links import Input
 from kernels.trigpoly import rotate
 
 MARGIN = -1  # instead of an order: the squared cosine of the last stage's pressure angle
@@ -23,21 +24,31 @@ AHEAD = 1e-5  # [rad] of the difference quotient for the fifth derivative, which
 class Curve:
     """Closures of a curve; k are the constants of a design, (a, b, c) what it is made of, (u, v) cosine and sine.
 
+    Samples are taken in two loops, up to the last stage and from there on: half as long, two rounds of each are under
+    way in the processor at the same time, which hides that a root waits for a root.
+
     Parameters
     ----------
     name : for the functions that are made of it
     guarded : how many stages behind the first have a discriminant that the curve needs to be positive
+    ends : whether the last stage is one of them
     samples : per distance of the nearest singularity, at least
+    drive : (k, u, v) -> `Input` of the last stage, discriminants of those before
     jet : (k, a, b, c, u, v) -> the curve and its first two derivatives
-    sample : (k, a, b, c, u, v) -> the curve, and the discriminants of the first ``guarded`` + 1 stages
+    sample : (k, a, b, c, input) -> the curve, and the discriminant of the last stage
+    hand, take : (rows, i, input) and (rows, i) -> input: what a sample needs of it, to and from place i of five rows
     rounding : (k, a, b, u, v) -> estimate of its rounding error
     """
 
     name: str
     guarded: int
+    ends: bool
     samples: float
+    drive: Helper
     jet: Helper
     sample: Helper
+    hand: Helper
+    take: Helper
     rounding: Helper
 
 
@@ -47,21 +58,45 @@ def curve(chain: Chained, order: int) -> Curve:
     name = f"{kind}_{chain.record.name}"
     derivatives = (_position, _velocity, _acceleration, _jerk)
     jet, sample, rounding = _margin(chain) if order == MARGIN else derivatives[order](chain)
-    made = [generated_inline(f"{f.__name__}_{name}", f) for f in (jet, sample, rounding)]
+    hand, take = _handing(max(order, 0))
+    jet, sample, hand, take, rounding = (
+        generated_inline(f"{f.__name__}_{name}", f) for f in (jet, sample, hand, take, rounding)
+    )
     guarded, samples = chain.stages - (2 if order == MARGIN else 1), 18.0 if order == JERK else 12.0
-    return Curve(name, guarded, samples, *made)
+    return Curve(name, guarded, order != MARGIN, samples, chain.drive, jet, sample, hand, take, rounding)
+
+
+def _handing(order: int) -> tuple[Helper, Helper]:
+    """Return functions that put an `Input` with so many derivatives to rows, and get it, the others 0."""
+
+    def hand(rows: Any, i: int, t: Any) -> None:
+        rows[0][i], rows[1][i] = t.u, t.v
+        if order >= 1:
+            rows[2][i] = t.t1
+        if order >= 2:
+            rows[3][i] = t.t2
+        if order >= 3:
+            rows[4][i] = t.t3
+
+    def take(rows: Any, i: int) -> Any:
+        t1 = rows[2][i] if order >= 1 else 0.0
+        t2 = rows[3][i] if order >= 2 else 0.0
+        t3 = rows[4][i] if order >= 3 else 0.0
+        return Input(rows[0][i], rows[1][i], t1, t2, t3, 0.0)
+
+    return hand, take
 
 
 def _position(chain: Chained) -> tuple[Helper, Helper, Helper]:
-    travel, blur = chain.travel, chain.blur
+    travel, land, blur = chain.travel, chain.land, chain.blur
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         m, _ = travel(k, u, v)
         return a * m.x0 + b * m.y0 + c, a * m.x1 + b * m.y1, a * m.x2 + b * m.y2
 
-    def sample(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
-        m, deltas = travel(k, u, v)
-        return a * m.x0 + b * m.y0 + c, deltas
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        m = land(k, t)
+        return a * m.x0 + b * m.y0 + c, m.delta
 
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         e0, _, _, _, f0, _, _, _, _ = blur(k, u, v)
@@ -71,15 +106,15 @@ def _position(chain: Chained) -> tuple[Helper, Helper, Helper]:
 
 
 def _velocity(chain: Chained) -> tuple[Helper, Helper, Helper]:
-    travel, blur = chain.travel, chain.blur
+    travel, land, blur = chain.travel, chain.land, chain.blur
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         m, _ = travel(k, u, v)
         return a * m.x1 + b * m.y1, a * m.x2 + b * m.y2, a * m.x3 + b * m.y3
 
-    def sample(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
-        m, deltas = travel(k, u, v)
-        return a * m.x1 + b * m.y1, deltas
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        m = land(k, t)
+        return a * m.x1 + b * m.y1, m.delta
 
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         _, e1, _, _, _, f1, _, _, _ = blur(k, u, v)
@@ -89,15 +124,15 @@ def _velocity(chain: Chained) -> tuple[Helper, Helper, Helper]:
 
 
 def _acceleration(chain: Chained) -> tuple[Helper, Helper, Helper]:
-    travel, blur = chain.travel, chain.blur
+    travel, land, blur = chain.travel, chain.land, chain.blur
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         m, _ = travel(k, u, v)
         return a * m.x2 + b * m.y2, a * m.x3 + b * m.y3, a * m.x4 + b * m.y4
 
-    def sample(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
-        m, deltas = travel(k, u, v)
-        return a * m.x2 + b * m.y2, deltas
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        m = land(k, t)
+        return a * m.x2 + b * m.y2, m.delta
 
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         _, _, e2, _, _, _, f2, _, _ = blur(k, u, v)
@@ -107,17 +142,17 @@ def _acceleration(chain: Chained) -> tuple[Helper, Helper, Helper]:
 
 
 def _jerk(chain: Chained) -> tuple[Helper, Helper, Helper]:
-    travel, blur = chain.travel, chain.blur
+    travel, land, blur = chain.travel, chain.land, chain.blur
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         m, _ = travel(k, u, v)
-        ahead, _ = travel(k, *rotate(u, v, AHEAD))
+        n, _ = travel(k, *rotate(u, v, AHEAD))
         slope = a * m.x4 + b * m.y4
-        return a * m.x3 + b * m.y3, slope, (a * ahead.x4 + b * ahead.y4 - slope) / AHEAD
+        return a * m.x3 + b * m.y3, slope, (a * n.x4 + b * n.y4 - slope) / AHEAD
 
-    def sample(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
-        m, deltas = travel(k, u, v)
-        return a * m.x3 + b * m.y3, deltas
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        m = land(k, t)
+        return a * m.x3 + b * m.y3, m.delta
 
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         _, _, _, e3, _, _, _, f3, _ = blur(k, u, v)
@@ -127,14 +162,15 @@ def _jerk(chain: Chained) -> tuple[Helper, Helper, Helper]:
 
 
 def _margin(chain: Chained) -> tuple[Helper, Helper, Helper]:
-    dip, before, blur = chain.dip, chain.before, chain.blur
+    drive, dip, blur = chain.drive, chain.dip, chain.blur
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
-        return dip(k, u, v)
+        t, _ = drive(k, u, v)
+        return dip(k, t)
 
-    def sample(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
-        y, _, _ = dip(k, u, v)
-        return y, before(k, u, v)
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        y, _, _ = dip(k, t)
+        return y, y
 
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         return blur(k, u, v)[8]

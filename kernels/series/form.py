@@ -11,6 +11,7 @@ Helper: TypeAlias = Callable[..., Any]
 # The search keeps the constants of a stage for each of its candidates, in rows of so many numbers.  Rows are 56 numbers
 # longer than a power of two, so that they do not evict each other from the cache.
 STRIDE = 256 + 56
+BLOCK = 32  # designs together
 
 
 class Turned(NamedTuple):
@@ -56,9 +57,11 @@ class Form:
     ----------
     name : of the family
     columns : of its design matrix
+    angle : column of an angle whose cosine and sine are taken from the library, which vector code cannot call; or None
     numbers : how many constants there are
-    constants : (designs, i) -> c, a tuple of floats with a field ``doubt``: a bound of the rounding error of
-        ``delta`` at any pose, nan for what is not a valid design
+    constants : (array, place, step, cos, sin) -> c, of the design whose columns stand at place, place + step, ..., and
+        of those two; a tuple of floats with a field ``doubt``: a bound of the rounding error of ``delta`` at any pose,
+        nan for what is not a valid design
     put, get : (array, place, c) and (array, place) -> c: constants in rows of `STRIDE` numbers
     turn : (c, u, v) -> `Turned`; None for a family that drives nothing
     travel : (c, u, v) -> `Travel`
@@ -71,6 +74,7 @@ class Form:
 
     name: str
     columns: int
+    angle: int | None
     numbers: int
     constants: Helper
     put: Helper

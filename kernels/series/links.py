@@ -32,11 +32,8 @@ class Input(NamedTuple):
 
 
 @inline
-def link_of(designs: Any, i: int, column: int) -> Link:
-    """Return the coupling whose kappa and offset stand in this column and the next;
-    kappa is nan if one of them is refused.
-    """
-    kappa, offset = designs[i, column], designs[i, column + 1]
+def link_of(kappa: Any, offset: Any) -> Link:
+    """Return the coupling of that sense and angle [rad]; kappa is nan if one of them is refused."""
     sine, cosine = sincos(offset)
     return Link(kappa if (kappa * kappa == 1.0) & (abs(offset) < 1e5) else math.nan, cosine, sine)
 

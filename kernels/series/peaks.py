@@ -20,7 +20,7 @@ from kernels.trigpoly import rotate
 
 Array: TypeAlias = NDArray[np.float64]
 
-BLOCK = 32  # designs together
+
 MOST_PEAKS = 16  # of one design; with more it is left to the slower search
 CAPACITY = STRIDE - 8  # a list is padded to whole vectors
 EPS = 2.0**-53

@@ -14,7 +14,7 @@ from sweep.chunks.cascade import BLOCK, Batch, Cascade, Recalled, levels
 from sweep.chunks.parameters import Parameters, parameter_matrix
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
-from sweep.families.base import Columns
+from sweep.families.base import Array, Columns
 from sweep.quantities.names import error_of, is_flag
 from sweep.reductions.steps import is_proven
 from sweep.synthesis.fit import fit_line
@@ -54,6 +54,20 @@ def warm(study: Study, tell: Callable[[int, int], None] = lambda done, total: No
 
     ``tell`` is called with how many of the steps through which a design goes are ready, and how many there are.
     """
+    designs, asked = few_designs(study), asked_outputs(study)
+    for k, outputs in enumerate(asked):
+        tell(k, len(asked))
+        design_outputs(study.family, designs, outputs, study.accuracy, study.window)
+    tell(len(asked), len(asked))
+
+
+def asked_outputs(study: Study) -> list[Sequence[str]]:
+    """Return what is asked of a design, step by step, in the order in which it is computed."""
+    return [level.route.outputs for level in levels(study) if level.route is not None]
+
+
+def few_designs(study: Study) -> Array:
+    """Return a few designs (n, P) spread over the space of a study."""
     count = study.space.count
     starts = sorted({k * (count - 1) // 7 for k in range(8)})
     blocks = [parameter_matrix(study, start, start + 1) for start in starts]
@@ -61,11 +75,7 @@ def warm(study: Study, tell: Callable[[int, int], None] = lambda done, total: No
     designs = np.nan_to_num(np.concatenate([matrix for matrix, _ in blocks]), nan=1.0)
     if study.fit is not None:
         designs, _ = fit_line(study.family, designs, study.fit, study.window)
-    asked = [level.route for level in levels(study) if level.route is not None]
-    for k, route in enumerate(asked):
-        tell(k, len(asked))
-        design_outputs(study.family, designs, route.outputs, study.accuracy, study.window)
-    tell(len(asked), len(asked))
+    return np.asarray(designs, np.float64)
 
 
 def compute_chunk(

@@ -14,6 +14,7 @@ from sweep.jobs.flow import Executor
 from sweep.jobs.signals import stop_on_signal
 
 if TYPE_CHECKING:
+    from sweep.proof import Proof
     from sweep.study import Study
 
 
@@ -46,9 +47,7 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
     Interrupted
         by a signal; finished work is kept.
     """
-    from sweep.jobs.progress import Progress
-    from sweep.proof import prove_study
-    from sweep.proof.rounds import Cores
+    from sweep.proof import known_proof
 
     place = store.beside(folder)
     if study.optimise is None or study.optimise.prove is None:
@@ -57,6 +56,20 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
     note = store.read_plan(folder) or {}
     if altered(place, note, [store.PROOF]):
         (place / store.PROOF).unlink(missing_ok=True)
+    found = known_proof(study, folder) or _proven(study, folder, jobs, backend, progress)
+    known, now = dict(note.get(TABLES) or {}), digests(place, [store.PROOF])
+    if now.items() - known.items():
+        store.write_plan(folder, note | {TABLES: known | now})
+    return found.cut_short
+
+
+def _proven(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> Proof:
+    """Judge the boxes, on as many cores as there are workers."""
+    from sweep.jobs.progress import Progress
+    from sweep.proof import prove_study
+    from sweep.proof.rounds import Cores
+
+    assert study.optimise is not None and study.optimise.prove is not None
     boxes = study.optimise.prove.boxes
     with stop_on_signal() as stop, Progress("proof", boxes, 0, progress, unit="boxes") as shown:
 
@@ -66,12 +79,8 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
 
         where: Executor = Here() if jobs == 1 else executor(backend, jobs)
         try:
-            found = prove_study(study, folder, Cores(where, jobs, stop), tell)
+            return prove_study(study, folder, Cores(where, jobs, stop), tell)
         except KeyboardInterrupt:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while proving; run again to continue"
             raise Interrupted(number, text) from None
-    known, now = dict(note.get(TABLES) or {}), digests(place, [store.PROOF])
-    if now.items() - known.items():
-        store.write_plan(folder, note | {TABLES: known | now})
-    return found.cut_short

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from sweep.dataset import store
 from sweep.dataset.tables import TABLES, altered, digests, metadata
+from sweep.engine.ahead import compiling_ahead
 from sweep.engine.log import circumstances, command
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
 from sweep.engine.proving import prove, refuse_unprovable
@@ -93,18 +94,19 @@ def run(
     place = executor(backend, jobs)  # refuses what there is not
     model = _model(study, smoke, accuracy, certify)
     refuse_unprovable(model)
-    with Phases(progress) as phases:
-        warm(model, lambda done, total: phases.say("compiling", done, total))
-        _check_budget(model, jobs, force, lambda done, total: phases.say("planning", done, total))
-    default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
-    folder = default if out is None else store.located(out)
-    refuse_or_clear_older(folder, force)
-    said = command(model, folder, smoke, accuracy, certify)
-    with store.locked(folder), _logged(folder, said, jobs, backend) as end, at_work(place):
-        computed = _sweep(model, folder, jobs, place, force, progress)
-        if not is_part(folder):
-            _search(model, folder, jobs, backend, progress)
-        end.append(f"{computed} chunks computed")
+    with compiling_ahead(model, jobs):
+        with Phases(progress) as phases:
+            warm(model, lambda done, total: phases.say("compiling", done, total))
+            _check_budget(model, jobs, force, lambda done, total: phases.say("planning", done, total))
+        default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
+        folder = default if out is None else store.located(out)
+        refuse_or_clear_older(folder, force)
+        said = command(model, folder, smoke, accuracy, certify)
+        with store.locked(folder), _logged(folder, said, jobs, backend) as end, at_work(place):
+            computed = _sweep(model, folder, jobs, place, force, progress)
+            if not is_part(folder):
+                _search(model, folder, jobs, backend, progress)
+            end.append(f"{computed} chunks computed")
     return folder
 
 

@@ -125,7 +125,7 @@ def summarise(
     wanted = [name for name in wanted if name != "status"]
     chosen = _accuracy(mechanism.domain, samples, accuracy, certify)
     if certify:
-        check_certifiable(mechanism, wanted, chosen)
+        check_certifiable(mechanism, wanted, chosen, window is not None)
     given = table
     table = in_radians(mechanism, table, angles, input_names(bare))
     matrix, _ = design_matrix(mechanism, table, unused=input_names(bare))

@@ -127,10 +127,10 @@ def ellipse(designs: Array) -> Array:
     return crank_rocker.ellipse(as_crank_rocker(designs))
 
 
-def travel_shares(designs: Array) -> Array:
-    """Factors by which the directions of the links enter the travel along the line, (n, 6)."""
-    shares = np.empty((len(designs), 6))
-    guide.travel_shares(np.ascontiguousarray(designs), shares)
+def point_shares(designs: Array) -> Array:
+    """Factors by which the directions of the links enter travel along the line and deviation across it, (n, 8)."""
+    shares = np.empty((len(designs), 8))
+    guide.point_shares(np.ascontiguousarray(designs), shares)
     return shares
 
 
@@ -201,7 +201,7 @@ FAMILY = Family(
         PressureEllipse(ellipse),
         CrankRockerLoop(as_crank_rocker),
         GuidedPoint(
-            travel_shares,
+            point_shares,
             fitted=("xi", "eta", "lam", "h"),
             scaled=("a", "b", "c", "e", "xi", "eta", "h"),
             direction="lam",

@@ -10,11 +10,12 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Never, TextIO, TypeAlias
 
-from tqdm import tqdm
+from tqdm import TMonitor, tqdm
 
 FIRST_SECONDS = 2.0  # of silence at the beginning
 LINE_SECONDS = 10.0
 TICK_SECONDS = 0.5
+TICKER = "linksweep: progress"
 
 Say: TypeAlias = Callable[[str, int, int, str], None]
 """``say(label, done, total, unit)``: what is worked on, and how much of it is done; ``total`` as is known by now."""
@@ -67,7 +68,7 @@ class Progress:
 
     def __enter__(self) -> Progress:
         if self.show:
-            self.ticker = threading.Thread(target=self._tick, name="progress", daemon=True)
+            self.ticker = threading.Thread(target=self._tick, name=TICKER, daemon=True)
             self.ticker.start()
         return self
 
@@ -82,6 +83,11 @@ class Progress:
                 self.bar.close()
             elif self.show and (not self.quiet or self.said is not None or self._is_due()):
                 self._line()
+
+    @staticmethod
+    def owns(thread: threading.Thread) -> bool:
+        """Whether a thread only shows progress."""
+        return thread.name == TICKER or isinstance(thread, TMonitor)
 
     def advance(self, designs: int) -> None:
         """Count so many more designs as finished."""

@@ -15,7 +15,7 @@ from sweep.dataset import store
 from sweep.dataset.tables import metadata
 from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.evaluation.tables import design_matrix
-from sweep.families.base import Angles, Array
+from sweep.families.base import Angles, Array, Columns
 from sweep.families.domain import Interval
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.brake import Brake
@@ -102,7 +102,7 @@ def optimise_study(
     say(after, 1, parts, "tables")
     write(side / store.CURVES, _curves(study, frame), study)
     say(after, 2, parts, "tables")
-    write(side / store.SENSITIVITY, _by_role(study, frame, _sensitivity), study)
+    write(side / store.SENSITIVITY, _by_role(study, frame, sensitivity), study)
     say(after, 3, parts, "tables")
     if study.tolerance is None:
         (side / store.TOLERANCE).unlink(missing_ok=True)
@@ -163,18 +163,22 @@ def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
 
 def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
     """Return pose curves of optimum and reference over one turn; no rows where the study wants none."""
+    shown = [k for k, role in enumerate(table["role"]) if role in ("optimum", "reference")]
+    designs = np.array([[table[name][k] for name in study.family.parameter_names] for k in shown])
+    columns = curves(study, designs.reshape(len(shown), len(study.family.parameters)))
+    count = len(columns["status"]) // POSES
+    return {"role": np.repeat([table["role"][k] for k in shown[:count]], POSES)} | columns
+
+
+def curves(study: Study, designs: Array) -> Columns:
+    """Return curves of designs (k, P) over one turn, one design below the other; none where the study wants none."""
     family = study.family
     wanted = [*motion_curves(family), *joint_curves(family)]
-    shown = [k for k, role in enumerate(table["role"]) if role in ("optimum", "reference")]
     if study.output.curves == "none" or isinstance(family.domain, Interval):  # there is no turn over an interval
-        shown = []
-    designs = np.array([[table[name][k] for name in family.parameter_names] for k in shown])
+        designs = designs[:0]
     phi: Array = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
-    columns = family.poses(
-        designs.reshape(len(shown), len(family.parameters)), Angles.of(phi[None, :]), frozenset(wanted)
-    )
-    head = {"role": np.repeat([table["role"][k] for k in shown], POSES), "phi": np.tile(phi, len(shown))}
-    return head | {name: columns[name].ravel() for name in [*wanted, "status"]}
+    columns = family.poses(designs, Angles.of(phi[None, :]), frozenset(wanted))
+    return {"phi": np.tile(phi, len(designs))} | {name: columns[name].ravel() for name in [*wanted, "status"]}
 
 
 def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Array], dict[str, list[Any]]]) -> Any:
@@ -189,7 +193,8 @@ def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Arra
     return rows
 
 
-def _sensitivity(study: Study, design: Array) -> dict[str, list[Any]]:
+def sensitivity(study: Study, design: Array) -> dict[str, list[Any]]:
+    """Return how fast what the study wants changes with the dimensions of a design (P,)."""
     return sensitivities(study.family, design, study.want, study.window)
 
 

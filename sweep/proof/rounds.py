@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.proof.branching import COMBINED, OPEN
 from sweep.dataset import store
 from sweep.families.base import Array
 from sweep.families.capabilities import Numbers, Searched
@@ -28,10 +29,8 @@ if TYPE_CHECKING:
 
 UNITS = 64
 SHARES = (0.1, 0.15, 0.25, 0.5)  # of all boxes, round by round: later ones know better where to look
-COMBINED = 7
-OPEN, TOO_SMALL, BOUND, EMPTY = range(4)
+OUTCOMES = ("open", "too small", "bound", "empty")  # by their numbers in kernels.proof.branching
 Tell: TypeAlias = Callable[[int, int], None]
-OUTCOMES = ("open", "too small", "bound", "empty")
 
 
 @dataclass(frozen=True)

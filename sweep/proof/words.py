@@ -37,7 +37,7 @@ def _bounded(proof: Proof, name: str, show: Callable[[float], str], took: str) -
     so_far = "" if proof.settled else " so far"
     text = f"proven{so_far}{_outside(proof)}: no design of this space has a {name} below {show(proof.bound)}"
     if not proof.settled and proof.bound <= proof.floor:
-        text += ", which any motion needs that goes so far from rest to rest in that time"
+        text += ", which is what any motion from rest to rest needs for that swing in that time"
     text += f"; the optimum is within {_percent(proof.gap)} of that"
     if proof.settled:
         return f"{text} ({proof.boxes} boxes{took})"

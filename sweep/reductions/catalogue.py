@@ -64,11 +64,12 @@ class Quantity:
         return tuple(Request(self.of, mode, inside, self.locates) for mode in self.modes)
 
 
-def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> None:
+def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: bool = False) -> None:
     """Refuse a proof for what has none.
 
     Exact outputs need no proof; limit positions, margins and means are no maxima that a search could miss a peak of.
-    Where ``accuracy.proven`` names outputs, it is they that must have one.
+    Where ``accuracy.proven`` names outputs, it is they that must have one.  With ``windowed`` some outputs count in a
+    part of the stroke only; what is proven is the whole turn.
 
     Raises
     ------
@@ -88,9 +89,13 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy)
     for name in accuracy.proven or wanted:
         output(family, name)  # unknown names end here
         found = quantity(family, name)
-        if applying_step(family, name, accuracy) is None and found is not None and found.route == "reduction":
+        if found is None or found.route != "reduction":
+            continue
+        cut = windowed and family.pose_output[found.of].windowed
+        if cut or applying_step(family, name, accuracy) is None:
+            why = f"{name} in a window" if cut else name
             raise InputError(
-                "certify", True, f"{allowed}; not of {name}: name those to prove", f"design outputs of {family.name}"
+                "certify", True, f"{allowed}; not of {why}: name those to prove", f"design outputs of {family.name}"
             )
     if not set(names) & set(wanted):
         raise InputError("certify", True, f"{allowed}; none of them is wanted", f"design outputs of {family.name}")

@@ -90,12 +90,9 @@ class FusedCurve:
     def _confirm(self, designs: Array, found: Extremum, rows: Index, tolerance: Array, spacing: Array) -> None:
         """Replace extrema that rounding may have moved too far by what precise poses say, in place."""
         precise, pose, mode = self.family.precise(), self.request.pose, self.request.mode
-        sign = np.ones(rows.size)
-        if mode == 0:
-            there, _ = pose_columns(precise, designs[rows], found.phi[rows, None], [pose])
-            sign = np.where(there[pose][:, 0] < 0.0, -1.0, 1.0)
-        elif mode == -1:
-            sign = -sign
+        phi = found.phi[rows]
+        there = self._precisely(precise, designs[rows], phi)
+        sign = np.where(there[pose] < 0.0, -1.0, 1.0) if mode == 0 else np.full(rows.size, float(mode))
         height = np.abs(found.value[rows]) if mode == 0 else mode * found.value[rows]
         blur = found.err[rows]
 
@@ -103,19 +100,31 @@ class FusedCurve:
             poses, _ = pose_columns(precise, designs[rows[active]], phi, [pose])
             return sign[active, None] * poses[pose]
 
-        peaks = Peaks(found.phi[rows], height, found.err_phi[rows], blur, height, spacing, SHRINK * spacing)
-        peaks = confirmed(sample, peaks, tolerance, np.full(rows.size, np.inf), blur)
+        peaks = Peaks(phi.copy(), height, found.err_phi[rows], blur, height, spacing, SHRINK * spacing)
+        peaks = confirmed(sample, peaks, tolerance, np.full(rows.size, np.inf), blur, sign * there[pose])
         found.value[rows] = -peaks.height if mode == -1 else peaks.height
         found.phi[rows], found.err_phi[rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
-        found.err[rows] = peaks.err_height + self._behind(precise, designs[rows], peaks.phi) * np.abs(peaks.height)
+        moved = np.flatnonzero(peaks.phi != phi)
+        if moved.size:
+            again = self._precisely(precise, designs[rows[moved]], peaks.phi[moved])
+            for name, values in again.items():
+                there[name][moved] = values
+        found.err[rows] = peaks.err_height + self._behind(designs[rows], there) * np.abs(peaks.height)
 
-    def _behind(self, precise: Family, designs: Array, phi: Array) -> Array:
+    def _precisely(self, precise: Family, designs: Array, phi: Array) -> dict[str, Array]:
+        """Return the pose output and the discriminants of the later stages, each at one crank angle of each design."""
+        names = [self.request.pose, *(loop.discriminant for loop in self._later())]
+        poses, _ = pose_columns(precise, designs, phi[:, None], list(dict.fromkeys(names)))
+        return {name: values[:, 0].copy() for name, values in poses.items()}
+
+    def _later(self) -> list[Assembly]:
+        return [loop for loop in self.family.every(Assembly) if int(loop.stage) in range(2, len(self.forms) + 1)]
+
+    def _behind(self, designs: Array, there: dict[str, Array]) -> Array:
         """Share of a value by which the rounded input angles of the later stages' precise poses may change it."""
-        loops = [loop for loop in self.family.every(Assembly) if int(loop.stage) in range(2, len(self.forms) + 1)]
-        poses, _ = pose_columns(precise, designs, phi[:, None], [loop.discriminant for loop in loops])
         amplified = np.ones(len(designs))
-        for loop in loops:
-            amplified += np.abs(loop.scale(designs) / poses[loop.discriminant][:, 0])
+        for loop in self._later():
+            amplified += np.abs(loop.scale(designs) / there[loop.discriminant])
         return 4.0 * EPS * amplified
 
 

@@ -124,7 +124,10 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
     return Peaks(phi, height, err_phi, err_height, guess, spacing, step)
 
 
-def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, rounding: Array | float = 0.0) -> Peaks:
+def confirmed(
+    sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, rounding: Array | float = 0.0,
+    there: Array | None = None,
+) -> Peaks:  # fmt: skip
     """Return peaks as poses of higher precision have them: their heights are values at their places.
 
     One pose at the place of a peak measures how far rounding, and what was left of interpolation, have moved its
@@ -137,9 +140,10 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, ro
     peaks, tolerance, locate : as in `sharpen`
     rounding : (k,) what rounding may have moved the heights by that the peaks come from.  One pose may see none of it
         by chance, and the place may be spoilt all the same
+    there : (k,) what ``sample`` says at the places of the peaks, where that is known
     """
     before = peaks.height
-    peaks = attained(sample, peaks, np.arange(peaks.phi.size))
+    peaks = attained(sample, peaks, np.arange(peaks.phi.size)) if there is None else reaching(there, peaks)
     rounded = np.abs(peaks.height - before)
     again = np.flatnonzero((peaks.err_height > tolerance) | (peaks.err_phi > locate))
     # The same rounding has moved the places; it varies along the curve, and one pose sees one value of it.
@@ -169,7 +173,11 @@ def confirmed(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, ro
 
 def attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
     """Return heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
-    height = sample(which, peaks.phi[:, None])[:, 0]
+    return reaching(sample(which, peaks.phi[:, None])[:, 0], peaks)
+
+
+def reaching(height: Array, peaks: Peaks) -> Peaks:
+    """Return peaks of these heights, and by how much that changes them added to their errors."""
     return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
 
 

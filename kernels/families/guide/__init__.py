@@ -8,5 +8,5 @@ from kernels.families.guide.closure import Design as Design
 from kernels.families.guide.motion import poses as poses
 from kernels.families.guide.precise import precise_poses as precise_poses
 from kernels.families.guide.sensitivities import dev_sensitivities as dev_sensitivities
-from kernels.families.guide.sensitivities import travel_shares as travel_shares
+from kernels.families.guide.sensitivities import point_shares as point_shares
 from kernels.families.guide.stage import FORM as FORM

@@ -7,13 +7,13 @@ complex step); decisions look at the real part.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels._jit import inline
+from kernels.bits import power_below
 
 Array = NDArray[np.float64]
 Status = NDArray[np.uint8]
@@ -64,19 +64,30 @@ class Reduced(NamedTuple):
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
-    _, exponent = math.frexp(designs[i, 2].real)
-    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
-    a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
-    lam, h, branch = designs[i, 6], designs[i, 7] * per_unit, designs[i, 8]
-    xi, eta = designs[i, 4] * per_unit / b, designs[i, 5] * per_unit / b
-    cl, sl = np.cos(lam), np.sin(lam)
+    d = Design(
+        designs[i, 0], designs[i, 1], designs[i, 2], designs[i, 3], designs[i, 4], designs[i, 5], designs[i, 6],
+        designs[i, 7], designs[i, 8],
+    )  # fmt: skip
+    return reduce_along(d, np.cos(d.lam), np.sin(d.lam))
+
+
+@inline
+def reduce_along(d: Any, cl: Any, sl: Any) -> Reduced:
+    """As :func:`reduce_design`, from a :class:`Design` and the cosine and sine of its lam;
+    without a branch or a call, so that it vectorises.
+    """
+    half_unit = power_below(d.c.real)
+    unit, per_unit = 2.0 * half_unit, 0.5 / half_unit
+    a, b, c, e = d.a * per_unit, d.b * per_unit, d.c * per_unit, d.e * per_unit
+    lam, h, branch = d.lam, d.h * per_unit, d.branch
+    xi, eta = d.xi * per_unit / b, d.eta * per_unit / b
     along, across = xi * cl + eta * sl, eta * cl - xi * sl
     k0 = 0.5 * ((c - b) * (c + b) + (a * a + e * e)) / c
     k2 = a * e / c
     w_size = 0.5 * (abs(((c - b) * (c + b)).real) + (a * a + e * e).real) / c.real + abs(k2.real)
-    valid = a.real > 0.0 and b.real > 0.0 and c.real > 0.0 and w_size < 1e140 and branch.real * branch.real == 1.0
+    valid = (a.real > 0.0) & (b.real > 0.0) & (c.real > 0.0) & (w_size < 1e140) & (branch.real * branch.real == 1.0)
     # 0 * x is nan exactly for what is not finite
-    valid = valid and abs(lam.real) < 1e5 and (0.0 * (xi + eta + h)).real == 0.0
+    valid = valid & (abs(lam.real) < 1e5) & ((0.0 * (xi + eta + h)).real == 0.0)
     return Reduced(
         a, b, c, e, k0, k2, abs(e.real) + a.real, w_size,
         a * (cl - along), -a * (sl + across), c * along, c * across, along * e, across * e - h,

@@ -13,13 +13,16 @@ from kernels.families.guide.motion import poses
 
 
 @kernel
-def travel_shares(designs: Array, shares: Array) -> None:
-    """Compute the travel as a combination of the two turning angles, (4): s = p1 u - p2 v + q1 C - q2 S + constant.
+def point_shares(designs: Array, shares: Array) -> None:
+    """Compute the guided point as a combination of the two turning angles, (4).
+
+    Travel is s = p1 u - p2 v + q1 C - q2 S + a constant, deviation is dev = p2 u + p1 v + q2 C + q1 S + constant.
 
     Parameters
     ----------
     designs : (n, 9) columns of :class:`Design`
-    shares : (n, 6) out; p1, p2, q1, q2 [length], and bounds of the rounding errors of the p and of the q
+    shares : (n, 8) out [length]; p1, p2, q1, q2, bounds of the rounding errors of the p and of the q, the constant of
+        dev and a bound of its rounding error
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
@@ -28,6 +31,8 @@ def travel_shares(designs: Array, shares: Array) -> None:
         shares[i, 2], shares[i, 3] = r.q_along * r.unit, r.q_across * r.unit
         # l/b is rounded once, sine and cosine to one unit in the last place, then two products and two sums.
         shares[i, 4], shares[i, 5] = 10.0 * EPS * r.a * (1.0 + reach) * r.unit, 8.0 * EPS * r.c * reach * r.unit
+        shares[i, 6] = r.across0 * r.unit
+        shares[i, 7] = 10.0 * EPS * reach * abs(r.e) * r.unit + 2.0 * EPS * abs(designs[i, 7])
 
 
 @kernel

@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from kernels._jit import inline
-from kernels.families.guide.closure import EPS, Array, place, reduce_design
+from kernels.families.guide.closure import EPS, Array, Design, place, reduce_along
 from kernels.families.guide.derivatives import acceleration, jerk, snap, velocity
 from kernels.reduce import largest
 from kernels.series.form import STRIDE, Form, Travel
@@ -33,8 +33,12 @@ class Constants(NamedTuple):
 
 
 @inline
-def _constants(designs: Array, i: int) -> Constants:
-    r = reduce_design(designs, i)
+def _constants(at: Array, i: int, step: int, cos: Any, sin: Any) -> Constants:
+    d = Design(
+        at[i], at[i + step], at[i + 2 * step], at[i + 3 * step], at[i + 4 * step], at[i + 5 * step], at[i + 6 * step],
+        at[i + 7 * step], at[i + 8 * step],
+    )  # fmt: skip
+    r = reduce_along(d, cos, sin)
     unit = 8.0 * EPS
     # discriminant_tolerance where every term has its full size
     doubt = (unit + unit * unit) * (r.x_size * r.x_size + r.a * r.a + r.w_size * r.w_size) if r.valid else math.nan
@@ -129,4 +133,4 @@ def _travel_blur(c: Constants, u: Any, v: Any, x1: Any, x2: Any, x3: Any) -> tup
     return e0, e1, e2, e3, e0, e1, e2, e3, tolerance * c.per_square
 
 
-FORM = Form("guide", 9, 15, _constants, _put, _get, None, _travel, _dip, None, _travel_blur)
+FORM = Form("guide", 9, 6, 15, _constants, _put, _get, None, _travel, _dip, None, _travel_blur)

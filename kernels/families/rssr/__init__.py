@@ -7,9 +7,9 @@
 """
 
 from kernels.families.rssr.certify import certify_maxima as certify_maxima
+from kernels.families.rssr.certify import certify_point as certify_point
 from kernels.families.rssr.closure import Design as Design
 from kernels.families.rssr.dense import dense_maxima as dense_maxima
-from kernels.families.rssr.driven import certify_travel as certify_travel
 from kernels.families.rssr.ellipse import pressure_ellipse as pressure_ellipse
 from kernels.families.rssr.joints import joints as joints
 from kernels.families.rssr.limits import LIMIT_NAMES as LIMIT_NAMES

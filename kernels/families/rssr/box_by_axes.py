@@ -6,27 +6,15 @@ place can still be told to hold no mechanism: rho1 = n1/det, X1 = nx/det, Y1 = n
 
 from __future__ import annotations
 
-from kernels.families.rssr.box_turn import (
-    INPUTS,
-    PASSED,
-    Formulas,
-    LimitPositions,
-    Linkage,
-    arrival,
-    constant_of_closure,
-    formulas,
-    sense,
-    turn,
-    within,
-)
+from kernels.families.rssr import box_turn as bt
 from kernels.proof.tape import Number, Tape
 
 SWING, PHI0, PHI1, E, F, G, ALPHA = range(7)
 
 
-def recorded() -> Formulas:
+def recorded() -> bt.Formulas:
     """Return the formulas; the limited lengths are crank, rocker, coupler."""
-    tape = Tape(INPUTS)
+    tape = Tape(bt.INPUTS)
     one = tape.one()
     e, f, g = tape.input(E), tape.input(F), tape.input(G)
     sin_half, cos_half = tape.input(SWING).sine_cosine(of_half=True)
@@ -50,25 +38,26 @@ def recorded() -> Formulas:
     total2, det2, rocker2 = total.square(), det.square(), nx.square() + ny.square()
     acceptance = (
         n1 * n2, total * det, crank * total,
-        sense(tape, total, crank, e, fs, ca, u1, v1, nx, ny), sense(tape, total, crank, e, fs, ca, u2, v2, x2, y2),
+        bt.sense(tape, total, crank, e, fs, ca, u1, v1, nx, ny),
+        bt.sense(tape, total, crank, e, fs, ca, u2, v2, x2, y2),
     )  # fmt: skip
-    limits = [within(tape, 0, crank.square(), total2, 2), within(tape, 1, rocker2, det2, 2)]
+    limits = [bt.within(tape, 0, crank.square(), total2, 2), bt.within(tape, 1, rocker2, det2, 2)]
     tape.end()
-    start = LimitPositions(total, crank, n1, nx, ny, e, fs, ca, u1, v1)
-    found = {PASSED: arrival(tape, start)}
+    start = bt.LimitPositions(total, crank, n1, nx, ny, e, fs, ca, u1, v1)
+    found = {bt.PASSED: bt.arrival(tape, start)}
     tape.end()
-    tape.end()
+    tape.end()  # FREE: by the axes no crank has a length of its own
     sign = tape.new()
     rocker, per_det = rocker2.root(), det.inverse()
     per_rocker = rocker.inverse()
     c, a = sign * rocker * per_det, crank * total.inverse()
     b2 = (n1 * per_det - a).square() + (ny * per_det * sa + g * ca - f).square()  # (7)
     share = a * c.inverse()
-    at = Linkage(one, a, e, fs, a * ca, one, share * h, share * e, b2, u1, v1)
-    at = at._replace(k0=constant_of_closure(at, _signed(sign, nx, per_rocker), _signed(sign, ny, per_rocker)))
-    limits.append(within(tape, 2, b2, one, 2))
+    at = bt.Linkage(one, a, e, fs, a * ca, one, share * h, share * e, b2, u1, v1)
+    at = at._replace(k0=bt.constant_of_closure(at, _signed(sign, nx, per_rocker), _signed(sign, ny, per_rocker)))
+    limits.append(bt.within(tape, 2, b2, one, 2))
     tape.end()
-    return formulas(tape, at, found | turn(tape, at), acceptance, limits, 2, start, (det, sign))
+    return bt.formulas(tape, at, found | bt.turn(tape, at), acceptance, limits, 2, start, (det, sign))
 
 
 def _signed(sign: Number, x: Number, per_size: Number) -> Number:

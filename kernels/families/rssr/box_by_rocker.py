@@ -17,30 +17,15 @@ No place of this locus is singular but phi0 = 180 degrees.
 
 from __future__ import annotations
 
-from kernels.families.rssr.box_turn import (
-    ANY_CRANK,
-    FREE_CRANK,
-    FREE_PASSED,
-    INPUTS,
-    PASSED,
-    Formulas,
-    LimitPositions,
-    Linkage,
-    arrival,
-    constant_of_closure,
-    formulas,
-    sense,
-    turn,
-    within,
-)
+from kernels.families.rssr import box_turn as bt
 from kernels.proof.tape import Tape
 
 SWING, PHI0, PHI1, PSI_EXT, C, F, ALPHA = range(7)
 
 
-def recorded() -> Formulas:
+def recorded() -> bt.Formulas:
     """Return the formulas; the limited lengths are crank, e, g, coupler. The angle alpha must not be 0."""
-    tape = Tape(INPUTS)
+    tape = Tape(bt.INPUTS)
     one = tape.one()
     c, f, phi1, psi1 = tape.input(C), tape.input(F), tape.input(PHI1), tape.input(PSI_EXT)
     swing, phi0 = tape.input(SWING), tape.input(PHI0)
@@ -67,22 +52,23 @@ def recorded() -> Formulas:
     crank, g = chord * (e * sin_m + fs * cos_m), h * per_sa
     acceptance = (
         rho1, rho2, crank,
-        sense(tape, total, crank, e, fs, ca, u1, v1, x1, y1), sense(tape, total, crank, e, fs, ca, u2, v2, x2, y2),
+        bt.sense(tape, total, crank, e, fs, ca, u1, v1, x1, y1),
+        bt.sense(tape, total, crank, e, fs, ca, u2, v2, x2, y2),
     )  # fmt: skip
-    limits = [within(tape, 0, crank, total), within(tape, 1, e, one), within(tape, 2, g, one)]
+    limits = [bt.within(tape, 0, crank, total), bt.within(tape, 1, e, one), bt.within(tape, 2, g, one)]
     tape.end()
-    start = LimitPositions(total, crank, rho1, x1, y1, e, fs, ca, u1, v1)
-    found = {PASSED: arrival(tape, start)}
+    start = bt.LimitPositions(total, crank, rho1, x1, y1, e, fs, ca, u1, v1)
+    found = {bt.PASSED: bt.arrival(tape, start)}
     tape.end()
-    any_crank = tape.input(ANY_CRANK)
-    found[FREE_PASSED] = arrival(tape, start._replace(total=one, crank=any_crank))
-    found[FREE_CRANK] = any_crank * total - crank
+    any_crank = tape.input(bt.ANY_CRANK)
+    found[bt.FREE_PASSED] = bt.arrival(tape, start._replace(total=one, crank=any_crank))
+    found[bt.FREE_CRANK] = any_crank * total - crank
     tape.end()
     a = crank * total.inverse()
     b2 = (rho1 - a).square() + ((y1 - ca * (rho1 * v1)) * per_sa - f).square()
     share = a * c.inverse()
-    at = Linkage(one, a, e, fs, a * ca, one, share * h, share * e, b2, u1, v1)
-    at = at._replace(k0=constant_of_closure(at, cos1, sin1))
-    limits.append(within(tape, 3, b2, one, 2))
+    at = bt.Linkage(one, a, e, fs, a * ca, one, share * h, share * e, b2, u1, v1)
+    at = at._replace(k0=bt.constant_of_closure(at, cos1, sin1))
+    limits.append(bt.within(tape, 3, b2, one, 2))
     tape.end()
-    return formulas(tape, at, found | turn(tape, at), acceptance, limits, 3, start)
+    return bt.formulas(tape, at, found | bt.turn(tape, at), acceptance, limits, 3, start)

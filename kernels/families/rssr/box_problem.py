@@ -18,8 +18,6 @@ from kernels.sincos import sincos
 # target: psi is in the tube.  The last four hold for any crank length between its limits that is one of the locus.
 LIMITED, PRESSURE, ABOVE, BELOW, AHEAD, BEHIND = bt.LIMITED, 15, 16, 17, 18, 19
 FREE_AHEAD, FREE_BEHIND, FREE_LONG, FREE_SHORT = 20, 21, 22, 23
-# What happened to a box.
-OPEN, TOO_SMALL, BOUND, EMPTY = 0, 1, 2, 3
 
 LARGE = 1e30
 

@@ -33,10 +33,19 @@ class Design(NamedTuple):
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
     """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
-    unit = unit_scale(designs[i, 2].real)
-    a, b, c = designs[i, 0] * unit, designs[i, 1] * unit, designs[i, 2] * unit
-    e, f, g = designs[i, 3] * unit, designs[i, 4] * unit, designs[i, 5] * unit
-    return reduce_scaled(a, b, c, e, f, g, designs[i, 6], designs[i, 7].real)
+    d = Design(
+        designs[i, 0], designs[i, 1], designs[i, 2], designs[i, 3], designs[i, 4], designs[i, 5], designs[i, 6],
+        designs[i, 7],
+    )  # fmt: skip
+    return reduce_one(d)
+
+
+@inline
+def reduce_one(d: Any) -> Reduced:
+    """As :func:`reduce_design`, from a :class:`Design`; without a branch or a call, so that it vectorises."""
+    unit = unit_scale(d.c.real)
+    a, b, c, e, f, g = d.a * unit, d.b * unit, d.c * unit, d.e * unit, d.f * unit, d.g * unit
+    return reduce_scaled(a, b, c, e, f, g, d.alpha, d.branch.real)
 
 
 class Place(NamedTuple):

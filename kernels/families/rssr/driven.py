@@ -1,8 +1,9 @@
-"""Certified maxima of what crank-rockers in series drive: the travel of a guided point, docs/guide.md.
+"""Enclosure of what crank-rockers in series drive: a guided point along its line and across it, docs/guide.md.
 
 The planar four-bar of a guide is the crank-rocker with parallel axes and all links in one plane, so each stage of the
-chain is one, its crank driven by the enclosure of the rocker before it; derivatives are taken of the composed jet.
-Several designs are enclosed side by side, each about its own crank angle; one that is proven makes room for the next.
+chain is one, its crank driven by the enclosure of the rocker before it.  The closure of the first stage is a known
+trigonometric polynomial of the crank angle; that of the later ones is composed.  Several designs are enclosed side by
+side, each about its own crank angle.
 """
 
 from __future__ import annotations
@@ -12,179 +13,154 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.abreast import LANES, circle, differentiate, inverse, root
-from kernels.certificate import CENTRE, DONE, MODE, REACH, STATE, begin, conclude, decide, share_of
-from kernels.families.rssr.closure import Array, Status, reduce_design
-from kernels.jets import EPS, ORDER, WIDTH, combined, get, product, put, size_of
+from kernels._jit import inline_uncounted, kernel_uncounted
+from kernels.abreast import LANES, circle, inverse, root
+from kernels.cells import CENTRE, REACH
+from kernels.families.rssr.closure import Array, reduce_design
+from kernels.families.rssr.enclosure import spread
+from kernels.jets import EPS, WIDTH, combined, double_harmonic, get, harmonic, product, put, size_of, sum_of
+from kernels.sincos import sincos
 
 Stages = NDArray[np.float64]
-# Rows of the numbers of a design: of each stage those of its closure and, but for the first, of its coupling; then the
-# shares of the links in the travel.
-E, Y0, CA, K0, K1, K2, W_SIZE, BRANCH, KAPPA, COS, SIN = (k * LANES for k in range(11))
-STAGE = 11 * LANES
-SHARES = 6
+# Rows of the numbers of a design: of each stage those of its closure; then a, b and a', b' of what it hands on,
+# a cos psi + b sin psi and a' cos psi + b' sin psi of its rocker angle, the b with the sign of the branch, and what
+# all four are off by.  That is cosine and sine of the next crank angle, at last the rocker's part of the point.
+E, Y0, CA, K0, K1, K2, W_SIZE, A1, B1, A2, B2, OFF = (k * LANES for k in range(12))
+STAGE = 12 * LANES
+# Behind the stages: the crank's part of the point, what its factors are off by, the constant across the line.
+P1, P2, P_OFF, CONSTANT, CONSTANT_OFF = (k * LANES for k in range(5))
+SHARES = 5
+# Places of jets: the crank; the closure; 1/R, which stands where the discriminant was; the point along and across the
+# line, the last two.
+COS, SIN, X, Y, W, R, T, PER, ALONG, ACROSS = (k * WIDTH * LANES for k in range(10))
+JETS = 10 * WIDTH * LANES
 
 
-@inline
+@inline_uncounted
 def load(lane: int, numbers: Array, stages: Stages, couplings: Array, shares: Array, i: int) -> None:
     """Write the numbers of design i into its lane."""
-    for k in range(stages.shape[0]):
+    count = stages.shape[0]
+    for k in range(count):
         r, row = reduce_design(stages[k], i), k * STAGE + lane
         numbers[row + E], numbers[row + Y0], numbers[row + CA] = r.e, r.y0, r.ca
-        numbers[row + K0], numbers[row + K1], numbers[row + K2] = r.k0, r.k1, r.k2
-        numbers[row + W_SIZE], numbers[row + BRANCH] = r.w_size, r.branch
-        if k > 0:
-            offset = couplings[k - 1, i, 1]
-            numbers[row + KAPPA] = couplings[k - 1, i, 0]
-            numbers[row + COS], numbers[row + SIN] = math.cos(offset), math.sin(offset)
-    for k in range(SHARES):
-        numbers[stages.shape[0] * STAGE + k * LANES + lane] = shares[i, k]
+        numbers[row + K0], numbers[row + K1], numbers[row + K2], numbers[row + W_SIZE] = r.k0, r.k1, r.k2, r.w_size
+        if k + 1 < count:
+            kappa, offset = couplings[k, i, 0] * r.branch, couplings[k, i, 1]
+            cos, sin, numbers[row + OFF] = math.cos(offset), math.sin(offset), 3.0 * EPS
+            numbers[row + A1], numbers[row + B1] = cos, -kappa * sin
+            numbers[row + A2], numbers[row + B2] = sin, kappa * cos
+        else:
+            q1, q2, numbers[row + OFF] = shares[i, 2], shares[i, 3], shares[i, 5]
+            numbers[row + A1], numbers[row + B1] = q1, -q2 * r.branch
+            numbers[row + A2], numbers[row + B2] = q2, q1 * r.branch
+    row = count * STAGE + lane
+    numbers[row + P1], numbers[row + P2], numbers[row + P_OFF] = shares[i, 0], shares[i, 1], shares[i, 4]
+    numbers[row + CONSTANT], numbers[row + CONSTANT_OFF] = shares[i, 6], shares[i, 7]
 
 
-@kernel
-def _terms(lanes: int, r: Array, cos: Array, sin: Array, x: Array, y: Array, w: Array) -> None:
-    """Enclose X, Y, W; the errors of the constants are those of 4.2."""
+@kernel_uncounted
+def _first(lanes: int, r: Array, walk: Array, jets: Array) -> None:
+    """Enclose X, Y, W, R = X^2 + Y^2 and, in PER, the discriminant R - W^2 of the first stage."""
     for i in range(lanes):
-        u, e = get(cos, i, LANES), r[E + i]
-        put(x, i, LANES, combined(e, -1.0, u, 0.0, u, 4.0 * EPS * abs(e)))
+        reach = walk[REACH + i]
+        v, u = sincos(walk[CENTRE + i])
+        z = spread(r[E + i], r[Y0 + i], r[CA + i], r[K0 + i], r[K1 + i], r[K2 + i], r[W_SIZE + i], u, v, reach)
+        put(jets, X + i, LANES, harmonic(z.x0, z.x1, z.x2, reach, z.ex))
+        put(jets, Y + i, LANES, harmonic(z.y0, z.y1, z.y2, reach, z.ey))
+        put(jets, W + i, LANES, harmonic(z.w0, z.w1, z.w2, reach, z.ew))
+        put(jets, R + i, LANES, double_harmonic(z.r0, z.r1, z.r2, z.r3, z.r4, reach, z.e_square))
+        put(jets, PER + i, LANES, double_harmonic(z.d0, z.d1, z.d2, z.d3, z.d4, reach, z.e_delta))
+
+
+@kernel_uncounted
+def _driven(lanes: int, r: Array, jets: Array) -> None:
+    """Enclose the same of a later stage from cosine and sine of its crank; the errors of the constants are of 4.2."""
     for i in range(lanes):
-        v, y0, ca = get(sin, i, LANES), r[Y0 + i], r[CA + i]
-        put(y, i, LANES, combined(y0, ca, v, 0.0, v, 6.0 * EPS * (abs(y0) + abs(ca) * size_of(v))))
-    for i in range(lanes):
-        u, v, k1, k2 = get(cos, i, LANES), get(sin, i, LANES), r[K1 + i], r[K2 + i]
+        u, v = get(jets, COS + i, LANES), get(jets, SIN + i, LANES)
+        e, y0, ca, k1, k2 = r[E + i], r[Y0 + i], r[CA + i], r[K1 + i], r[K2 + i]
+        put(jets, X + i, LANES, combined(e, -1.0, u, 0.0, u, 4.0 * EPS * abs(e)))
+        put(jets, Y + i, LANES, combined(y0, ca, v, 0.0, v, 6.0 * EPS * (abs(y0) + abs(ca) * size_of(v))))
         turning = 6.0 * EPS * (abs(k1) * size_of(v) + abs(k2) * size_of(u))
-        put(w, i, LANES, combined(r[K0 + i], k1, v, -k2, u, 16.0 * EPS * r[W_SIZE + i] + turning))
-
-
-@kernel
-def _discriminant(lanes: int, x: Array, y: Array, w: Array, square: Array, delta: Array) -> None:
-    """Enclose R = X^2 + Y^2 and the discriminant R - W^2."""
+        put(jets, W + i, LANES, combined(r[K0 + i], k1, v, -k2, u, 16.0 * EPS * r[W_SIZE + i] + turning))
     for i in range(lanes):
-        a, b, c = get(x, i, LANES), get(y, i, LANES), get(w, i, LANES)
-        rr = combined(0.0, 1.0, product(a, a), 1.0, product(b, b), 0.0)
-        put(square, i, LANES, rr)
-        put(delta, i, LANES, combined(0.0, 1.0, rr, -1.0, product(c, c), 0.0))
+        a, b, c = get(jets, X + i, LANES), get(jets, Y + i, LANES), get(jets, W + i, LANES)
+        rr = sum_of(product(a, a), product(b, b))
+        put(jets, R + i, LANES, rr)
+        put(jets, PER + i, LANES, combined(0.0, 1.0, rr, -1.0, product(c, c), 0.0))
 
 
-@kernel
-def _turned(
-    lanes: int, r: Array, by_branch: float, a: Array, b: Array, c: Array, d: Array, per: Array, out: Array
+@inline_uncounted
+def _mixed(lanes: int, r: Array, a: int, b: int, jets: Array, out: int) -> None:
+    """Enclose a cos psi + b sin psi of the rocker, (2*): (-a X + b Y) W/R + (-a Y - b X) T/R."""
+    for i in range(lanes):
+        x, y, p, q = get(jets, X + i, LANES), get(jets, Y + i, LANES), r[a + i], r[b + i]
+        error = r[OFF + i] * (size_of(x) + size_of(y))
+        of_w, of_t = combined(0.0, -p, x, q, y, error), combined(0.0, -p, y, -q, x, error)
+        total = sum_of(product(of_w, get(jets, W + i, LANES)), product(of_t, get(jets, T + i, LANES)))
+        put(jets, out + i, LANES, product(total, get(jets, PER + i, LANES)))
+
+
+@kernel_uncounted
+def _hand_on(lanes: int, r: Array, jets: Array) -> None:
+    """Enclose cosine and sine of the next stage's crank."""
+    _mixed(lanes, r, A1, B1, jets, COS)
+    _mixed(lanes, r, A2, B2, jets, SIN)
+
+
+@kernel_uncounted
+def _point_along(lanes: int, r: Array, ends: Array, jets: Array) -> None:
+    """Enclose the travel, without its constant: the rocker's part and the crank's p1 cos - p2 sin."""
+    _mixed(lanes, r, A1, B1, jets, ALONG)
+    for i in range(lanes):
+        u, v = get(jets, COS + i, LANES), get(jets, SIN + i, LANES)
+        crank = combined(0.0, ends[P1 + i], u, -ends[P2 + i], v, ends[P_OFF + i] * (size_of(u) + size_of(v)))
+        put(jets, ALONG + i, LANES, sum_of(crank, get(jets, ALONG + i, LANES)))
+
+
+@kernel_uncounted
+def _point_across(lanes: int, r: Array, ends: Array, jets: Array) -> None:
+    """Enclose the deviation: the rocker's part, the crank's p2 cos + p1 sin, and the constant."""
+    _mixed(lanes, r, A2, B2, jets, ACROSS)
+    for i in range(lanes):
+        u, v = get(jets, COS + i, LANES), get(jets, SIN + i, LANES)
+        error = ends[P_OFF + i] * (size_of(u) + size_of(v)) + ends[CONSTANT_OFF + i]
+        crank = combined(ends[CONSTANT + i], ends[P2 + i], u, ends[P1 + i], v, error)
+        put(jets, ACROSS + i, LANES, sum_of(crank, get(jets, ACROSS + i, LANES)))
+
+
+@kernel_uncounted
+def enclose_point(
+    lanes: int, count: int, numbers: Array, jets: Array, walk: Array, along: bool, across: bool, good: Array
 ) -> None:
-    """Enclose -(a b + c d) per, or with ``by_branch`` = 1 instead of 0 the branch times (a b - c d) per."""
-    plain = 1.0 - by_branch
-    for i in range(lanes):
-        p, q = by_branch * r[BRANCH + i] - plain, -by_branch * r[BRANCH + i] - plain
-        ab, cd = product(get(a, i, LANES), get(b, i, LANES)), product(get(c, i, LANES), get(d, i, LANES))
-        put(out, i, LANES, product(combined(0.0, p, ab, q, cd, 0.0), get(per, i, LANES)))
-
-
-@kernel
-def _coupled(lanes: int, r: Array, c: Array, s: Array, cos: Array, sin: Array) -> None:
-    """Enclose cosine and sine of the next stage's crank from those of the rocker that drives it."""
-    for i in range(lanes):
-        a, b = get(c, i, LANES), get(s, i, LANES)
-        error = 3.0 * EPS * (size_of(a) + size_of(b))
-        put(cos, i, LANES, combined(0.0, r[COS + i], a, -r[KAPPA + i] * r[SIN + i], b, error))
-    for i in range(lanes):
-        a, b = get(c, i, LANES), get(s, i, LANES)
-        error = 3.0 * EPS * (size_of(a) + size_of(b))
-        put(sin, i, LANES, combined(0.0, r[SIN + i], a, r[KAPPA + i] * r[COS + i], b, error))
-
-
-@kernel
-def _travel(lanes: int, k: Array, cos: Array, sin: Array, c: Array, s: Array, out: Array) -> None:
-    """Enclose the travel of the guided point, without its constant, from its crank and its rocker."""
-    for i in range(lanes):
-        u, v, p, q = get(cos, i, LANES), get(sin, i, LANES), get(c, i, LANES), get(s, i, LANES)
-        crank = combined(0.0, k[i], u, -k[LANES + i], v, k[4 * LANES + i] * (size_of(u) + size_of(v)))
-        rocker = combined(0.0, k[2 * LANES + i], p, -k[3 * LANES + i], q, k[5 * LANES + i] * (size_of(p) + size_of(q)))
-        put(out, i, LANES, combined(0.0, 1.0, crank, 1.0, rocker, 0.0))
-
-
-@kernel
-def enclose_travel(
-    lanes: int, count: int, numbers: Array, jets: Array, phi: Array, reach: Array, out: Array, good: Array
-) -> None:
-    """Enclose the travel at the end of ``count`` stages on |z| <= reach about phi, of all lanes.
+    """Enclose the guided point at the end of ``count`` stages in the cells that a walk asks for, of all lanes.
 
     Parameters
     ----------
-    lanes, count : lanes in use, number of stages
+    lanes, count : lanes in use, number of stages, the last one planar
     numbers : of :func:`load`
-    jets : (10, WIDTH * LANES) scratch
-    phi, reach : (LANES,)
-    out : jet of the travel
-    good : (LANES,) out, 0 where it cannot be enclosed
+    jets : (JETS,) out; ALONG is the travel along the line, without its constant, ACROSS the deviation from it
+    walk : (WALK,) of :mod:`kernels.cells`, with the CENTRE [rad] and REACH of each cell
+    along, across : whether that jet is wanted
+    good : (LANES,) out, 0 where the motion cannot be enclosed
     """
-    cos, sin, c, s, x, y, w, rr, t, per = (
-        jets[0], jets[1], jets[2], jets[3], jets[4], jets[5], jets[6], jets[7], jets[8], jets[9],
-    )  # fmt: skip
     for i in range(lanes):
         good[i] = 1.0
-    circle(lanes, phi, reach, cos, sin)
+    if count == 1:
+        circle(lanes, walk[CENTRE:], walk[REACH:], jets, COS, SIN)
     for k in range(count):
         r = numbers[k * STAGE : (k + 1) * STAGE]
-        if k > 0:
-            _coupled(lanes, r, c, s, cos, sin)
-        _terms(lanes, r, cos, sin, x, y, w)
+        if k == 0:
+            _first(lanes, r, walk, jets)
+        else:
+            _driven(lanes, r, jets)
         # No circle around zero may touch the discriminant or R, or root and reciprocal have no enclosure.
-        _discriminant(lanes, x, y, w, rr, per)
-        root(lanes, per, t, good)
-        inverse(lanes, rr, per, good)
-        # Cosine and sine of the rocker, (2*).
-        _turned(lanes, r, 0.0, x, w, y, t, per, c)
-        _turned(lanes, r, 1.0, y, w, x, t, per, s)
-    _travel(lanes, numbers[count * STAGE :], cos, sin, c, s, out)
-
-
-@kernel
-def certify_travel(
-    stages: Stages, couplings: Array, shares: Array, order: int, target: float, most: int, status: Status,
-    maximum: Array, phi: Array, error: Array, cells: Array,
-) -> None:  # fmt: skip
-    """Prove maxima of |d^order s / dphi^order| of a guided point that crank-rockers in series drive, or correct them.
-
-    Parameters
-    ----------
-    stages : (K, n, 8) columns of :class:`kernels.families.rssr.closure.Design`, the four-bar of the guide last
-    couplings : (K - 1, n, 2) kappa and offset [rad] of each stage but the first
-    shares : (n, 6) of :func:`kernels.families.guide.travel_shares`
-    order : 1, 2 or 3
-    target ... cells : as of :func:`kernels.families.rssr.certify.certify_maxima`; ``maximum`` and ``error`` [length]
-    """
-    n, rows, count = status.size, stages.shape[0] * STAGE + SHARES * LANES, stages.shape[0]
-    numbers, states, design = np.empty(rows), np.empty((LANES, STATE)), np.empty(LANES, np.int64)
-    jets, travel, y = np.empty((10, WIDTH * LANES)), np.empty(WIDTH * LANES), np.empty((ORDER + 1) * LANES)
-    centre, reach, share, good = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    bounds, here = np.empty(4 * LANES), np.empty(ORDER + 1)
-    lanes, coming = 0, 0
-    while True:
-        while coming < n and lanes < LANES:
-            cells[coming] = 0.0
-            if status[coming] == st.OK:
-                design[lanes] = coming
-                load(lanes, numbers, stages, couplings, shares, coming)
-                begin(states[lanes], phi[coming], target, most)
-                lanes += 1
-            coming += 1
-        if lanes == 0:
-            break
-        for lane in range(lanes):
-            centre[lane], reach[lane], share[lane] = states[lane, CENTRE], states[lane, REACH], share_of(states[lane])
-        enclose_travel(lanes, count, numbers, jets, centre, reach, travel, good)
-        differentiate(lanes, travel, order, reach, share, y, bounds)
-        for lane in range(lanes):
-            for k in range(ORDER + 1 - order):
-                here[k] = y[k * LANES + lane]
-            decide(states[lane], good[lane] != 0.0, here, order, share[lane], bounds[lane], bounds[LANES + lane])
-        # Lanes that are done make room. From last to first: what moves into a free one is not done.
-        for lane in range(lanes - 1, -1, -1):
-            if states[lane, MODE] == DONE:
-                conclude(states[lane], design[lane], most, status, maximum, phi, error, cells)
-                lanes -= 1
-                design[lane] = design[lanes]
-                states[lane] = states[lanes]
-                for row in range(0, rows, LANES):
-                    numbers[row + lane] = numbers[row + lanes]
+        root(lanes, jets, PER, T, good)
+        inverse(lanes, jets, R, PER, good)
+        if k + 1 < count:
+            _hand_on(lanes, r, jets)
+            continue
+        ends = numbers[count * STAGE :]
+        if along:
+            _point_along(lanes, r, ends, jets)
+        if across:
+            _point_across(lanes, r, ends, jets)

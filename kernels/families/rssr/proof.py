@@ -14,10 +14,10 @@ import numpy as np
 from kernels._jit import inline, kernel
 from kernels.families.rssr import box_turn as bt
 from kernels.families.rssr.box_peaks import POSES
-from kernels.families.rssr.box_problem import OPEN, TOO_SMALL, Problem, Room, room
+from kernels.families.rssr.box_problem import Problem, Room, room
 from kernels.families.rssr.box_rows import crank_known, judge, judge_any_crank
 from kernels.families.rssr.box_turn import Formulas
-from kernels.proof.branching import COMBINED, Flags, Indices, pop, push
+from kernels.proof.branching import COMBINED, OPEN, TOO_SMALL, Flags, Indices, pop, push
 from kernels.proof.taylor import Array
 
 NARROWEST = 1.0 / 64.0  # of the widest side

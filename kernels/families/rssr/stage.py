@@ -17,7 +17,7 @@ from kernels.families.rssr.block import (
     new_block,
     singularity_distance,
 )
-from kernels.families.rssr.closure import EPS, Array, Status, closure_terms, place, reduce_design
+from kernels.families.rssr.closure import EPS, Array, Design, Status, closure_terms, place, reduce_one
 from kernels.families.rssr.derivatives import acceleration, jerk, rocker, snap, velocity
 from kernels.reduce import largest
 from kernels.series.form import STRIDE, Form, Travel, Turned
@@ -40,8 +40,12 @@ class Constants(NamedTuple):
 
 
 @inline
-def _constants(designs: Array, i: int) -> Constants:
-    r = reduce_design(designs, i)
+def _constants(at: Array, i: int, step: int, cos: Any, sin: Any) -> Constants:
+    d = Design(
+        at[i], at[i + step], at[i + 2 * step], at[i + 3 * step], at[i + 4 * step], at[i + 5 * step], at[i + 6 * step],
+        at[i + 7 * step],
+    )  # fmt: skip
+    r = reduce_one(d)
     mx, my, mw = abs(r.e) + 1.0, abs(r.y0) + 1.0, r.w_size
     unit = 8.0 * EPS
     # discriminant_tolerance where every term has its full size
@@ -122,7 +126,7 @@ def _travel_blur(c: Constants, u: Any, v: Any, d1: Any, d2: Any, d3: Any) -> tup
     return angle, first, second, third, 0.0, 0.0, 0.0, 0.0, tolerance * c.per_square
 
 
-FORM = Form("rssr", 8, 10, _constants, _put, _get, _turn, _travel, _dip, _turn_blur, _travel_blur)
+FORM = Form("rssr", 8, None, 10, _constants, _put, _get, _turn, _travel, _dip, _turn_blur, _travel_blur)
 
 
 @kernel

@@ -27,7 +27,7 @@ def check(reading: Reading) -> None:
     if not accuracy.certify or reading.faults.lines:
         return
     try:
-        check_certifiable(reading.family, reading.fields["want"], accuracy)
+        check_certifiable(reading.family, reading.fields["want"], accuracy, reading.fields["window"] is not None)
     except InputError as error:
         reading.faults.value(("accuracy", "certify"), error.value, error.allowed)
 
