@@ -247,3 +247,43 @@ def test_a_thread_that_leaves_its_edge_has_its_largest_length():
     on = values["contact"].to_numpy().reshape(6, -1).mean(axis=1)
     # Two edges of the contact, each known to a pose of the grid.
     assert (np.abs(found["rms_contact"] ** 2 - on) <= 4.0 / every.shape[1] + 1e-3).all()
+
+
+# A lift coupler within rounding of locking the rack.
+LOCKED = {
+    "h_a": 0.25408090414650203, "h_b": 2.9744619353160444, "h_c": 3.131542498334712, "h_e": -0.6493191446012545,
+    "h_alpha": -0.08514024228371112, "rh": 0.3889513185511589, "dh": -0.5460003931988747, "xE": 3.3365689323813803,
+    "yE": 0.5221543693506001, "rE": 0.2657207636706481, "dE": 0.8097467229605483, "q": 4.730425414832597,
+    "fx": -0.9071710443443637, "fy": -0.3819641581085895, "tx": 0.3678820086688903, "ty": 1.2280081853211795,
+    "y_plate": -1.583411100410582, "h_sigma": -1.0, "bar_branch": 1.0,
+}  # fmt: skip
+
+
+def test_the_error_of_a_peak_near_locking_covers_the_rounding_of_poses():
+    """Poses within 10^-9 rad of the top differ by rounding alone; the estimate once knew of interpolation only."""
+    found = sweep.summarise("feed", LOCKED, ["max_abs_dy_t", "phi_max_abs_dy_t"], accuracy=1e-8).iloc[0]
+    beside = found["phi_max_abs_dy_t"] + 1e-9 * np.linspace(-1.0, 1.0, 101)
+    spread = np.ptp(np.abs(curve("feed", LOCKED, "dy_t", beside)))
+    assert found["status"] == st.OK
+    assert 1e-9 <= spread <= 2.0 * found["err_max_abs_dy_t"]
+
+
+@pytest.mark.parametrize(
+    ("sense", "drive"),
+    [
+        (-1.0, {"O2B": 16.1672, "BC": 244.142, "O3C": 120.805, "O2O3": 139.571, "O4E": 128.13, "chi_mid": 2.01468}),
+        (-1.0, {"O2B": 18.6526, "BC": 202.778, "O3C": 139.288, "O2O3": 85.3617, "O4E": 238.492, "chi_mid": 2.18138}),
+        (1.0, {"O2B": 27.3949, "BC": 129.567, "O3C": 61.6648, "O2O3": 159.722, "O4E": 125.85, "chi_mid": 1.98508,
+               "side_C": -1.0}),
+    ],
+)  # fmt: skip
+def test_of_tops_as_high_as_each_other_the_place_is_that_of_the_first(sense, drive):
+    """A heddle that stands twice at one end in a turn: rounding chose one place or the other by the accuracy."""
+    kind = "max" if sense > 0.0 else "min"
+    values = sense * curve("heddle", drive, "y")
+    tops = FINE[(values > np.roll(values, 1)) & (values >= np.roll(values, -1)) & (values > values.max() - 1e-5)]
+    assert len(tops) == 2
+    for target in (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10):
+        found = sweep.summarise("heddle", drive, [f"phi_{kind}_y", f"{kind}_y"], accuracy=target).iloc[0]
+        assert abs(found[f"phi_{kind}_y"] - tops[0]) <= found[f"err_phi_{kind}_y"] + 2.0 * TURN / FINE.size
+        assert abs(found[f"{kind}_y"] - sense * values.max()) <= found[f"err_{kind}_y"] + 1e-5

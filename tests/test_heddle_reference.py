@@ -229,3 +229,26 @@ def test_heddle_with_a_link_of_no_length_is_invalid_with_complex_numbers_too(lac
         got = moved([design(**values | {lacking: 0.0})], [[1.5]], dtype)
         assert got["status"][0, 0] == st.INVALID_INPUT
         assert np.isnan(got["y"][0, 0].real)
+
+
+@pytest.mark.parametrize("arm", [1e2, 1e4, 4.5e5])
+def test_heddle_of_long_arms_keeps_its_discriminant_and_its_speed(arm):
+    """Bell crank and frame of 10^2 to 10^4 cam levers, alike but for 85: the difference of their squares lost 9 digits.
+
+    The product loses none but those of its factors, a handful of roundings; the speed those of a c - e c/a as well.
+    """
+    long = design(O2B=30.0, BC=160.0, O3C=arm, O2O3=arm + 85.0, O4E=140.0, chi_mid=1.9)
+    theta = np.linspace(0.1, 6.2, 25)
+    got = moved(long, theta)
+    assert (got["status"] == st.OK).all()
+    with mp.workdps(50):
+        a, b, c, e = (mpf(long[k]) for k in range(4))
+        for k, angle in enumerate(theta):
+            u, v = mpf(math.cos(angle)), mpf(math.sin(angle))
+            x, y, w = e - a * u, -a * v, ((c - b) * (c + b) + a * a + e * e) / (2 * c) - a * e * u / c
+            delta = x * x + y * y - w * w
+            assert abs(got["discriminant"][0, k] - delta) <= 16.0 * 2.0**-53 * delta * float(b / mp.sqrt(delta)) ** 2
+            root = mp.sqrt(delta)
+            cos, sin = -(x * w + y * root) / (x * x + y * y), (x * root - y * w) / (x * x + y * y)
+            rate = (a * (v * cos - u * sin) + a * e * v / c) / root
+            assert abs(got["dchi"][0, k] - rate) <= 64.0 * 2.0**-53 * a / root

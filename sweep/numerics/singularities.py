@@ -38,7 +38,7 @@ class Singularities(NamedTuple):
 
     def distance(self, phi: Array) -> Array:
         """Return how far the nearest zero is from crank angles (n,), or (n, m)."""
-        one = phi.reshape(len(self.phi), -1)
+        one = phi[:, None] if phi.ndim == 1 else phi
         away = np.abs(one[:, :, None] - self.phi[:, None, :])
         away = np.abs(away - TWO_PI * np.round(away / TWO_PI))
         nearest: Array = np.hypot(self.rho[:, None, :], away).min(axis=2)

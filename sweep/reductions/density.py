@@ -14,10 +14,12 @@ SHARES = 16.0  # samples of a turn are a multiple of this over the shortest way 
 PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
 FEWEST = 32.0  # samples of any curve
 MOST = 1024.0  # times the fewest samples
+# Distance of a singularity [rad] up to which it is looked at closely: twice that from which on it decides on samples.
+MATTERS = 2.0 * PER_SINGULARITY / FEWEST
 
 
-def denser(family: Family, designs: Array) -> Array:
-    """Return by which power of two the fewest samples of a turn are multiplied, (n,).
+def denser(family: Family, designs: Array, near: Singularities | None = None) -> Array:
+    """Return by which power of two the fewest samples of a turn are multiplied, (n,); ``near`` if it is known.
 
     Between two switches stand several samples, in a wave at least a quarter of what else stands in a turn, and 12 in
     the distance of a singularity that the samples themselves would not see.
@@ -30,8 +32,8 @@ def denser(family: Family, designs: Array) -> Array:
         shortest = np.where(gaps > 1e-9, gaps, TWO_PI).min(axis=1)
         factor = np.maximum(factor, TWO_PI / (SHARES * shortest))
     if family.every(Singular):
-        # Zeros twice as far away as those that matter need not be known better than the samples show them.
-        rho = nearest(family, designs, 2.0 * PER_SINGULARITY / FEWEST).rho.min(axis=1)
+        near = nearest(family, designs, MATTERS) if near is None else near
+        rho = near.rho.min(axis=1)
         factor = np.where(rho < FAR, np.maximum(factor, PER_SINGULARITY / (FEWEST * rho)), factor)
     found: Array = np.exp2(np.ceil(np.log2(np.minimum(factor, MOST))))
     return found

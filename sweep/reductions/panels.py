@@ -18,10 +18,12 @@ from numpy.polynomial import chebyshev
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
-from sweep.families.pace import Bends, bends
+from sweep.families.pace import Bends, Singular, bends
 from sweep.numerics.chebyshev import NODES, at_nodes, basis, product, rising
 from sweep.reductions.cuts import ends
+from sweep.reductions.density import MATTERS, nearest
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
+from sweep.reductions.rounding import order_of, singular_share
 from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, blocks, discriminants, pose_columns
 
 PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
@@ -131,6 +133,12 @@ def _block(
         panels = _fitted(row, low, high, values, request.mode)
         top, size = _climbed(family, designs[rows], panels, request, target, locate or request.place)
         rounding = _rounding(guards, poses, good, row, top, family.precise_poses is not None)
+        if family.every(Singular):
+            near, order = (
+                nearest(family, designs[rows[top.row]], MATTERS),
+                np.full(top.row.size, order_of(family, request.pose)),
+            )
+            rounding += singular_share(near, top.phi, order) * np.abs(top.value)
         late = (top.err > target * size[top.row]) & (top.err > rounding)
         status[top.row[late]] = np.where(status[top.row[late]] == st.OK, st.NOT_CONVERGED, status[top.row[late]])
         at = rows[top.row]

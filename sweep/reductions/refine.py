@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels import scan
 from sweep.families.base import Array, Family
-from sweep.reductions.sampling import Index, Mask, pose_columns
+from sweep.reductions.sampling import TWO_PI, Index, Mask, pose_columns
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""
@@ -179,6 +179,26 @@ def attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
 def reaching(height: Array, peaks: Peaks) -> Peaks:
     """Return peaks of these heights, and by how much that changes them added to their errors."""
     return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
+
+
+def first_of_equals(row: Index, peaks: Peaks, chosen: Index) -> Index:
+    """Return, for the highest peaks ``chosen`` of some rows, the first of the turn that is as high as each.
+
+    Tops of a symmetric motion are as high as each other: rounding would choose another one at every accuracy.
+
+    Parameters
+    ----------
+    row : (k,) of the peaks;  chosen : numbers of the highest peaks, one of a row
+    """
+    best = np.full(row.max(initial=0) + 1, chosen[0] if chosen.size else 0)
+    best[row[chosen]] = chosen
+    best = best[row]
+    known = 2.0 * np.minimum(peaks.err_height, peaks.err_height[best])
+    late = np.where(peaks.height >= peaks.height[best] - known, -np.mod(peaks.phi, TWO_PI), -np.inf)
+    first = np.full(row.max(initial=0) + 1, -1)
+    scan.best_candidate(row, late, np.full(first.size, -np.inf), first)
+    found: Index = first[row[chosen]]
+    return found
 
 
 def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Array]:

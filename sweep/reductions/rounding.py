@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from kernels import status as st
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly
+from sweep.numerics.singularities import Singularities
 from sweep.reductions.refine import EPS
-from sweep.reductions.sampling import Index, Mask
+from sweep.reductions.sampling import TWO_PI, Index, Mask, pose_columns
+
+TRIES = 3
 
 
 def rounding_share(
@@ -36,8 +40,43 @@ def rounding_share(
         if name in sizes:
             largest = np.maximum(largest, sizes[name](designs)[row])
         amplified += np.divide(largest, here, out=np.ones(row.size), where=tells(largest) & (here > 0.0))
-    # A derivative of order n grows like the power 1/2 - n of the discriminant.
+    return _of_order(order, amplified)
+
+
+def singular_share(near: Singularities, phi: Array, order: Index) -> Array:
+    """Return what rounding may have changed near a singularity that no discriminant of an assembly tells of.
+
+    What is rounded there falls with the square of the distance of its complex zero.
+
+    Parameters
+    ----------
+    near : the singularities of the design of each value
+    phi, order : (k,) crank angle [rad] of each value, and of which derivative it is
+    """
+    return _of_order(order, np.maximum(near.distance(phi) ** -2.0 - 1.0, 0.0))
+
+
+def _of_order(order: Index, amplified: Array) -> Array:
+    """Return the share of rounding: a derivative of order n grows like the power 1/2 - n of what vanishes."""
     found: Array = 4.0 * EPS * np.where(order == 0, np.sqrt(amplified), np.where(order < 3, amplified, 2.0 * amplified))
+    return found
+
+
+def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
+    """Return by how much a pose output changes where the inputs of a design are rounded otherwise, (n,).
+
+    A kernel that is as exact as its inputs errs by as much again.  It is the largest change of TRIES poses, at one
+    crank angle of each design; a pose that is lost by that tells nothing.
+    """
+    free = np.array([p.choices is None and p.unit != "count" for p in family.parameters])
+    signs = np.where(free, np.random.default_rng(0).choice([-1.0, 1.0], (TRIES, free.size)), 0.0)
+    every = np.concatenate([designs, *(designs * (1.0 + 2.0 * EPS * sign) for sign in signs)])
+    columns, status = pose_columns(family, every, np.tile(phi, TRIES + 1)[:, None], [name])
+    values, known = (x.reshape(TRIES + 1, len(designs)) for x in (columns[name], status == st.OK))
+    off = values[1:] - values[0]
+    if family.pose_output[name].wraps:
+        off -= TWO_PI * np.rint(off / TWO_PI)
+    found: Array = np.where(known[1:], np.abs(off), 0.0).max(axis=0)
     return found
 
 

@@ -10,21 +10,25 @@ import numpy as np
 from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
+from sweep.families.pace import Singular
+from sweep.numerics.singularities import Singularities
 from sweep.reductions.breaks import jumps, level, near_jumps, search
-from sweep.reductions.density import denser
+from sweep.reductions.density import MATTERS, denser, nearest
 from sweep.reductions.refine import (
     EPS,
     SHRINK,
+    VARIES,
     Peaks,
     Sampler,
     attained,
     confirmed,
+    first_of_equals,
     first_peaks,
     polished,
     sharpen,
 )
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
-from sweep.reductions.rounding import order_of, rounding_share, tells
+from sweep.reductions.rounding import order_of, rounding_share, shaken, singular_share, tells
 from sweep.reductions.sampling import (
     TWO_PI,
     Index,
@@ -45,6 +49,7 @@ BREAKING = 512  # samples from which on what is still rough may be a jump
 DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
 RIVALS = 1e-3  # peaks lower than the best by no more of its size may turn out the highest
 NEVER = 2**40  # more samples than are ever needed
+CLOSE = 0.1  # distance of a singularity [rad] from which on it is measured what rounding does
 TIE = 1e-10  # to which peaks are told apart where their places are wanted
 
 
@@ -77,13 +82,15 @@ class Search:
     undone: Index = field(init=False)
     names: list[str] = field(init=False)
     guards: list[str] = field(init=False)
+    near: Singularities | None = field(init=False)
 
     def __post_init__(self) -> None:
         n = len(self.designs)
         self.found = {request: Extremum.unknown(n) for request in self.requests}
         self.status = np.zeros(n, np.uint8)
         # Samples that each request still needs of each design; 0 once it is found.
-        fewest = (START * denser(self.family, self.designs)).astype(np.int64)
+        self.near = nearest(self.family, self.designs, MATTERS) if self.family.every(Singular) else None
+        fewest = (START * denser(self.family, self.designs, self.near)).astype(np.int64)
         self.undone = np.tile(fewest, (len(self.requests), 1))
         # A discriminant is a smooth function whatever its sign; the motion is not where it vanishes.
         self.guards = [] if self.anywhere else list(discriminants(self.family))
@@ -204,6 +211,8 @@ class Search:
         place = np.where(self.places(number), self.target, np.inf)
         peaks = sharpen(sample, first, tolerance, place)
         share = self._rounding(rows, columns, candidates, self.guards)
+        if self.near is not None:
+            share += singular_share(self.near.only(rows[row]), peaks.phi, self._orders(candidates))
         peaks = peaks._replace(err_height=peaks.err_height + share * np.abs(peaks.height))
         if self.family.precise_poses is None:
             # A quartic may say less than nothing of what touches zero; a value at a pose is one that there is.
@@ -270,8 +279,13 @@ class Search:
     def _rounding(self, rows: Index, columns: dict[str, Array], candidates: Candidates, guards: list[str]) -> Array:
         """Return the share of a value that rounding may have changed alike at neighbouring poses."""
         given = self.designs[rows], columns, candidates.row, candidates.column
+        return rounding_share(self.family, *given, guards, self._orders(candidates))
+
+    def _orders(self, candidates: Candidates) -> Index:
+        """Return of which derivative each candidate is."""
         orders = np.array([order_of(self.family, request.pose) for request in self.requests])
-        return rounding_share(self.family, *given, guards, orders[candidates.request])
+        found: Index = orders[candidates.request]
+        return found
 
     def _within_window(
         self, rows: Index, columns: dict[str, Array], request: Request, row: Index, peaks: Peaks, resolved: Mask
@@ -315,13 +329,21 @@ class Search:
         chosen = which[has]
         found = self.found[request]
         found.value[rows[has]] = peaks.height[chosen] * (-1.0 if request.mode == -1 else 1.0)
+        err = peaks.err_height[chosen]
+        if self.near is not None and self.family.precise_poses is None:
+            close = np.flatnonzero(self.near.only(rows[has]).distance(peaks.phi[chosen]) < CLOSE)
+            if close.size:
+                given = self.designs[rows[has][close]], peaks.phi[chosen[close]]
+                err[close] += VARIES * shaken(self.family, *given, request.pose)
+        found.err[rows[has]] = err
+        moved = np.zeros(rows.size)
+        moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
+        if self.family.precise_poses is None and (self.locate or request.place):
+            chosen = first_of_equals(row, peaks, chosen)
         phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
         slope = self.family.derivative_of.get(request.pose)
         if (self.locate or request.place) and slope is not None and not request.windowed:
             phi, err_phi = polished(self.family, self.designs[rows[has]], slope, phi, err_phi)
         found.phi[rows[has]] = np.mod(phi, TWO_PI)
-        found.err[rows[has]] = peaks.err_height[chosen]
         found.err_phi[rows[has]] = err_phi
-        moved = np.zeros(rows.size)
-        moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
         return moved

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import cmath
 from typing import Any
 
+import numpy as np
 from mpmath import mp
 
 
@@ -90,3 +92,37 @@ def triad(p: dict[str, Any], phi: Any, start: tuple[float, float, float]) -> lis
             slopes[:, k] = (closures(moved) - closures(place)) / step
         place -= mp.lu_solve(slopes, closures(place))
     return list(place)
+
+
+def triad_from_guess(p: dict[str, float], steps: int) -> list[float] | None:
+    """Tooth and rack angle at phi = 0 on the assembly that the guess chooses, None where the leads lock before.
+
+    Links as long as the guess needs them take on their own lengths: their squares change evenly, in so many steps.
+    """
+    full = {name: p.get(name, 0.0) for name in ("h_f", "h_g", "h_alpha", "dh")} | p
+    leads = [complex(full["h_e"] + full["rh"] * mp.expj(rocker({k: mp.mpf(v) for k, v in full.items()}, mp.mpf(0))
+                     + full["dh"]))]  # fmt: skip
+    leads += [complex(full[f"xE{k}"], full[f"yE{k}"]) + full[f"rE{k}"] * cmath.exp(1j * full[f"dE{k}"]) for k in (2, 3)]
+    arms = [complex(full[f"f{k}x"], full[f"f{k}y"]) for k in (1, 2, 3)]
+
+    def links(place: Any) -> Any:
+        turned = [cmath.exp(1j * place[2]) * arm for arm in arms]
+        return [complex(place[0], place[1]) + g - lead for g, lead in zip(turned, leads, strict=True)], turned
+
+    place = np.array([full["x0"], full["y0"], full["chi0"]])
+    own = np.array([full[f"q{k}"] ** 2 for k in (1, 2, 3)])
+    guessed = np.abs(links(place)[0]) ** 2
+    positive = None
+    for step in range(1, steps + 1):
+        wanted = guessed + (own - guessed) * (step / steps)
+        for _ in range(12 if step == steps else 3):
+            d, turned = links(place)
+            slopes = np.array(
+                [[x.real, x.imag, (x * (1j * g).conjugate()).real] for x, g in zip(d, turned, strict=True)]
+            )
+            size = float(np.linalg.det(slopes))
+            if positive is not None and (size > 0.0) != positive:
+                return None
+            positive = size > 0.0
+            place = place - np.linalg.solve(2.0 * slopes, np.abs(d) ** 2 - wanted)
+    return [float(x) for x in place]

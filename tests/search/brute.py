@@ -77,8 +77,9 @@ def blurred(full: Family, designs: Array, name: str, phi: Array) -> Array:
     random = np.random.default_rng(1)
     one, _ = poses(full, designs, phi[:, None], (name,))
     exact, off = one[name][:, 0], np.zeros(len(designs))
+    free = np.array([p.choices is None and p.unit != "count" for p in full.parameters])  # no sign, no number of teeth
     for _ in range(8):
-        changed = designs * (1.0 + 2.0 * EPS * random.choice([-1.0, 0.0, 1.0], designs.shape))
+        changed = designs * (1.0 + 2.0 * EPS * free * random.choice([-1.0, 0.0, 1.0], designs.shape))
         now, status = poses(
             full, changed, (phi * (1.0 + 2.0 * EPS * random.uniform(-1.0, 1.0, phi.size)))[:, None], (name,)
         )

@@ -3,6 +3,10 @@
 The three closures are solved by Newton's method for the tooth and the rack's angle.  A design starts from its given
 guess at phi = 0 and goes round in NODES steps; a pose starts from the node before it.  So every pose of a design lies
 on the assembly that the guess chooses, whatever other poses are asked for.
+
+The guess chooses the assembly that is reached when links as long as it needs them take on their own lengths, without
+passing a position in which the leads lock.  Newton's method alone may wander about before it happens on some assembly:
+on which depends on the rounding of the lengths.
 """
 
 from __future__ import annotations
@@ -19,6 +23,10 @@ from kernels.families.feed.closure import EPS, Array, Driven, Rocker, Status, ec
 NODES = 180
 TWO_PI = 2.0 * math.pi
 _MOST_STEPS = 40
+_SMALL = 1e-9  # steps of Newton's method from here on are quadratically short, or rounding
+# From the guess to the links' own lengths: steps of Newton's method in all and at one stage, which ends when a step is
+# as small as CLOSE, and the least share of the way that one stage may be.
+_MOST_IN_ALL, _MOST_OF_STAGE, _CLOSE, _LEAST_SHARE = 60, 12, 1e-3, 2.0**-8
 
 OUTPUTS = ("x_t", "y_t", "chi", "dx_t", "dy_t", "dchi", "d2x_t", "d2y_t", "d2chi", "determinant")
 
@@ -153,10 +161,48 @@ def _newton(d: Array, u: float, v: float, x: float, y: float, chi: float) -> tup
             return x, y, chi, det, st.SINGULAR
         x, y, chi = x - dx, y - dy, chi - dchi
         # Steps of a few roundings that no longer shrink: as near as the closures can be told
-        if size <= 4.0 * EPS or (size <= 1e-9 and size >= 0.5 * before):
+        if size <= 4.0 * EPS or (size <= _SMALL and size >= 0.5 * before):
             return x, y, chi, det, st.OK
         before = size
     return x, y, chi, det, st.NOT_CONVERGED
+
+
+@inline
+def _begun(d: Array, x: float, y: float, chi: float) -> tuple[float, float, float, int]:
+    """Return tooth and rack angle near the assembly at phi = 0 that a guess chooses.
+
+    Half the squares of the links' lengths go from those of the guess to their own in stages as long as Newton's steps
+    keep halving; a good guess takes one.  NOT_CONVERGED where the leads lock on the way.
+    """
+    one, two, three, code = _leads(d, 1.0, 0.0)
+    if code != st.OK:
+        return x, y, chi, code
+    rows, f, _ = _links(d, (one, two, three), x, y, chi)
+    a, b, c = f
+    _, _, _, det = _solved(rows, a, b, c)
+    positive, left, share, count = det > 0.0, 1.0, 1.0, 0
+    while left > 0.0 and count < _MOST_IN_ALL:
+        goal = max(left - share, 0.0)
+        nx, ny, nchi, before, near = x, y, chi, math.inf, False
+        for _ in range(_MOST_OF_STAGE):
+            count += 1
+            rows, f, _ = _links(d, (one, two, three), nx, ny, nchi)
+            dx, dy, dchi, det = _solved(rows, f[0] - goal * a, f[1] - goal * b, f[2] - goal * c)
+            size = abs(dx) + abs(dy) + abs(dchi)
+            # written so that a nan ends it too
+            if (det > 0.0) != positive or not (size <= 0.5 * before or size <= _SMALL):
+                break
+            nx, ny, nchi, before = nx - dx, ny - dy, nchi - dchi, size
+            if size <= (_CLOSE if goal > 0.0 else _SMALL):
+                near = True
+                break
+        if near:
+            x, y, chi, left, share = nx, ny, nchi, goal, 2.0 * share
+        else:
+            share *= 0.5
+            if share < _LEAST_SHARE:
+                break
+    return x, y, chi, st.OK if left <= 0.0 else st.NOT_CONVERGED
 
 
 @inline
@@ -182,8 +228,8 @@ def _rates(d: Array, leads: tuple[Driven, Driven, Driven], x: Any, y: Any, chi: 
 @inline
 def _round(d: Array, nodes: Array) -> int:
     """Go once round from the given start; nodes (NODES, 4) get x, y, chi and the status.  Sign of the determinant."""
-    x, y, chi = d[26].real, d[27].real, d[28].real
-    code, sign = st.OK, 0
+    x, y, chi, code = _begun(d, d[26].real, d[27].real, d[28].real)
+    sign = 0
     for k in range(NODES):
         if code == st.OK:
             angle = k * (TWO_PI / NODES)

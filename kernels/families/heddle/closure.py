@@ -42,13 +42,17 @@ class Design(NamedTuple):
 
 
 class FourBar(NamedTuple):
-    """A four-bar in scaled lengths: driving arm a, driven arm c, pivot distance e; W = k0 - k2 u."""
+    """A four-bar in scaled lengths: driving arm a, coupler b, driven arm c, pivot distance e; W = k0 - k2 u,
+    R^2 - c^2 = gap - 2 a e u for the distance R of the driving pin from the driven pivot.
+    """
 
     a: Any
+    b: Any
     c: Any
     e: Any
     k0: Any
     k2: Any
+    gap: Any
     x_size: float  # sums of the magnitudes whose rounding errors make up X and W
     w_size: float
     side: float
@@ -80,7 +84,8 @@ def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
     k0 = 0.5 * (difference + (a * a + e * e)) / by
     k2 = a * e / by
     size = 0.5 * (abs(difference.real) + (a * a + e * e).real) / by.real + abs(k2.real)
-    return FourBar(a, c, e, k0, k2, abs(e.real) + a.real, size, side)
+    gap = (e - c) * (e + c) + a * a
+    return FourBar(a, b, c, e, k0, k2, gap, abs(e.real) + a.real, size, side)
 
 
 @inline
@@ -124,7 +129,10 @@ def driven(bar: FourBar, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
     """
     x, y, w = bar.e - bar.a * u, -(bar.a * v), bar.k0 - bar.k2 * u
     rr = x * x + y * y
-    delta = rr - w * w
+    # Heron's product for R^2 - W^2: of a long driven arm on a far pivot both squares are alike to most of their digits.
+    reach = np.sqrt(rr) + bar.c
+    beyond = (bar.gap - 2.0 * (bar.a * bar.e) * u) / divisor(reach)
+    delta = (bar.b - beyond) * (bar.b + beyond) * ((reach - bar.b) * (reach + bar.b)) / (4.0 * divisor(bar.c * bar.c))
     band = 8.0 * EPS
     tolerance = band * (abs(x.real) * bar.x_size + abs(y.real) * bar.a.real + abs(w.real) * bar.w_size)
     tolerance += band * band * (bar.x_size * bar.x_size + bar.a.real * bar.a.real + bar.w_size * bar.w_size)
