@@ -134,10 +134,8 @@ def _block(
         top, size = _climbed(family, designs[rows], panels, request, target, locate or request.place)
         rounding = _rounding(guards, poses, good, row, top, family.precise_poses is not None)
         if family.every(Singular):
-            near, order = (
-                nearest(family, designs[rows[top.row]], MATTERS),
-                np.full(top.row.size, order_of(family, request.pose)),
-            )
+            near = nearest(family, designs[rows[top.row]], MATTERS)
+            order = np.full(top.row.size, order_of(family, request.pose))
             rounding += singular_share(near, top.phi, order) * np.abs(top.value)
         late = (top.err > target * size[top.row]) & (top.err > rounding)
         status[top.row[late]] = np.where(status[top.row[late]] == st.OK, st.NOT_CONVERGED, status[top.row[late]])
