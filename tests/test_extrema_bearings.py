@@ -54,6 +54,18 @@ SLIDING = (
 )  # fmt: skip
 
 
+EASED = {
+    "a": 28.884019, "b": 97.070012, "c": 72.990025, "e": 47.589861, "f": 16.40729, "g": -7.6110695, "alpha": 0.95565604,
+    "branch": 1.0, "m_crank": 0.00033922375, "j_crank_zz": 0.36890804, "m_coupler": 5.4801258e-05,
+    "com_coupler_x": 41.597115, "com_coupler_y": 3.0426877, "j_coupler_xx": 0.0054656534, "j_coupler_yy": 0.15049925,
+    "j_coupler_zz": 0.049527371, "m_rocker": 0.00017268615, "com_rocker_x": 15.932171, "j_rocker_xx": 0.41140865,
+    "j_rocker_yy": 0.053787474, "j_rocker_zz": 0.21005117, "gravity_z": -14565.555, "load_torque": -929.61316,
+    "speed": 434.00784, "support_d1": -10.163255, "support_d2": 53.450536, "rotation_factor": 0.879645,
+    "radial_factor": 0.30694756, "axial_factor": 1.2999678, "e_limit": 0.2256111, "life_exponent": 3.7309541,
+    "dynamic_capacity": 3337.3613, "shock_factor": 1.2075804, "axial_support": 2.0, "finger": 1.0,
+}  # fmt: skip
+
+
 def zeros(row, output):
     """Crank angles at which a pose output vanishes."""
 
@@ -85,6 +97,16 @@ def test_the_largest_angle_that_sliding_bearings_permit_stands_where_nothing_loa
     assert found["status"] == st.OK
     assert spike > grid + 0.01  # an even grid does not see it
     assert spike - err <= value <= spike + err + 1e-4  # poses about it are as close as that
+
+
+@pytest.mark.parametrize("target", [1e-4, 1e-8])
+def test_the_least_load_of_a_bearing_stands_where_its_support_is_nearly_free(target):
+    """The load across a shaft is a magnitude: it dips to 2.1 of thousands between two poses; 3.1 once passed for it."""
+    found = sweep.summarise("rssr", EASED, ["min_equivalent_load_d1"], accuracy=target).iloc[0]
+    about = 6.261367648 + 1e-4 * np.linspace(-1.0, 1.0, 2001) ** 3
+    least = sweep.evaluate("rssr", EASED, ["equivalent_load_d1"], phi=about)["equivalent_load_d1"].min()
+    assert found["status"] == st.OK
+    assert abs(found["min_equivalent_load_d1"] - least) <= found["err_min_equivalent_load_d1"] + 1e-2
 
 
 def test_the_mean_of_a_load_that_changes_its_formula_is_that_of_its_pieces():

@@ -7,7 +7,7 @@ from functools import partial
 from sweep.effects import kinetostatics, loads
 from sweep.effects.base import DesignResult, Effect, Scene, refuse
 from sweep.effects.bearings import CATALOGUE, SUPPORTS, together
-from sweep.effects.shaft_life import BLOCK, FORMULAS, Shaft, bend, load_outputs, per_turn, turn_outputs
+from sweep.effects.shaft_life import BLOCK, FORMULAS, Shaft, bends, load_outputs, per_turn, turn_outputs
 from sweep.families.base import Array, Columns
 
 EQUATION = "B2 (1)-(3)"
@@ -49,6 +49,6 @@ EFFECT = Effect(
     negligible="sliding bearings; elsewhere never, the life is what is asked for",
     even_crank=True,
     takes_load=kinetostatics.KEY,
-    bends=(bend(ROCKER),),
+    bends=bends(ROCKER),
     design_result=DesignResult(turn_outputs("d", TEXT, EQUATION), partial(per_turn, shaft=ROCKER), BLOCK),
 )

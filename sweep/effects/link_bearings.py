@@ -13,8 +13,9 @@ from sweep.effects.base import DesignResult, Effect, Scene, Status, refuse, take
 from sweep.effects.bearings import CATALOGUE, REQUIRED_LIFE, permissible_load, together
 from sweep.effects.bend import Bend
 from sweep.effects.handed import FRICTION, LOADS
-from sweep.effects.shaft_life import BLOCK, Shaft, bend, load_outputs, turn_outputs
+from sweep.effects.shaft_life import BLOCK, Shaft, load_outputs, turn_outputs
 from sweep.effects.shaft_life import FORMULAS as LIFE_FORMULAS
+from sweep.effects.shaft_life import bends as bends_of_shaft
 from sweep.effects.shaft_life import per_turn as turn_of_shaft
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, filled
@@ -245,7 +246,7 @@ def rolling_of(name: str) -> Effect:
         poses += out
         lives += turn
         only |= {p.name: tuple(o.name for o in (*out, *turn)) for p in own} | {life.name: (out[-1].name,)}
-        bends.append(bend(_shaft(joint), out[-1].name))
+        bends += bends_of_shaft(_shaft(joint), out[-1].name)
     return Effect(
         key="B2",
         name=f"{name}_rolling_bearings",

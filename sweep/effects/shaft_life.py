@@ -103,9 +103,13 @@ class Shaft:
         return filled(bearing_loads, arguments, names, wanted & frozenset(names), status)
 
 
-def bend(shaft: Shaft, *more: str) -> Bend:
-    """Return where the equivalent loads of a shaft's bearings, and outputs made of them, bend."""
-    return Bend((*load_names(shaft.name)[3:], *more), partial(formula, shaft=shaft))
+def bends(shaft: Shaft, *more: str) -> tuple[Bend, ...]:
+    """Return where the equivalent loads of a shaft's bearings, and outputs made of them, bend.
+
+    That is where they change their formula, and where a support is nearly free.
+    """
+    names = (*load_names(shaft.name)[3:], *more)
+    return Bend(names, partial(formula, shaft=shaft)), Bend(names, partial(squares, shaft=shaft), squares=True)
 
 
 def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, shaft: Shaft) -> Columns:
@@ -184,6 +188,13 @@ def _switches(scene: Scene, shaft: Shaft) -> Array:
 def formula(scene: Scene, shaft: Shaft) -> Array:
     """Return what changes its sign where an equivalent load has a kink or jumps, (n, m, 2)."""
     return _switches(scene, shaft)[:, :, 1:]
+
+
+def squares(scene: Scene, shaft: Shaft) -> Array:
+    """Return the squares of the loads across the shaft of both supports, (n, m, 2)."""
+    names = load_names(shaft.name)[:2]
+    found = shaft.loads(scene, frozenset(names))
+    return np.stack([np.square(np.asarray(found[name], np.float64)) for name in names], axis=2)
 
 
 def _discriminant(scene: Scene, rows: Rows, stage: int, name: str, which: Rows, phi: Array) -> Array:

@@ -234,10 +234,10 @@ def _tops(panels: Panels, mode: int, err: Array) -> Top:
         height = _measured(chebyshev.chebval(after, panels.series.T, tensor=False), mode)
         x, value = np.where(height >= value, after, x), np.maximum(value, height)
     half = 0.5 * (panels.high - panels.low)
-    # At an end the slope is what holds the place, inside it is the bend.
+    # At an end the slope is what holds the place, inside it is the bend; poses stand a little inside of a jump there.
     inside, bow = np.abs(x) < 1.0, np.abs(chebyshev.chebval(x, bend, tensor=False))
     blur = np.divide(SLOPE * err, bow, out=np.full(x.size, 2.0), where=bow > 0.0)
-    err_phi = np.where(inside, half * np.minimum(blur, 2.0), 0.0) + 8.0 * EPS * np.pi
+    err_phi = np.where(inside, half * np.minimum(blur, 2.0), 0.5 * NARROWEST) + 8.0 * EPS * np.pi
     return Top(panels.row, 0.5 * (panels.low + panels.high) + half * x, value, err + 4.0 * EPS * np.abs(value), err_phi)
 
 
