@@ -6,8 +6,10 @@ is folded into its caller.  Here instead
 
 * a :class:`Part`, what kernels call, ends as LLVM code.  It is optimised and translated within its callers.
 * optimisers of single functions run on those that have a body.
-* Python does not look for garbage meanwhile.
+* what Python calls with reads its arguments once and is not optimised.
+* Python does not look for garbage meanwhile (:mod:`kernels._garbage`).
 * the way from Python to LLVM code is that of :mod:`kernels._frontend`.
+* two processes of one run do not compile the same (:mod:`kernels._claims`).
 
 Side by side with numba's own way a first use takes half the time, and loops 0.97 to 1.04 of theirs; ``make
 bench-first-use`` and ``make bench`` give both as they are now.
@@ -33,8 +35,9 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
 from kernels._claims import claimed
-from kernels._frontend import KernelLowering, contexts, passes, plainly
+from kernels._frontend import KernelLowering, contexts, passes
 from kernels._garbage import nobody_looks
+from kernels._plainly import plainly
 
 FOR_PYTHON = "_ZN7cpython"  # how names of functions begin that numba makes for calls from Python
 PART = "part"  # kind of a library without machine code, in the cache on disk

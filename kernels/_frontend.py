@@ -4,8 +4,7 @@ numba's front end takes most of a first use.  Here, against its own way,
 
 * passes are left out that look for what no kernel has, as ``with``, or write what nobody reads; those for closures and
   expressions of whole arrays where a function has none;
-* what an operator is, and what it gives for the types of its operands, is remembered;
-* what fails by design, as a look for constants among variables, fails without a message in colours;
+* what an operator is, and what functions of numba give for the types of their arguments, is remembered;
 * a constraint of the types is looked at again only after one of its types has changed.
 
 The code is that of numba: ``tests/test_compiler.py`` compares the two.  The classes derive from numba's at the places
@@ -18,8 +17,6 @@ that numba has for it.
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from types import CodeType
 from typing import Any
@@ -306,43 +303,3 @@ def passes(state: Any, writer: type[KernelLowering]) -> PassManager:
             found.add_pass(own.get(made, made), about)
     found.finalize()
     return found
-
-
-# Neither these nor what they are made of are variables of numba's intermediate code.
-_NO_VARIABLES = (ir.Loc, str, int, float, bool, type(None))
-
-
-def _variables_in(self: Any, value: Any) -> list[Any]:
-    """Return the variables in an instruction, or in what it is made of, as `ir.Inst._rec_list_vars` does."""
-    if isinstance(value, ir.Var):
-        return [value]
-    if isinstance(value, ir.Inst):
-        return value.list_vars()  # type: ignore[no-any-return]
-    inside = value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else ()
-    found: list[Any] = []
-    for one in inside:
-        if type(one) is ir.Var:
-            found.append(one)
-        elif type(one) not in _NO_VARIABLES:
-            found += _variables_in(self, one)
-    return found
-
-
-@contextmanager
-def plainly() -> Iterator[None]:
-    """Let numba list variables without asking each number and place for its own, and complain without colours.
-
-    Most complaints are caught, and colours would set up the terminal for each.
-    """
-    kind: Any = type(errors.termcolor())
-    instruction: Any = ir.Inst
-    listed, markup = instruction._rec_list_vars, vars(kind).get("_markup")
-    instruction._rec_list_vars = _variables_in
-    if markup is not None:  # numba has colours here
-        kind._markup = lambda _self, text, *_style: text
-    try:
-        yield
-    finally:
-        instruction._rec_list_vars = listed
-        if markup is not None:
-            kind._markup = markup

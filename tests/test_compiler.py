@@ -6,6 +6,8 @@ import gc
 import math
 import pickle
 import re
+import subprocess
+import sys
 
 import numba
 import numpy as np
@@ -13,7 +15,7 @@ import pytest
 from numba.core import errors
 
 from kernels._compiler import PART, Kernel, Part, rebuilt_part
-from kernels._jit import inline, kernel
+from kernels._jit import inline, kernel, part
 from kernels.families import rssr
 from kernels.families.rssr.derivatives import rocker_fused
 
@@ -144,6 +146,30 @@ def test_loops_of_a_part_are_those_of_the_number_at_the_place_of_its_call() -> N
     whole = kernel(lambda x: part(3, x))
     assert whole(2.0) == 6.0
     assert [str(args) for args in part.overloads] == ["(Literal[int](3), float64)"]
+
+
+def test_one_code_of_a_shared_part_serves_whatever_numbers_stand_in_its_calls() -> None:
+    shared = part(lambda n, x: x * n)
+    whole = kernel(lambda x: shared(3, x) + shared(4, x))
+    assert whole(2.0) == 14.0
+    assert [str(args) for args in shared.overloads] == ["(int64, float64)"]
+
+
+FROZEN = """
+import gc, sys
+from kernels._garbage import program_of_our_own
+from kernels._jit import kernel
+if sys.argv[1] == "ours":
+    program_of_our_own()
+kernel(lambda x: 5.0 * x)(1.0)
+print(gc.get_freeze_count() > 0, gc.isenabled())
+"""
+
+
+@pytest.mark.parametrize(("whose", "frozen"), [("ours", "True"), ("theirs", "False")])
+def test_what_compiling_left_stays_for_good_in_a_program_of_our_own_only(whose: str, frozen: str) -> None:
+    done = subprocess.run([sys.executable, "-c", FROZEN, whose], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.split() == [frozen, "True"]
 
 
 @pytest.mark.parametrize("works", [True, False])

@@ -17,9 +17,10 @@ import numpy as np
 
 from sweep.families.base import Angles, Array, Columns, PoseFunction
 
-MANY = 2**13  # poses of one call: half a block of a sweep, or the price of an output being measured
+MANY = 2**16  # poses of one call: dense samples, or the price of an output being measured
 # Poses of all calls so far.  All outputs take 30 to 100 ns more per pose than a few: for so many, as long as compiling.
-PAID = 2**22
+PAID = 2**21
+COMPLEX = 8  # real poses that take as long as a complex one, whose outputs take 1 us more
 
 _each_its_own = ContextVar("every set of outputs has machine code of its own", default=False)
 
@@ -49,8 +50,8 @@ class Together:
 
     def __call__(self, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
         """Return the wanted outputs and the status of every design at its angles, each (n, m)."""
-        count = len(designs) * angles.cos.shape[1]
         key = wanted, np.iscomplexobj(angles.cos) or np.iscomplexobj(designs)
+        count = len(designs) * angles.cos.shape[1] * (COMPLEX if key[1] else 1)
         self._asked[key] = self._asked.get(key, 0) + count
         if count >= MANY or self._asked[key] > PAID or _each_its_own.get():
             return self._poses(designs, angles, wanted)
