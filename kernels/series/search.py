@@ -1,7 +1,7 @@
 """True extrema of a chain over the turn, refined between samples: the generated kernel (docs/extrema.md).
 
-Per design: samples that resolve the curve (`kernels.series.look`); every local maximum of at least 60 % of the best is
-refined, vectorised over the maxima of a block of designs (`kernels.series.peaks`).  What is not trusted, or what
+Per design: samples that resolve the curve (`kernels.series.listing`); every local maximum of at least 60 % of the best
+is refined, vectorised over the maxima of a block of designs (`kernels.series.peaks`).  What is not trusted, or what
 rounding may have changed by more than 2^-14 of the target, is left to precise poses.
 """
 

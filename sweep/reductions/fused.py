@@ -61,7 +61,7 @@ class FusedCurve:
         opens, stage = self.forms[0].opening, self.family.stages[len(self.forms) - 1]
         assert opens is not None
         opens(designs, opening, distance)
-        made_of = np.ascontiguousarray(self.made_of(stage.designs(designs)))
+        made_of = np.ascontiguousarray(self.made_of(designs[:, stage.columns]))
         # Which of several is the highest decides on the place.
         tie = TIE if self.request.place else -1.0
         status, found = np.empty(n, np.uint8), np.empty((6, n))

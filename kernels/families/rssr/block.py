@@ -41,7 +41,7 @@ def load_block(designs: Array, start: int, count: int, at: Array) -> None:
         at[k + K0], at[k + K1], at[k + K2] = designs[i, 3], designs[i, 4], designs[i, 5]
         at[k + W_SIZE], at[k + COUPLER] = designs[i, 6], designs[i, 7]
         scaled |= not within_unit_range(designs[i, 2])
-    if scaled:  # apart, because only so the loop above is free of calls
+    if scaled:  # apart, because next to none are
         for k in range(count):
             unit = unit_scale(at[k + CA])
             for row in (E, Y0, CA, K0, K1, K2):
