@@ -70,7 +70,9 @@ class Chained:
 
 @lru_cache(maxsize=64)
 def chained(forms: tuple[Form, ...]) -> Chained:
-    """Compose the closures of two stages or more, each of which drives the next."""
+    """Compose the closures of stages each of which drives the next; a stage alone moves by the chain's crank itself."""
+    if len(forms) == 1:
+        return _alone(forms[0])
     driving = _first(forms[0])
     for form in forms[1:-1]:
         driving = _longer(driving, form)
@@ -90,13 +92,34 @@ def _first(form: Form) -> Driving:
         b0, b1, b2, b3 = blur_alone(c, u, v, m.d1, m.d2, m.d3)
         return m, b0, b1, b2, b3
 
+    record = _recorded_first(form)
+    return Driving(record, _made("turn", form.name, turn), _made("blur", form.name, blur))
+
+
+def _alone(form: Form) -> Chained:
+    travel_here, blur_here = form.travel, form.travel_blur
+
+    def travel(c: Any, u: Any, v: Any) -> Any:
+        n = travel_here(c, u, v)
+        return n, (n.delta,)
+
+    def before(c: Any, u: Any, v: Any) -> Any:
+        return ()
+
+    def blur(c: Any, u: Any, v: Any) -> Any:
+        n = travel_here(c, u, v)
+        return blur_here(c, u, v, n.x1, n.x2, n.x3)
+
+    made = [_made(f.__name__, f"{form.name}_alone", f) for f in (travel, before, blur)]
+    return Chained(1, _recorded_first(form), made[0], form.dip, *made[1:])
+
+
+def _recorded_first(form: Form) -> Record:
     def doubts(c: Any) -> Any:
         return (c.doubt,)
 
-    record = Record(
-        form.name, form.columns, form.numbers, form.constants, form.put, form.get, _made("doubts", form.name, doubts)
-    )
-    return Driving(record, _made("turn", form.name, turn), _made("blur", form.name, blur))
+    doubts = _made("doubts", form.name, doubts)
+    return Record(form.name, form.columns, form.numbers, form.constants, form.put, form.get, doubts)
 
 
 def _longer(driving: Driving, form: Form) -> Driving:
