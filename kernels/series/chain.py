@@ -14,7 +14,7 @@ import numpy as np
 
 from kernels._jit import generated_inline
 from kernels.series.form import BLOCK, STRIDE, Form, Helper, Travel, Turned
-from kernels.series.links import NUMBERS, blurred_through, enter, get_link, link_of, put_link, through
+from kernels.series.links import NUMBERS, Input, blurred_through, enter, get_link, link_of, put_link, through
 
 LIBRARY = 2  # rows of a block before the columns of a stage: what comes from the library
 COUPLING = 2  # columns kappa and offset of the design matrix behind those of each stage but the first
@@ -81,7 +81,9 @@ class Chained:
 
 @lru_cache(maxsize=64)
 def chained(forms: tuple[Form, ...]) -> Chained:
-    """Compose the closures of two stages or more, each of which drives the next."""
+    """Compose the closures of stages each of which drives the next; a stage alone moves by the chain's crank itself."""
+    if len(forms) == 1:
+        return _alone(forms[0])
     driving = _first(forms[0])
     for form in forms[1:-1]:
         driving = _longer(driving, form)
@@ -101,11 +103,31 @@ def _first(form: Form) -> Driving:
         b0, b1, b2, b3 = blur_alone(c, u, v, m.d1, m.d2, m.d3)
         return m, b0, b1, b2, b3
 
-    def doubts(c: Any) -> Any:
-        return (c.doubt,)
+    return Driving(_recorded_first(form), _made("turn", form.name, turn), _made("blur", form.name, blur))
 
-    record = _recorded_first(form, _made("doubts", form.name, doubts))
-    return Driving(record, _made("turn", form.name, turn), _made("blur", form.name, blur))
+
+def _alone(form: Form) -> Chained:
+    travel_here, dip_here, blur_here = form.travel, form.dip, form.travel_blur
+
+    def drive(c: Any, u: Any, v: Any) -> Any:
+        return Input(u, v, 1.0, 0.0, 0.0, 0.0), ()
+
+    def land(c: Any, t: Any) -> Any:
+        return travel_here(c, t.u, t.v)
+
+    def travel(c: Any, u: Any, v: Any) -> Any:
+        n = travel_here(c, u, v)
+        return n, (n.delta,)
+
+    def dip(c: Any, t: Any) -> Any:
+        return dip_here(c, t.u, t.v)
+
+    def blur(c: Any, u: Any, v: Any) -> Any:
+        n = travel_here(c, u, v)
+        return blur_here(c, u, v, n.x1, n.x2, n.x3)
+
+    made = [_made(f.__name__, f"{form.name}_alone", f) for f in (travel, drive, land, dip, blur)]
+    return Chained(1, _recorded_first(form), *made)
 
 
 def _longer(driving: Driving, form: Form) -> Driving:
@@ -172,8 +194,12 @@ def _ended(driving: Driving, form: Form, stages: int) -> Chained:
     return Chained(stages, record, travel, drive, land, dip, blur)
 
 
-def _recorded_first(form: Form, doubts: Helper) -> Record:
+def _recorded_first(form: Form) -> Record:
     """Return the constants of a first stage."""
+
+    def doubts(c: Any) -> Any:
+        return (c.doubt,)
+
     constants, load, loaded = _from_columns(form, form.name, 0, 0)
     return Record(
         form.name,
@@ -185,7 +211,7 @@ def _recorded_first(form: Form, doubts: Helper) -> Record:
         loaded,
         form.put,
         form.get,
-        doubts,
+        _made("doubts", form.name, doubts),
     )
 
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from kernels import status as st
 from kernels.families import guide
+from kernels.families import rssr as rssr_kernels
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, PoseFunction, filled_with_places
 from sweep.families.capabilities import (
@@ -170,6 +173,16 @@ def y_of_point(designs: Array) -> Array:
 
 
 _ALONG, _ACROSS = constant(1.0, 0.0, 0.0), constant(0.0, 1.0, 0.0)
+
+
+def opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
+    """Tell whether the crank turns, and how near the motion's nearest singularity is; as of the crank-rocker."""
+    rssr_kernels.opening(as_crank_rocker(designs), status, distance)
+    # The loop of the crank-rocker has neither the guided point nor the line.
+    known = np.isfinite(designs).all(axis=1) & (np.abs(parameter(PARAMETERS, "lam", designs)) < 1e5)
+    status[~known] = st.INVALID_INPUT
+
+
 IN_SERIES = InSeries(
     guide.FORM,
     {
@@ -178,6 +191,7 @@ IN_SERIES = InSeries(
         "x_m": Curve(0, x_of_point), "y_m": Curve(0, y_of_point),
     },
     {"ds": "x1", "d2s": "x2", "d3s": "x3", "dev": "y0", "ddev": "y1", "d2dev": "y2"},
+    opening,
 )  # fmt: skip
 
 FAMILY = Family(

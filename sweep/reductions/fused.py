@@ -1,10 +1,12 @@
-"""Extrema over the turn of chains whose stages are fused into one kernel (:mod:`kernels.series`); docs/extrema.md."""
+"""Extrema over the turn of chains whose stages are fused into one kernel (:mod:`kernels.series`); docs/extrema.md.
+
+A family that can only end a chain is one by itself: a guide whose crank is the main shaft.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import cast
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from kernels import status as st
 from kernels.series.curves import MARGIN
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries
-from sweep.families.chain import Chain
+from sweep.families.chain import Chain, stages_of
 from sweep.reductions.refine import EPS, SHRINK, Peaks, confirmed, polished
 from sweep.reductions.request import Extremum, Request
 from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, pose_columns, turn
@@ -35,7 +37,7 @@ class FusedCurve:
     scale : by which the kernel's values are multiplied, from the chain's designs; None for 1
     """
 
-    family: Chain
+    family: Family
     request: Request
     forms: tuple[InSeries, ...]
     order: int
@@ -58,7 +60,7 @@ class FusedCurve:
         """
         n, designs = len(designs), np.ascontiguousarray(designs)
         opening, distance = np.empty(n, np.uint8), np.empty(n)
-        opens, stage = self.forms[0].opening, self.family.stages[len(self.forms) - 1]
+        opens, stage = self.forms[0].opening, stages_of(self.family)[len(self.forms) - 1]
         assert opens is not None
         opens(designs, opening, distance)
         made_of = np.ascontiguousarray(self.made_of(designs[:, stage.columns]))
@@ -120,7 +122,7 @@ class FusedCurve:
         return {name: values[:, 0].copy() for name, values in poses.items()}
 
     def _later(self) -> list[Assembly]:
-        return [loop for loop in self.family.every(Assembly) if int(loop.stage) in range(2, len(self.forms) + 1)]
+        return [loop for loop in self.family.every(Assembly) if loop.stage and 2 <= int(loop.stage) <= len(self.forms)]
 
     def _behind(self, designs: Array, there: dict[str, Array]) -> Array:
         """Share of a value by which the rounded input angles of the later stages' precise poses may change it."""
@@ -138,20 +140,19 @@ def curve_of(family: Family, request: Request, anywhere: bool) -> FusedCurve | N
     forms = _forms(family)
     if forms is None:
         return None
-    chain = cast(Chain, family)
     if anywhere:
-        return _least_discriminant(chain, forms, request)
-    output, last = chain.pose_output[request.pose], chain.stages[-1]
-    if output.stage not in ("", str(last.number)) or (request.place and request.pose not in chain.derivative_of):
+        return _least_discriminant(family, forms, request)
+    output, last = family.pose_output[request.pose], stages_of(family)[-1]
+    if output.stage not in ("", str(last.number)) or (request.place and request.pose not in family.derivative_of):
         return None
     # Derivatives that carry the number of their stage are not with respect to the crank angle of the chain.
     curve: Curve | None = forms[-1].curves.get(output.base)
     if curve is None or (output.stage and curve.order > 0):
         return None
-    return FusedCurve(chain, request, forms, curve.order, curve.made_of)
+    return FusedCurve(family, request, forms, curve.order, curve.made_of)
 
 
-def _least_discriminant(family: Chain, forms: tuple[InSeries, ...], request: Request) -> FusedCurve | None:
+def _least_discriminant(family: Family, forms: tuple[InSeries, ...], request: Request) -> FusedCurve | None:
     if request.mode != -1:
         return None
     loop = next((loop for loop in family.every(Assembly) if loop.discriminant == request.pose), None)
@@ -170,7 +171,7 @@ def sampled_maxima(family: Family, designs: Array, requests: tuple[Request, ...]
 
     Each is (n,), nan where a discriminant on the grid is not surely positive: what the status is, poses say.
     """
-    forms = _forms(family)
+    forms = _forms(family) if isinstance(family, Chain) else None
     wanted = {} if forms is None else {r: name for r in requests if (name := _component(family, forms, r)) is not None}
     if forms is None or not wanted:
         return {}
@@ -198,11 +199,13 @@ def _component(family: Family, forms: tuple[InSeries, ...], request: Request) ->
 
 def _forms(family: Family) -> tuple[InSeries, ...] | None:
     """Return what the stages of a chain are fused by; None for any other family, and for poses of higher precision."""
-    if not isinstance(family, Chain) or family.poses is family.precise_poses:
+    if family.poses is family.precise_poses:
         return None
-    forms = [stage.family.find(InSeries) for stage in family.stages]
+    forms = [stage.family.find(InSeries) for stage in stages_of(family)]
     known = tuple(form for form in forms if form is not None)
     fits = len(known) == len(forms) and known[0].opening is not None
+    if len(forms) == 1:  # what can drive another stage has steps of its own
+        return known if fits and known[0].form.turn is None else None
     return known if fits and all(form.form.turn is not None for form in known[:-1]) else None
 
 
