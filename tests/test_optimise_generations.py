@@ -229,9 +229,13 @@ def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_three_populations_of_any_seed_find_the_record(seed: int) -> None:
+    """Bounds of what the fit makes are those of the study's 24 drawn designs, as in `make bench-basins`.
+
+    With the bounds of a single design the first three populations of seed 4 end at 10.4279; the study makes eleven.
+    """
     study = record(seed=seed, starts=3, populations=3, looks=2000)
     assert study.optimise is not None
-    known = drawn(study, 1, seed)
+    known = drawn(study, 24, seed)
     problem = problem_of(study, known)
     begun = proportion_starts(study, study.optimise, problem, known[:0], np.empty(0), lambda: False, 2)
     results, found = explore(begun.problem, begun.starts, study.optimise, None, 2, None, begun.origins)
