@@ -188,6 +188,37 @@ def test_near_change_points_no_error_exceeds_its_estimate(name):
     assert (off <= found[request].err[good] + shared).all()
 
 
+def hard_sliders(kind, n, seed):
+    """Slider-cranks whose terms cancel, or whose motion is tiny against their links."""
+    designs, r = slider_cranks(n, seed), np.random.default_rng(seed)
+    if kind == "slide along the crank axis":
+        designs[:, 4] = 0.5 * np.pi - 10.0 ** r.uniform(-12.0, -1.0, n)
+    elif kind == "tiny crank":
+        designs[:, 0] = 10.0 ** r.uniform(-10.0, -4.0, n)
+    else:
+        designs[:, 3] = 10.0 ** r.uniform(2.0, 6.0, n)
+        designs[:, 1] += designs[:, 3] * np.cos(designs[:, 4]) + 2.0 * designs[:, 0] + np.abs(designs[:, 2])
+    return designs
+
+
+@pytest.mark.parametrize("kind", ["slide along the crank axis", "tiny crank", "long offset"])
+@pytest.mark.parametrize("name", ["rssr+rssp", "rssp"])
+def test_no_error_of_hard_sliders_exceeds_its_estimate(name, kind):
+    of, designs, request = FAMILIES[name], hard_sliders(kind, 600, 4), Request("d2s", 0)
+    if of is DRIVEN_SLIDER:
+        driven = driven_sliders(600, 4)
+        driven[:, 8:14] = designs
+        designs = driven
+    found, status = extrema.true_extrema(of, designs, [request], 1e-8)
+    slow, other = extrema.true_extrema(of, designs, [request], 1e-8, locate=True)
+    np.testing.assert_array_equal(status, other)
+    good = status == st.OK
+    assert good.sum() > 100
+    exact = climbed(of, designs[good], "d2s", 0, slow[request].phi[good])
+    shared = 8.0 * EPS * amplified(of, designs[good]) * np.abs(exact) if of is DRIVEN_SLIDER else 0.0
+    assert (np.abs(found[request].value[good] - exact) <= found[request].err[good] + shared).all()
+
+
 @pytest.mark.parametrize("name", ["rssr+rssp", "rssp"])
 def test_statuses_are_those_of_the_search_on_poses(name):
     of = FAMILIES[name]

@@ -123,9 +123,10 @@ def _travel_blur(c: Constants, u: Any, v: Any, x1: Any, x2: Any, x3: Any) -> tup
     per_w = 1.0 / root
     w1, w2, w3 = root_derivatives(c, u, v, c.k0 + c.ka * v, c.branch * per_w)
     w1, w2, w3, lift = abs(w1), abs(w2), abs(w3), abs(c.ka)
-    tolerance = 4.0 * EPS * (abs(m) * c.m_size + abs(n) * c.n_size + abs(q))
+    # As kernels.slider_closure.tolerance: where f is long and Q small, Q has most of that.
+    tolerance = 8.0 * EPS * (abs(m) * c.m_size + abs(n) * c.n_size) + 4.0 * EPS * abs(q)
     share = 0.5 * tolerance * per_w * per_w + 4.0 * EPS  # relative error of w, and of a sum times 1/w
-    terms = 4.0 * EPS * (lift * (abs(c.k0) + 4.0 * lift) + c.a * abs(c.e))
+    terms = 8.0 * EPS * (lift * (abs(c.k0) + 4.0 * lift) + c.a * abs(c.e))
     b1 = w1 * share + terms * per_w
     b2 = w2 * share + (terms + 2.0 * w1 * b1) * per_w
     b3 = w3 * share + (terms + 3.0 * (w1 * b2 + w2 * b1)) * per_w
