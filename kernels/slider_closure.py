@@ -35,10 +35,17 @@ class Reduced(NamedTuple):
 @inline
 def reduce_scaled(a: Any, b: Any, e: Any, f: Any, alpha: Any, branch: Any, unit: float) -> Reduced:
     """Return constants of one design whose lengths are given in ``unit``; crank a, coupler b, offsets e and f."""
-    sa, ca = np.sin(alpha), np.cos(alpha)
+    return reduce_along(a, b, e, f, alpha, np.cos(alpha), np.sin(alpha), branch, unit)
+
+
+@inline
+def reduce_along(a: Any, b: Any, e: Any, f: Any, alpha: Any, ca: Any, sa: Any, branch: Any, unit: float) -> Reduced:
+    """As :func:`reduce_scaled`, with cosine and sine of alpha given;
+    without a branch or a call, so that it vectorises.
+    """
     m_size, n_size = abs(e.real) + a.real, abs(f.real) + a.real
-    valid = a.real > 0.0 and 0.0 < b.real < 1e140 and m_size < 1e140 and n_size < 1e140
-    valid = valid and abs(alpha.real) < 1e5 and branch.real * branch.real == 1.0
+    valid = (a.real > 0.0) & (b.real > 0.0) & (b.real < 1e140) & (m_size < 1e140) & (n_size < 1e140)
+    valid = valid & (abs(alpha.real) < 1e5) & (branch.real * branch.real == 1.0)
     return Reduced(a, b, e, f * sa, a * ca, f * ca, a * sa, m_size, n_size, branch, unit, valid)
 
 
@@ -51,8 +58,8 @@ class Place(NamedTuple):
 
 
 @inline
-def place(r: Reduced, u: Any, v: Any) -> Place:
-    """Evaluate the closure at (cos phi, sin phi) = (u, v); (1), (2)."""
+def place(r: Any, u: Any, v: Any) -> Place:
+    """Evaluate the closure at (cos phi, sin phi) = (u, v); (1), (2).  ``r`` has a, b, e, n0, na of :class:`Reduced`."""
     m, n = r.e - r.a * u, r.n0 - r.na * v
     # As a product: b^2 - m^2 would lose the digits of a small difference.
     return Place(m, n, (r.b - m) * (r.b + m) - n * n)
@@ -74,9 +81,16 @@ def derivatives(r: Reduced, u: Any, v: Any, y: Any, per_w: Any) -> tuple[Any, An
 
     What the caller does not use leaves no instruction.
     """
+    w1, w2, w3 = root_derivatives(r, u, v, y, per_w)
+    return r.ka * u + w1, w2 - r.ka * v, w3 - r.ka * u
+
+
+@inline
+def root_derivatives(r: Any, u: Any, v: Any, y: Any, per_w: Any) -> tuple[Any, Any, Any]:
+    """Return the first to third derivative of w = branch sqrt(Q), arguments as of :func:`derivatives`; (5)."""
     # m m' + n n' with cos^2(phi) + sin^2(phi) = 1 taken out: as it stands it cancels for alpha near 90 deg.
     q1 = r.ka * u * y - r.a * v * r.e
     w1 = q1 * per_w
     w2 = (r.ka * (r.ka * u * u - v * y) - r.a * u * r.e - w1 * w1) * per_w
     w3 = (-q1 - 3.0 * r.ka * r.ka * u * v - 3.0 * w1 * w2) * per_w
-    return r.ka * u + w1, w2 - r.ka * v, w3 - r.ka * u
+    return w1, w2, w3

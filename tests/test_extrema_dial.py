@@ -15,17 +15,21 @@ from kernels import status as st
 from studies.accuracy.regions import regions
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
+from sweep.families.capabilities import InSeries
 from sweep.reductions.extrema import Request, true_extrema
 from tests.climbing import climbed, turning_points, values
 from tests.turn_designs import GUIDE, NEEDLE, RSSP, RSSR, crank_rockers, guided_four_bars, needle_drives, slider_cranks
 
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 ALONE = replace(RSSR, steps=())
+ON_POSES = replace(RSSP, capabilities=tuple(one for one in RSSP.capabilities if not isinstance(one, InSeries)))
 ROCKER = (Request("d2psi", 0), Request("d3psi", 0), Request("psi", 1))
+SLIDE = (Request("d2s", 0), Request("d3s", 0), Request("s", 1))
 TRAVEL = (Request("d2s", 0), Request("d3s", 0), Request("dev", 0), Request("s", 1), Request("s", -1))
 CASES = {
     "rssr": (ALONE, crank_rockers, 2000, ROCKER),
-    "rssp": (RSSP, slider_cranks, 1000, (Request("d2s", 0), Request("d3s", 0), Request("s", 1))),
+    "rssp": (RSSP, slider_cranks, 1000, SLIDE),
+    "rssp on poses": (ON_POSES, slider_cranks, 1000, SLIDE),
     "guide": (GUIDE, guided_four_bars, 1000, TRAVEL),
     "rssr+guide": (NEEDLE, needle_drives, 1000, TRAVEL),
 }
@@ -56,7 +60,7 @@ def test_errors_fall_with_the_target_and_stay_below_it(case):
         relative = np.abs(found[requests[0]].value / exact[requests[0]] - 1.0)
         assert relative.max() <= target
         worst.append(np.quantile(relative, 0.99))
-    if family in (GUIDE, NEEDLE):
+    if family in (GUIDE, NEEDLE, RSSP):
         assert max(worst) < 1e-12  # the Newton steps of a fused search reach its rounding at any target
     else:
         assert worst[0] > 10.0 * worst[1] > 100.0 * worst[2]  # at 1e-6 most are exact already

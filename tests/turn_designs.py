@@ -1,4 +1,4 @@
-"""Random mechanisms for the tests of extrema: crank-rockers, slider-cranks, guided four-bars and a chain."""
+"""Random mechanisms for the tests of extrema: crank-rockers, slider-cranks, guided four-bars and chains."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from sweep.families import family
 
 RSSR, RSSP, GUIDE = family("rssr"), family("rssp"), family("guide")
-NEEDLE = family(["rssr", "guide"])
+NEEDLE, DRIVEN_SLIDER = family(["rssr", "guide"]), family(["rssr", "rssp"])
 
 
 def crank_rockers(n, seed):
@@ -33,6 +33,12 @@ def needle_drives(n, seed):
     r = np.random.default_rng(seed + 1000)
     coupling = np.column_stack([r.choice([-1.0, 1.0], n), r.uniform(-3.0, 3.0, n)])
     return np.column_stack([crank_rockers(n, seed), guided_four_bars(n, seed + 1, (0.5, 2.0)), coupling])
+
+
+def driven_sliders(n, seed):
+    r = np.random.default_rng(seed + 2)
+    coupling = np.column_stack([r.choice([-1.0, 1.0], n), r.uniform(-3.0, 3.0, n)])
+    return np.column_stack([crank_rockers(n, seed), slider_cranks(n, seed + 1), coupling])
 
 
 MAKERS = {"rssr": (RSSR, crank_rockers), "rssp": (RSSP, slider_cranks), "guide": (GUIDE, guided_four_bars)}

@@ -7,7 +7,17 @@ from numpy.typing import NDArray
 
 from kernels.families import rssp
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
-from sweep.families.capabilities import Assembly, JointRecords, LimitLocus, Points, PressureEllipse, Skeleton
+from sweep.families.capabilities import (
+    Assembly,
+    Curve,
+    InSeries,
+    JointRecords,
+    LimitLocus,
+    Points,
+    PressureEllipse,
+    Skeleton,
+    constant,
+)
 from sweep.families.hardpoints import SLIDER_CRANK_POINTS
 from sweep.families.skeletons import SLIDER_CRANK, SLIDER_CRANK_SIZES, Y, crank_axis, standing
 
@@ -149,6 +159,16 @@ def coupler_square(designs: Array) -> Array:
     return square
 
 
+_NAMES = ("s", "ds", "d2s", "d3s")
+CURVES = {name: Curve(order, constant(1.0, 0.0, 0.0)) for order, name in enumerate(_NAMES)}
+COMPONENTS = {"ds": "x1", "d2s": "x2", "d3s": "x3"}
+
+
+def opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
+    """Tell whether the crank turns, and how near the motion's nearest singularity is."""
+    rssp.opening(np.ascontiguousarray(designs), status, distance)
+
+
 FAMILY = Family(
     name="rssp",
     title="spatial slider-crank",
@@ -166,6 +186,7 @@ FAMILY = Family(
     capabilities=(
         SLIDER_CRANK_SIZES,
         Assembly("discriminant", "pressure_angle", coupler_square),
+        InSeries(rssp.FORM, CURVES, COMPONENTS, opening),
         JointRecords(joint_records, _JOINT_NEEDS, "slider"),
         PressureEllipse(ellipse),
         LimitLocus("stroke"),

@@ -8,10 +8,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from kernels.families.rssp import PLANAR_FORM
 from sweep.families import rssp
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
-from sweep.families.capabilities import Assembly, JointRecords, Points, Skeleton
+from sweep.families.capabilities import Assembly, InSeries, JointRecords, Points, Skeleton
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS
 from sweep.families.placing import move_records
 from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, standing
@@ -93,6 +95,11 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
     move_records(_FROM_SPATIAL, np.zeros((len(designs), 3)), per_pose, per_design)
 
 
+def opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
+    """Tell whether the crank turns, and how near the motion's nearest singularity is."""
+    rssp.opening(as_spatial(designs), status, distance)
+
+
 FAMILY = Family(
     name="slider_crank",
     title="planar slider-crank",
@@ -108,6 +115,7 @@ FAMILY = Family(
     capabilities=(
         SLIDER_CRANK_SIZES,
         Assembly("discriminant", "pressure_angle", rssp.coupler_square),
+        InSeries(PLANAR_FORM, rssp.CURVES, rssp.COMPONENTS, opening),
         JointRecords(joint_records, ("s", "ds", "d2s", "discriminant"), "slider"),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
         PLANAR_SLIDER_POINTS,

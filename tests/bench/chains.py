@@ -3,8 +3,9 @@
 The needle drive [rssr, guide]: ns per (design, crank angle) of the dense loop to acceleration with deviation, next to
 C with -O3 -march=native -ffast-math on the same formulas in the same run, and to the stages one after the other; us
 per design of true extrema to 1e-8, whatever decides them included, and their ratio to a grid of 360 angles; the same
-with the proof that no peak was missed.  All
-variants take turns, and each counts with its fastest round.
+with the proof that no peak was missed.  Then the dense
+loop to acceleration and its true maximum of a driven slider [rssr, rssp].  All variants take turns, and each counts
+with its fastest round.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ from typing import Any
 import numpy as np
 
 from kernels import series
-from kernels.families import guide, rssr
+from kernels.families import guide, rssp, rssr
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Angles
 from tests.bench.extrema import turning
 from tests.bench.kernels import FLAGS, measure
-from tests.turn_designs import NEEDLE, needle_drives
+from tests.turn_designs import DRIVEN_SLIDER, NEEDLE, driven_sliders, needle_drives
 
 DESIGNS, MANY, SAMPLES, ROUNDS = 2048, 16384, 360, 15
 WANTED = (
@@ -119,6 +120,24 @@ def dense(designs: Any) -> dict[str, tuple[Callable[[], object], float]]:
     return {name: (run, float(n * SAMPLES)) for name, run in runs.items()}
 
 
+def dense_sliders(designs: Any) -> dict[str, tuple[Callable[[], object], float]]:
+    """The dense loop of driven sliders, fused and staged: largest |d2s| and least discriminants."""
+    phi, n = np.arange(SAMPLES) * (2.0 * np.pi / SAMPLES), len(designs)
+    angles, least, acceleration = Angles.of(phi[None]), np.empty((n, 2)), np.empty(n)
+    kernel = series.dense_maxima(series.chained((rssr.FORM, rssp.FORM)))
+
+    def fused() -> Any:
+        kernel(designs, angles.cos[0], angles.sin[0], least, None, acceleration, None, None, None, None)
+        return acceleration
+
+    def staged() -> Any:
+        return np.abs(DRIVEN_SLIDER.poses(designs, angles, frozenset(("d2s",)))["d2s"]).max(axis=1)
+
+    np.testing.assert_allclose(staged(), fused(), rtol=1e-6)
+    count = float(n * SAMPLES)
+    return {"dense slider, fused": (fused, count), "dense slider, stage by stage": (staged, count)}
+
+
 def main(rounds: int = ROUNDS) -> None:
     """Print the table."""
     designs = turning(NEEDLE, needle_drives, MANY)
@@ -129,8 +148,12 @@ def main(rounds: int = ROUNDS) -> None:
     for names in PROVEN:
         label = "proven " + ", ".join(names)
         runs[label] = (partial(design_outputs, NEEDLE, designs, names, SURE), float(MANY))
+    sliders = turning(DRIVEN_SLIDER, driven_sliders, MANY)
+    runs |= dense_sliders(np.ascontiguousarray(sliders[:DESIGNS]))
+    search = partial(design_outputs, DRIVEN_SLIDER, sliders, ["max_abs_d2s"], FINE)
+    runs["true slider max_abs_d2s"] = (search, float(MANY))
     best = measure(runs, rounds)
-    print(f"needle drives, fastest of {rounds} interleaved rounds\n")
+    print(f"needle drives and driven sliders, fastest of {rounds} interleaved rounds\n")
     own = best["dense, fused"]
     for name, ns in best.items():
         if name.startswith("dense"):

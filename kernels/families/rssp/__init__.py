@@ -2,7 +2,7 @@
 
 ``closure`` reduces a design to its constants, ``motion`` evaluates poses, ``precise`` the same in twice the working
 precision, ``margin`` decides rotatability and the largest pressure angle, ``limits`` finds the limit positions,
-``joints`` and ``ellipse`` are what effects work from.
+``joints`` and ``ellipse`` are what effects work from, ``stage`` what chains are fused by.
 """
 
 from kernels.families.rssp.closure import Design as Design
@@ -12,3 +12,6 @@ from kernels.families.rssp.limits import limits as limits
 from kernels.families.rssp.margin import margin as margin
 from kernels.families.rssp.motion import poses as poses
 from kernels.families.rssp.precise import precise_poses as precise_poses
+from kernels.families.rssp.stage import FORM as FORM
+from kernels.families.rssp.stage import PLANAR_FORM as PLANAR_FORM
+from kernels.families.rssp.stage import opening as opening
