@@ -7,10 +7,14 @@ import os
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
+
+import pytest
 
 from kernels import _claims
 from sweep.engine import ahead
+from sweep.evaluation import summaries
 from sweep.jobs.progress import Phases
 from sweep.optimise.rehearsal import rehearsal
 from sweep.study.load import load_study
@@ -155,3 +159,14 @@ def test_what_the_second_process_does_covers_a_search_for_what_is_made() -> None
     assert len(steps) == 4
     for step in steps:
         step()
+
+
+def test_the_second_process_begins_with_the_objective_of_the_reference_design(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = load_study(ROOT / "studies" / "needle208", smoke=True)
+    asked: list[list[str]] = []
+    monkeypatch.setattr(summaries, "design_outputs", lambda family, designs, names, *_: asked.append(names))
+    for step in ahead._objective(study):
+        step()
+    assert asked == [["max_abs_d2s"]]
+    assert ahead._objective(replace(study, reference=None)) == []
+    assert ahead._objective(replace(study, objective=None)) == []

@@ -9,8 +9,9 @@ import numba
 import numpy as np
 import pytest
 
+import kernels.families.rssr
 from sweep.families import family, rssr
-from sweep.families.base import Angles, Array, Columns
+from sweep.families.base import Accuracy, Angles, Array, Columns
 from sweep.families.together import MANY, PAID, Together, own_code
 from sweep.reductions.sampling import turn
 from tests.rssr_designs import random_designs
@@ -100,3 +101,26 @@ def test_poses_go_to_another_process_by_their_name() -> None:
 
 def test_a_turn_has_the_type_of_all_angles_so_that_kernels_are_compiled_once() -> None:
     assert [numba.typeof(x) for x in turn(16)] == [numba.typeof(x) for x in angles(16)]
+
+
+@pytest.mark.parametrize("target", [None, 1e-6])
+def test_every_set_with_the_pressure_angle_takes_one_code_and_gives_what_is_wanted(
+    target: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    designs, accuracy = random_designs(50, 7), Accuracy(target=target)
+    kernel, sets = kernels.families.rssr.margin, set()
+
+    def noted(*arrays: Array | None) -> None:
+        sets.add(tuple(x is None for x in arrays))
+        kernel(*arrays)
+
+    monkeypatch.setattr(kernels.families.rssr, "margin", noted)
+    every = rssr.margin(designs, frozenset(("margin", "rotatable", "max_pressure_angle")), accuracy)
+    for wanted in (frozenset(("max_pressure_angle",)), frozenset(("rotatable", "max_pressure_angle"))):
+        found = rssr.margin(designs, wanted, accuracy)
+        errors = {f"err_{name}" for name in wanted} if target is not None else set()
+        assert set(found) == {"status"} | wanted | errors
+        for name, values in found.items():
+            np.testing.assert_array_equal(values, every[name])
+    assert len(sets) == 1
+    np.testing.assert_array_equal(rssr.margin(designs, frozenset(("margin",)), accuracy)["margin"], every["margin"])

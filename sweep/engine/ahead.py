@@ -1,8 +1,8 @@
 """A second process that compiles what a study will need later, while the first one compiles what it needs now.
 
 It is forked where the first kernel is missing in the cache, so it costs no imports and, with a full cache, nothing.  It
-goes through the study on a few designs, from the optimum back to the sweep, until both processes meet.  What it
-computes is thrown away; the kernels stay in the cache.
+goes through the study on a few designs, the objective first, then the search for the optimum, then the sweep from its
+end, until both processes meet.  What it computes is thrown away; the kernels stay in the cache.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ from sweep.jobs.signals import depend_on_parent
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
+    from sweep.families.base import Array
     from sweep.study import Study
 
 
@@ -92,12 +94,15 @@ def _end_after(work: Callable[[], None], parent: int) -> None:
 
 
 def _compile(study: Study) -> None:
-    """Do what the study does, last things first; what needs a kernel that the first process is at has to wait."""
+    """Do what the study does, last things first; what needs a kernel that the first process is at has to wait.
+
+    First of all comes the objective: nothing takes longer to compile, and it is the last that the sweep needs.
+    """
     from kernels._claims import impatient
     from sweep.optimise.rehearsal import rehearsal
 
     with impatient():
-        left = _undone(rehearsal(study))
+        left = _undone(chain(_objective(study), rehearsal(study)))
     steps = _sweep(study) + left
     with impatient():
         left = _undone(steps)
@@ -119,14 +124,25 @@ def _undone(steps: Iterable[Callable[[], object]]) -> list[Callable[[], object]]
     return left
 
 
+def _objective(study: Study) -> list[Callable[[], object]]:
+    """Return the step that computes the objective of the reference design, which no kernel has to make."""
+    from sweep.evaluation.tables import design_matrix
+
+    if study.reference is None or study.objective is None:
+        return []
+    return [_asked(study, design_matrix(study.family, study.reference)[0], [study.objective.output])]
+
+
 def _sweep(study: Study) -> list[Callable[[], object]]:
     """Return the steps of a sweep, last ones first, for a few designs."""
     from sweep.chunks.chunk import asked_outputs, few_designs
-    from sweep.evaluation.summaries import design_outputs
 
     designs = few_designs(study)
+    return [_asked(study, designs, names[::-1]) for names in reversed(asked_outputs(study))]
 
-    def asked(names: Sequence[str]) -> Callable[[], object]:
-        return lambda: design_outputs(study.family, designs, names[::-1], study.accuracy, study.window)
 
-    return [asked(names) for names in reversed(asked_outputs(study))]
+def _asked(study: Study, designs: Array, names: Sequence[str]) -> Callable[[], object]:
+    """Return the step that computes outputs of designs."""
+    from sweep.evaluation.summaries import design_outputs
+
+    return lambda: design_outputs(study.family, designs, names, study.accuracy, study.window)

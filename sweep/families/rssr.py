@@ -172,18 +172,21 @@ def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     needed = set(wanted)
     if with_error:
         needed |= {"error", "angle_error"} if "max_pressure_angle" in wanted else {"error"}
+    if "max_pressure_angle" in wanted:
+        # Beside its arctangent they take no time, but code for each set of outputs takes half a second to compile.
+        needed |= {"margin", "rotatable"}
     least, turns, angle, error, angle_error = optional_outputs(names, frozenset(needed), (n,))
     rssr.margin(designs, status, least, turns, angle, None, error, angle_error)
     columns: Columns = {"status": status}
-    if turns is not None:
+    if turns is not None and "rotatable" in wanted:
         columns["rotatable"] = turns == 1.0
-    if least is not None:
+    if least is not None and "margin" in wanted:
         columns["margin"] = least
     if angle is not None:
         columns["max_pressure_angle"] = angle
     if accuracy.target is not None and "rotatable" in wanted:
         columns["err_rotatable"] = np.zeros(n)
-    if error is not None and least is not None:
+    if error is not None and "margin" in wanted:
         columns["err_margin"] = error
     if angle_error is not None:
         columns["err_max_pressure_angle"] = angle_error

@@ -18,9 +18,9 @@ import numpy as np
 from sweep.families.base import Angles, Array, Columns, PoseFunction
 
 MANY = 2**16  # poses of one call: dense samples, or the price of an output being measured
-# Poses of all calls so far.  All outputs take 30 to 100 ns more per pose than a few: for so many, as long as compiling.
+# Poses of all calls so far.  All outputs take up to 40 ns more per pose than a few, 60 ns more where they are complex:
+# for so many, less than a set takes to compile.
 PAID = 2**21
-COMPLEX = 8  # real poses that take as long as a complex one, whose outputs take 1 us more
 
 _each_its_own = ContextVar("every set of outputs has machine code of its own", default=False)
 
@@ -51,7 +51,7 @@ class Together:
     def __call__(self, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
         """Return the wanted outputs and the status of every design at its angles, each (n, m)."""
         key = wanted, np.iscomplexobj(angles.cos) or np.iscomplexobj(designs)
-        count = len(designs) * angles.cos.shape[1] * (COMPLEX if key[1] else 1)
+        count = len(designs) * angles.cos.shape[1]
         self._asked[key] = self._asked.get(key, 0) + count
         if count >= MANY or self._asked[key] > PAID or _each_its_own.get():
             return self._poses(designs, angles, wanted)
