@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import os
 import subprocess
 import sys
-import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +13,6 @@ import pytest
 from kernels import _claims
 from sweep.engine import ahead
 from sweep.evaluation import summaries
-from sweep.jobs.progress import Phases
 from sweep.optimise.rehearsal import rehearsal
 from sweep.study.load import load_study
 from tests.engine_study import ROOT, chunk_bytes, write_study
@@ -138,18 +135,27 @@ def test_two_processes_begin_where_a_kernel_is_missing_and_write_the_same_bytes(
     assert bytes_of[0] == bytes_of[1] == bytes_of[2] and bytes_of[0]
 
 
-def test_no_process_is_forked_beside_threads_that_may_hold_locks(tmp_path: Path) -> None:
-    over = threading.Event()
-    other = threading.Thread(target=over.wait)
-    other.start()
-    try:
-        assert not ahead._may_fork()
-    finally:
-        over.set()
-        other.join()
-    with Phases(True, io.StringIO()) as phases:
-        phases.say("compiling")
-        assert ahead._may_fork()
+THREADS = """
+import io, threading
+from sweep.engine import ahead
+from sweep.jobs.progress import Phases
+
+over = threading.Event()
+other = threading.Thread(target=over.wait)
+other.start()
+print(ahead._may_fork())
+over.set()
+other.join()
+with Phases(True, io.StringIO()) as phases:
+    phases.say("compiling")
+    print(ahead._may_fork())
+"""
+
+
+def test_no_process_is_forked_beside_threads_that_may_hold_locks() -> None:
+    """In a process of its own, which has no threads of other tests."""
+    done = subprocess.run([sys.executable, "-c", THREADS], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "True"]
 
 
 def test_what_the_second_process_does_covers_a_search_for_what_is_made() -> None:

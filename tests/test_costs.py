@@ -110,12 +110,13 @@ def test_rows_and_identity_of_a_dataset_do_not_depend_on_measured_times(name, fa
 def test_the_order_of_work_puts_no_dear_route_before_a_cheap_one_that_a_limit_tests(path):
     """Order is fixed by kind of work, not by time; here it is held against the measured times.
 
-    A factor of six: within a kind of work the order is that of the sources, not of the time.
+    A factor of eight: within a kind of work the order is that of the sources, not of the time, and two measurements of
+    a time differ by a fifth.
     """
     study = load_study(path)
     tested = {limit.output for limit in study.tested_limits}
     before = 0.0
     for level in levels(study):
         if level.route is not None and tested.intersection(level.route.outputs):
-            assert before < 6.0 * level.ns_per_design, level.route.name
+            assert before < 8.0 * level.ns_per_design, level.route.name
         before = max(before, level.ns_per_design)
