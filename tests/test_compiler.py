@@ -20,7 +20,6 @@ from kernels._jit import inline, kernel, part
 from kernels.families import rssr
 from kernels.families.rssr.derivatives import rocker_fused
 
-
 ROOT = Path(__file__).parents[1]
 
 
