@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.families.base import Angles
+from kernels import status as st
+from sweep.evaluation.summaries import design_outputs
+from sweep.families.base import Accuracy, Angles
+from sweep.reductions import extrema, fused
 
+EPS = 2.0**-53
 OFFSETS = np.arange(-4.0, 5.0) / 4.0
 HALVINGS = 60
 
@@ -43,3 +47,21 @@ def turning_points(family, designs, slope, phi, width=1e-5):
         left = np.sign(values(family, designs, slope, middle[:, None])[:, 0]) == at_low
         low, high = np.where(left, middle, low), np.where(left, high, middle)
     return np.where(bracketed, 0.5 * (low + high), np.nan)
+
+
+def amplified(family, designs):
+    """What a dead point of any stage makes of one rounding: the inverse of the least margin."""
+    return 1.0 + 1.0 / design_outputs(family, designs, ["margin"], Accuracy(target=1e-6))["margin"]
+
+
+def assert_fused_extrema_lie_within_their_errors(family, designs, request):
+    """Of precise poses, climbed from what the search on poses finds, the way where places are asked for too."""
+    assert fused.curve_of(family, request, False) is not None
+    found, status = extrema.true_extrema(family, designs, [request], 1e-8)
+    slow, _ = extrema.true_extrema(family, designs, [request], 1e-10, locate=True)
+    exact = climbed(family, designs, request.pose, request.mode, slow[request].phi)
+    assert (status == st.OK).all()
+    off = np.abs(found[request].value - exact)
+    # The chain's precise poses hand a rounded angle from stage to stage.
+    assert (off <= found[request].err + 8.0 * EPS * amplified(family, designs) * np.abs(exact)).all()
+    assert np.quantile(off / np.abs(exact), 0.9) < 1e-13

@@ -21,7 +21,7 @@ from sweep.families.base import Accuracy, Angles
 from sweep.families.capabilities import Assembly
 from sweep.reductions import extrema, fused
 from sweep.reductions.request import Request
-from tests.climbing import climbed
+from tests.climbing import amplified, assert_fused_extrema_lie_within_their_errors, climbed
 from tests.turn_designs import NEEDLE, crank_rockers, guided_four_bars
 
 EPS = 2.0**-53
@@ -59,12 +59,6 @@ def staged(of, designs, names):
     poses = of.poses(designs, Angles.of(PHI[None, :]), frozenset(names))
     assert (poses["status"] == st.OK).all()
     return poses
-
-
-def amplified(of, designs):
-    """What a dead point of any stage makes of one rounding: the inverse of the least margin."""
-    margin = design_outputs(of, designs, ["margin"], Accuracy(target=1e-6))["margin"]
-    return 1.0 + 1.0 / margin
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -130,18 +124,7 @@ REQUESTS = {
 @pytest.mark.parametrize(("name", "request_"), [(n, r) for n, rs in REQUESTS.items() for r in rs], ids=str)
 def test_extrema_lie_within_their_errors_of_precise_poses_climbed_from_the_search_on_poses(name, request_):
     of, designs = CASES[name]
-    curve = fused.curve_of(of, request_, False)
-    assert curve is not None
-    found, status = extrema.true_extrema(of, designs, [request_], 1e-8)
-    # With their places asked for, extrema are searched for on poses.
-    slow, _ = extrema.true_extrema(of, designs, [request_], 1e-10, locate=True)
-    exact = climbed(of, designs, request_.pose, request_.mode, slow[request_].phi)
-    assert (status == st.OK).all()
-    off = np.abs(found[request_].value - exact)
-    # The chain's precise poses hand a rounded angle from stage to stage.
-    allowed = found[request_].err + 8.0 * EPS * amplified(of, designs) * np.abs(exact)
-    assert (off <= allowed).all()
-    assert np.quantile(off / np.abs(exact), 0.9) < 1e-13
+    assert_fused_extrema_lie_within_their_errors(of, designs, request_)
 
 
 PLACES = {"rssr+guide": (Request("d2s", 0, place=True), Request("s", -1, place=True), Request("dev", 1, place=True))}

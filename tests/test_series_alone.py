@@ -10,7 +10,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
 from sweep.reductions import extrema, fused
 from sweep.reductions.request import Request
-from tests.climbing import climbed
+from tests.climbing import assert_fused_extrema_lie_within_their_errors, climbed
 from tests.turn_designs import GUIDE, guided_four_bars
 
 EPS = 2.0**-53
@@ -36,16 +36,8 @@ REQUESTS = (
 
 @pytest.mark.parametrize("request_", REQUESTS, ids=str)
 def test_extrema_lie_within_their_errors_of_precise_poses_climbed_from_the_search_on_poses(request_):
-    designs, amplified = turning(400, 3)
-    assert fused.curve_of(GUIDE, request_, False) is not None
-    found, status = extrema.true_extrema(GUIDE, designs, [request_], 1e-8)
-    # With their places asked for, extrema are searched for on poses.
-    slow, _ = extrema.true_extrema(GUIDE, designs, [request_], 1e-10, locate=True)
-    exact = climbed(GUIDE, designs, request_.pose, request_.mode, slow[request_].phi)
-    assert (status == st.OK).all()
-    off = np.abs(found[request_].value - exact)
-    assert (off <= found[request_].err + 8.0 * EPS * amplified * np.abs(exact)).all()
-    assert np.quantile(off / np.abs(exact), 0.9) < 1e-13
+    designs, _ = turning(400, 3)
+    assert_fused_extrema_lie_within_their_errors(GUIDE, designs, request_)
 
 
 def test_places_are_those_of_the_search_on_poses():

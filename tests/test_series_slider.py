@@ -23,7 +23,7 @@ from sweep.families.base import Accuracy, Angles
 from sweep.families.capabilities import Assembly, InSeries
 from sweep.reductions import extrema, fused
 from sweep.reductions.request import Request
-from tests.climbing import climbed
+from tests.climbing import amplified, assert_fused_extrema_lie_within_their_errors, climbed
 from tests.turn_designs import DRIVEN_SLIDER, RSSP, crank_rockers, driven_sliders, slider_cranks
 
 EPS = 2.0**-53
@@ -41,11 +41,6 @@ def planar_cranks(n, seed):
 
 def planar_chains(n, seed):
     return np.column_stack([crank_rockers(n, seed), planar_cranks(n, seed + 1), driven_sliders(n, seed)[:, -2:]])
-
-
-def amplified(of, designs):
-    """What a dead point of any stage makes of one rounding: the inverse of the least margin."""
-    return 1.0 + 1.0 / design_outputs(of, designs, ["margin"], Accuracy(target=1e-6))["margin"]
 
 
 def turning(of, n, seed):
@@ -112,18 +107,7 @@ def test_a_grid_gives_the_largest_of_its_poses_and_their_status(name):
 
 @pytest.mark.parametrize(("name", "request_"), [(n, r) for n, rs in REQUESTS.items() for r in rs], ids=str)
 def test_extrema_lie_within_their_errors_of_precise_poses_climbed_from_the_search_on_poses(name, request_):
-    of, designs = FAMILIES[name], CASES[name]
-    assert fused.curve_of(of, request_, False) is not None
-    found, status = extrema.true_extrema(of, designs, [request_], 1e-8)
-    # With their places asked for, extrema are searched for on poses.
-    slow, _ = extrema.true_extrema(of, designs, [request_], 1e-10, locate=True)
-    exact = climbed(of, designs, request_.pose, request_.mode, slow[request_].phi)
-    assert (status == st.OK).all()
-    off = np.abs(found[request_].value - exact)
-    # The chain's precise poses hand a rounded angle from stage to stage.
-    allowed = found[request_].err + 8.0 * EPS * amplified(of, designs) * np.abs(exact)
-    assert (off <= allowed).all()
-    assert np.quantile(off / np.abs(exact), 0.9) < 1e-13
+    assert_fused_extrema_lie_within_their_errors(FAMILIES[name], CASES[name], request_)
 
 
 @pytest.mark.parametrize("name", ["rssr+rssp", "rssp"])
