@@ -35,8 +35,9 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
 from kernels._claims import claimed
-from kernels._frontend import KernelLowering, contexts, passes
+from kernels._frontend import contexts, passes
 from kernels._garbage import nobody_looks
+from kernels._lowering import KernelLowering
 from kernels._plainly import plainly
 
 FOR_PYTHON = "_ZN7cpython"  # how names of functions begin that numba makes for calls from Python

@@ -21,7 +21,7 @@ from functools import cache
 from types import CodeType
 from typing import Any
 
-from numba.core import errors, ir, lowering, typeinfer, types, untyped_passes
+from numba.core import errors, ir, typeinfer, types, untyped_passes
 from numba.core.compiler import DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.consts import ConstantInference
@@ -36,6 +36,8 @@ from numba.core.typed_passes import (
     NopythonTypeInference,
 )
 from numba.core.typing.context import Context
+
+from kernels._lowering import KernelLowering
 
 _OPERATORS = {id(function) for function in vars(operator).values() if callable(function)}
 # No kernel has `with`, functions inlined by numba, nor the features that one pass refuses.
@@ -239,42 +241,6 @@ class _Rewrites(NopythonRewrites):
                 if made and isinstance(state.typemap[assigned.target.name], types.Array):
                     return bool(super().run_pass(state))
         return False
-
-
-class Lowering(lowering.Lower):
-    """Writes LLVM code."""
-
-    def lower_binop(self, resty: Any, expr: Any, op: Any) -> Any:
-        """Write an operator; numba would first try whether its code for constants fits variables."""
-        if expr.static_lhs is not ir.UNDEFINED or expr.static_rhs is not ir.UNDEFINED:
-            return super().lower_binop(resty, expr, op)
-        return self._operator(op, self.fndesc.calltypes[expr], (expr.lhs, expr.rhs), resty)
-
-    def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
-        """Write an access to an element."""
-        return self._operator(operator.getitem, signature, (value, index), resty)
-
-    def _operator(self, op: Any, signature: Any, operands: Any, result: Any) -> Any:
-        table = self.context.typing_context
-        function = table.resolve_value_type(op)
-        code = self.context.get_function(function, table.resolve_function_type(function, signature.args, {}))
-        values = [
-            self.context.cast(self.builder, self.loadvar(x.name), self.typeof(x.name), to)
-            for x, to in zip(operands, signature.args, strict=True)
-        ]
-        return self.context.cast(self.builder, code(self.builder, values), signature.return_type, result)
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class KernelLowering(NativeLowering):
-    """The pass that writes LLVM code."""
-
-    _name = "kernel_lowering"
-
-    @property
-    def lowering_class(self) -> Any:
-        """What writes it."""
-        return Lowering
 
 
 class _Passes(PassManager):

@@ -10,7 +10,10 @@ from contextlib import contextmanager
 from typing import Any
 
 from numba.core import errors, ir
+from numba.core.runtime.context import NRTContext
 from numba.core.targetconfig import TargetConfig
+
+from kernels._counts import meminfos
 
 # Neither these nor what they are made of are variables of numba's intermediate code.
 _NO_VARIABLES = (ir.Loc, str, int, float, bool, type(None))
@@ -42,6 +45,7 @@ def _values(self: Any) -> dict[str, Any]:
 _REPLACED: tuple[tuple[Any, str, Any], ...] = (
     (ir.Inst, "_rec_list_vars", _variables_in),
     (TargetConfig, "values", _values),
+    (NRTContext, "get_meminfos", meminfos),
     (type(errors.termcolor()), "_markup", lambda _self, text, *_style: text),
 )
 

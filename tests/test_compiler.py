@@ -125,6 +125,7 @@ def _body(text: str, name: str) -> str:
     # Ours is optimised without numba's wrapper, so LLVM does not see that nobody compares addresses of it.
     text = text.replace(" local_unnamed_addr", "")
     (body,) = re.findall(rf"^define [^\n]*@{re.escape(name)}\(.*?^}}", text, re.M | re.S)
+    body = re.sub(r"^([\w.$-]+): *", r"%\1: ", body, flags=re.M)  # where a block begins its name stands without a %
     known: dict[str, str] = {}
     return re.sub(r"[@%!#][\w.$<>\"-]+", lambda found: known.setdefault(found[0], f"{found[0][0]}{len(known)}"), body)
 

@@ -38,8 +38,8 @@ def tree(tmp_path: Path) -> Path:
     """A package of two kernels around the house's decorators, with a cache folder of its own."""
     package = tmp_path / "tree" / "kernels"
     package.mkdir(parents=True)
-    for name in ("__init__", "_jit", "_cache", "_claims", "_compiler", "_frontend", "_garbage", "_plainly"):
-        (package / f"{name}.py").write_text((SOURCES / f"{name}.py").read_text())
+    for path in (SOURCES / "__init__.py", *SOURCES.glob("_[a-z]*.py")):
+        (package / path.name).write_text(path.read_text())
     (package / "loop.py").write_text(KERNEL)
     (package / "helper.py").write_text(HELPER.format(step=1))
     return package
