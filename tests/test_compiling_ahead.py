@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ import pytest
 from kernels import _claims
 from sweep.engine import ahead
 from sweep.evaluation import summaries
+from sweep.optimise import rehearsal as rehearsals
 from sweep.optimise.rehearsal import rehearsal
 from sweep.study.load import load_study
 from tests.engine_study import ROOT, chunk_bytes, write_study
@@ -162,12 +164,22 @@ def test_what_the_second_process_does_covers_a_search_for_what_is_made() -> None
     """Its steps are those of the search: none fails on the study that has all of them."""
     study = load_study(ROOT / "studies" / "needle208", smoke=True)
     steps = list(rehearsal(study))
-    assert len(steps) == 4
+    assert len(steps) == 5
     for step in steps:
         step()
 
 
-def test_the_second_process_begins_with_the_objective_of_the_reference_design(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_second_process_begins_with_poses_and_the_objective(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = load_study(ROOT / "studies" / "needle208", smoke=True)
+    done: list[str] = []
+    monkeypatch.setattr(rehearsals, "rehearsal", lambda _: iter([partial(done.append, x) for x in ("poses", "search")]))
+    monkeypatch.setattr(ahead, "_objective", lambda _: [partial(done.append, "objective")])
+    monkeypatch.setattr(ahead, "_sweep", lambda _: [partial(done.append, "sweep")])
+    ahead._compile(study)
+    assert done == ["poses", "objective", "search", "sweep"]
+
+
+def test_the_objective_is_that_of_the_reference_design(monkeypatch: pytest.MonkeyPatch) -> None:
     study = load_study(ROOT / "studies" / "needle208", smoke=True)
     asked: list[list[str]] = []
     monkeypatch.setattr(summaries, "design_outputs", lambda family, designs, names, *_: asked.append(names))

@@ -1,8 +1,8 @@
 """A second process that compiles what a study will need later, while the first one compiles what it needs now.
 
 It is forked where the first kernel is missing in the cache, so it costs no imports and, with a full cache, nothing.  It
-goes through the study on a few designs, the objective first, then the search for the optimum, then the sweep from its
-end, until both processes meet.  What it computes is thrown away; the kernels stay in the cache.
+goes through the study on a few designs, poses and the objective first, then the search for the optimum, then
+the sweep from its end, until both processes meet.  What it computes is thrown away; the kernels stay in the cache.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -96,13 +96,15 @@ def _end_after(work: Callable[[], None], parent: int) -> None:
 def _compile(study: Study) -> None:
     """Do what the study does, last things first; what needs a kernel that the first process is at has to wait.
 
-    First of all comes the objective: nothing takes longer to compile, and it is the last that the sweep needs.
+    First of all come poses: begun with the objective, whose parts the first process needs at once, that one waited for
+    half a second.  Then comes the objective: nothing takes longer to compile, and it is the last that the sweep needs.
     """
     from kernels._claims import impatient
     from sweep.optimise.rehearsal import rehearsal
 
+    search = rehearsal(study)
     with impatient():
-        left = _undone(chain(_objective(study), rehearsal(study)))
+        left = _undone(chain(islice(search, 1), _objective(study), search))
     steps = _sweep(study) + left
     with impatient():
         left = _undone(steps)

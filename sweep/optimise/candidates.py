@@ -15,6 +15,7 @@ from sweep.chunks.cascade import compared
 from sweep.families.base import Accuracy, Array
 from sweep.optimise.form import measured_in
 from sweep.optimise.problem import Problem
+from sweep.optimise.samples import sobol
 from sweep.optimise.starts import spread
 from sweep.quantities.names import is_flag, stem
 from sweep.reductions.measures import ROTATABLE_MARGIN, margins
@@ -74,8 +75,6 @@ def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed
     count : how many designs at most
     number : of the sample
     """
-    from scipy.stats import qmc
-
     centre = problem.lower + 0.5 * problem.span
     bases = [problem.rows(centre, **choice)[0] for choice in signs]
     block = BLOCK
@@ -83,10 +82,10 @@ def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed
         block //= 2
     blocks = max(-(-SAMPLED * count // block), len(bases))
     rng = np.random.default_rng((seed, number))
-    sobol = qmc.Sobol(len(problem.variables), seed=rng)
+    points = sobol(len(problem.variables), rng)
     place, kind, merit = np.empty((0, len(problem.variables))), np.empty(0, np.intp), np.empty(0)
     for k in range(blocks):
-        fractions, own = _brought_in(problem, sobol.random(block)), k % len(bases)
+        fractions, own = _brought_in(problem, points.random(block)), k % len(bases)
         found = ranking(problem, problem.placed(bases[own], fractions))
         place = np.concatenate([place, fractions])
         kind = np.concatenate([kind, np.full(block, own)])

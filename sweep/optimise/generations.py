@@ -25,6 +25,7 @@ from sweep.optimise.merit import STUCK
 from sweep.optimise.parallel import spread_over
 from sweep.optimise.pose_rows import PoseRows
 from sweep.optimise.proportions import turned_into
+from sweep.optimise.samples import sobol
 from sweep.optimise.starts import spread
 
 BLOCK = 1 << 13  # proportions that are looked at together
@@ -113,9 +114,7 @@ class Population:
 
 def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, kinds: int) -> tuple[Array, _Classes]:
     """Places of a Sobol sample that turn, the best of every class of swings that are not alike; and these classes."""
-    from scipy.stats import qmc
-
-    place = qmc.Sobol(len(rows.own.columns), seed=rng).random(size.sampled)
+    place = sobol(len(rows.own.columns), rng).random(size.sampled)
     worth = np.concatenate([rows.own.merit(block) for block in np.split(place, max(1, size.sampled // BLOCK))])
     order = np.argsort(worth, kind="stable")
     order = order[worth[order] < STUCK]

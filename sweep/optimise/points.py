@@ -199,9 +199,10 @@ class Curves:
         phi = points.phi.copy()
         if edge.any():
             phi[edge] = followed(self.problem.family, design[None, :], phi[edge], points.level[edge])[0]
+        own = self._by_series(points)
         reach, uphill = np.full(len(phi), stride), np.zeros(len(phi))
         for _ in range(12):
-            slope, curvature, pace, place, value = self._local(design, phi, points)
+            slope, curvature, pace, place, value = self._local(design, phi, points, own)
             move = np.zeros(len(phi))
             move[passing] = (points.level[passing] - value[passing]) / slope[passing]
             peak = held & (points.sense * curvature < 0.0)
@@ -218,7 +219,7 @@ class Curves:
             if np.abs(move).max() < SETTLED:
                 break
         if self.places or (points.how == CROSSING).any():
-            slope, curvature, pace, _, value = self._local(design, phi, points)
+            slope, curvature, pace, _, value = self._local(design, phi, points, own)
             # A passage is its angle itself: the error of the last step above is worth one step more.
             phi[passing] += np.clip((points.level - value) / slope, -SETTLED, SETTLED)[passing]
         moved = replace(points, phi=phi, slope=slope, curvature=curvature, pace=pace)
@@ -254,7 +255,14 @@ class Curves:
             return np.concatenate([points.phi, np.arange(16) * (math.pi / 8.0)])
         return points.phi
 
-    def _local(self, design: Array, phi: Array, points: Points) -> tuple[Array, Array, Array, Array, Array]:
+    def _by_series(self, points: Points) -> list[tuple[Series, Index]]:
+        """Return the series that have points, and which points these are."""
+        found = ((s, np.flatnonzero(points.series == n)) for n, s in enumerate(self.series))
+        return [(s, own) for s, own in found if len(own)]
+
+    def _local(
+        self, design: Array, phi: Array, points: Points, owners: list[tuple[Series, Index]]
+    ) -> tuple[Array, Array, Array, Array, Array]:
         """Return the slope and curvature of each point's own output, slope and value of the position,
         value there, all (K,).
         """
@@ -262,14 +270,12 @@ class Curves:
         columns = self.poses(design[None, :], three + 1j * STEP)
         k = len(phi)
         slopes, value = np.empty((3, k)), np.empty(k)
-        for n, s in enumerate(self.series):
-            own = points.series == n
-            if own.any():
-                curve = columns[s.output][0].reshape(3, k)[:, own]
-                slopes[:, own], value[own] = curve.imag / STEP, curve[1].real
-                if s.output in self.problem.rooms:
-                    room = self.problem.rooms[s.output].slope(design, three).reshape(3, k)
-                    slopes[:, own] += points.sense[own] * room[:, own]
+        for s, own in owners:
+            curve = columns[s.output][0].reshape(3, k)[:, own]
+            slopes[:, own], value[own] = curve.imag / STEP, curve[1].real
+            if s.output in self.problem.rooms:
+                room = self.problem.rooms[s.output].slope(design, three).reshape(3, k)
+                slopes[:, own] += points.sense[own] * room[:, own]
         curvature = (slopes[2] - slopes[0]) / (2.0 * NEIGHBOUR)
         if self.position < 0:
             return slopes[1], curvature, np.zeros(k), np.zeros(k), value

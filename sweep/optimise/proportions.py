@@ -17,6 +17,7 @@ from sweep.optimise.linear import Elimination
 from sweep.optimise.merit import STUCK, merit
 from sweep.optimise.parallel import spread_over
 from sweep.optimise.problem import Problem
+from sweep.optimise.samples import sobol
 from sweep.optimise.starts import spread
 
 SAMPLED = 1 << 15  # proportions per group, two to eight in a hundred of which turn
@@ -109,10 +110,8 @@ class _Group:
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[Array, Array]:
         """Return designs (k, P) and their merits, the best first."""
-        from scipy.stats import qmc
-
         own = Proportions(self.linear, self.signs[number % len(self.signs)])
-        place = qmc.Sobol(len(own.columns), seed=self.seed + number).random(SAMPLED)
+        place = sobol(len(own.columns), self.seed + number).random(SAMPLED)
         worth = np.concatenate([own.merit(block) for block in np.split(place, max(1, SAMPLED // BLOCK))])
         order = np.argsort(worth, kind="stable")
         order = order[worth[order] < STUCK]

@@ -10,6 +10,9 @@ import numpy as np
 
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Array
+from sweep.optimise.form import Program
+from sweep.optimise.model import SAMPLES
+from sweep.optimise.points import Curves
 from sweep.optimise.posing import problem_of
 from sweep.optimise.robust import robust
 from sweep.optimise.solve import explore
@@ -26,7 +29,8 @@ ASKED = 60  # times that rounds for what is made are let go on
 def rehearsal(study: Study) -> Iterator[Callable[[], object]]:
     """Yield steps of the search for a study's optimum, each fit to be called on its own, for one design of the study.
 
-    The steps are those of :func:`sweep.optimise.study.optimise_study`; their results are of no use.
+    The steps are those of :func:`sweep.optimise.study.optimise_study`; their results are of no use.  Before them come
+    its extrema: poses, and the complex ones that slopes are made of.
     """
     if study.optimise is None or study.objective is None:
         return
@@ -35,6 +39,7 @@ def rehearsal(study: Study) -> Iterator[Callable[[], object]]:
         return
     problem = problem_of(study, design)
     settings = replace(study.optimise, starts=1, looks=LOOKS, time_budget=None)
+    yield lambda: Curves(problem, Program(problem).series).scan(design[0], SAMPLES)
     yield lambda: explore(problem, design, settings)
     tolerance = study.tolerance
     if tolerance is not None and tolerance.robust is not None:

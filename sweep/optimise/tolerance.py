@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweep.families.base import Accuracy, Array, Family
+from sweep.optimise.samples import sobol
 
 if TYPE_CHECKING:
     from sweep.study import Limit, Tolerance
@@ -36,11 +37,10 @@ def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, sa
     samples : a power of two
     """
     from scipy.special import ndtri
-    from scipy.stats import qmc
 
     sigma = touched(family, tolerance) / SIGMAS
     varied = np.flatnonzero(sigma)
-    uniform = qmc.Sobol(len(varied), seed=seed).random(samples)
+    uniform = sobol(len(varied), seed).random(samples)
     designs = np.repeat(design[None, :], samples, axis=0)
     # A sample at 0 would be infinitely far away.
     designs[:, varied] += sigma[varied] * ndtri(np.maximum(uniform, 0.5 / samples))

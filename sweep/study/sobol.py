@@ -79,7 +79,7 @@ class Sobol:
         self._centre = 0.0 if seed is None else 0.5
         tables = []
         for k in range(dimensions):
-            directions = _direction_numbers(*_JOE_KUO[k])
+            directions = direction_numbers(k)
             if source is not None:
                 raw = [int(x) for x in source.random_raw(BITS + 1)]
                 directions = [_mix(v, raw) for v in directions]
@@ -135,8 +135,9 @@ class Sobol:
         return out
 
 
-def _direction_numbers(polynomial: int, first: tuple[int, ...]) -> list[int]:
+def direction_numbers(dimension: int) -> list[int]:
     """Return V_1 ... V_INDEX_BITS as integers of BITS digits, by the recurrence of the primitive polynomial."""
+    polynomial, first = _JOE_KUO[dimension]
     degree = polynomial.bit_length() - 1
     if degree == 0:  # the first dimension is the van der Corput sequence
         return [1 << (BITS - 1 - j) for j in range(INDEX_BITS)]
