@@ -114,6 +114,16 @@ def test_largest_speed_with_friction_is_no_better_known_than_the_turn_it_comes_f
     assert found.err_max_abs_crank_speed_friction[0] > 1e-9 * OMEGA  # kinks are not resolved to the rounding
 
 
+def test_error_of_a_small_acceleration_counts_the_torque_that_the_turn_misses():
+    names = ["fastest_friction", "max_abs_crank_acceleration_friction"]
+    found = sweep.summarise("rssr", CRANK_ROCKER | RUBBING, names, accuracy=1e-8).iloc[0]
+    assert found.status == st.OK
+    assert found.max_abs_crank_acceleration_friction < 0.2 * found.fastest_friction**2
+    # Both errors come from one share of J omega^2: for the speed it is one of omega, for the acceleration of omega^2.
+    missed = found.err_fastest_friction * found.fastest_friction
+    assert found.err_max_abs_crank_acceleration_friction >= missed * (1.0 - 1e-12)
+
+
 def test_friction_without_coefficients_is_the_smooth_drive():
     table = CRANK_ROCKER | RUBBING | {f"mu_{k}": 0.0 for k in "abcd"} | {"motor_slope": slope(CRANK_ROCKER)}
     found = sweep.summarise("rssr", table, ["unevenness", "unevenness_friction", "slowest_friction", "slowest"])
