@@ -165,7 +165,12 @@ def turn(
     relative = {"unevenness": found[f"slowest{suffix}"], "fastest": one, "slowest": one}
     columns |= {f"err_{name}{suffix}": error / size for name, size in relative.items()}
     limit = RESOLVED if grids == GRIDS else LEFT_OF_CURVE
-    return per_turn(found, status, columns, outputs(suffix, ""), wanted, limit, known)
+    # What is missed of the torque is a share of J omega^2: of a small acceleration it is a larger share.
+    change = f"crank_acceleration{suffix}"
+    size = np.abs(found[change]).max(axis=1)
+    ratio = np.divide(fastest**2, size, out=one.copy(), where=size > 0.0)
+    of_change = np.maximum(known, PER_LEFT * found[f"missed{suffix}"] * ratio)
+    return per_turn(found, status, columns, outputs(suffix, ""), wanted, limit, known, {change: of_change})
 
 
 def advise(scene: Scene) -> Advice | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from sweep.effects import friction, link_friction, speed
-from sweep.effects.base import DesignResult, Effect, Scene, Status
+from sweep.effects.base import DesignResult, Effect, Scene, Status, take_over
 from sweep.effects.handed import FRICTION, LOADS, computed
 from sweep.effects.speed import (
     FLYWHEEL,
@@ -34,7 +34,7 @@ SUFFIX = "_friction"
 OUTPUTS = outputs(SUFFIX, f"{OF_CONSTANT_MEAN}, friction included")
 PER_TURN = numbers(SUFFIX, ", friction included")
 # Friction grows with the loads, and these with the speed: it is computed again with the speed that it makes.
-PASSES = 8
+PASSES = 24
 SETTLED = 1e-7  # share of the largest torque excess or loss by which the last pass changes the loss
 
 
@@ -42,9 +42,24 @@ def loss(grid: Scene, slope: Array) -> tuple[Array, Status]:
     """Return the torque on the crank that friction takes, (n, N), at the speed over the turn that it makes,
     and the status.
 
-    The speed is found on a grid of GRIDS[-1] poses: what that misses of it changes the loss by as small a share.
+    The speed is found on a grid of GRIDS[-1] poses: what that misses of it changes the loss by as small a share.  Where
+    that grid resolves no steady state, the speed is found on the whole grid.
     """
-    coarse = grid if grid.shape[1] <= GRIDS[-1] else grid.on_grid(GRIDS[-1])
+    if grid.shape[1] <= GRIDS[-1]:
+        lost, status, _ = _settled(grid, grid, slope)
+        return lost, status
+    lost, status, steady_state = _settled(grid.on_grid(GRIDS[-1]), grid, slope)
+    again = np.flatnonzero(steady_state != st.OK)
+    if again.size:
+        whole = grid.only(again)
+        lost[again], status[again], _ = _settled(whole, whole, slope[again])
+    return lost, status
+
+
+def _settled(coarse: Scene, grid: Scene, slope: Array) -> tuple[Array, Status, Status]:
+    """Return the loss on the grid at a speed that is found on a coarse one, the status, NOT_CONVERGED where the loss
+    does not settle, and what the last search for a steady state said.
+    """
     inertia, excess = samples(coarse)
     mean, motor = grid.inputs["speed"], slope if slope.any() else None
     status = np.zeros(len(grid.designs), np.uint8)
@@ -52,24 +67,29 @@ def loss(grid: Scene, slope: Array) -> tuple[Array, Status]:
     lost = _lost(coarse, even, np.zeros(coarse.shape), status)
     phi = coarse.angles.phi
     for _ in range(PASSES):
-        before, lost = lost, _lost(coarse, *_turning(inertia, excess - lost, mean, motor, phi), status)
+        before = lost
+        turning, change, code = _turning(inertia, excess - lost, mean, motor, phi)
+        lost = _lost(coarse, turning, change, status)
         size = np.maximum(np.abs(excess).max(axis=1), np.abs(lost).max(axis=1))
         moved: NDArray[np.bool_] = np.asarray(np.abs(lost - before).max(axis=1) > SETTLED * size)
         if not moved.any():
             break
-    else:
-        status[(status == st.OK) & moved] = st.NOT_CONVERGED
+    take_over(status, np.where(moved & (code == st.OK), st.NOT_CONVERGED, code))
     if coarse is not grid:
-        lost = _lost(grid, *_turning(inertia, excess - lost, mean, motor, grid.angles.phi), status)
-    return lost, status
+        turning, change, code = _turning(inertia, excess - lost, mean, motor, grid.angles.phi)
+        take_over(status, code)
+        lost = _lost(grid, turning, change, status)
+    return lost, status, code
 
 
-def _turning(inertia: Array, excess: Array, mean: Array, motor: Array | None, phi: Array) -> tuple[Array, Array]:
-    """Return the speed and acceleration over the turn; even where there is no steady state, which its status says."""
-    found, _ = steady(inertia, excess, mean, motor, phi, LEFT)
+def _turning(
+    inertia: Array, excess: Array, mean: Array, motor: Array | None, phi: Array
+) -> tuple[Array, Array, Status]:
+    """Return the speed and acceleration over the turn, and the status; without a steady state the turning is even."""
+    found, status = steady(inertia, excess, mean, motor, phi, LEFT)
     usable = np.logical_and.reduce(np.isfinite(found["crank_speed"]), axis=1, keepdims=True)
     speed = np.where(usable, found["crank_speed"], mean[:, None])
-    return speed, np.where(usable, found["crank_acceleration"], 0.0)
+    return speed, np.where(usable, found["crank_acceleration"], 0.0), status
 
 
 def _lost(grid: Scene, speed: Array, change: Array, status: Status) -> Array:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
@@ -15,6 +16,7 @@ from sweep.families.domain import Turn
 from sweep.quantities.reduction import REDUCTIONS
 
 RESOLVED = 1e-9
+NONE: Mapping[str, Array] = MappingProxyType({})
 
 Solver: TypeAlias = Callable[[Scene, Array, bool], tuple[dict[str, Array], Status]]
 """``solve(scene, phi, last)``: numbers (n,) and curves (n, m) at phi from a scene on a grid, and status (n,)."""
@@ -67,16 +69,18 @@ def per_turn(
     wanted: frozenset[str],
     limit: float = RESOLVED,
     known: Array | float = RESOLVED,
+    known_of: Mapping[str, Array] = NONE,
 ) -> Columns:
     """Return the wanted ones of ``numbers`` and of the reductions of ``curves``,
     sampled on an odd grid in ``found``.
 
-    ``limit`` is the share of a curve that the grid may miss, ``known`` the relative error of what it is made of.
+    ``limit`` is the share of a curve that the grid may miss, ``known`` the relative error of what it is made of,
+    ``known_of`` that of single curves.
     """
     columns = dict(numbers)
     for o in curves:
         if any(name.endswith(f"_{o.name}") for name in wanted):
-            columns |= reductions(o.name, found[o.name], status, limit, known)
+            columns |= reductions(o.name, found[o.name], status, limit, known_of.get(o.name, known))
     return chosen(columns, wanted, status)
 
 

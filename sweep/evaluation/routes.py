@@ -12,7 +12,7 @@ from sweep.evaluation.boxes import box_route
 from sweep.evaluation.members import machine_routes
 from sweep.evaluation.negatives import negative_route
 from sweep.evaluation.route import Part, Route
-from sweep.families.base import Accuracy, Array, Columns, Family, Step
+from sweep.families.base import Accuracy, Array, Columns, Family, Step, Work
 from sweep.families.chain import Stage
 from sweep.families.domain import March
 from sweep.families.members import Machine
@@ -118,7 +118,8 @@ def _run_step(
         for plain in own.values():
             # A step that serves a target promises it; one that estimates its error says so itself.
             found.setdefault(error_of(plain), accuracy.target * np.abs(np.asarray(found[plain], np.float64)))
-            if not accuracy.certify:
+            # The poses of an effect come from the same solution of the whole turn: they are wrong alike.
+            if not accuracy.certify and step.work is not Work.EFFECT:
                 _sharpen(mechanism, step, part, plain, found, accuracy.target)
     return {"status": found["status"]} | {
         key: found[own_key]

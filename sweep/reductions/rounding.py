@@ -12,6 +12,22 @@ from sweep.reductions.refine import EPS
 from sweep.reductions.sampling import TWO_PI, Index, Mask, pose_columns
 
 TRIES = 3
+CONSTANT = 64.0 * EPS  # of its size: a curve that varies by no more tells nothing but rounding
+
+
+def measure_constants(values: Array, scale: Array, rough: Array) -> None:
+    """Make the size of a curve that is constant but for rounding the scale of its signed extrema, in place.
+
+    The range of such a curve is noise, which no target relative to it can be met by, and no denser samples resolve.
+
+    Parameters
+    ----------
+    values : (n, m) samples of one turn
+    scale, rough : (n,) range of each curve, and what share of that the samples do not resolve
+    """
+    size = np.abs(values).max(axis=1)
+    constant = np.ptp(values, axis=1) <= CONSTANT * size
+    scale[constant], rough[constant] = size[constant], 0.0
 
 
 def rounding_share(

@@ -28,7 +28,7 @@ from sweep.reductions.refine import (
     sharpen,
 )
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
-from sweep.reductions.rounding import order_of, rounding_share, shaken, singular_share, tells
+from sweep.reductions.rounding import measure_constants, order_of, rounding_share, shaken, singular_share, tells
 from sweep.reductions.sampling import (
     TWO_PI,
     Index,
@@ -162,6 +162,8 @@ class Search:
             row, column = (np.empty(rows.size * (samples // 2 + 1), np.int64) for _ in range(2))
             count = scan.peaks(values, request.mode, SHARE, allowed, scale, rough, row, column)
             row, column = row[:count], column[:count]
+            if request.mode != 0:
+                measure_constants(values, scale, rough)
             if samples >= BREAKING and allowed is None and (rough > ROUGH).any():
                 between, smooth = jumps(values, scale, ROUGH)
                 between[~smooth] = False
@@ -188,12 +190,7 @@ class Search:
         return samples_needed
 
     def _refine(
-        self,
-        rows: Index,
-        columns: dict[str, Array],
-        samples: int,
-        candidates: Candidates,
-        scales: dict[Request, Array],
+        self, rows: Index, columns: dict[str, Array], samples: int, candidates: Candidates, scales: dict[Request, Array]
     ) -> Peaks:
         number, row, column, sign = candidates
         near = (column[:, None] + np.arange(-3, 4)) % samples

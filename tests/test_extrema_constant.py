@@ -1,0 +1,56 @@
+"""Signed extrema of curves that are constant but for rounding: the value is simple, its range is noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sweep
+from kernels import status as st
+from sweep.families import family
+
+N = 60
+PHI = np.linspace(0.0, 2.0 * np.pi, 257)
+TARGET = 1e-8
+
+
+def standing_sliders(alpha):
+    """The crank turns about the line of the slider: where alpha is a right angle, the slider stands still."""
+    random = np.random.default_rng(5)
+    a, along = 10.0 ** random.uniform(-1.0, 1.0, N), random.uniform(-1.0, 1.0, N)
+    b = a * (1.0 + np.abs(along) + 10.0 ** random.uniform(-1.0, 2.0, N))
+    return {"a": a, "b": b, "e": np.zeros(N), "f": along * a, "alpha": np.full(N, alpha), "branch": np.ones(N)}
+
+
+def poses(table):
+    rows = {name: np.repeat(values, PHI.size) for name, values in table.items()} | {"phi": np.tile(PHI, N)}
+    return sweep.evaluate("rssp", rows, ["s"]).s.to_numpy().reshape(N, PHI.size)
+
+
+@pytest.mark.parametrize(("name", "reduced"), [("max_s", np.max), ("min_s", np.min), ("range_s", np.ptp)])
+def test_extrema_of_a_slider_that_stands_still_are_its_place(name, reduced):
+    table = standing_sliders(0.5 * np.pi)
+    found = sweep.summarise("rssp", table, [name], accuracy=TARGET)
+    assert (found.status == st.OK).all()
+    places, err = poses(table), found[f"err_{name}"]
+    assert (np.abs(found[name] - reduced(places, axis=1)) <= err).all()
+    assert (err <= 1e-13 * np.abs(places).max(axis=1)).all()  # some hundred roundings of the place
+
+
+def test_range_of_a_slider_that_moves_by_little_is_still_resolved():
+    table = standing_sliders(0.5 * np.pi + 1e-9)
+    found = sweep.summarise("rssp", table, ["range_s"], accuracy=1e-4)
+    true, size = np.ptp(poses(table), axis=1), np.abs(poses(table)).max(axis=1)
+    assert (true > 1e-13 * size).all()
+    # 257 poses miss a sine's range by 2e-4 of it.
+    assert (np.abs(found.range_s - true) <= found.err_range_s + 2e-4 * true + 4e-16 * size).all()
+
+
+def test_tension_that_a_back_rest_holds_is_found_to_its_rounding():
+    table = dict(family("backrest_tension").example) | {"K0": np.linspace(1400.0, 1550.0, 5)}
+    names = ["max_K_couple", "min_K_couple", "range_K_couple"]
+    found = sweep.summarise("backrest_tension", table, names, accuracy=TARGET)
+    assert (found.status == st.OK).all()
+    for name in names[:2]:
+        assert (np.abs(found[name] - table["K0"]) <= found[f"err_{name}"] + 1e-13 * table["K0"]).all()
+    assert (found.range_K_couple <= 1e-13 * table["K0"]).all()
