@@ -93,7 +93,7 @@ def _unless_nobody_listens(told: Any) -> Any:
 
 # What numba does tens of thousands of times, and what takes its place: the same, but less roundabout.  Complaints are
 # caught, and colours would set up the terminal for each.
-_REPLACED: tuple[tuple[Any, str, Any], ...] = (
+REPLACED: list[tuple[Any, str, Any]] = [
     (ir.Inst, "_rec_list_vars", _variables_in),
     (TargetConfig, "values", _values),
     (TargetConfig, "__eq__", _same),
@@ -103,14 +103,14 @@ _REPLACED: tuple[tuple[Any, str, Any], ...] = (
     (event, "end_event", _unless_nobody_listens(event.end_event)),
     (NRTContext, "get_meminfos", meminfos),
     (type(errors.termcolor()), "_markup", lambda _self, text, *_style: text),
-)
+]
 
 
 @contextmanager
 def plainly() -> Iterator[None]:
     """Let numba list variables and options without asking each for its own way, and complain without colours."""
-    before = [(kind, name, vars(kind)[name]) for kind, name, _ in _REPLACED if name in vars(kind)]
-    for kind, name, ours in _REPLACED:
+    before = [(kind, name, vars(kind)[name]) for kind, name, _ in REPLACED if name in vars(kind)]
+    for kind, name, ours in REPLACED:
         if name in vars(kind):
             setattr(kind, name, ours)
     try:

@@ -10,7 +10,7 @@ from numba.core import analysis, bytecode, event, interpreter
 from numba.core.compiler import Flags
 
 from kernels._jit import kernel
-from kernels._plainly import _REPLACED, plainly
+from kernels._plainly import REPLACED, plainly
 from tests.test_compiler import _everything
 
 
@@ -65,7 +65,7 @@ def test_who_listens_is_told_of_events_and_others_are_not() -> None:
 
 
 def test_what_is_replaced_is_numbas_own_again_after_compiling() -> None:
-    before = [vars(kind).get(name) for kind, name, _ in _REPLACED]
+    before = [vars(kind).get(name) for kind, name, _ in REPLACED]
     assert kernel(lambda x: 7.0 * x)(1.0) == 7.0
-    assert all(vars(kind).get(name) is own for (kind, name, _), own in zip(_REPLACED, before, strict=True))
-    assert not any(own is ours for (_, _, ours), own in zip(_REPLACED, before, strict=True))
+    assert all(vars(kind).get(name) is own for (kind, name, _), own in zip(REPLACED, before, strict=True))
+    assert not any(own is ours for (_, _, ours), own in zip(REPLACED, before, strict=True))
