@@ -5,6 +5,7 @@ function that Python can call, optimises it and translates it to machine code, a
 is folded into its caller.  Here instead
 
 * a :class:`Part`, what kernels call, ends as LLVM code.  It is optimised and translated within its callers.
+* a :class:`Helper`, a function of numba's own, has no machine code for itself either.
 * optimisers of single functions run on those that have a body.
 * what Python calls with reads its arguments once and is not optimised.
 * Python does not look for garbage meanwhile (:mod:`kernels._garbage`).
@@ -33,12 +34,13 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
+from numba.core.typing.templates import _OverloadFunctionTemplate
 
 from kernels._claims import claimed
 from kernels._frontend import contexts, passes
 from kernels._garbage import nobody_looks
 from kernels._lowering import KernelLowering
-from kernels._plainly import plainly
+from kernels._plainly import REPLACED, plainly
 
 FOR_PYTHON = "_ZN7cpython"  # how names of functions begin that numba makes for calls from Python
 PART = "part"  # kind of a library without machine code, in the cache on disk
@@ -148,6 +150,16 @@ class _PartCompiler(_KernelCompiler):
     lowering = _PartLowering
 
 
+class _HelperLibrary(_PartLibrary):
+    """The LLVM module of a function of numba's own, optimised before it is linked, as numba does it."""
+
+    _optimize_final_module = _Library._optimize_final_module
+
+
+class _HelperCompiler(_PartCompiler):
+    library = _HelperLibrary
+
+
 class Kernel(CPUDispatcher):
     """A function that Python and other kernels call; one set of machine code per set of types."""
 
@@ -213,6 +225,35 @@ class Part(Kernel):
             options = {key: value for key, value in self.targetoptions.items() if key != "no_cpython_wrapper"}
             self._callable = Kernel(self.py_func, None, options)
         return self._callable._compile_for_args(*args, **kws)
+
+
+class Helper(Part):
+    """A function of numba's own that kernels call, as that which makes an array; numba would make machine code too."""
+
+    compiler = _HelperCompiler
+
+    def _made(self, sig: Any, args: Any, result: Any) -> Any:
+        known = self._compiler.compile(args, result)
+        self.add_overload(known)
+        return known
+
+
+_SAID = {"nopython": True, "boundscheck": None, "no_cpython_wrapper": True}
+
+
+def _makes_helpers(template: Any) -> Any:
+    """Return what makes a function of numba's own, as `_OverloadFunctionTemplate._get_jit_decorator` does."""
+
+    def made(**options: Any) -> Any:
+        if options.items() <= _SAID.items():
+            return lambda function: Helper(function, None, _SAID | {"no_cfunc_wrapper": True})
+        return _numbas_own(template)(**options)
+
+    return made
+
+
+_numbas_own = _OverloadFunctionTemplate._get_jit_decorator
+REPLACED.append((_OverloadFunctionTemplate, "_get_jit_decorator", _makes_helpers))
 
 
 class Shared(Part):

@@ -9,13 +9,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from numba.core import errors, ir
+from numba.core import analysis, errors, event, ir
 from numba.core.runtime.context import NRTContext
 from numba.core.targetconfig import TargetConfig
 
 from kernels._counts import meminfos
 
 # Neither these nor what they are made of are variables of numba's intermediate code.
+_HASHES: dict[type, int] = {}
 _NO_VARIABLES = (ir.Loc, str, int, float, bool, type(None))
 
 
@@ -40,21 +41,76 @@ def _values(self: Any) -> dict[str, Any]:
     return {name: self._values.get(name, option.default) for name, option in self.options.items()}
 
 
+def _same(self: Any, other: Any) -> bool:
+    """Return whether two sets of options are equal, as `TargetConfig.__eq__` does; most are the same to the letter."""
+    alike = isinstance(other, TargetConfig)
+    return alike and (self is other or self._values == other._values or self.values() == other.values())
+
+
+def _hash(self: Any) -> int:
+    """Return the hash of a set of options; numba's is of their names alone too, but sorts them each time."""
+    kind = type(self)
+    if kind not in _HASHES:
+        _HASHES[kind] = hash(tuple(sorted(self.options)))
+    return _HASHES[kind]
+
+
+def _uses_and_definitions(blocks: Any) -> Any:
+    """Return the variables that each block reads and sets, as `analysis.compute_use_defs` does, listing each once."""
+    used: dict[int, set[str]] = {}
+    defined: dict[int, set[str]] = {}
+    for offset, block in blocks.items():
+        uses = used[offset] = set()
+        sets = defined[offset] = set()
+        for statement in block.body:
+            if type(statement) in analysis.ir_extension_usedefs:
+                analysis.ir_extension_usedefs[type(statement)](statement, uses, sets)
+                continue
+            if isinstance(statement, ir.Assign):
+                value = statement.value
+                read = {value.name} if isinstance(value, ir.Var) else _names(value)
+                if statement.target.name not in read:
+                    sets.add(statement.target.name)
+            else:
+                read = _names(statement)
+            uses |= read - sets
+    return analysis._use_defs_result(usemap=used, defmap=defined)
+
+
+def _names(value: Any) -> set[str]:
+    return {x.name for x in value.list_vars()} if isinstance(value, ir.Inst) else set()  # type: ignore[no-untyped-call]
+
+
+def _unless_nobody_listens(told: Any) -> Any:
+    """Return what tells of an event, without making one for nobody: LLVM's lock has two at each call of LLVM."""
+
+    def tell(kind: str, *about: Any, **more: Any) -> None:
+        if event._registered[kind]:
+            told(kind, *about, **more)
+
+    return tell
+
+
 # What numba does tens of thousands of times, and what takes its place: the same, but less roundabout.  Complaints are
 # caught, and colours would set up the terminal for each.
-_REPLACED: tuple[tuple[Any, str, Any], ...] = (
+REPLACED: list[tuple[Any, str, Any]] = [
     (ir.Inst, "_rec_list_vars", _variables_in),
     (TargetConfig, "values", _values),
+    (TargetConfig, "__eq__", _same),
+    (TargetConfig, "__hash__", _hash),
+    (analysis, "compute_use_defs", _uses_and_definitions),
+    (event, "start_event", _unless_nobody_listens(event.start_event)),
+    (event, "end_event", _unless_nobody_listens(event.end_event)),
     (NRTContext, "get_meminfos", meminfos),
     (type(errors.termcolor()), "_markup", lambda _self, text, *_style: text),
-)
+]
 
 
 @contextmanager
 def plainly() -> Iterator[None]:
     """Let numba list variables and options without asking each for its own way, and complain without colours."""
-    before = [(kind, name, vars(kind)[name]) for kind, name, _ in _REPLACED if name in vars(kind)]
-    for kind, name, ours in _REPLACED:
+    before = [(kind, name, vars(kind)[name]) for kind, name, _ in REPLACED if name in vars(kind)]
+    for kind, name, ours in REPLACED:
         if name in vars(kind):
             setattr(kind, name, ours)
     try:

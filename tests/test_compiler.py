@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numba.core import errors
 
-from kernels._compiler import PART, Kernel, Part, rebuilt_part
+from kernels._compiler import PART, Helper, Kernel, Part, rebuilt_part
 from kernels._jit import inline, kernel, part
 from kernels.families import rssr
 from kernels.families.rssr.derivatives import rocker_fused
@@ -128,6 +128,16 @@ def _body(text: str, name: str) -> str:
     body = re.sub(r"^([\w.$-]+): *", r"%\1: ", body, flags=re.M)  # where a block begins its name stands without a %
     known: dict[str, str] = {}
     return re.sub(r"[@%!#][\w.$<>\"-]+", lambda found: known.setdefault(found[0], f"{found[0][0]}{len(known)}"), body)
+
+
+def test_a_function_of_numbas_own_has_no_machine_code_for_itself() -> None:
+    """It is optimised as numba does it; the test above holds the code of its caller against numba's."""
+    whole = kernel(lambda n: np.zeros(n).sum() + min((n, 3)))
+    made = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Helper, "add_overload", lambda self, known: made.append(known) or Part.add_overload(self, known))
+        assert whole(4) == 3.0
+    assert made and {known.library.serialize_using_object_code()[1] for known in made} == {PART}
 
 
 @inline
