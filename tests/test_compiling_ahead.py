@@ -16,6 +16,7 @@ from sweep.engine import ahead
 from sweep.evaluation import summaries
 from sweep.optimise import rehearsal as rehearsals
 from sweep.optimise.rehearsal import rehearsal
+from sweep.reductions import extrema
 from sweep.study.load import load_study
 from tests.engine_study import ROOT, chunk_bytes, write_study
 from tests.test_kernel_cache import report, tree  # noqa: F401
@@ -181,10 +182,13 @@ def test_the_second_process_begins_with_poses_and_the_objective(monkeypatch: pyt
 
 def test_the_objective_is_that_of_the_reference_design(monkeypatch: pytest.MonkeyPatch) -> None:
     study = load_study(ROOT / "studies" / "needle208", smoke=True)
-    asked: list[list[str]] = []
+    asked: list[object] = []
+    monkeypatch.setattr(extrema, "true_extrema", lambda family, designs, requests, _: asked.append(requests))
     monkeypatch.setattr(summaries, "design_outputs", lambda family, designs, names, *_: asked.append(names))
-    for step in ahead._objective(study):
-        step()
-    assert asked == [["max_abs_d2s"]]
+    for other in (None, "stroke"):  # an extremum is searched for as it is, anything else as an output
+        goal = replace(study.objective, output=other) if other and study.objective else study.objective
+        for step in ahead._objective(replace(study, objective=goal)):
+            step()
+    assert asked == [(extrema.Request("d2s", 0),), ["stroke"]]
     assert ahead._objective(replace(study, reference=None)) == []
     assert ahead._objective(replace(study, objective=None)) == []

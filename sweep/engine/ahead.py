@@ -14,7 +14,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from itertools import chain, islice
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -97,14 +97,17 @@ def _compile(study: Study) -> None:
     """Do what the study does, last things first; what needs a kernel that the first process is at has to wait.
 
     First of all come poses: begun with the objective, whose parts the first process needs at once, that one waited for
-    half a second.  Then comes the objective: nothing takes longer to compile, and it is the last that the sweep needs.
+    half a second.  Then comes the objective: it takes long to compile, and it is the last that the sweep needs.
     """
     from kernels._claims import impatient
     from sweep.optimise.rehearsal import rehearsal
 
     search = rehearsal(study)
     with impatient():
-        left = _undone(chain(islice(search, 1), _objective(study), search))
+        left = _undone(islice(search, 1))
+    left += _undone(_objective(study))  # what it may have to wait for is short
+    with impatient():
+        left += _undone(search)
     steps = _sweep(study) + left
     with impatient():
         left = _undone(steps)
@@ -127,12 +130,24 @@ def _undone(steps: Iterable[Callable[[], object]]) -> list[Callable[[], object]]
 
 
 def _objective(study: Study) -> list[Callable[[], object]]:
-    """Return the step that computes the objective of the reference design, which no kernel has to make."""
+    """Return the step that computes the objective of the reference design, which no kernel has to make.
+
+    Where that is an extremum over the turn it is searched for as it is: the margin that an answer needs besides is what
+    the first process compiles meanwhile.
+    """
     from sweep.evaluation.tables import design_matrix
+    from sweep.reductions.catalogue import quantity
+    from sweep.reductions.extrema import true_extrema
 
     if study.reference is None or study.objective is None:
         return []
-    return [_asked(study, design_matrix(study.family, study.reference)[0], [study.objective.output])]
+    family, name, target = study.family, study.objective.output, study.accuracy.target
+    design = design_matrix(family, study.reference)[0]
+    found = quantity(family, name)
+    requests = () if found is None or found.route != "reduction" else found.requests(family, study.window is not None)
+    if target is None or not requests or any(request.windowed for request in requests):
+        return [_asked(study, design, [name])]
+    return [lambda: true_extrema(family, design, requests, target)]
 
 
 def _sweep(study: Study) -> list[Callable[[], object]]:
