@@ -161,6 +161,7 @@ EDGES = [
     (ROCKER, '"0.02 mm"', '"1e90 mm"'),
     (ROCKER, '"1 MB"', '"1e308 GB"'),
     (ROCKER, '"600 rpm"', '"1e308 rpm"'),
+    (ROCKER, 'design = { a = "20 mm"', 'design = { a = "1e308 m"'),
     (ROCKER, "[30, 10]", "[-1e100, 1e100]"),
     (ROCKER, 'e = "100 mm"\nf', f"e = {10**400}\nf"),
     (DWELL, K, "k = { from = 1e99, to = 1e100 }"),

@@ -142,6 +142,15 @@ def test_interrupted_run_says_so_and_keeps_the_optimum(
     assert not is_complete(again)
 
 
+def test_looks_of_the_optimum_are_those_of_the_front(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(
+        (STUDY.format(swing=40) + TABLE).replace("[optimise]", "[optimise]\nlooks = 700"), encoding="utf-8"
+    )
+    study = load_study(tmp_path)
+    assert study.optimise is not None and study.pareto is not None
+    assert study.optimise.looks == study.pareto.looks == 700
+
+
 def test_starts_lie_within_their_bound(whole: tuple[Study, Path]) -> None:
     study, folder = whole
     rows = pd.concat(pd.read_parquet(path) for path in sorted(folder.glob("part-*")))

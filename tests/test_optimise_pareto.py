@@ -91,6 +91,13 @@ def test_linkage_pays_for_a_smaller_pressure_angle() -> None:
         assert result.objective <= alone.objective * (1.0 + 1e-9)
 
 
+def test_no_start_of_a_bound_looks_at_more_designs_than_the_optimum_may() -> None:
+    problem, starts = linkage()
+    (long,) = pareto(problem, settings("max_pressure_angle", 0.9), starts)
+    (short,) = pareto(problem, replace(settings("max_pressure_angle", 0.9), looks=5), starts)
+    assert short.ended == "looks" and short.looks <= 5 < long.looks
+
+
 def test_no_linkage_with_a_pressure_angle_near_zero() -> None:
     problem, starts = linkage()
     (result,) = pareto(problem, settings("max_pressure_angle", 0.02), starts)

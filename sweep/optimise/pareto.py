@@ -278,7 +278,8 @@ def _search(
     from sweep.study import OptimiseSettings
 
     # All starts of a bound count: none of them may be lost to a rule that has seen enough.
-    results = minimise(bounded(problem, settings, bound), begin, OptimiseSettings(len(begin), unseen=0.0), asked, jobs)
+    search = OptimiseSettings(len(begin), unseen=0.0, looks=settings.looks)
+    results = minimise(bounded(problem, settings, bound), begin, search, asked, jobs)
     cut = any(r.ended in CUT for r in results) or len(results) < len(begin)
     return replace(results[0], ended="time") if cut and results[0].ended not in CUT else results[0]
 

@@ -16,7 +16,6 @@ from sweep.study.sobol import DIMENSIONS
 from sweep.study.space import Axis, DesignSpace
 
 MOST_DESIGNS = 10**12
-LARGEST = 1e100  # number that may stand in a study
 
 Entry: TypeAlias = Axis | float
 
@@ -167,7 +166,7 @@ def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | 
     bare = raw if isinstance(raw, (int, float)) and not isinstance(raw, bool) else None
     if bare is None or internal != "1":
         # A whole number may have more digits than a float has room for.
-        shown = bare if bare is not None and abs(bare) <= LARGEST else None
+        shown = bare if bare is not None and abs(bare) <= units.LARGEST else None
         faults.value(key, raw, _forms(p, shown))
         return None
     return _read_fixed(p, {"value": raw}, key, faults)

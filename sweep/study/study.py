@@ -93,6 +93,7 @@ class ParetoSettings:
     ``bounds`` are upper ones, or with ``at_least`` lower ones; ``starts`` designs of the sweep within each bound are
     searched besides the optimum and the result of the next looser bound; ``time_budget`` [s] for the whole front is an
     emergency brake.  With ``points`` further bounds are placed where the front bends, until there are so many.
+    ``looks`` are the designs each start may look at, as many as those of the optimum.
     """
 
     output: str
@@ -101,6 +102,7 @@ class ParetoSettings:
     starts: int = 2
     time_budget: float | None = None
     points: int | None = None
+    looks: int = 20_000
 
 
 @dataclass(frozen=True)

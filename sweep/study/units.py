@@ -50,6 +50,7 @@ SYMBOLS = tuple(line.rsplit(" = ", 1)[1] for line in _DEFINITIONS)
 # Other ways to write a symbol: "90°", "2 inch", both code points of the micro sign.
 _ALIASES = {"°": "deg", "inch": "in", "\u00b5m": "um", "\u03bcm": "um"}
 
+LARGEST = 1e100  # number that may stand in a study: with a unit it must not overflow
 # What may stand for an internal unit, as messages say it.
 _EXAMPLES = {
     "mm": "a length, in mm, um, cm, m or inch",
@@ -118,13 +119,15 @@ def split(text: str, internal: str) -> tuple[float, str]:
     Raises
     ------
     UnitFault
-        if there is no number, or no unit where one is needed.
+        if there is no number, or no unit where one is needed, or if the number is beyond 1e100.
     """
     match = _NUMBER.fullmatch(text.strip())
     if match is not None and match[2].startswith(","):
         raise UnitFault(f"a decimal point, no comma; {example(internal)}")
     if match is None or not match[2] or not math.isfinite(float(match[1])):
         raise UnitFault(f"a number and its unit; {example(internal)}")
+    if abs(float(match[1])) > LARGEST:
+        raise UnitFault(f"a number of magnitude up to {LARGEST:g} and its unit; {example(internal)}")
     return float(match[1]), match[2]
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from sweep.study.model import ObjectiveSection, ParetoSection
+from sweep.study.model import ObjectiveSection, OptimiseSection, ParetoSection
 from sweep.study.pareto import read_pareto
 from sweep.study.reading import Reading
 
@@ -34,4 +34,5 @@ def check(reading: Reading) -> None:
     reading.fields["pareto"] = None
     if isinstance(raw, dict):
         section, seconds = reading.get(ParetoSection), reading.get(FrontBudget).seconds
-        reading.fields["pareto"] = read_pareto(section, raw, reading.family, goal, seconds, reading.faults)
+        found = read_pareto(section, raw, reading.family, goal, seconds, reading.faults)
+        reading.fields["pareto"] = found and replace(found, looks=reading.get(OptimiseSection).looks)
