@@ -1,9 +1,9 @@
 """Where references to arrays are counted: in functions that make or return one, not in those that only use them.
 
 numba counts the references to every array that a function is given, slices or passes on.  Whoever called it holds the
-array all the while, so that is for nothing.  A function goes without where it is plain to see that each of its arrays is
-an argument or a view of one.  With what `kernels._lowering` leaves out, that is a quarter of the LLVM instructions of a
-first use of needle208: 197 537 instead of 261 620.
+array all the while, so that is for nothing.  A function goes without where it is plain to see that each of its arrays
+is an argument or a view of one.  With what `kernels._lowering` leaves out, that is a quarter of the LLVM instructions
+of a first use of needle208: 197 537 instead of 261 620.
 """
 
 # mypy: disable-error-code="no-untyped-call, attr-defined"
