@@ -65,9 +65,7 @@ def _bound(kind: Any) -> bool:
 def _arrays(kind: Any) -> bool:
     """Return whether what is counted in a type are arrays."""
     if isinstance(kind, types.BaseTuple):
-        return all(
-            _arrays(inner) or isinstance(inner, types.Number | types.Boolean | types.NoneType) for inner in kind.types
-        )
+        return all(_arrays(inner) or isinstance(inner, _NUMBERS) for inner in kind.types)
     return isinstance(kind.type if isinstance(kind, types.Optional) else kind, types.Array)
 
 

@@ -7,7 +7,9 @@ import numpy as np
 from kernels import status as st
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Angles
+from sweep.families.capabilities import Assembly
 from sweep.reductions import extrema, fused
+from sweep.reductions.request import Request
 
 EPS = 2.0**-53
 OFFSETS = np.arange(-4.0, 5.0) / 4.0
@@ -65,3 +67,15 @@ def assert_fused_extrema_lie_within_their_errors(family, designs, request):
     # The chain's precise poses hand a rounded angle from stage to stage.
     assert (off <= found[request].err + 8.0 * EPS * amplified(family, designs) * np.abs(exact)).all()
     assert np.quantile(off / np.abs(exact), 0.9) < 1e-13
+
+
+def assert_fused_margins_are_those_of_poses(family, designs, number):
+    """Of the search on poses for the least discriminant of a later stage, within the errors that both say."""
+    request = Request(f"discriminant{number}", -1)
+    loop = next(loop for loop in family.every(Assembly) if loop.stage == str(number))
+    found, _, undecided = fused.curve_of(family, request, True).extremum(designs, 1e-10)
+    slow, _ = extrema._searched(family, designs, [request], 1e-10, False, True, None)
+    known, scale = ~undecided, loop.scale(designs)
+    assert known.mean() > 0.98
+    off = np.abs(found.value - slow[request].value)[known] / scale[known]
+    assert (off <= ((found.err + slow[request].err) / scale)[known] + 4.0 * EPS).all()

@@ -18,10 +18,14 @@ from kernels.families import guide, rssr
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
-from sweep.families.capabilities import Assembly
 from sweep.reductions import extrema, fused
 from sweep.reductions.request import Request
-from tests.climbing import amplified, assert_fused_extrema_lie_within_their_errors, climbed
+from tests.climbing import (
+    amplified,
+    assert_fused_extrema_lie_within_their_errors,
+    assert_fused_margins_are_those_of_poses,
+    climbed,
+)
 from tests.turn_designs import NEEDLE, crank_rockers, guided_four_bars
 
 EPS = 2.0**-53
@@ -189,14 +193,7 @@ def test_which_of_two_equal_peaks_is_higher_is_left_to_the_search_on_poses_where
 def test_margins_of_later_stages_are_those_of_the_search_on_poses(name):
     of, designs = CASES[name]
     for number in range(2, len(of.stages) + 1):
-        request = Request(f"discriminant{number}", -1)
-        loop = next(loop for loop in of.every(Assembly) if loop.stage == str(number))
-        found, _, undecided = fused.curve_of(of, request, True).extremum(designs, 1e-10)
-        slow, _ = extrema._searched(of, designs, [request], 1e-10, False, True, None)
-        known, scale = ~undecided, loop.scale(designs)
-        assert known.mean() > 0.98
-        off = np.abs(found.value - slow[request].value)[known] / scale[known]
-        assert (off <= ((found.err + slow[request].err) / scale)[known] + 4.0 * EPS).all()
+        assert_fused_margins_are_those_of_poses(of, designs, number)
 
 
 def near_a_change_point(seed):

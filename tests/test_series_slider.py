@@ -20,10 +20,15 @@ from kernels.families.rssp import stage
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
-from sweep.families.capabilities import Assembly, InSeries
+from sweep.families.capabilities import InSeries
 from sweep.reductions import extrema, fused
 from sweep.reductions.request import Request
-from tests.climbing import amplified, assert_fused_extrema_lie_within_their_errors, climbed
+from tests.climbing import (
+    amplified,
+    assert_fused_extrema_lie_within_their_errors,
+    assert_fused_margins_are_those_of_poses,
+    climbed,
+)
 from tests.turn_designs import DRIVEN_SLIDER, RSSP, crank_rockers, driven_sliders, slider_cranks
 
 EPS = 2.0**-53
@@ -128,15 +133,7 @@ def test_places_of_extrema_are_those_of_the_search_on_poses(name):
 
 @pytest.mark.parametrize("name", ["rssr+rssp", "rssr+slider_crank"])
 def test_margins_of_the_slider_are_those_of_the_search_on_poses(name):
-    of, designs = FAMILIES[name], CASES[name]
-    request = Request("discriminant2", -1)
-    loop = next(loop for loop in of.every(Assembly) if loop.stage == "2")
-    found, _, undecided = fused.curve_of(of, request, True).extremum(designs, 1e-10)
-    slow, _ = extrema._searched(of, designs, [request], 1e-10, False, True, None)
-    known, scale = ~undecided, loop.scale(designs)
-    assert known.mean() > 0.98
-    off = np.abs(found.value - slow[request].value)[known] / scale[known]
-    assert (off <= ((found.err + slow[request].err) / scale)[known] + 4.0 * EPS).all()
+    assert_fused_margins_are_those_of_poses(FAMILIES[name], CASES[name], 2)
 
 
 def near_a_change_point(of, seed):
