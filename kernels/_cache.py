@@ -262,6 +262,12 @@ def _checked(path: Path) -> bytes:
     return data
 
 
+@cache
+def _processor(codegen: Any) -> Any:
+    """Return what compiled code depends on besides its source."""
+    return codegen.magic_tuple()
+
+
 class KernelCache(FunctionCache):
     """numba's cache of one function, in our folder."""
 
@@ -279,12 +285,16 @@ class KernelCache(FunctionCache):
         would find the code of another.  A generated kernel says by its name what it closes over (`kernels._jit`).
         """
         code: bytes = self._py_func.__code__.co_code
-        return sig, codegen.magic_tuple(), hashlib.sha256(code).hexdigest()
+        return sig, _processor(codegen), hashlib.sha256(code).hexdigest()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled code of one signature, or None; of files that cannot be read nothing is kept."""
         try:
-            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            data = self._cache_file.load(self._index_key(sig, target_context.codegen()))  # type: ignore[no-untyped-call]
+            if data is None:
+                return None
+            target_context.refresh()  # numba's does that before it knows whether there is anything
+            return self._impl.rebuild(target_context, data)
         except DAMAGED:
             with suppress(OSError), locked():
                 self.flush()  # type: ignore[no-untyped-call]

@@ -22,6 +22,7 @@ from types import CodeType
 from typing import Any
 
 from numba.core import errors, ir, typeinfer, types, untyped_passes
+from numba.core.callconv import CPUCallConv
 from numba.core.compiler import DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.consts import ConstantInference
@@ -37,7 +38,9 @@ from numba.core.typed_passes import (
 )
 from numba.core.typing.context import Context
 
+from kernels._calls import Calls
 from kernels._lowering import KernelLowering
+from kernels._operations import OPERATIONS
 
 _OPERATORS = {id(function) for function in vars(operator).values() if callable(function)}
 # No kernel has `with`, functions inlined by numba, nor the features that one pass refuses.
@@ -84,6 +87,8 @@ class _Typing(Context):
 class _Target(CPUContext):
     """What numba knows of the processor."""
 
+    catches = False  # whether the function that is compiled catches errors
+
     def get_abi_sizeof(self, ty: Any) -> int:
         """Return the size of a type of LLVM's in memory, which parses a module to ask for it."""
         text = str(ty)
@@ -96,7 +101,25 @@ class _Target(CPUContext):
         # Asked at every element of an array; only what imitates arrays has it, and looking for it reads all registers.
         if fn == "__array__" and all(type(x) is types.Array for x in sig.args):
             raise NotImplementedError(fn)
+        write = OPERATIONS.get(getattr(fn, "typing_key", fn))
+        return (write and write(self, sig)) or self.numbas_own(fn, sig, _firstcall)
+
+    def numbas_own(self, fn: Any, sig: Any, _firstcall: bool = True) -> Any:
+        """Return numba's code of a function for a signature."""
         return super().get_function(fn, sig, _firstcall)
+
+    def pair_first(self, builder: Any, val: Any, ty: Any) -> Any:
+        """Return the first of a pair."""
+        return builder.extract_value(val, 0)
+
+    def pair_second(self, builder: Any, val: Any, ty: Any) -> Any:
+        """Return the second of a pair."""
+        return builder.extract_value(val, 1)
+
+    @property
+    def call_conv(self) -> CPUCallConv:
+        """How functions are called."""
+        return CPUCallConv(self) if self.catches else Calls(self)
 
 
 _remembering = cache(_Typing)  # one for each table: numba keeps what it has compiled of its own by the table asked for

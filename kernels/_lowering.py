@@ -3,6 +3,7 @@
 Against numba's own way
 
 * a number has no references to count, so none of its variables is read to count down before it is set or ends;
+* a variable that is set once, before all places where it is read, has no room in memory;
 * an operator's code is looked up by the types of its operands alone.
 
 LLVM takes the needless instructions out again, but each is made, printed, read and looked at before.
@@ -14,19 +15,45 @@ LLVM takes the needless instructions out again, but each is made, printed, read 
 from __future__ import annotations
 
 import operator
+from collections import Counter
 from functools import partial
 from typing import Any
 
 from numba.core import errors, ir, lowering
+from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs
 from numba.core.compiler_machinery import register_pass
 from numba.core.errors import new_error_context  # type: ignore[attr-defined]
 from numba.core.typed_passes import NativeLowering
 
+from kernels._calls import catches
 from kernels._counts import borrows, counted
 
 
 class Lowering(lowering.Lower):
     """Writes LLVM code."""
+
+    def _find_singly_assigned_variable(self) -> None:
+        """Find variables that need no room in memory.
+
+        numba takes those that are set once and read in the same block.  Here are also those that are set once, in a
+        block that every way to where they are read goes through.
+        """
+        used, defined = compute_use_defs(self.blocks)
+        times = Counter(inst.target.name for block in self.blocks.values() for inst in block.find_insts(ir.Assign))
+        readers: dict[str, list[int]] = {}
+        for offset, names in used.items():
+            for name in names:
+                readers.setdefault(name, []).append(offset)
+        before = compute_cfg_from_blocks(self.blocks).dominators() if readers else {}
+        self._blk_local_varmap: dict[str, Any] = {}
+        self._singly_assigned_vars = {
+            name
+            for offset, names in defined.items()
+            for name in names
+            if times[name] == 1 and not self.func_ir.is_generator
+            if name not in readers
+            or (not self._counted(name) and all(offset < at and offset in before[at] for at in readers[name]))
+        }
 
     def lower_block(self, block: Any) -> None:
         """Write a block; numba would set up for each instruction what describes it in a complaint."""
@@ -98,6 +125,7 @@ class KernelLowering(NativeLowering):
 
     def run_pass(self, state: Any) -> bool:
         """Write the code of a function."""
+        state.targetctx.catches = catches(state.func_ir)
         if state.targetctx.enable_nrt and borrows(state):
             state.targetctx.enable_nrt = False
             vars(state.targetctx).pop("nrt", None)  # the counter, made for the setting before

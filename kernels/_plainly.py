@@ -5,15 +5,23 @@ They give the same.  They stand there only while a kernel is compiled.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FunctionType
 from typing import Any
 
-from numba.core import analysis, errors, event, ir
+from llvmlite.ir import IRBuilder
+from llvmlite.ir._utils import NameScope
+from numba.core import analysis, base, errors, event, ir, transforms
+from numba.core.cpu import CPUContext
+from numba.core.postproc import PostProcessor, VariableLifetime
 from numba.core.runtime.context import NRTContext
 from numba.core.targetconfig import TargetConfig
+from numba.core.typing.context import Context
 
 from kernels._counts import meminfos
+from kernels._operations import part_of
 
 # Neither these nor what they are made of are variables of numba's intermediate code.
 _HASHES: dict[type, int] = {}
@@ -81,6 +89,67 @@ def _names(value: Any) -> set[str]:
     return {x.name for x in value.list_vars()} if isinstance(value, ir.Inst) else set()  # type: ignore[no-untyped-call]
 
 
+def _in_order(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+    """Bring the blocks of a function into order, as `PostProcessor.run` does after each pass.
+
+    Where variables live and end it finds each time; here it does when that is asked for, as at the last time.
+    """
+    function = self.func_ir
+    if emit_dels or function.is_generator:
+        _numbas_order(self, emit_dels, extend_lifetimes)
+    else:
+        function.blocks = transforms.canonicalize_cfg(function.blocks)  # type: ignore[no-untyped-call]
+        function.variable_lifetime = VariableLifetime(function.blocks)  # type: ignore[no-untyped-call]
+
+
+_numbas_order = PostProcessor.run
+
+
+def _registered(self: Any, name: str, deduplicate: bool = False) -> str:
+    """Return a name for an LLVM value that no other has, as `NameScope.register` does."""
+    used = self._useset
+    if name in used:
+        if not deduplicate:
+            return str(_numbas_name(self, name))
+        wanted, number = name, self._basenamemap[name]
+        while name in used:
+            number += 1
+            name = f"{wanted}.{number}"
+        self._basenamemap[wanted] = number
+    used.add(name)
+    return name
+
+
+_numbas_name = NameScope.register
+
+
+def _takes_a_place(function: Any) -> bool:
+    """Return whether a function takes an argument `loc`, as `base._has_loc` does."""
+    if type(function) is not FunctionType or hasattr(function, "__wrapped__"):
+        return bool(_numbas_look(function))
+    code = function.__code__
+    return "loc" in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+
+
+_numbas_look: Any = base._has_loc
+
+
+def _after_an_import(look: Any) -> Any:
+    """Return what looks for functions that were added to numba's tables, in all modules only if some came in since."""
+    seen: dict[int, int] = {}
+
+    def looked(self: Any) -> None:
+        table = id(self._registries)
+        if seen.get(table) != len(sys.modules):
+            look(self)
+            seen[table] = len(sys.modules)
+        else:
+            for registry in list(self._registries):
+                self.install_registry(registry)
+
+    return looked
+
+
 def _unless_nobody_listens(told: Any) -> Any:
     """Return what tells of an event, without making one for nobody: LLVM's lock has two at each call of LLVM."""
 
@@ -102,6 +171,12 @@ REPLACED: list[tuple[Any, str, Any]] = [
     (event, "start_event", _unless_nobody_listens(event.start_event)),
     (event, "end_event", _unless_nobody_listens(event.end_event)),
     (NRTContext, "get_meminfos", meminfos),
+    (PostProcessor, "run", _in_order),
+    (base, "_has_loc", _takes_a_place),
+    (CPUContext, "load_additional_registries", _after_an_import(CPUContext.load_additional_registries)),
+    (Context, "load_additional_registries", _after_an_import(Context.load_additional_registries)),
+    (IRBuilder, "extract_value", part_of),
+    (NameScope, "register", _registered),
     (type(errors.termcolor()), "_markup", lambda _self, text, *_style: text),
 ]
 

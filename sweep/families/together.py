@@ -2,8 +2,10 @@
 
 Such a kernel is compiled for every set of outputs that it gives: what is not in the set is not in the machine code.
 That takes a quarter of a second per set, and a study with an optimum asks for dozens of sets, most of them on a few
-thousand poses.  Here a set on few poses is taken from the set of all outputs, and gets machine code of its own as soon
-as it is asked for on many.  The bits are the same.
+thousand poses.  Here a set on few poses is taken from a larger one, and gets machine code of its own as soon as it is
+asked for on many.  The larger set is that of all outputs.  Where arguments are complex, which takes longer to compile,
+it is the first set that was asked for, as long as that will do: who wants slopes asks for all curves first.  The bits
+are the same.
 """
 
 from __future__ import annotations
@@ -43,6 +45,7 @@ class Together:
         self._poses = poses
         self._all = frozenset(names)
         self._asked: dict[tuple[frozenset[str], bool], int] = {}
+        self._first: frozenset[str] | None = None  # set that was asked for with complex arguments
 
     def __reduce__(self) -> str:
         """By its name, as a function: a process that gets it has its own."""
@@ -55,8 +58,14 @@ class Together:
         self._asked[key] = self._asked.get(key, 0) + count
         if count >= MANY or self._asked[key] > PAID or _each_its_own.get():
             return self._poses(designs, angles, wanted)
-        found = self._poses(designs, angles, self._all)
+        found = self._poses(designs, angles, self._larger(*key))
         return {name: found[name] for name in (*wanted, "status")}
+
+    def _larger(self, wanted: frozenset[str], is_complex: bool) -> frozenset[str]:
+        """Return the set that a set on few poses is taken from."""
+        if is_complex and self._first is None:
+            self._first = wanted
+        return self._first if is_complex and self._first is not None and wanted <= self._first else self._all
 
 
 def together(*names: str) -> Callable[[PoseFunction], PoseFunction]:
