@@ -19,8 +19,7 @@ from collections import Counter
 from functools import partial
 from typing import Any
 
-from numba.core import errors, ir, lowering
-from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs
+from numba.core import analysis, errors, ir, lowering
 from numba.core.compiler_machinery import register_pass
 from numba.core.errors import new_error_context  # type: ignore[attr-defined]
 from numba.core.typed_passes import NativeLowering
@@ -38,13 +37,13 @@ class Lowering(lowering.Lower):
         numba takes those that are set once and read in the same block.  Here are also those that are set once, in a
         block that every way to where they are read goes through.
         """
-        used, defined = compute_use_defs(self.blocks)
+        used, defined = analysis.compute_use_defs(self.blocks)
         times = Counter(inst.target.name for block in self.blocks.values() for inst in block.find_insts(ir.Assign))
         readers: dict[str, list[int]] = {}
         for offset, names in used.items():
             for name in names:
                 readers.setdefault(name, []).append(offset)
-        before = compute_cfg_from_blocks(self.blocks).dominators() if readers else {}
+        before = analysis.compute_cfg_from_blocks(self.blocks).dominators() if readers else {}
         self._blk_local_varmap: dict[str, Any] = {}
         self._singly_assigned_vars = {
             name

@@ -13,7 +13,7 @@ from typing import Any
 
 from llvmlite.ir import IRBuilder
 from llvmlite.ir._utils import NameScope
-from numba.core import analysis, base, errors, event, ir, transforms
+from numba.core import analysis, base, errors, event, ir, ssa, transforms
 from numba.core.cpu import CPUContext
 from numba.core.postproc import PostProcessor, VariableLifetime
 from numba.core.runtime.context import NRTContext
@@ -83,6 +83,13 @@ def _uses_and_definitions(blocks: Any) -> Any:
                 read = _names(statement)
             uses |= read - sets
     return analysis._use_defs_result(usemap=used, defmap=defined)
+
+
+def _handled(states: Any, block: Any, handler: Any) -> Iterator[Any]:
+    """Hand the statements of a block to one that renames variables, as `ssa._run_ssa_block_pass` does, and no log."""
+    for statement in block.body:
+        handle = handler.on_assign if isinstance(statement, ir.Assign) else handler.on_other
+        yield handle(states, statement)
 
 
 def _names(value: Any) -> set[str]:
@@ -171,6 +178,7 @@ REPLACED: list[tuple[Any, str, Any]] = [
     (event, "start_event", _unless_nobody_listens(event.start_event)),
     (event, "end_event", _unless_nobody_listens(event.end_event)),
     (NRTContext, "get_meminfos", meminfos),
+    (ssa, "_run_ssa_block_pass", _handled),
     (PostProcessor, "run", _in_order),
     (base, "_has_loc", _takes_a_place),
     (CPUContext, "load_additional_registries", _after_an_import(CPUContext.load_additional_registries)),

@@ -67,7 +67,16 @@ def test_a_set_that_is_asked_for_often_gets_code_of_its_own_and_no_other_does() 
     assert asked[0] == ALL and asked[-1] == A and asked.count(A) == 1
     poses(ONE, few, frozenset("ab"))
     poses(ONE.astype(complex), few, A)  # other code than that of float64
-    assert asked[-2:] == [ALL, ALL]
+    assert asked[-2:] == [ALL, A]
+
+
+def test_complex_poses_take_the_set_asked_for_first_as_long_as_it_will_do() -> None:
+    poses, asked = recorded()
+    slopes = ONE.astype(complex)
+    for wanted in ("ab", "a", "b", "bc", "ab"):
+        assert set(poses(slopes, angles(4), frozenset(wanted))) == {*wanted, "status"}
+    poses(ONE, angles(4), A)
+    assert asked == [frozenset("ab")] * 3 + [ALL, frozenset("ab"), ALL]
 
 
 def test_own_code_is_taken_at_once_where_a_time_is_measured() -> None:
