@@ -35,7 +35,7 @@ class Lowering(lowering.Lower):
         """Find variables that need no room in memory.
 
         numba takes those that are set once and read in the same block.  Here are also those that are set once, in a
-        block that every way to where they are read goes through.
+        block that every way to where they are read goes through.  An error that is caught leaves a block on the way.
         """
         used, defined = analysis.compute_use_defs(self.blocks)
         times = Counter(inst.target.name for block in self.blocks.values() for inst in block.find_insts(ir.Assign))
@@ -43,7 +43,8 @@ class Lowering(lowering.Lower):
         for offset, names in used.items():
             for name in names:
                 readers.setdefault(name, []).append(offset)
-        before = analysis.compute_cfg_from_blocks(self.blocks).dominators() if readers else {}
+        whole = not self.context.catches
+        before = analysis.compute_cfg_from_blocks(self.blocks).dominators() if readers and whole else {}
         self._blk_local_varmap: dict[str, Any] = {}
         self._singly_assigned_vars = {
             name
@@ -51,7 +52,7 @@ class Lowering(lowering.Lower):
             for name in names
             if times[name] == 1 and not self.func_ir.is_generator
             if name not in readers
-            or (not self._counted(name) and all(offset < at and offset in before[at] for at in readers[name]))
+            or (whole and not self._counted(name) and all(offset < at and offset in before[at] for at in readers[name]))
         }
 
     def lower_block(self, block: Any) -> None:
