@@ -14,9 +14,10 @@ import pytest
 from kernels import _claims
 from sweep.engine import ahead
 from sweep.evaluation import summaries
+from sweep.families.base import Accuracy
 from sweep.optimise import rehearsal as rehearsals
 from sweep.optimise.rehearsal import rehearsal
-from sweep.reductions import extrema
+from sweep.reductions import extrema, sampling
 from sweep.study.load import load_study
 from tests.engine_study import ROOT, chunk_bytes, write_study
 from tests.test_kernel_cache import report, tree  # noqa: F401
@@ -178,6 +179,19 @@ def test_the_second_process_begins_with_poses_and_the_objective(monkeypatch: pyt
     monkeypatch.setattr(ahead, "_sweep", lambda _: [partial(done.append, "sweep")])
     ahead._compile(study)
     assert done == ["poses", "objective", "search", "sweep"]
+
+
+def test_precise_poses_are_those_of_the_last_limit_on_an_extremum(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = load_study(ROOT / "studies" / "needle208", smoke=True)
+    asked: list[object] = []
+    real = sampling.pose_columns
+    monkeypatch.setattr(sampling, "pose_columns", lambda *given: asked.append(given[3]) or real(*given))
+    for step in ahead._precise(study):
+        step()
+    assert asked == [["dev", "discriminant1", "discriminant2"]]
+    assert ahead._precise(replace(study, reference=None)) == []
+    assert ahead._precise(replace(study, accuracy=Accuracy())) == []
+    assert ahead._precise(replace(study, limits=())) == []
 
 
 def test_the_objective_is_that_of_the_reference_design(monkeypatch: pytest.MonkeyPatch) -> None:

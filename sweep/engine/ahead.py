@@ -97,7 +97,8 @@ def _compile(study: Study) -> None:
     """Do what the study does, last things first; what needs a kernel that the first process is at has to wait.
 
     First of all come poses: begun with the objective, whose parts the first process needs at once, that one waited for
-    half a second.  Then comes the objective: it takes long to compile, and it is the last that the sweep needs.
+    half a second.  Then come precise poses, and the objective: it takes long to compile, and it is the last that the
+    sweep needs.
     """
     from kernels._claims import impatient
     from sweep.optimise.rehearsal import rehearsal
@@ -105,7 +106,8 @@ def _compile(study: Study) -> None:
     search = rehearsal(study)
     with impatient():
         left = _undone(islice(search, 1))
-    left += _undone(_objective(study))  # what it may have to wait for is short
+    # By the time that precise poses are compiled the first process has compiled what both searches share.
+    left += _undone(_precise(study) + _objective(study))
     with impatient():
         left += _undone(search)
     steps = _sweep(study) + left
@@ -129,20 +131,48 @@ def _undone(steps: Iterable[Callable[[], object]]) -> list[Callable[[], object]]
     return left
 
 
+def _precise(study: Study) -> list[Callable[[], object]]:
+    """Return the step that computes precise poses for the last limit on an extremum.
+
+    A sweep asks for them where rounding leaves open whether a design keeps the limit.
+    """
+    import numpy as np
+
+    from sweep.reductions.catalogue import quantity
+    from sweep.reductions.sampling import discriminants, pose_columns
+
+    family = study.family
+    searched = [
+        found for limit in study.limits if (found := quantity(family, limit.output)) and found.route == "reduction"
+    ]
+    if not searched or family.precise_poses is None or study.reference is None or study.accuracy.target is None:
+        return []
+    requests = searched[-1].requests(family, study.window is not None)
+    names = [*(request.pose for request in requests), *discriminants(family)]
+    design = _reference(study)
+    return [lambda: pose_columns(family.precise(), design, np.zeros((1, 1)), names)]
+
+
+def _reference(study: Study) -> Array:
+    """Return the reference design, (1, P), which no kernel has to make."""
+    from sweep.evaluation.tables import design_matrix
+
+    return design_matrix(study.family, study.reference or {})[0]
+
+
 def _objective(study: Study) -> list[Callable[[], object]]:
-    """Return the step that computes the objective of the reference design, which no kernel has to make.
+    """Return the step that computes the objective of the reference design.
 
     Where that is an extremum over the turn it is searched for as it is: the margin that an answer needs besides is what
     the first process compiles meanwhile.
     """
-    from sweep.evaluation.tables import design_matrix
     from sweep.reductions.catalogue import quantity
     from sweep.reductions.extrema import true_extrema
 
     if study.reference is None or study.objective is None:
         return []
     family, name, target = study.family, study.objective.output, study.accuracy.target
-    design = design_matrix(family, study.reference)[0]
+    design = _reference(study)
     found = quantity(family, name)
     requests = () if found is None or found.route != "reduction" else found.requests(family, study.window is not None)
     if target is None or not requests or any(request.windowed for request in requests):
