@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from statistics import NormalDist
 from typing import Any
 
@@ -159,6 +160,23 @@ def test_robust_search_finds_the_share_out_that_costs_least() -> None:
     # The share is good to 0.2 % (8192 mechanisms of the search), which is 0.02 standard deviations at this price.
     assert share == pytest.approx(SHARE, abs=0.002)
     assert cost == pytest.approx(price((DEAR, 1.0), best((DEAR, 1.0))), abs=0.02 * (DEAR + 1.0))
+
+
+def test_a_search_that_runs_out_of_looks_is_corrected_until_that_brings_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What its limits cost is not known there; what is asked for is kept all the same."""
+    approached, ended = robust_search._approached, []
+
+    def unsettled(*given: Any) -> Any:
+        result, radius, step = approached(*given)
+        ended.append(result.ended)
+        return replace(result, ended="looks"), radius, step
+
+    monkeypatch.setattr(robust_search, "_approached", unsettled)
+    _, share = room()
+    assert share == pytest.approx(SHARE, abs=0.002)
+    assert len(ended) < robust_search.CORRECTIONS
 
 
 def test_one_number_for_all_limits_would_cost_more(monkeypatch: pytest.MonkeyPatch) -> None:

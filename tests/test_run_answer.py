@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from sweep.cli import main
 from sweep.report import write_report
+from sweep.report.terminal import held_back
 from tests.test_optimise_study import STUDY
 
 
@@ -30,6 +31,13 @@ def test_answer_names_the_optimum_what_holds_it_back_and_the_next_command(tmp_pa
     assert "held back by: " in text and "swing (at least 40°)" in text
     assert "search: 3 starts, " in text and "estimated unseen" in text
     assert f"next: sweep report {tmp_path / 'designs'}" in text
+
+
+def test_an_optimum_is_in_the_open_only_if_its_search_has_settled() -> None:
+    assert held_back([], "converged") == "nothing: an optimum in the open"
+    assert held_back(["swing"], "converged") == "swing"
+    assert held_back([], "looks") == "the number of looks, which ended its search"
+    assert held_back(["swing"], "looks") == "swing; the number of looks, which ended its search"
 
 
 def test_no_feasible_design_ends_with_4_and_says_which_limit_gives_way(tmp_path: Path) -> None:

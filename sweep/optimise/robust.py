@@ -201,7 +201,7 @@ class _Calibrate:
         levels: Levels = dict.fromkeys(keyed(self.problem).values(), self.level)
         best = Robust(head, _share(self.problem, head.design, self.tolerance, self.seed), True)
         design, radius, reach = head.design, RADIUS, REACH
-        for _ in range(CORRECTIONS):
+        for corrected in range(CORRECTIONS):
             if should_stop():
                 return replace(best, cut=True)
             result, radius, step = _approached(
@@ -212,6 +212,8 @@ class _Calibrate:
             better = share >= wanted and (best.share < wanted or result.objective < best.result.objective)
             if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
                 best = Robust(replace(result, agree=head.agree), share, result.ended in CUT)
+            if corrected and share >= wanted and not better and result.ended == "looks":
+                break  # what the limits of a search cost that does not settle leads nowhere
             levels, saved = self._corrected(design, levels, values, reach)
             if wanted <= share <= wanted + ENOUGH and step < STAYED and saved < SAVED:
                 break

@@ -112,9 +112,16 @@ def _optimum(data: Dataset) -> list[str]:
     wanted = f", {100.0 * asked:g} % asked" if asked is not None else ""
     return [
         f"optimum: {shown.words} {shown.show(value)}{f' ({fast})' if fast else ''}",
-        f"held back by: {'; '.join(held) or 'nothing: an optimum in the open'}",
+        f"held back by: {held_back(held, str(data.optimum.get('ended')))}",
         *([f"as it is made: {100.0 * made:.1f} % within all limits{wanted}"] if math.isfinite(made) else []),
     ]
+
+
+def held_back(held: list[str], ended: str) -> str:
+    """Return what keeps an optimum from being better: limits and bounds, or how its search ended."""
+    if ended == "looks":
+        held = [*held, "the number of looks, which ended its search"]
+    return "; ".join(held) or "nothing: an optimum in the open"
 
 
 def _nearest(data: Dataset) -> list[str]:
