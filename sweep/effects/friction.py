@@ -8,9 +8,10 @@ from functools import partial
 import numpy as np
 
 from kernels.effects.friction import friction_loads
-from sweep.effects import loads
+from sweep.effects import ball_stops, loads
 from sweep.effects.base import Effect, Scene, largest, refuse, take_over
 from sweep.effects.bearings import together
+from sweep.effects.bend import Bend
 from sweep.effects.handed import FRICTION
 from sweep.effects.handed import behind as handed_behind
 from sweep.effects.kinetostatics import bodies, drive, force_outputs, vector_columns, wanted_groups
@@ -134,6 +135,7 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def _effect(kind: loads.Follower) -> Effect:
+    results = _outputs(kind)
     return Effect(
         key=KEY,
         name=f"{kind.prefix}friction",
@@ -144,11 +146,12 @@ def _effect(kind: loads.Follower) -> Effect:
         needs=(f"{kind.prefix}kinetostatics",),
         inputs=(*kind.parameters, *_data(kind)),
         tool_inputs=loads.TOOLS,
-        outputs=_outputs(kind),
+        outputs=results,
         compute=compute,
         called_for="losses, drive sizing, a check against jamming",
         negligible="contraction rho(L) below 0.01: joint loads change by less than 1 %",
         takes_load=KEY,
+        bends=(Bend(tuple(o.name for o in results), ball_stops.slowness, squares=True),),
         advise=partial(
             largest,
             compute=compute,

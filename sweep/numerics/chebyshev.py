@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+DENSE = 33  # places at which the highest point of a polynomial is looked for, its ends included
+PASSES = 8  # of Newton's method between two of them, or by halves: then a top is found to 1e-4 of a panel at least
 NODES = 8  # of a panel, its ends among them: a jump just inside would be seen by no other
 
 
@@ -40,3 +42,45 @@ def product(rows: Array, matrix: Array) -> Array:
     for k in range(1, matrix.shape[0]):
         total += rows[:, k, None] * matrix[k]
     return total
+
+
+def summits(series: Array, mode: int) -> tuple[Array, Array]:
+    """Return the highest points of polynomials on [-1, 1]: places and measured values; each (k,).
+
+    Parameters
+    ----------
+    series : (k, NODES) coefficients
+    mode : 0 for the largest magnitude, +1 for the largest value, -1 for the largest negative
+
+    Notes
+    -----
+    Between two of 33 places a top shows by the change of sign of the slope, however little it rises above both: next
+    to an end, or as one of two tops, it may be the highest and stand beside no high place.  The places crowd towards
+    the ends, as tops may: next to a dwell the end is level too.
+    """
+    dense: Array = -np.cos(np.pi * np.arange(DENSE) / (DENSE - 1))
+    values = product(series, rising(dense))
+    sense = np.sign(values) if mode == 0 else np.full(values.shape, float(mode))
+    heights = sense * values
+    slope, bend = (np.asarray(chebyshev.chebder(series, order, axis=1), np.float64) for order in (1, 2))
+    slopes = sense * product(slope, rising(dense)[:-1])
+    best = heights.argmax(axis=1)
+    every = np.arange(len(series))
+    x, value = dense[best], heights[every, best]
+
+    row, column = np.nonzero((slopes[:, :-1] > 0.0) & (slopes[:, 1:] < 0.0))
+    low, high, sign = dense[column], dense[column + 1], sense[row, column]
+    left, right = slopes[row, column], slopes[row, column + 1]
+    at = low + (high - low) * left / (left - right)
+    terms, slope, bend = (np.ascontiguousarray(part[row].T) for part in (series, slope, bend))
+    for _ in range(PASSES):
+        uphill = sign * chebyshev.chebval(at, slope, tensor=False)
+        low, high = np.where(uphill > 0.0, at, low), np.where(uphill > 0.0, high, at)
+        bow = sign * chebyshev.chebval(at, bend, tensor=False)
+        after = at - np.divide(uphill, bow, out=np.full(at.shape, np.inf), where=bow < 0.0)
+        at = np.where((low <= after) & (after <= high), after, 0.5 * (low + high))
+    top = sign * chebyshev.chebval(at, terms, tensor=False)
+    order = np.argsort(top, kind="stable")  # of several tops of a row the highest is written last
+    order = order[top[order] >= value[row[order]]]
+    x[row[order]], value[row[order]] = at[order], top[order]
+    return x, value

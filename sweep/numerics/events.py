@@ -14,6 +14,8 @@ GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 SECTIONS = 12
 PARABOLAS = 4
 NARROWER = 1.0 / 16.0
+WIDER = 8.0  # times the place before: between them a pole beside the nearer end leaves 2.1^-k of the k-th coefficient
+SHORTEST = 1e-11  # distance of a zero [rad] below which no pose sees what turns there
 BISECTIONS = 120  # at most; a smooth function takes some eight steps, a jump one for each bit of the angle
 LAST = 2.0**-48  # width of the last brackets [rad]: four times the rounding of an angle
 
@@ -109,8 +111,10 @@ def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index
 
     Notes
     -----
-    A dip D + D''/2 x^2 has such a zero at the distance sqrt(2 D/D''): the angles of its bottom and of both places as
-    far beside it are returned.  Its bottom is found by golden sections.
+    A dip D + D''/2 x^2 has such a zero at the distance sqrt(2 D/D''): the angles of its bottom, of both places as
+    far beside it, and of places ever eight times farther up to ``reach`` are returned.  What turns there goes on
+    turning like the inverse of the distance: a panel that begins close by and ends far away would hide that.  The
+    bottom is found by golden sections.
     """
     before = np.concatenate([angles[:, -1:] - TWO_PI, angles[:, :-1]], axis=1)
     after = np.concatenate([angles[:, 1:], angles[:, :1] + TWO_PI], axis=1)
@@ -127,7 +131,11 @@ def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index
     rise = np.maximum(beside - lowest, np.finfo(float).tiny)
     away = step * np.sqrt(np.maximum(lowest, 0.0) / rise)
     row, bottom, away = (x[away < reach] for x in (row, bottom, away))
-    return np.tile(row, 3), np.mod(np.concatenate([bottom - away, bottom, bottom + away]), TWO_PI)
+    widths = away[:, None] * WIDER ** np.arange(1.0 + np.ceil(np.log(reach / SHORTEST) / np.log(WIDER)))
+    which, column = np.nonzero((widths < reach) & ((away >= SHORTEST)[:, None] | (np.arange(widths.shape[1]) == 0)))
+    middle, aside = bottom[which], widths[which, column]
+    places = np.concatenate([bottom, middle - aside, middle + aside])
+    return np.concatenate([row, row[which], row[which]]), np.mod(places, TWO_PI)
 
 
 def _one(functions: Functions, row: Index, which: Index, phi: Array) -> Array:

@@ -50,7 +50,7 @@ def singularities(discriminants: Sequence[Curve], n: int, within: float = FAR) -
 
     A dip D + D''/2 x^2 vanishes at x = +- i rho with rho^2 = D/(D''/2).  The parabola through three samples is taken
     again ever closer to the dip, unless the first one puts the zero farther away than ``within`` [rad]: such zeros
-    are as good as the samples.
+    are as good as the samples.  Where a discriminant is nan there is no pose, so a zero is there.
     """
     if not discriminants:
         return Singularities(np.ones((n, 1)), np.full((n, 1), FAR))
@@ -76,6 +76,9 @@ def _dips(curve: Curve, n: int, number: int, within: float) -> Singularities:
     close = np.flatnonzero(rho <= within)
     row, which = row[close], which[close]
     places[row, which], distances[row, which] = _closer(curve, row, phi[close])
+    lost = np.isnan(values)
+    none = np.flatnonzero(lost.any(axis=1))
+    places[none, 0], distances[none, 0] = turn[lost[none].argmax(axis=1)], SHORTEST
     return Singularities(places, distances)
 
 
@@ -87,9 +90,14 @@ def _elsewhere(n: int, number: int) -> tuple[Array, Array]:
 def _closer(curve: Curve, row: Index, phi: Array) -> tuple[Array, Array]:
     """Return places and distances of the zeros of designs ``row`` near dips at ``phi``, (k,)."""
     spacing = TWO_PI / SAMPLES
-    rho, step = np.full(phi.size, FAR), np.full(phi.size, spacing)
+    every, rho, step = np.arange(phi.size), np.full(phi.size, FAR), np.full(phi.size, spacing)
     for _ in range(PASSES if phi.size else 0):
-        left, here, right = curve(row, phi[:, None] + step[:, None] * np.arange(-1.0, 2.0)).T
+        angles = phi[:, None] + step[:, None] * np.arange(-1.0, 2.0)
+        values = curve(row, angles)
+        lost = np.isnan(values)
+        left, here, right = np.where(lost.any(axis=1, keepdims=True), 0.0, values).T  # does not bend, is not followed
+        none = lost.any(axis=1)
+        phi, rho = np.where(none, angles[every, lost.argmax(axis=1)], phi), np.where(none, SHORTEST, rho)
         bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
         usable = bend > 0.0
         per_bend = np.divide(1.0, bend, out=np.zeros(phi.size), where=usable)

@@ -19,7 +19,7 @@ from kernels import scan
 from kernels import status as st
 from sweep.families.base import Array, Family
 from sweep.families.pace import Bends, Singular, bends
-from sweep.numerics.chebyshev import NODES, at_nodes, basis, product, rising
+from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
 from sweep.reductions.cuts import ends
 from sweep.reductions.density import MATTERS, nearest
 from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
@@ -27,10 +27,8 @@ from sweep.reductions.rounding import order_of, singular_share
 from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, blocks, discriminants, pose_columns
 
 PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
-DENSE = 33  # places at which the highest point of a polynomial is looked for, its ends included
-NEWTON = 4
-TAIL = 3  # last coefficients that tell how wrong a polynomial may be ...
-CAREFUL = 4.0  # ... times this; their sum is a quarter of a jump inside the panel
+TAIL = 4  # last coefficients that tell how wrong a polynomial may be; of a tent in the middle three nearly vanish ...
+CAREFUL = 3.0  # ... times this: the tip of a tent, wherever on the panel, is up to 2.91 times their sum above the rest
 LATELY = 0.25  # of what the polynomial before was wrong by: halving takes a kink's share to a half
 # Next to a reversal friction takes its direction from a speed that is all rounding: nearer poses are noise.
 NARROWEST = 1e-11  # width of a panel [rad] that can only hold a jump
@@ -223,19 +221,11 @@ def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Requ
 
 def _tops(panels: Panels, mode: int, err: Array) -> Top:
     """Return the highest points of the polynomials, whose heights are wrong by ``err`` at most."""
-    dense = np.linspace(-1.0, 1.0, DENSE)
-    heights = _measured(product(panels.series, rising(dense)), mode)
-    x, value = dense[heights.argmax(axis=1)], heights.max(axis=1)
-    slope, bend = (np.ascontiguousarray(chebyshev.chebder(panels.series, order, axis=1).T) for order in (1, 2))
-    for _ in range(NEWTON):
-        bow = chebyshev.chebval(x, bend, tensor=False)
-        step = np.divide(chebyshev.chebval(x, slope, tensor=False), bow, out=np.zeros(x.size), where=bow != 0.0)
-        after = np.clip(x - np.clip(step, -2.0 / DENSE, 2.0 / DENSE), -1.0, 1.0)
-        height = _measured(chebyshev.chebval(after, panels.series.T, tensor=False), mode)
-        x, value = np.where(height >= value, after, x), np.maximum(value, height)
+    x, value = summits(panels.series, mode)
+    bow = np.abs(chebyshev.chebval(x, chebyshev.chebder(panels.series, 2, axis=1).T, tensor=False))
     half = 0.5 * (panels.high - panels.low)
     # At an end the slope is what holds the place, inside it is the bend; poses stand a little inside of a jump there.
-    inside, bow = np.abs(x) < 1.0, np.abs(chebyshev.chebval(x, bend, tensor=False))
+    inside = np.abs(x) < 1.0
     blur = np.divide(SLOPE * err, bow, out=np.full(x.size, 2.0), where=bow > 0.0)
     err_phi = np.where(inside, half * np.minimum(blur, 2.0), 0.5 * NARROWEST) + 8.0 * EPS * np.pi
     return Top(panels.row, 0.5 * (panels.low + panels.high) + half * x, value, err + 4.0 * EPS * np.abs(value), err_phi)

@@ -66,11 +66,14 @@ def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
     around : (k, 7) measured values at the best sample and its three neighbours on either side
     """
     place, height, ripple, blur = _quartic(np.ascontiguousarray(around[:, 1:6]))
+    # A sample two steps away may be higher: that is another peak, which has a first guess of its own.
+    rival = np.abs(place) == 2.0
+    place[rival], height[rival] = 0.0, around[rival, 3]
     # One fourth difference may vanish by chance where the curve is not yet resolved; three in a row do not.
     fourth = np.abs(around[:, :3] + around[:, 4:] - 4.0 * (around[:, 1:4] + around[:, 3:6]) + 6.0 * around[:, 2:5])
     widest = fourth.max(axis=1)
     error = RIPPLE * widest + 4.0 * EPS * np.abs(height) + _kink(around[:, 1:6], BENT)
-    err_height = np.where(np.abs(place) < 2.0, error, np.inf)
+    err_height = np.where(rival, np.inf, error)
     err_phi = spacing * np.minimum(blur * widest / np.maximum(ripple, EPS * EPS), 2.0)
     return Peaks(centre + spacing * place, height, err_phi, err_height, height, spacing, SHRINK * spacing)
 

@@ -13,7 +13,7 @@ from sweep.families.base import Array, Family
 from sweep.families.pace import Singular
 from sweep.numerics.singularities import Singularities
 from sweep.reductions.breaks import jumps, level, near_jumps, search
-from sweep.reductions.density import MATTERS, denser, nearest
+from sweep.reductions.density import MATTERS, broken, denser, nearest
 from sweep.reductions.refine import (
     EPS,
     SHRINK,
@@ -92,6 +92,9 @@ class Search:
         self.near = nearest(self.family, self.designs, MATTERS) if self.family.every(Singular) else None
         fewest = (START * denser(self.family, self.designs, self.near)).astype(np.int64)
         self.undone = np.tile(fewest, (len(self.requests), 1))
+        if self.near is not None and not self.anywhere:
+            broken(self.family, self.designs, self.near, self.status)
+            self.undone[:, self.status != st.OK] = 0
         # A discriminant is a smooth function whatever its sign; the motion is not where it vanishes.
         self.guards = [] if self.anywhere else list(discriminants(self.family))
         position = [self.family.position] if self.window is not None else []
