@@ -92,11 +92,12 @@ def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
                 if status[i] != st.OK:
                     continue
                 own, low, high = span[i - start, 0], span[i - start, 1], span[i - start, 2]
-                for slot in range(low - 1, high):
-                    peak = (own if slot < low else slot) & PLACE
-                    if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
-                        refine(1, m[peak:], SETTLING)
-                        finish(1, m[peak:], target)
+                if not _trusted(own, low, high, m):
+                    for slot in range(low - 1, high):
+                        peak = (own if slot < low else slot) & PLACE
+                        if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
+                            refine(1, m[peak:], SETTLING)
+                            finish(1, m[peak:], target)
                 status[i] = _decide(own, low, high, m, mode, allowed * target, tie, i, found)
             # Now the list is free for those, one by one, whose tops were not single ones between their samples.
             for i in range(start, end):
@@ -126,11 +127,11 @@ def _decide(
 
     Return OK, ROUNDED, UNTRUSTED, or OPEN where it is not sure which is highest.
     """
-    own = own & PLACE
-    winner, trusted = own, m[own + ERROR] < math.inf
-    for slot in range(begin, end):
+    own, second, third = _first_three(own, begin, end)
+    winner = second if m[second + HEIGHT] > m[own + HEIGHT] else own
+    winner = third if m[third + HEIGHT] > m[winner + HEIGHT] else winner
+    for slot in range(begin + 2, end):
         peak = slot & PLACE
-        trusted = trusted & (m[peak + ERROR] < math.inf)
         winner = peak if m[peak + HEIGHT] > m[winner + HEIGHT] else winner
     height, blur, scale = m[winner + HEIGHT], m[winner + ROUNDING], m[winner + SCALE]
     code = st.OK if blur <= rounding * scale else ROUNDED
@@ -144,4 +145,24 @@ def _decide(
     found[VALUE, i], found[PHI, i] = -height if mode < 0 else height, place - TURN * np.floor(place / TURN)
     found[VALUE_ERROR, i], found[PHI_ERROR, i] = m[winner + ERROR] + blur, m[winner + REACH]
     found[SCALE_ROW, i], found[SPACING, i] = scale, m[winner + WIDTH]
-    return code if trusted else UNTRUSTED
+    return code if _trusted(own, begin, end, m) else UNTRUSTED
+
+
+@inline
+def _first_three(own: int, begin: int, end: int) -> tuple[int, int, int]:
+    """Return the places of a design's first three maxima, the first again for those it does not have.
+
+    Few designs have more, and how many they have the processor cannot foresee: these are chosen without a branch.
+    """
+    own = own & PLACE
+    return own, (begin if end > begin else own) & PLACE, (begin + 1 if end > begin + 1 else own) & PLACE
+
+
+@inline
+def _trusted(own: int, begin: int, end: int, m: Array) -> bool:
+    """Tell whether all maxima of a design are trusted."""
+    own, second, third = _first_three(own, begin, end)
+    highest = max(m[own + ERROR], max(m[second + ERROR], m[third + ERROR]))
+    for slot in range(begin + 2, end):
+        highest = max(highest, m[(slot & PLACE) + ERROR])
+    return highest < math.inf

@@ -16,6 +16,7 @@ from kernels.series.curves import MARGIN
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries
 from sweep.families.chain import Chain, stages_of
+from sweep.families.derived import of_family
 from sweep.reductions.refine import EPS, SHRINK, Peaks, confirmed, polished
 from sweep.reductions.request import Extremum, Request
 from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, pose_columns, turn
@@ -93,7 +94,7 @@ class FusedCurve:
 
     def _confirm(self, designs: Array, found: Extremum, rows: Index, tolerance: Array, spacing: Array) -> None:
         """Replace extrema that rounding may have moved too far by what precise poses say, in place."""
-        precise, pose, mode = self.family.precise(), self.request.pose, self.request.mode
+        precise, pose, mode = _precise(self.family), self.request.pose, self.request.mode
         phi = found.phi[rows]
         there = self._precisely(precise, designs[rows], phi)
         sign = np.where(there[pose] < 0.0, -1.0, 1.0) if mode == 0 else np.full(rows.size, float(mode))
@@ -130,6 +131,11 @@ class FusedCurve:
         for loop in self._later():
             amplified += np.abs(loop.scale(designs) / there[loop.discriminant])
         return 4.0 * EPS * amplified
+
+
+@of_family
+def _precise(family: Family) -> Family:
+    return family.precise()
 
 
 def curve_of(family: Family, request: Request, anywhere: bool) -> FusedCurve | None:
