@@ -6,6 +6,7 @@ share their machine code (`kernels._jit.generated`).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -13,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from kernels._jit import generated_inline
+from kernels.rounded_sincos import FAR, rounded_sincos
 from kernels.series.form import BLOCK, STRIDE, Form, Helper, Travel, Turned
 from kernels.series.links import NUMBERS, Input, blurred_through, enter, get_link, link_of, put_link, through
 
-LIBRARY = 2  # rows of a block before the columns of a stage: what comes from the library
 COUPLING = 2  # columns kappa and offset of the design matrix behind those of each stage but the first
 
 
@@ -25,8 +26,9 @@ class Record:
     """The constants of some stages in a row, as nested tuples: (stage 1), ((stage 1), link, stage 2), ...
 
     ``constants(designs, i)`` gives those of a design.  So does ``loaded(block, k)``, as vector code, from what
-    ``load(designs, i, block, k)`` has written to place k of a block of ``wide`` rows.  ``doubts(c)`` gives for each
-    stage a bound of the rounding error of its discriminant, nan where it is not valid.
+    ``load(designs, i, block, k)`` has written to place k of a block of ``wide`` rows; only sines and cosines of angles
+    among its columns come from `rounded_sincos` instead of the C library.  ``doubts(c)`` gives for each stage a bound
+    of the rounding error of its discriminant, nan where it is not valid.
     """
 
     name: str
@@ -204,7 +206,7 @@ def _recorded_first(form: Form) -> Record:
     return Record(
         form.name,
         form.columns,
-        LIBRARY + form.columns,
+        form.columns,
         form.numbers,
         constants,
         load,
@@ -217,7 +219,7 @@ def _recorded_first(form: Form) -> Record:
 
 def _recorded(before: Record, form: Form) -> Record:
     """Return the constants of some stages and of one more, coupled to them."""
-    end, link = before.columns + form.columns, before.wide + LIBRARY + form.columns
+    end, link = before.columns + form.columns, before.wide + form.columns
     link_row, stage_row = before.numbers * STRIDE, (before.numbers + NUMBERS) * STRIDE
     constants_before, put_before, get_before, doubts_before = before.constants, before.put, before.get, before.doubts
     load_before, loaded_before, put_here, get_here = before.load, before.loaded, form.put, form.get
@@ -254,31 +256,42 @@ def _recorded(before: Record, form: Form) -> Record:
 def _from_columns(form: Form, name: str, start: int, row: int) -> tuple[Helper, ...]:
     """Return ``constants``, ``load`` and ``loaded`` of one stage, as of a `Record`.
 
-    Its columns begin at ``start``.  In a block they begin at row ``row``, behind what comes from the library.
+    Its columns begin at ``start``, in a block at row ``row``.
     """
-    constants_here, columns, first = form.constants, form.columns, row + LIBRARY
-    angle = start + (form.angle or 0)
+    constants_here, columns = form.constants, form.columns
+    angle = None if form.angle is None else start + form.angle
+    angle_row = row + (form.angle or 0)
 
-    def nothing(designs: Any, i: int) -> tuple[float, float]:
+    def nothing(at: Any, i: int) -> tuple[float, float]:
         return 1.0, 0.0
 
-    def turned(designs: Any, i: int) -> tuple[float, float]:
+    def library(designs: Any, i: int) -> tuple[float, float]:
         return np.cos(designs[i, angle]), np.sin(designs[i, angle])
 
-    called = _made("library", name, nothing if form.angle is None else turned)
+    def vectorised(block: Any, k: int) -> tuple[float, float]:
+        sine, cosine = rounded_sincos(block[angle_row * BLOCK + k])
+        return cosine, sine
+
+    def principal(x: float) -> float:
+        return x if abs(x) <= FAR else math.atan2(math.sin(x), math.cos(x))
+
+    called = _made("library", name, nothing if angle is None else library)
+    near = _made("principal", name, principal)
+    computed = _made("turned", name, nothing if angle is None else vectorised)
 
     def constants(designs: Any, i: int) -> Any:
         cos, sin = called(designs, i)
         return constants_here(designs[i], start, 1, cos, sin)
 
     def load(designs: Any, i: int, block: Any, k: int) -> None:
-        block[row * BLOCK + k], block[(row + 1) * BLOCK + k] = called(designs, i)
         for column in range(columns):
-            block[(first + column) * BLOCK + k] = designs[i, start + column]
+            block[(row + column) * BLOCK + k] = designs[i, start + column]
+        if angle is not None:
+            block[angle_row * BLOCK + k] = near(designs[i, angle])
 
     def loaded(block: Any, k: int) -> Any:
-        cos, sin = block[row * BLOCK + k], block[(row + 1) * BLOCK + k]
-        return constants_here(block, first * BLOCK + k, BLOCK, cos, sin)
+        cos, sin = computed(block, k)
+        return constants_here(block, row * BLOCK + k, BLOCK, cos, sin)
 
     return tuple(_made(f.__name__, name, f) for f in (constants, load, loaded))
 

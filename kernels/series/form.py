@@ -57,7 +57,7 @@ class Form:
     ----------
     name : of the family
     columns : of its design matrix
-    angle : column of an angle whose cosine and sine are taken from the library, which vector code cannot call; or None
+    angle : column of an angle whose cosine and sine the constants need, or None
     numbers : how many constants there are
     constants : (array, place, step, cos, sin) -> c, of the design whose columns stand at place, place + step, ..., and
         of those two; a tuple of floats with a field ``doubt``: a bound of the rounding error of ``delta`` at any pose,

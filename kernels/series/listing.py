@@ -36,6 +36,7 @@ Status: TypeAlias = NDArray[np.uint8]
 Counts: TypeAlias = NDArray[np.int64]
 
 CHUNK = FEWEST  # samples whose peaks are looked for together
+ROW = 2**62 - 1  # as `kernels.series.peaks.PLACE`, for rows of a table
 ANGLE = 2**15 - 1  # as `kernels.series.peaks.PLACE`, for samples and crank angles
 LINE = 8  # numbers in a line of the cache
 ABREAST = MOST + LINE  # where the samples of a block begin, behind those of one design
@@ -103,7 +104,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
                 few = distance * FEWEST >= per_rho
                 if few if some == 0 else (not few) & (distance * MOST >= per_rho):
                     places[i - begin] = count
-                    load(designs, i, block, count)
+                    load(designs, i & ROW, block, count & PLACE)
                     m[count + A], m[count + B], m[count + C] = made_of[i, 0], made_of[i, 1], made_of[i, 2]
                     count += 1
         length = (count + 7) & ~7  # whole vectors; what stands in the surplus is never read

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels._jit import generated, inline
+from kernels.prefetch import prefetch_rows
 from kernels.series.chain import Chained
 from kernels.series.curves import MARGIN, curve
 from kernels.series.form import BLOCK, STRIDE, Helper
@@ -85,6 +86,7 @@ def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
                 status[i] = st.NOT_ROTATABLE if opening[i] == st.NOT_ROTATABLE else OPEN
                 near[i - start] = distance[i] if opening[i] == st.OK else 0.0
             length = enlist(designs, start, end, near, cos, sin, made_of, mode, m, span, status, room)
+            prefetch_rows(designs, end, end + BLOCK)  # of the next block
             begin_at_vertex(length, m)
             refine(length, m, rounds)
             finish(length, m, target)

@@ -1,0 +1,84 @@
+"""Sine and cosine to the last bit, against 40 digits and next to the C library."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from kernels._jit import kernel
+from kernels.rounded_sincos import rounded_sincos
+from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
+from sweep.families.base import Accuracy
+from sweep.study.load import load_study
+from tests.engine_study import ROOT
+
+
+@kernel
+def both(x, sine, cosine):
+    for i in range(x.size):
+        sine[i], cosine[i] = rounded_sincos(x[i])
+
+
+def sines(x):
+    sine, cosine = np.empty_like(x), np.empty_like(x)
+    both(x, sine, cosine)
+    return sine, cosine
+
+
+def misses(got, of, x):
+    """Errors in units of the last place of the nearest number, and how many are not that number."""
+    with mpmath.workdps(40):
+        exact = [of(mpmath.mpf(y)) for y in x]
+        nearest = np.array([float(y) for y in exact])
+        off = np.array([float(mpmath.mpf(a) - b) for a, b in zip(got, exact, strict=True)])
+    return np.abs(off) / np.spacing(np.abs(nearest)), np.count_nonzero(got != nearest)
+
+
+def test_sine_and_cosine_are_the_nearest_numbers_more_often_than_those_of_the_library():
+    x = np.random.default_rng(7).uniform(-2.0 * math.pi, 2.0 * math.pi, 20_000)
+    own = [misses(got, of, x)[1] for got, of in zip(sines(x), (mpmath.sin, mpmath.cos), strict=True)]
+    library = [misses(got, of, x)[1] for got, of in ((np.sin(x), mpmath.sin), (np.cos(x), mpmath.cos))]
+    assert sum(own) <= sum(library)
+    assert sum(own) < 20  # of 40 000; 8 are expected
+
+
+@pytest.mark.parametrize("most", [math.pi / 4, 1e5])
+def test_sine_and_cosine_err_by_no_more_than_rounding_does(most):
+    r = np.random.default_rng(8)
+    near = np.arange(-40, 41) * (math.pi / 2)  # next to zeros, where all digits cancel
+    tiny = r.choice([-1.0, 1.0], 99) * 10.0 ** r.uniform(-300, 0, 99)
+    x = np.concatenate([r.uniform(-most, most, 2000), near, np.nextafter(near, 9e9), tiny])
+    for got, of in zip(sines(x), (mpmath.sin, mpmath.cos), strict=True):
+        assert misses(got, of, x)[0].max() < 0.513  # half a unit is what rounding must cost
+
+
+def test_sine_and_cosine_of_what_is_no_angle_are_nan():
+    sine, cosine = sines(np.array([math.nan, math.inf, -math.inf]))
+    assert np.isnan(sine).all()
+    assert np.isnan(cosine).all()
+
+
+def test_sine_and_cosine_in_a_vector_are_those_of_one_angle():
+    x = np.random.default_rng(9).uniform(-10.0, 10.0, 101)
+    one_by_one = np.concatenate([sines(y[None]) for y in x], axis=1)
+    np.testing.assert_array_equal(np.stack(sines(x)), one_by_one)
+
+
+@pytest.mark.parametrize("angle", [0.7, -3e4, 1e7, -4e12])
+def test_a_design_with_an_angle_of_many_turns_is_that_of_the_same_angle_within_one(angle):
+    """A chain's search takes its line's angle from here.  Beyond 1e5 rad its turns are taken off before."""
+    study = load_study(ROOT / "studies" / "needle208", smoke=True)
+    (design,), _ = design_matrix(study.family, study.reference)
+    lam = study.family.parameter_names.index("lam2")
+    turns, within = (np.tile(design, (9, 1)) for _ in range(2))
+    turns[:, lam] = angle + np.arange(9.0)
+    within[:, lam] = np.arctan2(np.sin(turns[:, lam]), np.cos(turns[:, lam]))
+    names = ["max_abs_d2s", "max_abs_dev", "max_x_m2"]
+    one, other = (design_outputs(study.family, x, names, Accuracy(target=1e-6)) for x in (turns, within))
+    for name in names:
+        # an angle within a turn is rounded to 2e-16 of it; what that moves is measured by the size of the drive
+        np.testing.assert_allclose(one[name], other[name], rtol=1e-12, atol=1e-13, err_msg=name)
