@@ -13,7 +13,6 @@ from typing import Any
 
 from kernels._jit import inline
 
-FAR = 1e5  # [rad] farther off what is left of an angle is less exact
 _TWO_PER_PI = 2.0 / math.pi
 _P1 = float.fromhex("0x1.921fb54400000p+0")  # pi/2 in three parts of 33 bits: their products with n < 2^20 are exact
 _P2 = float.fromhex("0x1.0b4611a600000p-34")
@@ -27,7 +26,7 @@ _C6, _C8, _C10, _C12, _C14, _C16, _C18 = (1.0 / math.factorial(k) for k in range
 
 @inline
 def rounded_sincos(x: Any) -> tuple[Any, Any]:
-    """Return (sin x, cos x) for |x| <= `FAR`; nan for nan and infinity."""
+    """Return (sin x, cos x) for |x| <= 1e5 rad; nan for nan and infinity."""
     n = (x * _TWO_PER_PI + _ROUND) - _ROUND
     t, w = x - n * _P1, n * _P2  # both exact
     head = t - w

@@ -8,6 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from kernels import status as st
 from kernels._jit import kernel
 from kernels.rounded_sincos import rounded_sincos
 from sweep.evaluation.summaries import design_outputs
@@ -21,6 +22,9 @@ from tests.engine_study import ROOT
 def both(x, sine, cosine):
     for i in range(x.size):
         sine[i], cosine[i] = rounded_sincos(x[i])
+
+
+OUTPUTS = ["max_abs_d2s", "max_abs_dev", "max_x_m2"]
 
 
 def sines(x):
@@ -68,17 +72,26 @@ def test_sine_and_cosine_in_a_vector_are_those_of_one_angle():
     np.testing.assert_array_equal(np.stack(sines(x)), one_by_one)
 
 
-@pytest.mark.parametrize("angle", [0.7, -3e4, 1e7, -4e12])
-def test_a_design_with_an_angle_of_many_turns_is_that_of_the_same_angle_within_one(angle):
-    """A chain's search takes its line's angle from here.  Beyond 1e5 rad its turns are taken off before."""
+def drives(angles):
+    """Needle drives whose line has these angles [rad]."""
     study = load_study(ROOT / "studies" / "needle208", smoke=True)
     (design,), _ = design_matrix(study.family, study.reference)
-    lam = study.family.parameter_names.index("lam2")
-    turns, within = (np.tile(design, (9, 1)) for _ in range(2))
-    turns[:, lam] = angle + np.arange(9.0)
-    within[:, lam] = np.arctan2(np.sin(turns[:, lam]), np.cos(turns[:, lam]))
-    names = ["max_abs_d2s", "max_abs_dev", "max_x_m2"]
-    one, other = (design_outputs(study.family, x, names, Accuracy(target=1e-6)) for x in (turns, within))
-    for name in names:
+    designs = np.tile(design, (len(angles), 1))
+    designs[:, study.family.parameter_names.index("lam2")] = angles
+    return design_outputs(study.family, designs, OUTPUTS, Accuracy(target=1e-6))
+
+
+@pytest.mark.parametrize("angle", [0.7, -3e4, 9e4])
+def test_a_design_with_an_angle_of_many_turns_is_that_of_the_same_angle_within_one(angle):
+    """A chain's search takes sine and cosine of its line's angle from here."""
+    turns = angle + np.arange(9.0)
+    one, other = drives(turns), drives(np.arctan2(np.sin(turns), np.cos(turns)))
+    for name in OUTPUTS:
         # an angle within a turn is rounded to 2e-16 of it; what that moves is measured by the size of the drive
         np.testing.assert_allclose(one[name], other[name], rtol=1e-12, atol=1e-13, err_msg=name)
+
+
+def test_a_design_with_an_angle_beyond_what_is_exact_is_refused():
+    found = drives(np.array([1.1e5, -1e7, math.inf]))
+    assert (found["status"] == st.INVALID_INPUT).all()
+    assert np.isnan([found[name] for name in OUTPUTS]).all()

@@ -6,7 +6,6 @@ share their machine code (`kernels._jit.generated`).
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kernels._jit import generated_inline
-from kernels.rounded_sincos import FAR, rounded_sincos
+from kernels.rounded_sincos import rounded_sincos
 from kernels.series.form import BLOCK, STRIDE, Form, Helper, Travel, Turned
 from kernels.series.links import NUMBERS, Input, blurred_through, enter, get_link, link_of, put_link, through
 
@@ -272,11 +271,7 @@ def _from_columns(form: Form, name: str, start: int, row: int) -> tuple[Helper, 
         sine, cosine = rounded_sincos(block[angle_row * BLOCK + k])
         return cosine, sine
 
-    def principal(x: float) -> float:
-        return x if abs(x) <= FAR else math.atan2(math.sin(x), math.cos(x))
-
     called = _made("library", name, nothing if angle is None else library)
-    near = _made("principal", name, principal)
     computed = _made("turned", name, nothing if angle is None else vectorised)
 
     def constants(designs: Any, i: int) -> Any:
@@ -286,8 +281,6 @@ def _from_columns(form: Form, name: str, start: int, row: int) -> tuple[Helper, 
     def load(designs: Any, i: int, block: Any, k: int) -> None:
         for column in range(columns):
             block[(row + column) * BLOCK + k] = designs[i, start + column]
-        if angle is not None:
-            block[angle_row * BLOCK + k] = near(designs[i, angle])
 
     def loaded(block: Any, k: int) -> Any:
         cos, sin = computed(block, k)

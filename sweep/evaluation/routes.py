@@ -14,7 +14,6 @@ from sweep.evaluation.negatives import negative_route
 from sweep.evaluation.route import Part, Route
 from sweep.families.base import Accuracy, Array, Columns, Family, Step, Work
 from sweep.families.chain import Stage
-from sweep.families.derived import of_family
 from sweep.families.domain import March
 from sweep.families.members import Machine
 from sweep.quantities.names import at_stage, error_of, without_minus
@@ -37,19 +36,6 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
     InputError
         for an unknown name, or an accuracy that the family's domain or the output does not serve.
     """
-    known, key = _known(family), (tuple(wanted), accuracy)
-    if key not in known:
-        known[key] = _routes(family, wanted, accuracy)
-    return known[key]
-
-
-@of_family
-def _known(family: Family) -> dict[tuple[tuple[str, ...], Accuracy], tuple[Route, ...]]:
-    """Return the memory of `routes`: it is asked the same for every chunk of a sweep."""
-    return {}
-
-
-def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
     _check_domain(family, accuracy)
     found = [negative_route(family, name, accuracy) for name in dict.fromkeys(wanted) if without_minus(name)]
     wanted = [name for name in wanted if not without_minus(name)]
