@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
+from sweep import costs
 from sweep.errors import InputError
 from sweep.evaluation.boxes import box_route
 from sweep.evaluation.members import machine_routes
@@ -14,6 +16,7 @@ from sweep.evaluation.negatives import negative_route
 from sweep.evaluation.route import Part, Route
 from sweep.families.base import Accuracy, Array, Columns, Family, Step, Work
 from sweep.families.chain import Stage
+from sweep.families.derived import of_family
 from sweep.families.domain import March
 from sweep.families.members import Machine
 from sweep.quantities.names import at_stage, error_of, without_minus
@@ -36,6 +39,19 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
     InputError
         for an unknown name, or an accuracy that the family's domain or the output does not serve.
     """
+    known, key, prices = _known(family), (tuple(wanted), accuracy), costs.table()
+    if key not in known or known[key][0] is not prices:
+        known[key] = prices, _routes(family, wanted, accuracy)
+    return known[key][1]
+
+
+@of_family
+def _known(family: Family) -> dict[tuple[tuple[str, ...], Accuracy], tuple[Any, tuple[Route, ...]]]:
+    """Return the memory of `routes`, with the prices they have: it is asked the same for every chunk of a sweep."""
+    return {}
+
+
+def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
     _check_domain(family, accuracy)
     found = [negative_route(family, name, accuracy) for name in dict.fromkeys(wanted) if without_minus(name)]
     wanted = [name for name in wanted if not without_minus(name)]
