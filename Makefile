@@ -25,9 +25,9 @@ setup: $(VENV)/ready  ## create the environment in .venv
 test: $(VENV)/ready  ## run the tests, in two processes
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-test-long: $(VENV)/ready  ## the tests that take minutes, thousands of hostile tables; loads against Pinocchio, which it installs
+test-long: $(VENV)/ready  ## the tests that take minutes, thousands of hostile tables; properties at random; loads against Pinocchio, which it installs
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,peers]'
-	$(BIN)/python -m pytest -m long
+	$(BIN)/python -m pytest -m 'long or hypothesis' --hypothesis-profile=random
 
 test-faults: $(VENV)/ready  ## kills, signals, full disks, damage: 150 kills and 170 other faults, a table; about 15 minutes
 	$(BIN)/python -m tests.faults
@@ -68,6 +68,7 @@ smoke-nightly: $(VENV)/ready  ## the same with every study's tiny version, into 
 
 study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accuracy.md and docs/accuracy/, about 10 minutes
 	$(BIN)/python -m studies.accuracy --out results/accuracy
+	$(BIN)/python -m tests.bench.factors
 
 smoke-accuracy: $(VENV)/ready  ## the same on few designs, writes no page
 	$(BIN)/python -m studies.accuracy --smoke --out results/smoke/accuracy
@@ -75,9 +76,10 @@ smoke-accuracy: $(VENV)/ready  ## the same on few designs, writes no page
 bench-peers: $(VENV)/ready  ## next to pylinkage and Pinocchio, which get an environment of their own, and loads next to MuJoCo
 	$(PYTHON) -m venv .venv-peers
 	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable '.[peers]' 'pylinkage[numba]'
-	.venv-peers/bin/python -m studies.accuracy.peers --out results/accuracy
-	.venv-peers/bin/python -m studies.accuracy.peer_loads --out results/accuracy
+	.venv-peers/bin/python -m tests.bench.peers --out results/accuracy
+	.venv-peers/bin/python -m tests.bench.peer_loads --out results/accuracy
 	$(BIN)/python -m tests.bench.loads --out results/accuracy
+	$(BIN)/python -m tests.bench.programs --out results/accuracy
 
 bench-scale: $(VENV)/ready  ## 10^5 to 10^9 samples, to 10^8 designs, and reading them: writes docs/scale.md, about 10 minutes
 	$(BIN)/python -m tests.bench.scale --out docs/scale.md

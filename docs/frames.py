@@ -8,7 +8,7 @@ from pathlib import Path
 from sweep.exchange.scene import over
 from sweep.families import NAMES, family
 from sweep.report.figures import house_style, new_figure, save
-from sweep.report.space import draw_frame, is_spatial, projection
+from sweep.report.mechanisms import draw_frame, is_spatial, projection
 
 FOLDER = Path(__file__).parent / "figures"
 FIRST = math.radians(50.0)  # a crank angle at which no two joints lie on each other

@@ -10,7 +10,7 @@ from pathlib import Path
 
 # A file that another package may bring too, and what ours says in it; and one that is ours alone.
 FILE, WORDS = "__init__.py", "Mechanics only: jitted, floats in, arrays out"
-OWN_FILE = "_jit.py"
+OWN_FILE = "jit.py"
 
 
 def check_kernels() -> None:

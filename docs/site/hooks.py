@@ -102,7 +102,7 @@ def python_page() -> str:
 
 def families_page() -> str:
     """Return parameters and outputs of every family, from the register."""
-    from sweep.cli.listing import capability_words, main_outputs, over
+    from sweep.cli.families import capability_words, main_outputs, over
     from sweep.evaluation.summaries import output
     from sweep.families import NAMES, family
 

@@ -1,4 +1,4 @@
-"""C0: orientation of the coupler, its rates, and the motion of a point on it.
+"""C0, M1: orientation of the coupler, its rates, the motion of a point on it, and of the links' centre of mass.
 
 A ball joint with a finger is a universal joint: its first axis ``w`` is fixed in the neighbouring link, its second axis
 ``n`` in the coupler, normal to w and to the coupler (Polukhin 1971, 2.6).
@@ -7,6 +7,15 @@ A ball joint with a finger is a universal joint: its first axis ``w`` is fixed i
   n = branch (w x s)/|w x s|; degenerates only at a dead point, |w x s| >= cos(pressure angle);
 * finger on the driving joint B: w = u (crank axis), n = (w x s)/|w x s|; degenerates where the coupler is parallel to
   the crank axis, whatever the pressure angle.
+
+M1 is the shaking force without masses: the acceleration of the common centre of mass of links like slender rods, ours.
+Rods of one mass per length have their centres in the middle, so with lengths a, b, c of crank, coupler, rocker
+
+    (a + b + c) S'' = a B''/2 + b (B'' + C'')/2 + c C''/2,                                                    (1)
+
+primes being derivatives with respect to the crank angle; the centres of the fixed pivots do not move.  A slider has no
+length and counts for nothing.  Where the crank turns unevenly, as that of a chain's later stage, its rates w, w' with
+respect to the angle that counts make P'' into w^2 P'' + w' P' (2).
 """
 
 from __future__ import annotations
@@ -14,16 +23,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.joints import Joints, read
-from kernels.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
+from kernels.jit import inline, kernel
+from kernels.linkage.joints import Joints, read
+from kernels.types import Array, Status
 
 DRIVEN, DRIVING = 0.0, 1.0
 
@@ -46,9 +50,7 @@ class Coupler(NamedTuple):
 
 @inline
 def orientation(j: Joints, construction: float) -> Coupler:
-    """Return the orientation and rates of the coupler for one pose;
-    primes are derivatives with respect to the crank angle.
-    """
+    """Orientation and rates of the coupler for one pose; primes are derivatives by the crank angle."""
     v_b, a_b = scale(j.a, j.tau_b), scale(-j.a, j.rho_b)
     v_c = scale(j.c * j.dpsi, j.tau)
     a_c = mix(j.c * j.d2psi, j.tau, -j.turns * j.c * j.dpsi * j.dpsi, j.rho)
@@ -111,7 +113,7 @@ def coupler_point(
 
     Parameters
     ----------
-    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.joints`
+    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.linkage.joints`
     point : (n, 3), coordinates along (s, n x s, n) from B [length]
     finger : (n,) DRIVEN or DRIVING, which ball joint carries the finger
     status : (n, m), in and out; poses that are not OK give nan, SINGULAR where the finger axis meets the coupler
@@ -148,3 +150,45 @@ def coupler_point(
 @inline
 def _store(out: Array, i: int, j: int, good: float, a: Vector) -> None:
     out[i, j, 0], out[i, j, 1], out[i, j, 2] = good * a[0], good * a[1], good * a[2]
+
+
+@kernel
+def centre_acceleration(
+    poses: Array,
+    designs: Array,
+    first: Array,
+    second: Array,
+    status: Status,
+    size: Array | None,
+    x: Array | None,
+    y: Array | None,
+    z: Array | None,
+) -> None:
+    """Compute the acceleration analogue S'' of the common centre of mass, and its magnitude.
+
+    Parameters
+    ----------
+    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.linkage.joints`
+    first, second : (n, m) first and second derivative of the crank angle with respect to the angle that counts
+    status : (n, m), in; nan where it is not OK
+    size, x, y, z : (n, m) or None; magnitude and components along the fixed axes
+    """
+    for i in range(poses.shape[0]):
+        for k in range(poses.shape[1]):
+            j = read(poses[i, k], designs[i])
+            good = 1.0 if status[i, k] == st.OK else math.nan
+            w, dw = first[i, k], second[i, k]
+            crank = mix(-j.a * w * w, j.rho_b, j.a * dw, j.tau_b)
+            along = j.c * (j.d2psi * w * w + j.dpsi * dw)
+            driven = mix(-j.turns * j.c * (j.dpsi * w) ** 2, j.rho, along, j.tau)
+            rocker = j.turns * j.c
+            total = j.a + j.b + rocker
+            s = mix(0.5 * good * (j.a + j.b) / total, crank, 0.5 * (j.b + rocker) / total, driven)
+            if size is not None:
+                size[i, k] = math.sqrt(dot(s, s))
+            if x is not None:
+                x[i, k] = s[0]
+            if y is not None:
+                y[i, k] = s[1]
+            if z is not None:
+                z[i, k] = s[2]

@@ -11,15 +11,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
+from kernels.curves.periodic import coefficients, series, tail
 from kernels.effects.elasticity import LINEAR, PHASE_STEP, RESOLVED, solve_band
-from kernels.periodic import coefficients, series, tail
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.jit import inline, kernel
+from kernels.types import Array, Status
 
 KEPT = 1e-12  # share of its largest harmonic below which a coefficient is the rounding of what it is made of
 
@@ -116,8 +113,7 @@ def driven_steady_state(
     p: Array, b: Array, c: Array, r: Array, radius: Array, reach: Array, phi: Array, last: bool, status: Status,
     eta: Array, elongation: Array, floquet: Array,
 ) -> None:  # fmt: skip
-    """Compute the periodic steady state of the lag and the largest Floquet multiplier,
-    from the coefficients on a grid.
+    """Compute the periodic steady state of the lag and the largest Floquet multiplier from coefficients on a grid.
 
     Parameters
     ----------

@@ -18,11 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.periodic import coefficients, series, significant, tail
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.curves.periodic import coefficients, series, significant, tail
+from kernels.jit import inline, kernel
+from kernels.types import Array, Status
 
 # Columns of the data matrix: inertia of the driven side J, coupler stiffness k, damping h, crank speed, torque M.
 COLUMNS = ("inertia", "stiffness", "damping", "speed", "torque")
@@ -46,8 +44,7 @@ def quasi_static(
     frequency_ratio: Array | None,
     varying: Array | None = None,
 ) -> None:
-    """Compute the lag of the follower under inertia and load, its displacement at the joint,
-    and the frequency ratio.
+    """Compute the follower's lag under inertia and load, its displacement at the joint, the frequency ratio.
 
     Parameters
     ----------
@@ -199,8 +196,7 @@ def solve_band(band: NDArray[np.complex128], x: NDArray[np.complex128], w: int, 
 
 @kernel
 def largest_multiplier(qc: Array, qs: Array, stiffness: float, damping: float) -> float:
-    """Return the largest modulus of the multipliers
-    of eta'' + damping q eta' + (stiffness q + damping q'/2) eta = 0.
+    """Largest multiplier of eta'' + damping q eta' + (stiffness q + damping q'/2) eta = 0, its modulus.
 
     Fourth-order Magnus steps: exact for constant q, so stiff couplers need no smaller step than the phase asks for.
     """

@@ -8,18 +8,14 @@ crank angle; forces are divided by m omega^2 (a foot of mass m at the speed omeg
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel  # long helpers are kernels: folded into one another they took 17 s to compile
+from kernels.jit import inline, kernel  # long helpers are kernels: folded into one another they took 17 s to compile
+from kernels.types import TWO_PI, Array, Status
 
-Array: TypeAlias = NDArray[np.float64]
-Status: TypeAlias = NDArray[np.uint8]
-
-TWO_PI = 2.0 * math.pi
 PLATE, RACK, FLIGHT = 0, 1, 2
 _PARTS = 4
 _MOST_EVENTS = 64
@@ -53,9 +49,7 @@ class State(NamedTuple):
 
 @inline
 def _between(p0: float, p1: float, m0: float, m1: float, c0: float, c1: float, s: float) -> tuple[float, float, float]:
-    """Return the quintic with given ends, slopes and curvatures (by s) at the share s,
-    and its first two derivatives; (4).
-    """
+    """Quintic with given ends, slopes, curvatures (by s) at the share s, and its first two derivatives; (4)."""
     d, e, f = p1 - p0 - m0 - 0.5 * c0, m1 - m0 - c0, c1 - c0
     a3, a4, a5 = 10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f
     value = p0 + s * (m0 + s * (0.5 * c0 + s * (a3 + s * (a4 + s * a5))))
@@ -106,9 +100,7 @@ def _force(foot: Foot, y: float, bend: float) -> float:
 
 @inline
 def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int) -> float:
-    """Return what changes sign at an event:
-    height of the rack (0), contact force (1), gap below the flying foot (2).
-    """
+    """Measure that changes sign at an event: height of the rack 0, contact force 1, gap below the flying foot 2."""
     y, _, bend = rack_height(path, j, s)
     if which == 0:
         return y
@@ -119,9 +111,7 @@ def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int
 
 @kernel
 def _root(path: Array, foot: Foot, state: State, j: int, low: float, high: float, which: int) -> float:
-    """Return the share of the cell at which a measure passes zero:
-    false position, the end that stays halved (Illinois).
-    """
+    """Share of the cell at which a measure passes zero: false position, the end that stays halved (Illinois)."""
     f_low, f_high = _measure(path, foot, state, j, low, which), _measure(path, foot, state, j, high, which)
     for _ in range(_MOST_STEPS):
         if f_low == f_high:
@@ -165,9 +155,7 @@ def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[St
 
 @kernel
 def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tuple[float, int]:
-    """Return the share of the cell at which the state ends, and by which measure;
-    2 and -1 if it lasts beyond the cell.
-    """
+    """Share of the cell at which the state ends, and by which measure; 2 and -1 if it lasts beyond the cell."""
     if state.mode == PLATE:
         if _measure(path, foot, state, j, 1.0, 0) > 0.0:
             return _root(path, foot, state, j, s, 1.0, 0), 0

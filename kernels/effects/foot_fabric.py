@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.effects.foot import TWO_PI, Array, Foot, State, Status, flown, rack_height
+from kernels.effects.foot import Foot, State, flown, rack_height
+from kernels.jit import inline, kernel
+from kernels.types import TWO_PI, Array, Status
 
 LYING, FLIGHT = 1, 2
 TERMS = 22  # of the power series: over a radian the next one is below 2^-53
@@ -22,6 +23,7 @@ PARTS = 4  # of a cell at least
 MOST_PARTS = 4096  # of a cell: a fabric so stiff that it swings 650 times within a five-hundredth of a turn
 _HALVINGS = 60
 _MOST_EVENTS = 64
+ALIKE = 1e-6  # share of the height of foot or rack by which turns that are alike may differ
 
 
 class Fabric(NamedTuple):
@@ -230,9 +232,10 @@ def march_on_fabric(
         forces[i, :] = math.nan
         valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and soft > 0.0 and damping >= 0.0
         valid = valid and feet[i, 4] == 0.0
-        unit, lowest = mass * speed * speed, 0
+        unit, lowest, highest = mass * speed * speed, 0, 0.0
         for j in range(count):
             valid = valid and abs(rack[0, j]) < math.inf
+            highest = max(highest, rack[0, j])
             if rack[0, j] < rack[0, lowest]:
                 lowest = j
         status[i] = st.OK if valid and unit > 0.0 and unit < math.inf else st.INVALID_INPUT
@@ -251,11 +254,11 @@ def march_on_fabric(
         rest = -foot.g0 / (foot.kappa * foot.kappa + fabric.stiffness)
         begin = lowest * step
         state = State(LYING, begin, rest, 0.0, begin)
-        lying = True
+        first = state
         for turn in range(turns):
             tally[:] = 0.0
             tally[1], tally[2], tally[8] = math.nan, math.nan, math.inf
-            lying = state.mode == LYING
+            first = state
             for k in range(count):
                 j, node = turn * count + lowest + k, (lowest + k) % count
                 y, v = (state.y, state.v) if state.mode == LYING else flown(foot, state, j * step)
@@ -276,4 +279,7 @@ def march_on_fabric(
         outputs[3, i], outputs[4, i], outputs[5, i] = tally[3], tally[4], tally[5]
         outputs[6, i], outputs[7, i] = tally[6] * speed, 0.0
         outputs[8, i], outputs[9, i] = unit * tally[8] if tally[8] < math.inf else math.nan, unit * tally[7]
-        outputs[10, i] = 1.0 if lying and state.mode == LYING else 0.0
+        # A foot that lies still rises and sinks on its fabric: turns are alike once it comes back to where it was.
+        moved = max(abs(state.y - first.y), abs(state.v - first.v))
+        lying = first.mode == LYING and state.mode == LYING
+        outputs[10, i] = 1.0 if lying and moved <= ALIKE * max(-rest, highest) else 0.0

@@ -16,10 +16,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
+from kernels.arithmetic.vectors import Vector, cross, dot, mix, norm, scale, sub
 from kernels.effects.coupler import Coupler, orientation
 from kernels.effects.kinetostatics import (
     SPEED,
@@ -31,11 +30,9 @@ from kernels.effects.kinetostatics import (
     solve,
     store_forces,
 )
-from kernels.joints import Joints, read
-from kernels.vectors import Vector, cross, dot, mix, norm, scale, sub
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.jit import inline, kernel
+from kernels.linkage.joints import Joints, read
+from kernels.types import Array, Status
 
 TOLERANCE = 1e-14
 PASSES = 200
@@ -94,9 +91,7 @@ def _of_moving(f: Friction, load: Loads) -> Friction:
 
 @inline
 def supports(force: Vector, moment: Vector, axis: Vector, z1: float, z2: float) -> tuple[float, float, float]:
-    """Return radial loads of the two supports of a shaft and the axial force,
-    from force and moment about the origin of z.
-    """
+    """Radial loads of a shaft's two supports and the axial force, from force and moment about the origin of z."""
     axial = dot(force, axis)
     radial = mix(1.0, force, -axial, axis)
     second = scale(1.0 / (z2 - z1), mix(1.0, cross(moment, axis), -z1, radial))
@@ -110,7 +105,8 @@ def _shaft_torque(mu: float, r: float, rt: float, loads: tuple[float, float, flo
 
 
 @inline
-def _unit(a: Vector) -> Vector:
+def unit_vector(a: Vector) -> Vector:
+    """Return the unit vector along a vector; zero for a vector without length."""
     length = norm(a)
     return scale(1.0 / length, a) if length > 0.0 else a
 
@@ -197,8 +193,8 @@ def _answers(
     j: Joints, coupler: Coupler, load: Loads, finger: float, f: Friction, speed_d: float, answers: Array
 ) -> Vector:
     """Solve the reactions without friction, then those to each couple alone; return the three couples' sizes."""
-    turn_b = _unit(sub(load.omega2, load.omega1))
-    turn_c = _unit(sub(load.omega2, load.omega3))
+    turn_b = unit_vector(sub(load.omega2, load.omega1))
+    turn_c = unit_vector(sub(load.omega2, load.omega3))
     unit_b, unit_c, unit_d = 0.0, 0.0, 0.0
     for which in range(4):
         e_b = scale(-unit_b if which == 1 else 0.0, turn_b)

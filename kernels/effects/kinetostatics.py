@@ -11,17 +11,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kernels import status as st
-from kernels._jit import inline, kernel
+from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale, spun, sub, turned
 from kernels.effects.coupler import DRIVEN, LEAST_SINE, Coupler, orientation
-from kernels.joints import Joints, read
-from kernels.vectors import Vector, add, cross, dot, mix, scale, spun, sub, turned
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.jit import inline, kernel
+from kernels.linkage.joints import Joints, read
+from kernels.types import Array, Status
 
 # Inertia reactions grow as 1/cos^4 of the pressure angle and lose the share 2^-53/cos^2 of their digits: at this cosine
 # 4e-4 of the value; beyond it no number is given.
@@ -172,8 +167,7 @@ def _about_axis(body: Body, axis: Vector) -> float:
 def solve(
     j: Joints, coupler: Coupler, on: Loads, construction: float, e_b: Vector, e_c: Vector, t_d: float, t_a: float
 ) -> Reactions:
-    """Return reactions of one pose; e_b, e_c friction couples on the coupler, t_d,
-    t_a friction torques on the shafts.
+    """Reactions of one pose under the friction couples e_b, e_c on the coupler and torques t_d, t_a on the shafts.
 
     On a slider t_d is the friction force of its way along tau.
     """
@@ -218,7 +212,7 @@ def kinetostatics(
 
     Parameters
     ----------
-    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.joints`
+    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.linkage.joints`
     bodies : (n, BODIES): per body m, centre of mass, inertia about it (body axes: crank rho_B, tau_B, u from A; coupler
         s, n x s, n from B; follower rho, tau, k from D); gravity
     drive : (n, m, 3) or (n, 1, 3): torque on the rocker about k or force on the slider along tau; crank speed; its rate

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.effects.friction import PASSES, STALLED, STILL, TOLERANCE, supports
+from kernels.arithmetic.vectors import Vector, cross, dot, mix, norm, scale, sub
+from kernels.effects.friction import PASSES, STALLED, STILL, TOLERANCE, supports, unit_vector
 from kernels.effects.link_loads import (
     CONTACT,
     FREEDOM,
@@ -36,12 +36,11 @@ from kernels.effects.link_loads import (
     right_sides,
     spread,
 )
-from kernels.links import DRIVEN, Links, Moving, moving, vector, velocity_at
-from kernels.vectors import Vector, cross, dot, mix, norm, scale, sub
+from kernels.jit import inline, kernel
+from kernels.linkage.bodies import DRIVEN, Links, Moving, moving, vector, velocity_at
+from kernels.types import Array, Status
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Status = NDArray[np.uint8]
 
 MU, RADIUS, THRUST, FIRST, SECOND, PER_FRICTION = 0, 1, 2, 3, 4, 5
 
@@ -57,26 +56,16 @@ def _rates(links: Links, i: int, k: int, body: int) -> Moving:
 
 @inline
 def _moved(a: Vector, b: Vector) -> Vector:
-    """Return the difference of two rates, zero where it is rounding:
-    then nothing moves, and friction has no direction.
-    """
+    """Difference of two rates, zero where it is rounding: nothing moves then, and friction has no direction."""
     found = sub(a, b)
     return found if norm(found) > STILL * (norm(a) + norm(b)) else (0.0, 0.0, 0.0)
-
-
-@inline
-def _unit(a: Vector) -> Vector:
-    size = norm(a)
-    return scale(1.0 / size, a) if size > 0.0 else a
 
 
 @inline
 def direction(
     links: Links, i: int, k: int, joint: Index, place: Vector, data: Array, speed: float
 ) -> tuple[Vector, Vector, float]:
-    """Return the friction force and couple of a joint per unit of its load, (7), (8),
-    and their power per unit crank speed.
-    """
+    """Friction force and couple of a joint per unit of its load, (7), (8), and their power per unit crank speed."""
     on, by = joint_ends(links, i, joint)
     one, two = _rates(links, i, k, on), _rates(links, i, k, by)
     sense = math.copysign(1.0, speed) if speed != 0.0 else 0.0
@@ -106,7 +95,7 @@ def direction(
             couple = scale(mu * data[RADIUS] * around / whole, axis)
             force = scale(mu / whole, slip)
     else:
-        couple, force = scale(mu * data[RADIUS], _unit(turn)), scale(mu, _unit(slip))
+        couple, force = scale(mu * data[RADIUS], unit_vector(turn)), scale(mu, unit_vector(slip))
     return force, couple, dot(force, slip) + dot(couple, turn)
 
 

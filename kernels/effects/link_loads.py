@@ -1,10 +1,10 @@
 """D1, D3 for any number of links: joint reactions, driving torque and reduced inertia of a tree of bodies with loops.
 
-Equation numbers are of docs/links.md.  The loops are cut at the lines of :class:`kernels.links.Links`.  Each body needs
-a wrench for its inertia and weight; the force x_k of each line adds one that is linear in x_k.  What hangs on a joint
-is summed towards the frame, so the joint's wrench is known but for the x_k.  A freedom that nothing drives bears no
-moment about its axis, or no force along it: as many linear equations as there are lines.  They are solved by Gaussian
-elimination; every reaction and the driving torque then follow by adding up.
+Equation numbers are of docs/links.md.  The loops are cut at the lines of :class:`kernels.linkage.bodies.Links`.  Each
+body needs a wrench for its inertia and weight; the force x_k of each line adds one that is linear in x_k.  What hangs
+on a joint is summed towards the frame, so the joint's wrench is known but for the x_k.  A freedom that nothing drives
+bears no moment about its axis, or no force along it: as many linear equations as there are lines.  They are solved by
+Gaussian elimination; every reaction and the driving torque then follow by adding up.
 """
 
 from __future__ import annotations
@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
+from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale, spun, sub, turned
 from kernels.effects.kinetostatics import BODY, LEAST_COSINE, Tensor
-from kernels.links import DRIVEN, SLIDE, Links, moving, vector
-from kernels.vectors import Vector, add, cross, dot, mix, scale, spun, sub, turned
+from kernels.jit import inline, kernel
+from kernels.linkage.bodies import DRIVEN, SLIDE, Links, moving, vector
+from kernels.types import Array, Status
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Status = NDArray[np.uint8]
 
 TOOL = 4  # mass of the tool; its place in the axes of the body that carries it
 SPEED, CHANGE, LOAD, FORCE = 0, 1, 2, 3  # of the drive: speed, its rate, torque on the output link, force on the tool
@@ -107,9 +106,7 @@ def spread(links: Links, i: int, k: int, room: Array) -> None:
 
 @inline
 def on_freedom(kind: int, axis: Vector, joint: Vector, wrench: Array) -> float:
-    """Return the moment of a wrench about an axis through the joint,
-    or its force along it where the freedom is a slide.
-    """
+    """Moment of a wrench about an axis through the joint; its force along the axis where the freedom is a slide."""
     force = vector(wrench)
     if kind == SLIDE:
         return dot(axis, force)
@@ -206,9 +203,7 @@ def reactions(links: Links, i: int, k: int, wrenches: Array, room: Array, x: Arr
 
 @inline
 def at_joint(links: Links, i: int, k: int, joint: Index, found: Array, x: Array) -> tuple[Vector, Vector, Vector]:
-    """Return the force and moment of a joint, and its place:
-    of a body's joint with its parent, or of lines that close a loop.
-    """
+    """Force, moment and place of a body's joint with its parent, or of a joint made of lines that close a loop."""
     if joint[KIND] <= GUIDE:
         body = joint[BODY_OF]
         return vector(found[body]), vector(found[body, 3:]), vector(links.bodies[i, k, body, 24:])

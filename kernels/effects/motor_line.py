@@ -16,12 +16,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kernels._jit import inline, kernel
-from kernels.periodic import on_grid
-
-Array = NDArray[np.float64]
+from kernels.curves.periodic import on_grid
+from kernels.jit import inline, kernel
+from kernels.types import Array
 
 NEWTON = 40
 LARGEST_STEP = 2.0 * math.pi / 256
@@ -41,8 +39,7 @@ def steady_energy(
     still: float,
     energy: Array,
 ) -> bool:
-    """Return the kinetic energy in the steady state;
-    False where the machine stalls or the motor is too stiff for the steps.
+    """Kinetic energy in the steady state; False where the machine stalls or the motor is too stiff for the steps.
 
     Parameters
     ----------
@@ -116,9 +113,7 @@ def _march(
     between: int,
     energy: Array,
 ) -> tuple[float, float, float, float, float, float]:
-    """Return one turn: T at its end, the time it takes, and the derivatives of both by T(0) and M;
-    writes T on the grid.
-    """
+    """March one turn: T at its end, its time, and the derivatives of both by T(0) and M; T is written on the grid."""
     points = inertia.size
     step = 4.0 * math.pi / points
     t, by_start, by_torque, time, time_start, time_torque = start, 1.0, 0.0, 0.0, 0.0, 0.0
@@ -159,9 +154,7 @@ def _rates(
     by_start: float,
     by_torque: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """Return derivatives by phi of T, of its derivatives by T(0) and M, of the time,
-    and of the time's two derivatives.
-    """
+    """Compute the slopes by phi of T, its derivatives by T(0) and M, the time and its two derivatives."""
     if not t > 0.0:
         return math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
     omega = math.sqrt(2.0 * t / inertia)

@@ -10,17 +10,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kernels import status as st
-from kernels._jit import inline, kernel
 from kernels.effects.bearings import equivalent_load, in_plane, sliding_criteria, sliding_data, support_arms
+from kernels.jit import inline, kernel
+from kernels.types import EPS, Array, Status
 
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
-
-EPS = 2.0**-53
 # Looks for the first crossing.  Mean pressures rise with theta1 all the way (R/cos, thrust/cos rise, the arm over cos
 # falls), so one bracket holds; an equivalent load may step down once, where it changes to its second formula.
 SLIDING_LOOKS, ROLLING_LOOKS = 1, 16

@@ -11,15 +11,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
+from kernels.curves.periodic import coefficients, on_grid, series, significant, tail
 from kernels.effects.motor_line import steady_energy
-from kernels.periodic import coefficients, on_grid, series, significant, tail
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.jit import inline, kernel
+from kernels.types import Array, Status
 
 NEWTON = 60
 RESOLVED = 1e-9

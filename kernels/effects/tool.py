@@ -16,18 +16,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kernels import status as st
-from kernels._jit import inline, kernel
+from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
 from kernels.effects.coupler import orientation
 from kernels.effects.kinetostatics import CHANGE, SPEED, pose_status
-from kernels.joints import Joints, read
-from kernels.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.jit import inline, kernel
+from kernels.linkage.joints import Joints, read
+from kernels.types import Array, Status
 
 # Columns of the data matrix: mass; point M from B along the coupler, across it, along the rocker's axis; lam; gravity;
 # piercing force, place of the fabric along lam, sense in which it lies.
@@ -42,9 +37,7 @@ def arm(j: Joints, data: Array) -> Vector:
 
 @inline
 def piercing(force: float, fabric: float, sense: float, s: float, ds: float) -> float:
-    """Return the force on the tool along lam while it goes into the fabric:
-    from entry to the turning point, not back.
-    """
+    """Force on the tool along lam while it goes into the fabric: from entry to the turning point, not back."""
     return -sense * force if sense * (s - fabric) > 0.0 and sense * ds > 0.0 else 0.0
 
 
@@ -61,12 +54,11 @@ def tool_load(
     inertia: Array | None,
     along: Array | None,
 ) -> None:
-    """Compute the force of the tool on the coupler, its moment about B,
-    and the inertia that the tool adds to the crank's.
+    """Compute a tool's force on the coupler, its moment about B, and the inertia that it adds to the crank's.
 
     Parameters
     ----------
-    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.joints`
+    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.linkage.joints`
     data : (n, COLUMNS), see COLUMNS; lam a unit vector
     drive : (n, m or 1, 3), of which the crank speed and its rate are read
     working : (n, m or 1), force F on the tool along lam; a resisting one opposes s'
@@ -119,8 +111,7 @@ def free_tool(
     inertia: Array | None,
     along: Array | None,
 ) -> None:
-    """Compute the force of a tool that moves freely with a point of the coupler or of the rocker,
-    and its moment; (6), (7).
+    """Compute force and moment of a tool that moves freely with a point of the coupler or of the rocker; (6), (7).
 
     Parameters
     ----------

@@ -7,16 +7,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.thread_path import bend, length, slope, wrap_angle
-from kernels.vectors import Vector, cross, dot, norm, sub
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.arithmetic.vectors import Vector, cross, dot, norm, sub
+from kernels.jit import inline, kernel
+from kernels.linkage.thread_path import bend, length, slope, wrap_angle
+from kernels.types import Array, Status
 
 
 @kernel
@@ -31,8 +26,7 @@ def thread_over_point(
     second: Array | None,
     wrap: Array | None,
 ) -> None:
-    """Compute the length of the thread N1, E, N2, its derivatives with respect to the crank angle,
-    and the wrap angle at E.
+    """Compute the length of the thread N1, E, N2, its derivatives by the crank angle, and the wrap angle at E.
 
     Parameters
     ----------
@@ -68,8 +62,7 @@ def thread_over_point(
 
 @kernel
 def guide_line(guides: Array, position: Array, off: Array, along: Array, half: Array) -> None:
-    """Compute coordinates of (26): distance of E from the line of the guides, place along it from its middle,
-    half its length.
+    """Compute (26): distance of E from the line of the guides, place along it from its middle, half its length.
 
     Parameters
     ----------

@@ -6,17 +6,8 @@ of the locus may belong to a mechanism that does something else: tests 1 to 5 fi
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
-import numpy as np
-from numpy.typing import NDArray
-
 from kernels import status as st
-from kernels._jit import inline
-
-Array: TypeAlias = NDArray[np.float64]
-Status: TypeAlias = NDArray[np.uint8]
-EPS = 2.0**-53
+from kernels.jit import inline
 
 PASSED = 0
 NO_POINT = 1

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from kernels._jit import inline
-from kernels.sincos import sincos
+from kernels.arithmetic.sincos import sincos
+from kernels.jit import inline
 
 PI = 3.141592653589793
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from kernels._jit import kernel
-from kernels.synthesis.acceptance import Array
+from kernels.jit import kernel
 from kernels.synthesis.angles import PI, sine_cosine
+from kernels.types import Array
 
 
 @kernel

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.families.heddle.closure import driven, four_bar
-from kernels.synthesis.acceptance import EPS, Array, Status
+from kernels.families.heddle import driven, four_bar
+from kernels.jit import inline, kernel
+from kernels.types import EPS, Array, Status
 
 _MOST_RODS = 4
 _MOST_STEPS = 200

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kernels._jit import inline, kernel
-from kernels.synthesis.acceptance import EPS, Array, Status, design_status, first_failure
+from kernels.jit import inline, kernel
+from kernels.synthesis.acceptance import design_status, first_failure
 from kernels.synthesis.angles import PI, sine_cosine
+from kernels.types import EPS, Array, Status
 
 
 class Given(NamedTuple):

@@ -14,10 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels._jit import inline, kernel
-from kernels.complex_step import arctan2
-from kernels.synthesis.acceptance import EPS, Array, Status, design_status, first_failure
+from kernels.arithmetic.complex_step import arctan2
+from kernels.jit import inline, kernel
+from kernels.synthesis.acceptance import design_status, first_failure
 from kernels.synthesis.angles import PI, sine_cosine
+from kernels.types import EPS, Array, Status
 
 
 class _Requirement(NamedTuple):

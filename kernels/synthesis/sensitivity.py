@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from kernels._jit import inline, kernel
-from kernels.synthesis.acceptance import Array
+from kernels.jit import inline, kernel
 from kernels.synthesis.angles import sine_cosine
+from kernels.types import Array
 
 PARAMETERS = ("a", "b", "c", "e", "f", "g", "alpha")
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from kernels import status as st
 from studies.accuracy.effect_witness import Effected, known_of
-from studies.accuracy.scene_prices import SCENES
+from studies.accuracy.scenes import SCENES
 from studies.accuracy.timing import per_design
 from studies.accuracy.witness import Known
 from sweep.effects import NAMES, effect, extended
@@ -19,7 +19,7 @@ from sweep.effects.wanted import expanded
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Family
-from sweep.quantities.names import error_of
+from sweep.families.names import error_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,9 +37,7 @@ PRICED = (*NAMES, *SCENES)
 
 
 def effect_prices(smoke: bool, names: Sequence[str] | None = None) -> pd.DataFrame:
-    """Return one row per effect of the register and accuracy, each on the first family that it serves, and the rows of
-    the scenes beside them; of ``names`` alone if they are given.
-    """
+    """Rows of every effect by accuracy, each on the first family that it serves, and of the scenes; or of ``names``."""
     import pandas as pd
 
     rows: list[dict[str, object]] = []
@@ -82,7 +80,7 @@ def loaded(bare: Family, full: Family, designs: int) -> Array:
 
 
 def count(name: str, smoke: bool) -> int:
-    """Return on how many designs an effect is measured."""
+    """On how many designs an effect is measured."""
     if effect(name).ns_per_design > DEAREST:
         return 1
     dear = effect(name).ns_per_design > DEAR or effect(name).ns_per_pose > DEAR_POSE
@@ -90,9 +88,7 @@ def count(name: str, smoke: bool) -> int:
 
 
 def outputs_of(name: str, bare: Family) -> tuple[str, ...]:
-    """Return what the name of the effect stands for in ``want``;
-    where an output bears it, the effect's numbers of a turn.
-    """
+    """Names that the effect stands for in ``want``; its numbers of a turn where an output bears the effect's name."""
     found = tuple(expanded(bare, [name]))
     whole = effect(name).design_result
     if found != (name,) or whole is None:
@@ -103,7 +99,7 @@ def outputs_of(name: str, bare: Family) -> tuple[str, ...]:
 def prices_of(
     name: str, on: str, given: Effected, wanted: tuple[str, ...], smoke: bool = False
 ) -> list[dict[str, object]]:
-    """Return rows of one effect or scene, and of the outputs that it stands for."""
+    """Rows of one effect or scene, and of the outputs that it stands for."""
     known, words = known_of(name, given, wanted)
     head: dict[str, object] = {
         "effect": name,

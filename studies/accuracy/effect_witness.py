@@ -31,13 +31,11 @@ class Effected(NamedTuple):
     designs: Array
 
     def given(self, name: str) -> Array:
-        """Return an input or parameter of the designs."""
+        """Input or parameter of the designs."""
         return self.designs[:, self.full.parameter_names.index(name)]
 
     def poses(self, names: tuple[str, ...], samples: int, changed: Mapping[str, Array] | None = None) -> list[Array]:
-        """Return pose outputs over an even grid, (n, samples), also of other effects;
-        inputs ``changed`` pose by pose.
-        """
+        """Pose outputs over an even grid, (n, samples), also of other effects; inputs ``changed`` pose by pose."""
         wider = extended(self.bare, names)
         rows = np.column_stack([self._input(wider, name) for name in wider.parameter_names])
         phi = np.arange(samples) * (TWO_PI / samples)
@@ -63,7 +61,7 @@ Witness: TypeAlias = Callable[[Effected, int], dict[str, Array]]
 
 
 def known_of(name: str, given: Effected, wanted: tuple[str, ...]) -> tuple[dict[str, Known], str]:
-    """Return what is known of an effect's outputs by other means, and in words by which."""
+    """Values of an effect's outputs known by other means, and in words by which."""
     entry = WITNESSES.get(kind_of(name)) if name in NAMES else None
     found, words = {}, ""
     if entry is not None:
@@ -81,13 +79,13 @@ def known_of(name: str, given: Effected, wanted: tuple[str, ...]) -> tuple[dict[
 
 
 def kind_of(name: str) -> str:
-    """Return the name of an effect without that of a slider, or of the family with a tree of links that it is for."""
+    """Name of an effect without that of a slider, or of the family with a tree of links that it is for."""
     entry = effect(name)
     return name.removeprefix("slider_" if entry.tree is None else f"{entry.families[0]}_")
 
 
 def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
-    """Return the largest values and magnitudes and least values of pose outputs, by ever narrower grids."""
+    """Largest values and magnitudes and least values of pose outputs, by ever narrower grids."""
     found = {}
     for name in wanted:
         for prefix, sign in EXTREMA.items():
@@ -99,13 +97,13 @@ def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
 
 
 def pressure(given: Effected, samples: int) -> dict[str, Array]:
-    """Return the largest and least pressure angle, from the angle itself."""
+    """Largest and least pressure angle, from the angle itself."""
     largest, least = (extreme(given.full.precise(), given.designs, "pressure_angle", sign).value for sign in (1, -1))
     return {"pressure_max": largest, "pressure_min": least}
 
 
 def bearing_life(given: Effected, samples: int) -> dict[str, Array]:
-    """Return mean loads and lives of the rocker's bearings by even sums over very many poses, kinks or none."""
+    """Mean loads and lives of the rocker's bearings by even sums over very many poses, kinks or none."""
     return _lives(given, samples, "d", "", given.bare.derivative_of[given.bare.position])
 
 
@@ -115,7 +113,7 @@ _ANGLES = {"d": ("psi", 0.0), "d1": ("psi", 0.0), "os": ("chi", 0.0), "b": ("the
 
 
 def bearings_of_shafts(given: Effected, samples: int) -> dict[str, Array]:
-    """Return the same of every shaft of a tree of links."""
+    """Mean loads and lives of the bearings of every shaft of a tree of links."""
     found: dict[str, Array] = {}
     for name in given.full.parameter_names:  # those of the rocker alone, a massless estimate, have no shaft's name
         shaft = name.removeprefix("dynamic_capacity_")
@@ -150,7 +148,7 @@ def _lives(given: Effected, samples: int, shaft: str, tail: str, turning: str) -
 
 
 def _slope(angle: Array) -> Array:
-    """Return the derivative of an angle that grows by full turns, by differences of sixth order."""
+    """Slope of an angle that grows by full turns, by differences of sixth order."""
     turns = np.rint((angle[:, -1] - angle[:, 0]) / TWO_PI)
     step = TWO_PI / angle.shape[1]
     swing = angle - turns[:, None] * np.arange(angle.shape[1]) * step
@@ -162,12 +160,12 @@ def _slope(angle: Array) -> Array:
 
 
 def speed(given: Effected, samples: int) -> dict[str, Array]:
-    """Return the energy of the drive summed pose by pose, its mean level by halving."""
+    """Energy of the drive summed pose by pose, its mean level by halving."""
     return _numbers(*_steady(*_energies(given, samples), given.given("speed")), given.given("speed"), _height)
 
 
 def speed_with_friction(given: Effected, samples: int) -> dict[str, Array]:
-    """Return the same, friction taken anew at every pose with the speed that it makes until that no longer changes."""
+    """Speeds with friction, taken anew at every pose with the speed that it makes until that no longer changes."""
     inertia, slope, excess = _energies(given, samples)
     mean = given.given("speed")
     crank, change = np.tile(mean[:, None], (1, samples)), np.zeros(inertia.shape)
@@ -180,16 +178,14 @@ def speed_with_friction(given: Effected, samples: int) -> dict[str, Array]:
 
 
 def _energies(given: Effected, samples: int) -> tuple[Array, Array, Array]:
-    """Return the inertia about the crank, its derivative, and the torque that is left over at even speed."""
+    """Inertia about the crank, its derivative, and the torque that is left over at even speed."""
     inertia, slope, drive = given.poses(("reduced_inertia", "dreduced_inertia", "drive_torque"), samples)
     mean = given.given("speed")[:, None]
     return inertia + given.given("flywheel")[:, None], slope, 0.5 * slope * mean**2 - drive
 
 
 def _steady(inertia: Array, slope: Array, excess: Array, mean: Array) -> tuple[Array, Array]:
-    """Return the speed and acceleration of d(J w^2/2)/d phi = excess - its mean, given the mean speed;
-    constant motor torque.
-    """
+    """Speed and acceleration of d(J w^2/2)/d phi = excess - its mean, with constant motor torque and a mean speed."""
     torque = excess - excess.mean(axis=1, keepdims=True)
     step = TWO_PI / inertia.shape[1]
     work = np.concatenate([np.zeros((len(torque), 1)), np.cumsum(_panels(torque), axis=1)[:, :-1]], axis=1) * step
@@ -211,14 +207,14 @@ def _numbers(crank: Array, change: Array, mean: Array, height: Callable[[Array],
 
 
 def _panels(y: Array) -> Array:
-    """Return the integral of every panel of a periodic curve over its width, by the cubic through four samples."""
+    """Integral of every panel of a periodic curve over its width, by the cubic through four samples."""
     left, right, after = np.roll(y, 1, axis=1), np.roll(y, -1, axis=1), np.roll(y, -2, axis=1)
     panels: Array = (13.0 * (y + right) - left - after) / 24.0
     return panels
 
 
 def elastic(given: Effected, samples: int) -> dict[str, Array]:
-    """Return the periodic vibration by differences of eighth order, its damping by Liouville's formula."""
+    """Periodic vibration by differences of eighth order, its damping by Liouville's formula."""
     from scipy.sparse import diags
     from scipy.sparse.linalg import spsolve
 
@@ -244,7 +240,7 @@ def elastic(given: Effected, samples: int) -> dict[str, Array]:
 
 
 def _stencil(order: int, samples: int) -> Any:
-    """Return the matrix of the first or second derivative of a periodic curve by differences of eighth order."""
+    """Matrix of the first or second derivative of a periodic curve by differences of eighth order."""
     from scipy.sparse import diags
 
     half = {1: (4 / 5, -1 / 5, 4 / 105, -1 / 280), 2: (8 / 5, -1 / 5, 8 / 315, -1 / 560)}[order]
@@ -256,9 +252,7 @@ def _stencil(order: int, samples: int) -> Any:
 
 
 def _height(curve: Array) -> Array:
-    """Return the largest magnitude of close samples of a smooth periodic curve,
-    with the parabola through the highest three.
-    """
+    """Largest magnitude of a smooth periodic curve from close samples, by the parabola through the highest three."""
     size, rows = np.abs(curve), np.arange(len(curve))
     top = size.argmax(axis=1)
     left, middle, right = (size[rows, (top + k) % size.shape[1]] for k in (-1, 0, 1))

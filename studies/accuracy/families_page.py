@@ -1,159 +1,104 @@
-"""docs/accuracy/families.md: error and time of every registered family by every way, and other programs beside it."""
+"""Pages docs/accuracy/families.md and crank-rocker.md: error and time of every family by every way, by region."""
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from studies.accuracy.measured import Measured
 from studies.accuracy.prices import CERTIFIED, GRID, PROVEN, REFINED, SAMPLES, TARGETS
 from studies.accuracy.subjects import TEXTS
-from studies.accuracy.tables import duration, pipe_table, power, prose
+from studies.accuracy.tables import Parts, cells, duration, pipe_table, power, prose
 from studies.accuracy.tables import significant as sig
 
 if TYPE_CHECKING:
     import pandas as pd
 
-HEAD = ("family", "number", "designs", *(f"grid {n}" for n in SAMPLES), *(f"`{power(t)}`" for t in TARGETS),
+WAYS = (*((GRID, float(n)) for n in SAMPLES), *((REFINED, target) for target in TARGETS), (CERTIFIED, PROVEN))
+HEAD = ("number", "designs", *(f"grid {n}" for n in SAMPLES), *(f"`{power(t)}`" for t in TARGETS),
         f"proven, `{power(PROVEN)}`", "reference sure to", "no answer")  # fmt: skip
+PURPOSES = {"For a nightly map": 1e-3, "For a drawing, an optimum, a comparison with a measurement": 1e-9}
 
 
-def families_page(m: Measured) -> list[str]:
-    """Return the page, line by line."""
-    lines = [
-        "# What accuracy costs: every family",
-        "",
-        *prose(
-            "For every family of the register and two chains the largest second derivative of its output over the",
-            "turn; where there is none (an interval, a march, a position without derivatives) how far the output",
-            "ranges. A cell is the largest relative error of the region's designs and the median time per design.",
-            "Back to [what the next digit costs](../accuracy.md).",
-        ),
-        "",
-        "![Error and time of every family by a grid and by accuracy=](../figures/accuracy-families.svg)",
-        "",
-        *_by_region(m.families),
-        "## How the errors are known",
-        "",
-        *prose(
-            "The reference uses the position of the mechanism alone, in twice the working precision where the family",
-            "has such poses: no derivative of the family and no search enters it. Second differences on a fine grid",
-            "name the peaks, narrower grids sharpen their places, a polynomial through Chebyshev nodes about each is",
-            "differentiated instead of the mechanism; how far an output ranges is found by narrowing grids alone. The",
-            "column *reference sure to* is by how much neighbouring widths of its intervals differ: an error below it",
-            "says nothing. A march exists on its own grid only; its reference is the same march in far finer steps.",
-            "The positions themselves are compared with 25-digit tables in [marks](marks.md) and by the tests.",
-        ),
-        "",
-        *prose(
-            "*No answer* counts designs that some way refuses with a status, or that the reference cannot judge.",
-            "`-`: nothing to judge, or not offered (a march has no `accuracy=`; few families prove their maxima). A",
-            "family has no row near a change point if no design within 90 % of its ordinary one fails to move.",
-            "Times: processor time of one thread.",
-        ),
-        "",
-        *_spread(m.families),
-        *_planar(m),
-        *_loads(m.loads, m.peer_loads),
-    ]
-    return lines[:-1]
+def families_parts(m: Measured) -> Parts:
+    """Tables of all families, region by region, and how far timings differ."""
+    return {"regions": _by_region(m.families), "spread": _spread(m.families)}
+
+
+def crank_rocker_parts(m: Measured) -> Parts:
+    """Table of the crank-rocker's own regions, and what to use for what."""
+    texts = m.regions[["region", "text"]].drop_duplicates()
+    rows = [_row(str(name), part) for name, part in m.regions.groupby("region", sort=False)]
+    return {
+        "prices": pipe_table(("region", *HEAD), rows),
+        "regions": pipe_table(("region", "what its designs have in common"), texts.to_numpy().tolist()),
+        "advice": [f"* {line}" for line in advice(m.regions)],
+    }
+
+
+def advice(table: pd.DataFrame) -> list[str]:
+    """Name for every purpose the cheapest way that keeps its bound in every region but at change points."""
+    plain = table[table["region"] != "change point"]
+    lines = [f"**{purpose}** (to {power(bound)}): {_choice(plain, bound)}" for purpose, bound in PURPOSES.items()]
+    return [*lines, f"**For a proof that no peak was missed**: {_proof(plain)}"]
+
+
+def _choice(table: pd.DataFrame, bound: float) -> str:
+    """Find the cheapest setting within the bound; of ``accuracy=``, a promise, none coarser than the bound."""
+    promised = (table["method"] == GRID) | ((table["method"] == REFINED) & (table["setting"] <= bound * (1.0 + 1e-9)))
+    ways: dict[Hashable, pd.DataFrame] = {}
+    for (method, _), rows in table[promised].groupby(["method", "setting"]):
+        kept = (rows["largest_error"] <= rows["reference_error"].clip(lower=bound)).all()
+        # The groups come by rising settings: the coarsest of a grid is the first, of a target the last.
+        if kept and not rows["unanswered"].any() and (method == REFINED or method not in ways):
+            ways[method] = rows
+    if not ways:
+        return "nothing measured here keeps that bound."
+    rows = min(ways.values(), key=lambda rows: float(rows["ns_per_design"].mean()))
+    first, dear = rows.iloc[0], rows.sort_values("ns_per_design").iloc[-1]
+    worst = rows.sort_values("largest_error").iloc[-1]
+    refined = first["method"] == REFINED
+    used = f"`accuracy = {power(first['setting'])}`" if refined else f"a grid of {first['setting']:.0f}"
+    return (
+        f"use {used}. {duration(rows['ns_per_design'].mean())} a design on average, {duration(dear['ns_per_design'])}"
+        f" in the dearest region ({dear['region']}); largest error {sig(worst['largest_error'])}, where the reference"
+        f" is sure to {sig(worst['reference_error'])}."
+    )
+
+
+def _proof(table: pd.DataFrame) -> str:
+    """Say what the certificate costs beside the search that it checks."""
+    proven = table[table["method"] == CERTIFIED]
+    searched = table[(table["method"] == REFINED) & (table["setting"] <= PROVEN)]
+    searched = searched[searched["setting"] == searched["setting"].max()]
+    took, alone = (float(rows["ns_per_design"].mean()) for rows in (proven, searched))
+    return (
+        f"add `certify = true`. {duration(took)} a design on average at `accuracy = {power(PROVEN)}`,"
+        f" {sig(took / alone)} times as long as the search alone: for survivors and optima."
+        f" {proven['unanswered'].sum()} of {proven['designs'].sum()} proofs failed."
+    )
 
 
 def _by_region(table: pd.DataFrame) -> list[str]:
     lines = []
     for region in dict.fromkeys(table["region"]):
-        part = table[table["region"] == region]
+        part = table[table["region"] == region].groupby("family", sort=False)
         lines += [f"## {region[0].upper()}{region[1:]}", "", f"{TEXTS[region][0].upper()}{TEXTS[region][1:]}.", ""]
-        lines += [*pipe_table(HEAD, [_row(name, rows) for name, rows in part.groupby("family", sort=False)]), ""]
-    return lines
+        lines += [*pipe_table(("family", *HEAD), [_row(f"`{name}`", rows) for name, rows in part]), ""]
+    return lines[:-1]
 
 
-def _row(name: object, rows: pd.DataFrame) -> list[str]:
-    ways = [(GRID, float(n)) for n in SAMPLES] + [(REFINED, t) for t in TARGETS] + [(CERTIFIED, PROVEN)]
-    cells = []
-    for method, setting in ways:
-        found = rows[(rows["method"] == method) & np.isclose(rows["setting"], setting, rtol=1e-9, atol=0.0)]
-        cells.append(_cell(found.iloc[0]) if len(found) else "-")
+def _row(name: str, rows: pd.DataFrame) -> list[str]:
     first, missing = rows.iloc[0], int((rows["unanswered"] + rows["unjudged"]).max())
     sure = sig(rows["reference_error"].max())
-    return [f"`{name}`", f"`{first['measure']}`", str(first["designs"]), *cells, sure, str(missing)]
-
-
-def _cell(row: pd.Series) -> str:
-    return f"{sig(row['largest_error'])}; {duration(row['ns_per_design'])}"
+    return [name, f"`{first['measure']}`", str(first["designs"]), *cells(rows, WAYS), sure, str(missing)]
 
 
 def _spread(table: pd.DataFrame) -> list[str]:
-    """Return how far the timings of one call differ, over all rows of the table."""
+    """How far the timings of one call differ, over all rows of the table."""
     width = (table["ns_per_design_upper"] - table["ns_per_design_lower"]) / table["ns_per_design"]
-    return [
-        *prose(
-            f"Every time is the median of five; between its quartiles lie {sig(100.0 * width.median())} % of it in the",
-            f"middle of the table, {sig(100.0 * width.quantile(0.95))} % in the worst twentieth. The quartiles",
-            "stand in `results/accuracy/families.parquet`.",
-        ),
-        "",
-    ]
-
-
-def _planar(m: Measured) -> list[str]:
-    lines = ["## The planar case next to another program", ""]
-    if m.peers is None:
-        return [*lines, "Not measured in this results folder: `make bench-peers` first.", ""]
-    family = str(m.peers["family"].iloc[0])
-    rows = [
-        [str(what), *(_cell(row) for _, row in part.sort_values("setting").iterrows())]
-        for what, part in m.peers.groupby("what", sort=False)
-    ]
-    return [
-        *lines,
-        *prose(
-            f"Largest acceleration of ordinary designs of `{family}` on a grid, each program by its fastest way",
-            "(`make bench-peers`, on this machine). All have the same designs: equal errors mean equal accelerations.",
-        ),
-        "",
-        *pipe_table(["program", *(f"grid {n}" for n in SAMPLES)], rows),
-        "",
-    ]
-
-
-def _loads(loads: pd.DataFrame | None, one: pd.DataFrame | None = None) -> list[str]:
-    """Joint loads: ``loads`` by family, ``one`` of one crank-rocker by the ways of a program."""
-    lines = ["## Joint loads next to general programs", ""]
-    if loads is None and one is None:
-        return [*lines, "Not measured in this results folder: `make bench-peers` first.", ""]
-    if loads is not None:
-        lines += [
-            *prose(
-                "Inverse dynamics of the same bodies at the same poses (`make bench-peers`): largest difference of a",
-                "joint force or drive torque, relative to the largest of the turn, and the time per pose; theirs from",
-                "Python, with the loop closed by Newton's method in the exported model, ours in a sweep.",
-            ),
-            "",
-            *pipe_table(
-                ["program", "family", "poses", "difference", "its time", "ours", "times as fast"],
-                [_load_row(row) for _, row in loads.iterrows()],
-            ),
-            "",
-        ]
-    if one is not None:
-        lines += [
-            *prose(
-                "One crank-rocker with heavy links, time per pose and how many times as fast as the first; the loads",
-                f"differ by at most {sig(one['largest_difference'].max())} of the largest.",
-            ),
-            "",
-            *pipe_table(
-                ["what", "per pose", "times as fast"],
-                [[str(row["what"]), duration(row["ns_per_pose"]), sig(row["ratio"])] for _, row in one.iterrows()],
-            ),
-            "",
-        ]
-    return lines
-
-
-def _load_row(row: pd.Series) -> list[str]:
-    ratio = row["ns_per_pose"] / row["ns_per_pose_own"]
-    times = [duration(row["ns_per_pose"]), duration(row["ns_per_pose_own"]), sig(ratio)]
-    return [row["program"], f"`{row['family']}`", str(row["poses"]), sig(row["largest_difference"]), *times]
+    return prose(
+        f"Every time is the median of five; between its quartiles lie {sig(100.0 * width.median())} % of it in the",
+        f"middle of the table, {sig(100.0 * width.quantile(0.95))} % in the worst twentieth. The quartiles",
+        "stand in `results/accuracy/families.parquet`.",
+    )

@@ -1,4 +1,4 @@
-"""The first page: one figure, five lines, what to use, and where the details are."""
+"""What the first page says: five lines, what to use, and a whole study."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from studies.accuracy.measured import Measured
 from studies.accuracy.prices import GRID, REFINED
 from studies.accuracy.subjects import EDGE, ORDINARY
-from studies.accuracy.tables import duration, pipe_table, power, prose
+from studies.accuracy.tables import Parts, at, duration, pipe_table, power, prose
 from studies.accuracy.tables import significant as sig
 
 if TYPE_CHECKING:
@@ -19,45 +19,17 @@ COARSE, FINE = 1e-3, 1e-9
 CLOSE = 1e-6
 NOTHING = 1.1  # a time that is multiplied by less is the same time
 USUAL = 360.0  # samples of a turn that are taken where nobody thinks about it
-PAGES = (
-    ("accuracy/families.md", "every family", "error and time by every way, ordinary and near change points; others"),
-    ("accuracy/effects.md", "every effect", "error against another method, time per pose and per design"),
-    ("accuracy/crank-rocker.md", "the crank-rocker in depth", "all methods by region, digits of poses, float32, disk"),
-    ("accuracy/marks.md", "marks and 25-digit tables", "what was set before, and the largest known errors"),
-)
 
 
-def front(m: Measured) -> list[str]:
-    """Return docs/accuracy.md, line by line."""
-    return [
-        "# What the next digit costs",
-        "",
-        "![Time per design for the largest acceleration of a turn, against the digits that are right]"
-        "(figures/accuracy.svg)",
-        "",
-        *(f"* {line}" for line in five(m)),
-        "",
-        "## One study from its file to its optimum",
-        "",
-        *_study(m.whole),
-        "",
-        "## Behind these lines",
-        "",
-        *pipe_table(("page", "what it has"), [[f"[{name}]({path})", text] for path, name, text in PAGES]),
-        "",
-        *prose(
-            "Smoke version: few designs, rough figures."
-            if m.smoke
-            else "Every figure here is measured, none is typed.",
-            f"Machine: {m.machine}. Ratios travel between machines, nanoseconds do not. `make study-accuracy` writes",
-            "these pages and the tables behind them, `results/accuracy/*.parquet`; what is promised is in",
-            "[promises](promises.md).",
-        ),
-    ]
+def front_parts(m: Measured) -> Parts:
+    """Lines of the first page: five sentences, one whole study, what the times depend on."""
+    rough = "Smoke version: few designs, rough figures." if m.smoke else "Every figure here is measured, none is typed."
+    told = f"{rough} Machine: {m.machine}. Ratios travel between machines, nanoseconds do not."
+    return {"five": [f"* {line}" for line in five(m)], "study": _study(m.whole), "measured": prose(told)}
 
 
 def five(m: Measured) -> list[str]:
-    """Return what a designer should know, a sentence or two each."""
+    """Say what a designer should know, a sentence or two each."""
     return [
         _refined(m.families),
         _grid(m.families),
@@ -67,16 +39,15 @@ def five(m: Measured) -> list[str]:
     ]
 
 
-def at(table: pd.DataFrame, region: str, method: str, setting: float) -> pd.DataFrame:
-    """Return rows of one region and method at one setting, a row per family."""
-    found = table[(table["region"] == region) & (table["method"] == method)]
-    return found[np.isclose(found["setting"], setting, rtol=1e-9, atol=0.0)].set_index("family")
+def of_region(table: pd.DataFrame, region: str, method: str, setting: float) -> pd.DataFrame:
+    """Rows of one region and method at one setting, a row per family."""
+    return at(table[table["region"] == region], method, setting).set_index("family")
 
 
 def _refined(table: pd.DataFrame) -> str:
-    first, last = (at(table, ORDINARY, REFINED, setting)["ns_per_design"] for setting in (COARSE, FINE))
+    first, last = (of_region(table, ORDINARY, REFINED, setting)["ns_per_design"] for setting in (COARSE, FINE))
     ratio = (last / first).dropna()
-    error = at(table, ORDINARY, REFINED, FINE)
+    error = of_region(table, ORDINARY, REFINED, FINE)
     judged = error[error["largest_error"].notna()]
     kept = judged["largest_error"] <= np.maximum(FINE, judged["reference_error"])
     return (
@@ -88,9 +59,9 @@ def _refined(table: pd.DataFrame) -> str:
 
 
 def _grid(table: pd.DataFrame) -> str:
-    found = at(table, ORDINARY, GRID, USUAL)
+    found = of_region(table, ORDINARY, GRID, USUAL)
     error = found["largest_error"].dropna()
-    refined = at(table, ORDINARY, REFINED, FINE)["ns_per_design"]
+    refined = of_region(table, ORDINARY, REFINED, FINE)["ns_per_design"]
     ratio = (found["ns_per_design"] / refined).dropna()
     return (
         f"**A fixed grid pays for every digit.** {USUAL:.0f} crank angles miss the largest acceleration by"
@@ -101,12 +72,12 @@ def _grid(table: pd.DataFrame) -> str:
 
 
 def _edge(table: pd.DataFrame) -> str:
-    grid, refined = at(table, EDGE, GRID, USUAL), at(table, EDGE, REFINED, FINE)
+    grid, refined = of_region(table, EDGE, GRID, USUAL), of_region(table, EDGE, REFINED, FINE)
     both = grid.merge(refined, left_index=True, right_index=True, suffixes=("_grid", ""))
     both = both.dropna(subset=["largest_error", "largest_error_grid"])
     if both.empty:
         return "**Near a change point** nothing was measured in this run."
-    easy = at(table, ORDINARY, REFINED, FINE)["ns_per_design"].reindex(both.index)
+    easy = of_region(table, ORDINARY, REFINED, FINE)["ns_per_design"].reindex(both.index)
     worst = str(both["largest_error"].idxmax())
     off, slower = sig(100.0 * both["largest_error_grid"].max()), sig((both["ns_per_design"] / easy).median())
     return (
@@ -118,7 +89,7 @@ def _edge(table: pd.DataFrame) -> str:
 
 
 def _effects(table: pd.DataFrame) -> str:
-    found = table[(table["method"] == REFINED) & np.isclose(table["setting"], CLOSE)].set_index("effect")
+    found = at(table, REFINED, CLOSE).set_index("effect")
     kept = found["largest_error"] <= np.maximum(CLOSE, found["reference_error"])
     times = found["ns_per_design"].sort_values()
     others = ", ".join(f"{name} ({sig(found['largest_error'][name])})" for name in kept.index[~kept])

@@ -1,4 +1,4 @@
-"""The marks: true maxima of 100 000 random designs against the reference, the exact margin, and what both cost."""
+"""The marks: true maxima of 100 000 random designs against a reference, the exact margin, and what both cost."""
 
 from __future__ import annotations
 
@@ -10,25 +10,24 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from kernels import status as st
 from kernels.families import rssr
-from studies.accuracy import reference
-from studies.accuracy.regions import BRANCH, drawn, rotatable
+from studies.accuracy.regions import drawn, rotatable
 from studies.accuracy.timing import seconds
+from studies.accuracy.witness import reference
+from sweep.families import family
 from sweep.families.base import Array
-from sweep.reductions.sampling import Index, Status, turn
-
-if TYPE_CHECKING:
-    import pandas as pd
+from sweep.reductions.sampling import Index, pose_columns, turn
 
 TARGET = 1e-8
 WRONG_PEAK = 1e-4  # relative difference in height that no refinement of the right peak leaves
 GRID = 360
 REPEATS = 15  # of a timing; the shortest counts, and other work on the machine disturbs most of them
+SAMPLES, HALVINGS = 65536, 44  # of the reference; from one sample distance to the rounding of an angle
 
 
 @dataclass(frozen=True)
@@ -41,27 +40,16 @@ class Mark:
     met: bool
 
 
-def marks(designs: int, decisions: int) -> list[Mark]:
-    """Return all marks; ``decisions`` designs are decided in rational arithmetic as well."""
+def marks(designs: int) -> list[Mark]:
+    """All marks but those of whole programs."""
     turning = rotatable(designs, 2024)
     mixed = drawn(designs, np.random.default_rng(7))
-    return [*_maxima(turning), *_margin(mixed), _verdicts(decisions), *_two_threads(mixed, turning)]
-
-
-def tables_mark(oracle: pd.DataFrame) -> Mark:
-    """Return rows of the oracle tables whose error is above the factor of their sheet;
-    ``oracle`` as of :mod:`.oracle`.
-    """
-    beyond = int((~(oracle["factor"] <= oracle["allowed"])).sum())
-    rows = int(oracle.groupby(["table", "kind"])["rows"].max().sum())
-    text = f"{beyond} of {len(oracle)}, over {rows} rows; {int(oracle['undecidable'].sum())} declared undecidable"
-    return Mark(
-        "quantities and kinds of oracle rows beyond the factor of their sheet (8, 16, 64)", "0", text, beyond == 0
-    )
+    both = [(mixed, "every random design"), (turning, "every design that turns")]
+    return [*_maxima(turning), _margin(mixed), *(_in_two_threads(*pair) for pair in both)]
 
 
 def smoke_mark() -> Mark:
-    """Return the smoke version of this study, run as a user would, with warm kernels."""
+    """Time of the smoke version of this study, run as a user would, with warm kernels."""
     with tempfile.TemporaryDirectory() as folder:
         start, before = time.perf_counter(), os.times()
         command = [sys.executable, "-m", "studies.accuracy", "--smoke", "--out", folder]
@@ -72,37 +60,38 @@ def smoke_mark() -> Mark:
 
 
 def study_mark(took: float) -> Mark:
-    """Return the study that measures all this, up to its figures."""
+    """Time of the study that measures all this, up to its figures."""
     used = sum(os.times()[:4])
     text = f"{took / 60.0:.1f}; {used / 60.0:.1f} of processor time"
     return Mark("`make study-accuracy` [min]", "10", text, took <= 600.0)
 
 
-def _true_maxima(designs: Array, target: float) -> Callable[[], tuple[Array, Array, Array]]:
+def _true_maxima(designs: Array) -> Callable[[], tuple[Array, Array, Array]]:
     cos, sin = rssr.sampling_tables()
     status, found, error = np.empty(len(designs), np.uint8), np.empty(len(designs)), np.empty(len(designs))
 
     def run() -> tuple[Array, Array, Array]:
-        rssr.true_maxima(designs, cos, sin, target, status, None, error, None, None, found, None)
+        rssr.true_maxima(designs, cos, sin, TARGET, status, None, error, None, None, found, None)
         return found, error, status.astype(np.float64)
 
     return run
 
 
 def _maxima(designs: Array) -> list[Mark]:
-    found, error, status = _true_maxima(designs, TARGET)()
+    found, error, status = _true_maxima(designs)()
     exact = even_reference(designs)
     off = np.abs(found - exact) / exact
     # Where they differ the even samples may be the ones that missed, or their rounding: the slower reference decides.
     doubtful = np.flatnonzero(~((off <= TARGET) & (off * exact <= error)))
-    exact[doubtful] = reference.largest_acceleration(np.ascontiguousarray(designs[doubtful]))
+    if doubtful.size:
+        exact[doubtful] = reference(family("rssr"), np.ascontiguousarray(designs[doubtful])).value
     off = np.abs(found - exact) / exact
     answered = status == st.OK
     worst, wrong = float(off[answered].max()), int((off[answered] > WRONG_PEAK).sum())
     held = int((np.abs(found - exact)[answered] > error[answered]).sum())
     angles, least, grid = turn(GRID), np.empty(len(designs)), np.empty(len(designs))
     dense = seconds(lambda: rssr.dense_maxima(designs, angles.cos[0], angles.sin[0], least, None, grid, None), REPEATS)
-    true = seconds(_true_maxima(designs, TARGET), REPEATS)
+    true = seconds(_true_maxima(designs), REPEATS)
     n = len(designs)
     return [
         Mark(
@@ -123,22 +112,30 @@ def _maxima(designs: Array) -> list[Mark]:
 
 
 def even_reference(designs: Array) -> Array:
-    """Return the largest |psi''| from 65 536 even samples by the fused loop,
-    and halving between the neighbours of the top.
-    """
-    angles = turn(reference.SAMPLES)
-    step = 2.0 * np.pi / reference.SAMPLES
+    """Largest |psi''| from even samples by the fused loop, and halving between the neighbours of the top."""
+    angles = turn(SAMPLES)
     exact, halves = np.empty(len(designs)), np.array_split(np.arange(len(designs)), 2)
 
     def work(rows: Index, own: Array) -> None:
         part = np.ascontiguousarray(designs[rows])
-        least, grid, at = np.empty(len(part)), np.empty(len(part)), np.empty(len(part), np.int64)
-        rssr.dense_maxima(part, angles.cos[0], angles.sin[0], least, None, grid, None, at, own)
-        gaps = np.full(len(part), step)
-        exact[rows] = np.fmax(grid, reference.refined(part, "d2psi", 0, angles.phi[0, at], gaps, gaps)[0])
+        least, grid, top = np.empty(len(part)), np.empty(len(part)), np.empty(len(part), np.int64)
+        rssr.dense_maxima(part, angles.cos[0], angles.sin[0], least, None, grid, None, top, own)
+        exact[rows] = np.fmax(grid, _halved(part, angles.phi[0, top], 2.0 * np.pi / SAMPLES))
 
-    _together(work, [(half, np.empty(reference.SAMPLES)) for half in halves])
+    _together(work, [(half, np.empty(SAMPLES)) for half in halves])
     return exact
+
+
+def _halved(designs: Array, phi: Array, reach: float) -> Array:
+    """Height of the peak of |psi''| within ``reach`` of each angle, by halving on the sign of its slope."""
+    low, high = phi - reach, phi + reach
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        columns, _ = pose_columns(family("rssr"), designs, middle[:, None], ("d2psi", "d3psi"))
+        rising = columns["d3psi"][:, 0] * np.sign(columns["d2psi"][:, 0]) > 0.0
+        low, high = np.where(rising, middle, low), np.where(rising, high, middle)
+    columns, _ = pose_columns(family("rssr"), designs, 0.5 * (low + high)[:, None], ("d2psi",))
+    return np.abs(columns["d2psi"][:, 0])
 
 
 def _together(work: Callable[[Any, Any], None], parts: Sequence[tuple[Any, Any]]) -> None:
@@ -150,105 +147,28 @@ def _together(work: Callable[[Any, Any], None], parts: Sequence[tuple[Any, Any]]
         thread.join()
 
 
-def _margin(designs: Array) -> list[Mark]:
+def _margin(designs: Array) -> Mark:
     n = len(designs)
     status, margin, turns = np.empty(n, np.uint8), np.empty(n), np.empty(n)
     # So short that a phase of a slower clock would be all it sees.
     repeats = 20 * REPEATS
     took = 1e9 * seconds(lambda: rssr.margin(designs, status, margin, turns, None, None, None), repeats) / n
-    return [Mark("exact margin with rotatability [ns per design]", "25", f"{took:.0f}", took <= 25.0)]
-
-
-def _verdicts(designs: int) -> Mark:
-    """Return verdicts near change points against the sign of a fine minimum in 50 digits."""
-    wrong, undecided = 0, 0
-    generator = np.random.default_rng(5)
-    plain = rotatable(designs, 77)
-    plain[:, 1] *= _to_the_edge(plain)
-    plain[:, 1] *= 1.0 + generator.choice([-1.0, 1.0], designs) * 10.0 ** generator.uniform(-15.5, -8.0, designs)
-    status, turns = np.empty(designs, np.uint8), np.empty(designs)
-    rssr.margin(plain, status, None, turns, None, None, None)
-    for design, verdict, code in zip(plain, turns, status, strict=True):
-        if code == st.UNDECIDABLE:
-            undecided += 1
-        else:
-            wrong += int((least_discriminant(design) > 0.0) != bool(verdict == 1.0))
-    text = f"{wrong} of {designs} within 1e-15.5 ... 1e-8 of a change point; {undecided} reported as undecidable"
-    return Mark("wrong verdicts on full rotation", "0", text, wrong == 0)
-
-
-def _to_the_edge(designs: Array) -> Array:
-    """Return the factor on the coupler that brings each design to its change point,
-    as near as halving in float64 comes.
-    """
-    low, high, trial = np.zeros(len(designs)), np.ones(len(designs)), designs.copy()
-    status, turns = np.empty(len(designs), np.uint8), np.empty(len(designs))
-    for _ in range(54):
-        middle = 0.5 * (low + high)
-        trial[:, 1] = designs[:, 1] * middle
-        rssr.margin(trial, status, None, turns, None, None, None)
-        turning = turns == 1.0
-        high, low = np.where(turning, middle, high), np.where(turning, low, middle)
-    return high
-
-
-def least_discriminant(design: Array) -> float:
-    """Return the sign-exact least value of Delta over the turn in 50 digits:
-    64 samples and Newton from the lowest ones.
-    """
-    from mpmath import mp, mpf
-
-    with mp.workdps(50):
-        a, b, c, e, f, g, alpha = (mpf(float(x)) for x in design[:7])
-        sa, ca = mp.sin(alpha), mp.cos(alpha)
-        k0 = (a * a - b * b + c * c + e * e + f * f + g * g - 2 * f * g * ca) / (2 * c)
-        k1, k2 = a * g * sa / c, a * e / c
-        c1, s1 = 2 * (k0 * k2 - a * e), 2 * (a * f * sa * ca - k0 * k1)
-        d3, d4, d5 = a * a - k2 * k2, 2 * k1 * k2, a * a * ca * ca - k1 * k1
-        c0, c2, s2 = e * e + (f * sa) ** 2 - k0 * k0 + (d3 + d5) / 2, (d3 - d5) / 2, d4 / 2
-
-        def value(t: Any) -> Any:
-            return c0 + c1 * mp.cos(t) + s1 * mp.sin(t) + c2 * mp.cos(2 * t) + s2 * mp.sin(2 * t)
-
-        count = 64
-        samples = [value(2 * mp.pi * k / count) for k in range(count)]
-        best = min(samples)
-        for k in range(count):
-            if samples[k] <= samples[k - 1] and samples[k] <= samples[(k + 1) % count]:
-                t = 2 * mp.pi * k / count
-                for _ in range(60):
-                    slope = -c1 * mp.sin(t) + s1 * mp.cos(t) - 2 * c2 * mp.sin(2 * t) + 2 * s2 * mp.cos(2 * t)
-                    bend = -c1 * mp.cos(t) - s1 * mp.sin(t) - 4 * c2 * mp.cos(2 * t) - 4 * s2 * mp.sin(2 * t)
-                    step = max(min(-slope / abs(bend), mpf("0.05")), mpf("-0.05"))
-                    t += step
-                    if abs(step) < mpf(10) ** -40:
-                        break
-                best = min(best, value(t))
-        return float(best)
-
-
-def _two_threads(mixed: Array, turning: Array) -> list[Mark]:
-    """Return the verdict and true maximum of every design, wall time on two threads:
-    of any designs, and of those that turn.
-    """
-    assert set(np.unique(mixed[:, BRANCH])) <= {-1.0, 1.0}
-    return [_in_two_threads(mixed, "every random design"), _in_two_threads(turning, "every design that turns")]
+    return Mark("exact margin with rotatability [ns per design]", "25", f"{took:.0f}", took <= 25.0)
 
 
 def _in_two_threads(designs: Array, which: str) -> Mark:
     halves = [np.ascontiguousarray(part) for part in np.array_split(designs, 2)]
-    cos, sin = rssr.sampling_tables()
-    statuses = [np.empty(len(part), np.uint8) for part in halves]
+    runs = [_true_maxima(half) for half in halves]
+    found: dict[int, Array] = {}
 
-    def work(part: Array, status: Status) -> None:
-        rssr.true_maxima(part, cos, sin, TARGET, status, None, None, None, None, np.empty(len(part)), None)
+    def work(number: int, run: Callable[[], tuple[Array, Array, Array]]) -> None:
+        found[number] = run()[2]
 
-    parts = list(zip(halves, statuses, strict=True))
     took, work_of_both = (
-        1e9 * seconds(lambda: _together(work, parts), REPEATS, clock=clock) / len(designs)
+        1e9 * seconds(lambda: _together(work, list(enumerate(runs))), REPEATS, clock=clock) / len(designs)
         for clock in (time.perf_counter, time.process_time)
     )
-    turning = float(np.mean(np.concatenate(statuses) == st.OK))
+    turning = float(np.mean(np.concatenate(list(found.values())) == st.OK))
     text = f"{took:.0f} of wall time, {work_of_both:.0f} of processor time of both; {100 * turning:.0f} % turn"
     return Mark(
         f"exact rotatability and true maximum acceleration of {which}, two threads [ns per design]",

@@ -29,7 +29,7 @@ USUAL = 360.0
 
 
 def draw_prices(m: Measured, folder: Path) -> list[Saved]:
-    """Return the headline and the two lists."""
+    """Draw the headline and the two lists."""
     with house_style():
         figures = {"accuracy": headline(m.families, m.peers)}
         ordinary = m.families[m.families["region"] == ORDINARY]
@@ -39,9 +39,7 @@ def draw_prices(m: Measured, folder: Path) -> list[Saved]:
 
 
 def headline(table: pd.DataFrame, peers: pd.DataFrame | None) -> Figure:
-    """Return the time per design against digits: promised by accuracy=, reached by grids;
-    large letters, to be read on a phone.
-    """
+    """Draw time per design against digits, promised by accuracy= or reached by grids; legible on a phone."""
     figure = new_figure(7.2, 5.0)
     axes = figure.subplots()
     ordinary = table[table["region"] == ORDINARY]
@@ -89,7 +87,7 @@ def _decades(axes: Axes) -> None:
 
 
 def _list(table: pd.DataFrame, key: str, targets: tuple[float, ...]) -> Figure:
-    """Return a row each: on the left the error, on the right the time, by a usual grid and by every accuracy."""
+    """Draw a row each: on the left the error, on the right the time, by a usual grid and by every accuracy."""
     names = list(dict.fromkeys(table[key]))
     figure = new_figure(8.4, 1.3 + 0.235 * len(names))
     left, right = figure.subplots(1, 2, sharey=True)

@@ -1,4 +1,4 @@
-"""The price list of the families: error and time of their measure by every way that they offer, region by region."""
+"""Price list of the families: error and time of their measure by every way that they offer, region by region."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.accuracy.regions import Region
+from studies.accuracy.regions import Region, regions
 from studies.accuracy.subjects import MOVES, measure, regions_of, subjects
 from studies.accuracy.timing import per_design
 from studies.accuracy.witness import Known, reference
@@ -17,7 +17,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import chain_names, family
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.domain import March
-from sweep.reductions.catalogue import check_certifiable
+from sweep.reductions.steps import check_certifiable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,10 +29,11 @@ JUDGED = 1e-2  # a reference that is less sure than that says nothing
 # Designs per region by what a pose takes [ns]: what is dear is measured on few.
 COUNTS = ((100.0, (48, 48, 16)), (2000.0, (16, 16, 8)), (float("inf"), (3, 3, 2)))
 SMOKE_COUNTS, SMOKE_EVERY = (2, 0, 0), 6
+EACH, SMOKE_EACH, SEED = 100, 4, 1  # crank-rockers of each of their own regions
 
 
 def family_prices(smoke: bool) -> pd.DataFrame:
-    """Return one row per family or chain, region and method; in smoke every sixth of them, two designs each."""
+    """One row per family or chain, region and method; in smoke every sixth of them, two designs each."""
     import pandas as pd
 
     rows: list[dict[str, object]] = []
@@ -41,14 +42,23 @@ def family_prices(smoke: bool) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def crank_rocker_prices(smoke: bool) -> pd.DataFrame:
+    """Rows of the crank-rocker in regions that only it has, each with its text."""
+    import pandas as pd
+
+    found = regions(SMOKE_EACH if smoke else EACH, SEED)
+    table = pd.DataFrame(prices_of(family("rssr"), found, smoke))
+    return table.assign(text=table["region"].map({region.name: region.text for region in found}))
+
+
 def counts(name: str) -> tuple[int, int, int]:
-    """Return how many designs of each region a family is measured on."""
+    """How many designs of each region a family is measured on."""
     ns = sum(nanoseconds("poses", part) for part in chain_names(name))
     return next(found for limit, found in COUNTS if ns < limit)
 
 
 def prices_of(mechanism: Family, regions: Iterable[Region], smoke: bool = False) -> list[dict[str, object]]:
-    """Return rows of one family."""
+    """Rows of one family."""
     rows = []
     for region in regions:
         known = reference(mechanism, region.designs)
@@ -60,7 +70,7 @@ def prices_of(mechanism: Family, regions: Iterable[Region], smoke: bool = False)
 
 
 def methods(mechanism: Family, smoke: bool) -> Sequence[tuple[str, float, Accuracy]]:
-    """Return the name, setting and accuracy of every way to the measure that the family's domain allows."""
+    """Name, setting and accuracy of every way to the measure that the family's domain allows."""
     samples, targets = (SMOKE_SAMPLES, SMOKE_TARGETS) if smoke else (SAMPLES, TARGETS)
     found = [(GRID, float(n), Accuracy(samples=n)) for n in samples]
     if isinstance(mechanism.domain, March):

@@ -29,12 +29,12 @@ HALVINGS = 26
 
 
 def subjects() -> tuple[str, ...]:
-    """Return names of all families of the register, and of the chains."""
+    """Names of all families of the register, and of the chains."""
     return (*NAMES, *CHAINS)
 
 
 def measure(mechanism: Family) -> str:
-    """Return the design output that the price list is about.
+    """Design output that the price list is about.
 
     The largest second derivative of the position over the turn, where the register says which output that is; of an
     interval, a march, or a position without derivatives, how far the position ranges.
@@ -45,9 +45,7 @@ def measure(mechanism: Family) -> str:
 
 
 def example(mechanism: Family) -> Array:
-    """Return the ordinary design of a family, or those of a chain's stages together,
-    as one row of the design matrix.
-    """
+    """Ordinary design of a family, or those of a chain's stages together, as one row of the design matrix."""
     given = dict(mechanism.example)
     if isinstance(mechanism, Chain):
         given = {f"{name}{s.number}": value for s in mechanism.stages for name, value in s.family.example.items()}
@@ -55,14 +53,14 @@ def example(mechanism: Family) -> Array:
 
 
 def around(mechanism: Family, count: int, share: float, generator: np.random.Generator) -> Array:
-    """Return designs that differ from the ordinary one by at most ``share`` in every parameter that has no choices."""
+    """Designs that differ from the ordinary one by at most ``share`` in every parameter that has no choices."""
     fixed = np.array([p.choices is not None for p in mechanism.parameters])
     change = generator.uniform(-share, share, (count, fixed.size))
     return np.ascontiguousarray(example(mechanism) * (1.0 + np.where(fixed, 0.0, change)))
 
 
 def moves(mechanism: Family, designs: Array, grid: Accuracy = COARSE) -> Mask:
-    """Return whether each design moves all the way, as far as a grid shows."""
+    """Whether each design moves all the way, as far as a grid shows."""
     return np.isin(design_outputs(mechanism, designs, [measure(mechanism)], grid)["status"], MOVES)
 
 
@@ -80,9 +78,7 @@ def regions_of(name: str, counts: tuple[int, int, int], seed: int = 1) -> Iterat
 
 
 def _edge(mechanism: Family, count: int, generator: np.random.Generator) -> Array:
-    """Return designs just inside the range of motion,
-    on lines from ordinary ones to such as do not move all the way.
-    """
+    """Designs just inside the range of motion, on lines from ordinary ones to such as do not move all the way."""
     far = around(mechanism, 12 * count, FAR, generator)
     stuck = far[~moves(mechanism, far)][:count]
     inside = around(mechanism, len(stuck), NEAR, generator)

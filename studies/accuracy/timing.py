@@ -29,7 +29,7 @@ class Spread(NamedTuple):
         return cls(float(median), float(lower), float(upper))
 
     def columns(self, units: int, per: str) -> dict[str, float]:
-        """Return the columns of a table, ns per unit: the median, and both quartiles."""
+        """Columns of a table, ns per unit: the median, and both quartiles."""
         names = (f"ns_per_{per}", f"ns_per_{per}_lower", f"ns_per_{per}_upper")
         return {name: 1e9 * took / units for name, took in zip(names, self, strict=True)}
 
@@ -40,19 +40,17 @@ def seconds(
     least: float = 2e-3,
     clock: Callable[[], float] = time.process_time,
 ) -> float:
-    """Return the shortest of several timings of one call [s], see :func:`timings`."""
+    """Shortest of several timings of one call [s], see :func:`timings`."""
     return min(timings(call, repeats, least, clock))
 
 
 def spread(call: Callable[[], object], repeats: int = REPEATS, least: float = 2e-3) -> Spread:
-    """Return the median and quartiles of several timings of one call, see :func:`timings`."""
+    """Median and quartiles of several timings of one call, see :func:`timings`."""
     return Spread.of(timings(call, repeats, least))
 
 
 def per_design(run: Callable[[Array], object], designs: Array) -> dict[str, float]:
-    """Return columns of the time per design, of the same designs over and over:
-    what a call itself takes must not show.
-    """
+    """Columns of the time per design, of the same designs over and over, so that the call itself does not show."""
     start = time.process_time()
     run(designs)
     took = time.process_time() - start
@@ -69,7 +67,7 @@ def timings(
     least: float,
     clock: Callable[[], float] = time.process_time,
 ) -> list[float]:
-    """Return times of one call [s]; the first call, which may compile, is not counted.
+    """Processor times of one call [s]; the first call, which may compile, is not counted.
 
     Calls shorter than ``least`` are timed in groups, so that the clock does not show.  Processor time, which other work
     on the machine disturbs least; what runs in several threads needs ``time.perf_counter``.

@@ -12,7 +12,7 @@ import numpy as np
 import sweep
 from studies.accuracy.timing import REPEATS, Spread
 from studies.accuracy.witness import reference
-from sweep.dataset.layout import OPTIMUM
+from sweep.dataset.files import OPTIMUM
 from sweep.families import family
 from sweep.families.base import Array
 
@@ -22,44 +22,12 @@ if TYPE_CHECKING:
 SETTINGS = ("samples = 360", "target = 1e-3", "target = 1e-6", "target = 1e-9")  # of the table [accuracy]
 JUDGED = 200  # of the designs that the study keeps
 FAMILY, OBJECTIVE = "rssr", "max_abs_d2psi"
-STUDY = """
-[study]
-name = "whole"
-question = "The least acceleration of a rocker that swings by 40 to 50 degrees"
-[mechanism]
-family = "rssr"
-[scene]
-want = ["max_abs_d2psi", "swing", "max_pressure_angle"]
-[design]
-sample = {{ kind = "sobol", n = {designs}, seed = 17 }}
-a = {{ from = 5, to = 20, unit = "mm" }}
-b = {{ from = 20, to = 80, unit = "mm" }}
-c = {{ from = 15, to = 50, unit = "mm" }}
-e = {{ from = 10, to = 70, unit = "mm" }}
-f = {{ from = -20, to = 20, unit = "mm" }}
-g = {{ from = -20, to = 20, unit = "mm" }}
-alpha = {{ from = 0, to = 90, unit = "deg" }}
-[limits]
-rotatable = true
-swing = {{ min = 40, max = 50, unit = "deg" }}
-max_pressure_angle = {{ max = 60, unit = "deg" }}
-[objective]
-minimise = "max_abs_d2psi"
-[accuracy]
-{setting}
-[optimise]
-starts = 4
-seed = 1
-global = "none"
-[output]
-keep = "feasible"
-dtype = "float64"
-"""
+STUDY = (Path(__file__).parent / "whole.toml").read_text(encoding="utf-8")
+DESIGNS, FINEST = "n = 20000", SETTINGS[-1]  # as they stand there
 
 
 def whole_study(designs: int, repeats: int = REPEATS, smoke: bool = False) -> pd.DataFrame:
-    """Return one row per setting: time of the whole run, error of what is kept,
-    the optimum and how far it is from the finest.
+    """One row per setting: time of the whole run, error of what is kept, the optimum, how far it is from the finest.
 
     Wall time and processor time of one worker, as median and quartiles; the first run, which may compile, is not
     counted.
@@ -87,14 +55,15 @@ def whole_study(designs: int, repeats: int = REPEATS, smoke: bool = False) -> pd
 
 def _run(folder: Path, setting: str, designs: int) -> tuple[float, float]:
     folder.mkdir()
-    (folder / "study.toml").write_text(STUDY.format(designs=designs, setting=setting))
+    text = STUDY.replace(DESIGNS, f"n = {designs}").replace(FINEST, setting)
+    (folder / "study.toml").write_text(text, encoding="utf-8")
     start = time.perf_counter(), time.process_time()
     sweep.run(folder, out=folder / "designs", jobs=1)
     return time.perf_counter() - start[0], time.process_time() - start[1]
 
 
 def _judged(folder: Path) -> dict[str, object]:
-    """Return rows kept, largest relative error of the objective among some of them, and the optimum with its error."""
+    """Rows kept, largest relative error of the objective among some of them, and the optimum with its error."""
     import pandas as pd
 
     kept, best = sweep.load(folder / "designs"), pd.read_parquet(folder / OPTIMUM).iloc[:1]

@@ -21,8 +21,7 @@ from studies.accuracy.subjects import measure
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.domain import March
-from sweep.reductions.closing import on_closed_turn
-from sweep.reductions.sampling import TWO_PI, Index, pose_columns
+from sweep.reductions.sampling import TWO_PI, Index, on_closed_turn, pose_columns
 
 GRID, FINER = 2048, 33  # angles of the first grid over a turn, and of each narrower one round a place
 ROUNDS = 3  # of narrower grids that sharpen the place of a peak
@@ -50,7 +49,7 @@ class Known(NamedTuple):
 
 
 def reference(mechanism: Family, designs: Array) -> Known:
-    """Return the family's measure by the method of this module."""
+    """Family's measure by the method of this module."""
     if isinstance(mechanism.domain, March):
         return _marched(mechanism, designs)
     name, precise = measure(mechanism), on_closed_turn(mechanism.precise())
@@ -73,7 +72,7 @@ def _marched(mechanism: Family, designs: Array) -> Known:
 
 
 def position(mechanism: Family, designs: Array, phi: Array) -> Array:
-    """Return the position at angles (n, m) of each design, made continuous along the row where it is an angle."""
+    """Position at angles (n, m) of each design, made continuous along the row where it is an angle."""
     y = pose_columns(mechanism, designs, np.ascontiguousarray(phi), (mechanism.position,))[0][mechanism.position]
     return np.unwrap(y, axis=1) if mechanism.pose_output[mechanism.position].wraps else y
 

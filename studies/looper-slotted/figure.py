@@ -18,8 +18,8 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import minimise
-from sweep.optimise.posing import problem_of
-from sweep.optimise.starts import drawn
+from sweep.optimise.starts.dataset import drawn
+from sweep.optimise.starts.posing import problem_of
 from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, house_style, new_figure, save
 from sweep.study import OptimiseSettings, study_from_data
 

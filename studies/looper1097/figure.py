@@ -16,7 +16,7 @@ import pandas as pd
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.optimise import minimise
-from sweep.optimise.posing import problem_of
+from sweep.optimise.starts.posing import problem_of
 from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, house_style, new_figure, save
 from sweep.study import OptimiseSettings, load_study, study_from_data
 

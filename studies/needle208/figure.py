@@ -17,10 +17,10 @@ import pandas as pd
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
-from sweep.optimise.drawn_in import bounded
-from sweep.optimise.posing import problem_of
-from sweep.optimise.robust import robust
-from sweep.optimise.tolerance import deviating
+from sweep.optimise.manufacture.margins import bounded
+from sweep.optimise.manufacture.robust import robust
+from sweep.optimise.manufacture.tolerance import deviating
+from sweep.optimise.starts.posing import problem_of
 from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, house_style, new_figure, save
 from sweep.study import Limit, OptimiseSettings, Study, load_study
 

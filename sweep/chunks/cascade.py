@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,12 @@ from sweep.effects import called_for
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array, Columns
 from sweep.families.chain import stages_of
-from sweep.quantities.names import by_magnitude, error_of, parts
+from sweep.families.names import error_of, parts
+from sweep.quantities.limits import Limit, meets
 from sweep.synthesis.fit import driving_outputs, fit_line
 
 if TYPE_CHECKING:
-    from sweep.study import Limit, Study
+    from sweep.study import Study
 
 # A route gets at most so many designs at once, so that their tables stay in the caches, and of a dear one at most what
 # it does in this time: a stop is noticed in between.
@@ -35,8 +36,6 @@ BATCH_SECONDS = 0.1
 FEWEST = 64
 # Measured: what a call of a route takes however few designs it is given.
 CALL_SECONDS = 1e-3
-
-Number = TypeVar("Number", float, Array)
 
 # With these one output is missing or rough, the others are worth having where all rows are kept.
 PARTIAL = (
@@ -302,19 +301,3 @@ def _before_fit(study: Study, route: Route) -> bool:
         return False
     # Loads of a stage are those of all stages behind it.
     return not any(placed.entry.takes_load for placed in called_for(study.bare, route.outputs))
-
-
-def compared(name: str, values: Number) -> Number:
-    """Give what limits and objectives compare: the magnitude of a swing or stroke, the value of any other output."""
-    return abs(values) if by_magnitude(name) else values
-
-
-def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:
-    """Return whether each value keeps the limit; nan does not. Swing and stroke are compared by magnitude."""
-    x = compared(limit.output, np.asarray(values, dtype=np.float64))
-    good = np.isfinite(x)
-    if limit.minimum is not None:
-        good &= x >= limit.minimum
-    if limit.maximum is not None:
-        good &= x <= limit.maximum
-    return good

@@ -15,7 +15,7 @@ from sweep.chunks.parameters import Parameters, parameter_matrix
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array, Columns
-from sweep.quantities.names import error_of, is_flag
+from sweep.families.names import error_of, is_flag
 from sweep.reductions.steps import is_proven
 from sweep.synthesis.fit import fit_line
 

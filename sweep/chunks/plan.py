@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 
+from kernels.cache_folder import source_hash
 from kernels.status import OK
 from sweep.chunks.cascade import BLOCK, CALL_SECONDS, Cascade, levels
 from sweep.chunks.chunk import output_columns
 from sweep.chunks.parameters import parameter_matrix, parameter_ns
 from sweep.evaluation.summaries import output
 from sweep.families.base import Array, Unit
-from sweep.quantities.names import is_error, without_error
+from sweep.families.names import is_error, without_error
 from sweep.reductions.steps import is_proven
 from sweep.sources import DIGESTS
 from sweep.study.units import internal_unit
@@ -84,6 +85,11 @@ class Plan:
     def chunks(self) -> int:
         """Number of chunks."""
         return -(-self.designs // self.chunk_size)
+
+    @property
+    def format(self) -> int:
+        """Number of the layout of a chunk, which its metadata name."""
+        return FORMAT
 
     @property
     def identity(self) -> str:
@@ -252,8 +258,6 @@ def _output_column(study: Study, name: str, dtype: str) -> Column:
 def code_hash() -> str:
     """Return the hash of the sources and libraries that determine the values in a chunk."""
     import scipy
-
-    from kernels._cache import source_hash
 
     values = [path for path in DIGESTS if path.split("/")[0] in VALUES]
     return _hash_sources(values, f"{source_hash()} {np.__version__} {scipy.__version__}")

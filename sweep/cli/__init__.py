@@ -1,7 +1,4 @@
-"""Command line: ``sweep VERB ...``, also ``python -m sweep VERB ...``.
-
-Every verb imports what it needs when it runs, so that ``sweep --help`` and a misspelt option answer at once.
-"""
+"""Command line: ``sweep VERB ...``, also ``python -m sweep VERB ...``."""
 
 from __future__ import annotations
 

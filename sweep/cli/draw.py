@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypedDict, Unpack
 
 import click
 
-from sweep.cli.listing import ANGLES
-
-if TYPE_CHECKING:
-    from sweep.evaluation.angles import AngleUnit
+import sweep.plot as plot
+from sweep.cli.families import family_names
+from sweep.cli.options import ANGLES
+from sweep.cli.tables import read_table
+from sweep.errors import InputError
+from sweep.evaluation.angles import AngleUnit, grid_in_radians
+from sweep.report.dataset import chosen
 
 OF_DATASETS = ("map", "front", "tolerance", "sensitivity")
 OF_DESIGNS = ("motion", "mechanism", "polar_load")
 ENDINGS = (".svg", ".png", ".pdf")
+
+
+class Options(TypedDict):
+    """Options of the pictures, each of them of some."""
+
+    design: str | None
+    row: int
+    want: str | None
+    phi: float
+    view: str | None
+    positions: int
+    output: str | None
+    angles: AngleUnit | None
 
 
 @click.command()
@@ -34,58 +50,42 @@ ENDINGS = (".svg", ".png", ".pdf")
     "--positions", type=click.IntRange(min=1), default=1, show_default=True, help="Of mechanism, over its turn."
 )
 @click.option("--output", help="Of tolerance: the output whose histogram is drawn; all in percent if left out.")
-def draw(
-    what: str,
-    source: str,
-    table: Path | None,
-    out: Path,
-    design: str | None,
-    row: int,
-    want: str | None,
-    phi: float,
-    view: str | None,
-    positions: int,
-    output: str | None,
-    angles: AngleUnit | None,
-) -> None:
+def draw(what: str, source: str, table: Path | None, out: Path, **options: Unpack[Options]) -> None:
     """Draw one picture.
 
     SOURCE is a FOLDER that `sweep run` left behind, or FAMILY with a TABLE of designs (.parquet or .csv, angles in rad
     unless --angles or a header such as `alpha [deg]` says otherwise), of which --row is drawn.  map, front, tolerance
     and sensitivity are pictures of a folder; motion, mechanism and polar_load of one design.
     """
-    import sweep.plot as plot
-    from sweep.errors import InputError
-    from sweep.evaluation.angles import grid_in_radians
-
     if out.suffix.lower() not in ENDINGS:
         raise InputError("--out", str(out), f"a file name ending in {' or '.join(ENDINGS)}", "command line")
     if what in OF_DATASETS:
         if table is not None or not Path(source).is_dir():
             raise InputError("SOURCE", source, f"a dataset folder for {what}", "command line")
-        drawn: Any = getattr(plot, what)(source, **({"output": output} if what == "tolerance" else {}))
+        drawn: Any = getattr(plot, what)(source, **({"output": options["output"]} if what == "tolerance" else {}))
     else:
-        mechanism, columns = _of_one(source, table, design, row)
-        unit: AngleUnit | None = "rad" if table is None else angles
-        shown = {"phi": phi, "view": view, "positions": positions}
-        known: dict[str, dict[str, Any]] = {"motion": {"want": want}, "mechanism": shown}
-        options = known.get(what, {}) | {"angles": unit}
-        if table is None:
-            grid_in_radians("phi", "rad", phi, None)  # a design out of a folder is in rad, --phi may not be
-        drawn = getattr(plot, what)(mechanism, columns, **options)
+        drawn = _of_one(what, source, table, options)
     axes = drawn if what in ("front", "tolerance", "sensitivity", "polar_load") else drawn[0]
     out.parent.mkdir(parents=True, exist_ok=True)
     axes.figure.savefig(out)
     click.echo(f"{what}: {out}")
 
 
-def _of_one(source: str, table: Path | None, design: str | None, row: int) -> tuple[Any, dict[str, Any]]:
-    """Return the mechanism and design out of a folder, or a family's name and a table."""
-    from sweep.cli.listing import family_names
-    from sweep.cli.tables import read_table
-    from sweep.errors import InputError
-    from sweep.report.chosen import chosen
+def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any:
+    """Draw one design, out of a folder or of a family and a table."""
+    mechanism, design = _design(source, table, options["design"], options["row"])
+    known: dict[str, dict[str, Any]] = {
+        "motion": {"want": options["want"]},
+        "mechanism": {"phi": options["phi"], "view": options["view"], "positions": options["positions"]},
+    }
+    if table is None:
+        grid_in_radians("phi", "rad", options["phi"], None)  # a design out of a folder is in rad, --phi may not be
+    unit: AngleUnit | None = "rad" if table is None else options["angles"]
+    return getattr(plot, what)(mechanism, design, angles=unit, **known.get(what, {}))
 
+
+def _design(source: str, table: Path | None, design: str | None, row: int) -> tuple[Any, dict[str, Any]]:
+    """Mechanism and design out of a folder, or a family's name and a row of a table."""
     if table is None:
         if not Path(source).is_dir():
             raise InputError("SOURCE", source, "a dataset folder, or a family with a table of designs", "command line")

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
-from sweep.cli import completion
-from sweep.cli.listing import aligned, echo_columns
+from sweep.cli.families import aligned, echo_columns
+from sweep.effects import NAMES, effect
+from sweep.effects.base import Effect
+from sweep.errors import InputError, nearest
+from sweep.families.base import Output, Parameter
+from sweep.study.units import internal_unit
 
-if TYPE_CHECKING:
-    from sweep.effects.base import Effect
-    from sweep.families.base import Output, Parameter
+
+def complete_effects(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Complete an effect."""
+    return [name for name in NAMES if name.startswith(incomplete)]
 
 
 @click.command()
-@click.argument("name", required=False, shell_complete=completion.effects)
+@click.argument("name", required=False, shell_complete=complete_effects)
 @click.option("--markdown", is_flag=True, help="The whole register as docs/effects.md.")
 def effects(name: str | None, markdown: bool) -> None:
     """List the effects a scene can call for, or explain one: outputs, inputs, cost, when it matters."""
-    from sweep.effects import NAMES, effect
-    from sweep.errors import InputError, nearest
-
     if markdown:
         click.echo(page(), nl=False)
         return
@@ -53,8 +53,6 @@ def chain_words(entry: Effect) -> str:
 
 def explain(entry: Effect) -> list[str]:
     """Return one effect in full, line by line."""
-    from sweep.study.units import internal_unit
-
     lines = [f"{entry.name} ({entry.key}): {entry.title}", ""]
     kind = "whole turn: it couples the crank angles" if entry.whole_turn else "pointwise in the crank angle"
     lines += aligned(
@@ -83,8 +81,6 @@ def explain(entry: Effect) -> list[str]:
 
 
 def _output_rows(outputs: tuple[Output, ...]) -> list[tuple[str, str, str, str]]:
-    from sweep.study.units import internal_unit
-
     return [(o.name, internal_unit(o.unit), o.text, o.equation) for o in outputs]
 
 
@@ -102,9 +98,6 @@ def every_input(entry: Effect) -> tuple[Parameter, ...]:
 
 def page() -> str:
     """Return docs/effects.md, made from the register."""
-    from sweep.effects import NAMES, effect
-    from sweep.study.units import internal_unit
-
     entries = [effect(name) for name in NAMES]
     lines = [
         "# Effects",

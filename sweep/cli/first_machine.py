@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from sweep.cli.first_study import design_lines, limit_lines, mechanism_line, swept_names, wanted_outputs
-
-if TYPE_CHECKING:
-    from sweep.families.base import Family
-    from sweep.families.members import Machine
+from sweep.families.base import Family
+from sweep.families.machines import Machine
 
 APART = 10  # mm between the frames of two members, along z
 OF_EACH = 2  # outputs of a member that are asked for

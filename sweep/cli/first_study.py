@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from sweep.families.base import Family, Parameter
+from sweep.cli.families import main_outputs
+from sweep.families.base import Family, Parameter
+from sweep.families.chain import Chain, stages_of
+from sweep.families.domain import March
+from sweep.families.names import is_flag, parts, stem
 
 # Units of the examples by unit word.  Those with forces or masses are in SI, the others in any length unit.
 SI = {
@@ -26,8 +28,6 @@ WIDTH = 56  # column of the explanations
 
 def study_text(name: str, family: Family, schema: str) -> str:
     """Return a study.toml that passes `sweep check`; ``schema`` is where its JSON schema lies, seen from the file."""
-    from sweep.families.domain import March
-
     wanted = wanted_outputs(family)
     goal = next((w for w in wanted if w.startswith("max_abs_d2")), wanted[-1])
     lines = [
@@ -88,8 +88,6 @@ def smoke_text(family: Family) -> str:
 
 
 def _names(family: Family) -> list[str]:
-    from sweep.families.chain import stages_of
-
     return [stage.family.name for stage in stages_of(family)]
 
 
@@ -103,8 +101,6 @@ def mechanism_line(family: Family) -> str:
 
 def _example(family: Family) -> dict[str, float]:
     """Return the examples of the stages under the names of the chain."""
-    from sweep.families.chain import Chain, stages_of
-
     stages = stages_of(family)
     if not isinstance(family, Chain):
         return dict(family.example)
@@ -115,9 +111,6 @@ def wanted_outputs(family: Family) -> list[str]:
     """Return what a designer asks first: size of the motion, pressure angle, greatest acceleration;
     else what there is.
     """
-    from sweep.cli.listing import main_outputs
-    from sweep.quantities.names import is_flag, parts
-
     # Of a chain first what it does as a whole, then the stages.
     offered = sorted((name for name in main_outputs(family) if not is_flag(name)), key=lambda name: parts(name).stage)
     dwells = [name for name in offered if parts(name).stem.startswith("dwell_")]
@@ -166,9 +159,6 @@ def _words(p: Parameter) -> str:
 
 def limit_lines(family: Family) -> list[str]:
     """Return the full rotation as a limit, pressure angles as comments."""
-    from sweep.cli.listing import main_outputs
-    from sweep.quantities.names import is_flag, stem
-
     offered = main_outputs(family)
     flags = [f"{name} = true" for name in offered if is_flag(name)]
     angles = [name for name in offered if stem(name) == "max_pressure_angle"]

@@ -1,27 +1,25 @@
-"""The group of verbs, and how errors reach the shell."""
+"""The group of verbs, and how errors reach the shell.
+
+A verb's module is imported when the verb is called, so that ``sweep --help`` and the completion of verbs answer at
+once.
+"""
 
 from __future__ import annotations
 
+import errno
+import os
 import signal
 import sys
 import warnings
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TextIO
 
 import click
+from click.shell_completion import CompletionItem
 
-from sweep.cli.begin import init, schema
-from sweep.cli.draw import draw
-from sweep.cli.effects import effects
-from sweep.cli.exchange import export, points
-from sweep.cli.listing import cache, families
-from sweep.cli.nightly import nightly
-from sweep.cli.parts import merge, split
-from sweep.cli.studies import check, compare, report, run
-from sweep.cli.tables import evaluate_table, summarise_table
-from sweep.cli.task import task
-from sweep.cli.verify import verify
-from sweep.errors import LinksweepError, LinksweepWarning, ProgramFault, StoreError
+from sweep.errors import LinksweepError, LinksweepWarning, ProgramFault, StoreError, WorkerDied
 from sweep.jobs.signals import leaving_within
 
 SIGNALLED = 128  # and the number of the signal: what a shell expects of an interrupted command
@@ -31,8 +29,54 @@ SECONDS_TO_LEAVE = 1.6
 WORDS = "sweep: interrupted at work that cannot be stopped half way; what was finished is kept, run again to continue"
 
 
+# Where each verb is, and what the list of verbs says of it.
+VERBS = {
+    "cache": ("cache:cache", "Manage the compiled kernels that are kept on disk."),
+    "check": ("plan:check", "Validate a study and print what running it would compute and cost."),
+    "compare": ("verify:compare", "Say what moved between two datasets of one study: values, rows, time."),
+    "draw": ("draw:draw", "Draw one picture."),
+    "effects": ("effects:effects", "List the effects a scene can call for, or explain one."),
+    "eval": ("tables:evaluate_table", "Compute pose outputs of the designs in TABLE, one row per pose."),
+    "export": ("points:export", "Write one design of a dataset to a file that other programs read."),
+    "families": ("families:families", "List the mechanism families, or the parameters and outputs of one."),
+    "init": ("init:init", "Write a first study of a mechanism or a machine."),
+    "merge": ("parts:merge", "Bring the finished chunks of all parts of a study together."),
+    "nightly": ("nightly:nightly", "Compute all STUDIES into a dated folder, and say what changed."),
+    "points": ("points:points", "Find the dimensions of FAMILY from the points of a drawing."),
+    "report": ("report:report", "Write report.html, figures and tables about a dataset."),
+    "run": ("run:run", "Run or resume a study."),
+    "schema": ("init:schema", "Write the JSON schema of study files, by which editors complete and check them."),
+    "split": ("parts:split", "Cut a study into parts that separate jobs compute."),
+    "summarise": ("tables:summarise_table", "Compute design outputs of the designs in TABLE, one row per design."),
+    "task": ("task:task", "Answer the [task] table of FILE: mechanisms, the best first."),
+    "verify": ("verify:verify", "Check a dataset: every byte against its hash, every row against the plan."),
+}
+
+
 class Verbs(click.Group):
     """A group in which an error raised on purpose is one message and an exit code; any other shows its traceback."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the verbs."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a verb; None for a name that is none."""
+        if cmd_name not in VERBS:
+            return None
+        module, name = VERBS[cmd_name][0].split(":")
+        command: click.Command = getattr(import_module(f"sweep.cli.{module}"), name)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of verbs without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, words) for name, (_, words) in VERBS.items()])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Verbs that begin so, without importing them, and options."""
+        found = [CompletionItem(name, help=words) for name, (_, words) in VERBS.items() if name.startswith(incomplete)]
+        return found + click.Command.shell_complete(self, ctx, incomplete)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the verb."""
@@ -48,11 +92,23 @@ class Verbs(click.Group):
         except KeyboardInterrupt as error:
             click.echo("sweep: interrupted", err=True)
             ctx.exit(SIGNALLED + getattr(error, "number", signal.SIGINT))
-        except FileNotFoundError:
-            if _is_here():
+        except OSError as error:
+            if error.errno == errno.EPIPE:  # whoever reads has had enough, which click knows
                 raise
-            click.echo("sweep: the folder it was started in is not there any more; go to another one", err=True)
+            gone = isinstance(error, FileNotFoundError) and not _is_here()
+            words = "the folder it was started in is not there any more; go to another one" if gone else error
+            _last_words(f"sweep: {words}")
             ctx.exit(StoreError.exit_code)
+        except MemoryError:
+            _last_words("sweep: the memory it may use is full; fewer jobs need less")
+            ctx.exit(WorkerDied.exit_code)
+
+
+def _last_words(text: str) -> None:
+    """Say why it ends, and let nothing else be written: a full disk refuses that at the very end, too."""
+    with suppress(OSError):
+        click.echo(text, err=True)
+    sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
 
 
 def _said(
@@ -90,27 +146,3 @@ def main() -> None:
     changed or missing, 12 slower (compare, nightly, verify), 70 worker died, 74 I/O, damaged data or disk full, 75
     folder locked, 124 time budget used up (run again to resume), 130 and 143 stopped by a signal.
     """
-
-
-for verb in (
-    init,
-    run,
-    check,
-    evaluate_table,
-    summarise_table,
-    families,
-    effects,
-    report,
-    compare,
-    verify,
-    nightly,
-    split,
-    merge,
-    cache,
-    points,
-    export,
-    draw,
-    task,
-    schema,
-):
-    main.add_command(verb)

@@ -6,8 +6,11 @@ from pathlib import Path
 
 import click
 
-from sweep.cli.studies import BACKEND
+from sweep.cli.options import BACKEND, JOBS
 from sweep.errors import InputError
+from sweep.nights import Settings
+from sweep.nights import nightly as run_night
+from sweep.study.units import factor, split
 
 
 @click.command()
@@ -18,7 +21,7 @@ from sweep.errors import InputError
 )  # fmt: skip
 @click.option("--budget", default="6h", show_default=True, help="Time for the whole night, such as 6h or 90 min.")
 @click.option("--keep", type=click.IntRange(min=1), default=14, show_default=True, help="Nights that are kept.")
-@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers.")
+@JOBS
 @BACKEND
 @click.option("--smoke", is_flag=True, help="The tiny version of every study.")
 @click.option("--on-change", metavar="CMD", help="Command to run unless the exit code is 0; the log is its input.")
@@ -41,10 +44,6 @@ def nightly(
     Ends with 0 if nothing changed, 11 if rows or statuses changed, 10 if values did, 124 if the time was over, 12 if a
     study was slower twice in a row, 74 if the disk refused; with a study's own code if its run failed.
     """
-    from sweep.nights import Settings
-    from sweep.nights import nightly as run_night
-    from sweep.study.units import factor, split
-
     try:
         number, unit = split(budget, "s")
         seconds = number * factor(unit, "s")

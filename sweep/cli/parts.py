@@ -7,13 +7,12 @@ from pathlib import Path
 
 import click
 
-from sweep.dataset.layout import DESIGNS
+from sweep.cli.options import OUT, SMOKE, STUDY
+from sweep.dataset.files import DESIGNS
+from sweep.engine.parts import merge as merge_parts
+from sweep.engine.parts import split as split_study
+from sweep.study import load_study
 
-STUDY = click.argument("study", type=click.Path(exists=True, path_type=Path))
-OUT = click.option(
-    "--out", type=click.Path(file_okay=False, path_type=Path), help="Dataset folder; default results/<study>/designs."
-)
-SMOKE = click.option("--smoke", is_flag=True, help="The tiny version: smoke.toml beside the study.")
 INCOMPLETE = 11
 
 
@@ -28,8 +27,6 @@ def split(study: Path, parts: int, out: Path | None, smoke: bool) -> None:
     The parts are runs of consecutive chunks of one dataset, with folders of their own beside it: parts/0000 ...  When
     they have ended, `sweep merge` brings their chunks together and `sweep run` does the rest.
     """
-    from sweep.engine.parts import split as split_study
-
     for folder in split_study(study, _folder(study, out, smoke), parts, smoke=smoke):
         words = ["sweep", "run", str(study), "--out", str(folder), *(["--smoke"] if smoke else [])]
         click.echo(shlex.join(words))
@@ -44,8 +41,6 @@ def merge(study: Path, out: Path | None, smoke: bool) -> None:
 
     Ends with 11 while chunks are missing; `sweep run` computes those, and the optimum.
     """
-    from sweep.engine.parts import merge as merge_parts
-
     found = merge_parts(study, _folder(study, out, smoke), smoke=smoke)
     for path in found.damaged:
         click.echo(f"{path}: damaged, left out; the run of this part computes it anew")
@@ -58,9 +53,7 @@ def merge(study: Path, out: Path | None, smoke: bool) -> None:
 
 
 def _folder(study: Path, out: Path | None, smoke: bool) -> Path:
-    """Return the folder that `sweep run` would take."""
-    from sweep.study import load_study
-
+    """Folder that `sweep run` would take."""
     if out is not None:
         return out
     return Path("results", *(["smoke"] if smoke else []), load_study(study, smoke=smoke).name, DESIGNS)

@@ -1,27 +1,59 @@
-"""What ``sweep check`` prints: what a study would compute, how, and at what cost."""
+"""The verb ``check``: what a study would compute, how, and at what cost."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from pathlib import Path
 
-from sweep.cli.listing import aligned, main_outputs
-from sweep.families.members import Machine
-from sweep.quantities.names import without_minus
+import click
 
-if TYPE_CHECKING:
-    from sweep.engine.estimate import Estimate
-    from sweep.families.base import Family
-    from sweep.study import Study
-    from sweep.study.space import Axis
-
+from sweep.chunks.cascade import ordered_routes
+from sweep.chunks.plan import PARAMETER_UNITS, feasible_designs, spread_designs
+from sweep.cli.families import aligned, main_outputs
+from sweep.cli.options import SMOKE, STUDY
+from sweep.effects.advice import findings, left_out, tree
+from sweep.engine.estimate import LEAST_KEPT, Estimate, check_budget, estimate, other_accuracies
+from sweep.engine.searches import refuse_unprovable
+from sweep.evaluation.summaries import output
+from sweep.families.base import Family
+from sweep.families.machines import Machine
+from sweep.families.names import without_minus
+from sweep.jobs.progress import Phases
+from sweep.optimise.front.pareto import searches
+from sweep.optimise.multistart.survey import MET, wanted
+from sweep.proof.question import question_of
+from sweep.report.quantities import number, quantity
+from sweep.report.tables import bound_words
+from sweep.study import Study, load_study
+from sweep.study.space import Axis
 
 # Poses per design that the shares of the effects are counted at, and designs that their rules are tried on.
 POSES = 100.0
 ADVISED = 64
 NAMED = 24  # outputs that are not computed
 SECONDS_PER_BOX = 20e-6  # of a proof, docs/proof.md
+
+
+@click.command()
+@STUDY
+@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers to plan for.")
+@SMOKE
+def check(study: Path, jobs: int, smoke: bool) -> None:
+    """Validate a study and print what running it would compute and cost; nothing is written.
+
+    A study over its budget ends with exit code 3.
+    """
+    model = load_study(study, smoke=smoke)
+    refuse_unprovable(model)
+    with Phases(show=True) as phases:
+        cost = estimate(model, jobs, lambda done, of: phases.say("planning", done, of))
+        others = other_accuracies(model, jobs, lambda done, of: phases.say("other accuracies", done, of))
+        phases.say("what matters")
+        lines = plan_lines(model, cost, others)
+    for line in lines:
+        click.echo(line)
+    check_budget(model, cost)
 
 
 def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]) -> list[str]:
@@ -51,9 +83,12 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     if study.optimise is not None:
         settings = study.optimise
         brake = "" if settings.time_budget is None else f"; emergency brake after {duration(settings.time_budget)}"
-        rule = f"fewer if the estimated share of unseen basins falls to {100.0 * settings.unseen:g} %"
+        populations = settings.globally != "none"
+        share = 100.0 * wanted(settings, populations)
+        unlikely = f"better optima are unlikely (under {share:g} %) and " if share < 100.0 else ""
+        rule = f"fewer once {unlikely}the best was found {MET} times"
         most = f"at most {settings.starts} starts of {settings.looks} looks"
-        if settings.globally != "none":
+        if populations:
             most = f"{settings.starts} starts of {settings.looks} looks from at most {settings.populations} populations"
         lines += [f"optimiser: {most}, {rule}{brake}"]
     lines += _proof(study)
@@ -90,11 +125,6 @@ def _left_out(study: Study) -> list[str]:
 
 def _computed(study: Study) -> list[str]:
     """Return the routes of the sweep in their order, with their cost, outputs and limits."""
-    from sweep.chunks.cascade import ordered_routes
-    from sweep.evaluation.summaries import output
-    from sweep.report.limits import bound_words
-    from sweep.report.quantities import quantity
-
     limits = {
         limit.output: bound_words(limit, quantity(limit.output, output(study.family, limit.output).unit))
         for limit in study.output_limits
@@ -118,10 +148,6 @@ def _before_and_between(study: Study) -> list[str]:
     """Return parameters that follow from others: made before the sweep's routes, or fitted between them;
     and their limits.
     """
-    from sweep.chunks.plan import PARAMETER_UNITS
-    from sweep.report.limits import bound_words
-    from sweep.report.quantities import quantity
-
     lines = []
     if study.locus is not None:
         made, given = ", ".join(study.locus.made), ", ".join(study.prescribed)
@@ -138,8 +164,6 @@ def _before_and_between(study: Study) -> list[str]:
 
 
 def _kept(cost: Estimate) -> str:
-    from sweep.engine.estimate import LEAST_KEPT
-
     words = f"{cost.kept:.3g} of all designs"
     return f"none of a pilot's designs, {words} assumed" if cost.kept <= LEAST_KEPT else words
 
@@ -150,10 +174,6 @@ def _times(ratio: float) -> str:
 
 def _front(study: Study) -> list[str]:
     """Return the front of [pareto]: what is set against what, from where to where, and how much searching that is."""
-    from sweep.evaluation.summaries import output
-    from sweep.optimise.pareto import searches
-    from sweep.report.quantities import number, quantity
-
     if study.pareto is None:
         return []
     name, bounds = study.pareto.output, study.pareto.bounds
@@ -170,8 +190,6 @@ def _front(study: Study) -> list[str]:
 
 def _proof(study: Study) -> list[str]:
     """Return what is to be proven of which space, and with which budget."""
-    from sweep.proof.question import question_of
-
     if study.optimise is None or study.optimise.prove is None:
         return []
     asked, question = study.optimise.prove, question_of(study)
@@ -186,9 +204,6 @@ def _proof(study: Study) -> list[str]:
 
 def _effects(study: Study) -> list[str]:
     """Return the effects of the scene: what is computed, what is not, and which rules of negligibility hold."""
-    from sweep.chunks.plan import feasible_designs, spread_designs
-    from sweep.effects.advice import findings, left_out, tree
-
     bare = study.bare
     out = left_out(bare, study.want)
     if not out and bare is study.family:

@@ -5,27 +5,27 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
+import numpy as np
+import pandas as pd
+from pyarrow import csv
 
-from sweep.cli import completion
-from sweep.cli.listing import ANGLES, family_names
+from sweep.cli.families import complete_families, complete_outputs, family_names
+from sweep.cli.options import ANGLES
 from sweep.errors import InputError, StoreError
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from sweep.evaluation.angles import AngleUnit
+from sweep.evaluation.angles import AngleUnit
+from sweep.evaluation.poses import evaluate
+from sweep.evaluation.summaries import summarise
 
 FORMATS = (".parquet", ".csv")
-FAMILY = click.argument("family", shell_complete=completion.families)
+FAMILY = click.argument("family", shell_complete=complete_families)
 TABLE = click.argument("table", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 WANT = click.option(
     "--want",
     multiple=True,
     required=True,
-    shell_complete=completion.outputs,
+    shell_complete=complete_outputs,
     help="Outputs, separated by commas; see `sweep families FAMILY`.",
 )
 OUT = click.option(
@@ -65,10 +65,6 @@ def evaluate_table(
     is a design).  FAMILY is a family or a chain such as rssr+guide.  A value that is nan has a status that says why.
     """
     out = checked_format(out)
-    import numpy as np
-
-    from sweep.evaluation.poses import evaluate
-
     whole = 2.0 * np.pi if angles != "deg" else 360.0
     phi = None if poses is None else np.arange(poses) * (whole / poses)
     designs = read_table(table)
@@ -119,8 +115,6 @@ def summarise_table(
     status that says why.
     """
     out = checked_format(out)
-    from sweep.evaluation.summaries import summarise
-
     designs = read_table(table)
     found = summarise(
         family_names(family),
@@ -138,13 +132,13 @@ def summarise_table(
 
 
 def wanted(texts: tuple[str, ...]) -> list[str]:
-    """Return names out of ``--want x,y --want z``, without repetition."""
+    """Names out of ``--want x,y --want z``, without repetition."""
     names = [name.strip() for text in texts for name in text.split(",")]
     return list(dict.fromkeys(name for name in names if name))
 
 
 def kept(texts: tuple[str, ...]) -> bool | list[str]:
-    """Return what ``--keep`` asks for, as the argument ``keep`` of the API."""
+    """Argument ``keep`` of the API that ``--keep`` stands for."""
     names = wanted(texts)
     return True if names == ["all"] else names
 
@@ -162,9 +156,6 @@ def checked_format(out: Path | None) -> Path | None:
 
 def read_table(path: Path) -> pd.DataFrame:
     """Read designs from Parquet or CSV; a file that is neither is an :class:`InputError`."""
-    import pandas as pd
-    from pyarrow import csv
-
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         raise InputError("table", path.name, f"a file name ending in {' or '.join(FORMATS)}", str(path))

@@ -5,6 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+import pandas as pd
+
+from sweep.cli.tables import write_table
+from sweep.study.task import load_task
+from sweep.synthesis.tasks import solve
 
 NOTHING = 4  # as of `sweep run`: no design within the limits
 
@@ -19,19 +24,12 @@ NOTHING = 4  # as of `sweep run`: no design within the limits
 @click.option("--out", type=click.Path(path_type=Path), help="The mechanisms as a table: .csv or .parquet.")
 def task(file: Path, candidates: int, starts: int, seed: int, out: Path | None) -> None:
     """Answer the [task] table of FILE (docs/tasks.md): mechanisms, the best first, lengths in mm, angles in rad."""
-    from sweep.study.task import load_task
-    from sweep.synthesis.tasks import solve
-
     solutions = solve(load_task(file), candidates=candidates, starts=starts, seed=seed)
     for solution in solutions:
         click.echo(str(solution))
     if not solutions:
         click.echo("no candidate was a mechanism at all")
     if out is not None:
-        import pandas as pd
-
-        from sweep.cli.tables import write_table
-
         rows = [s.mechanism | {"objective": s.objective, "feasible": s.feasible} for s in solutions]
         write_table(pd.DataFrame(rows), out)
     if not any(s.feasible for s in solutions):

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.dataset import store
-from sweep.errors import InputError
-from sweep.quantities.names import is_error
+from sweep.errors import InputError, StoreError
+from sweep.families.names import is_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -191,6 +191,7 @@ class _Rows:
         chunks = store.parts(folder) if folder.is_dir() else []
         if not chunks:
             raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "compare")
+        self.folder = folder
         self.stops = [store.about(part)["stop"] for part in chunks]
         names = pq.read_schema(io.BytesIO(chunks[0].read())).names
         self.columns = [name for name in names if not is_error(name)]
@@ -212,6 +213,8 @@ class _Rows:
         if not pieces:
             return pd.DataFrame({name: [] for name in self.columns})
         rows = pd.concat(pieces, ignore_index=True)
+        if np.any(np.diff(rows["design"].to_numpy()) <= 0):
+            raise StoreError(f"{self.folder}: designs are not in their order, or there twice; see sweep verify")
         now = rows["design"] < (np.inf if stop is None else stop)
         self._rows = rows[~now]
         return rows[now]
@@ -250,7 +253,7 @@ def _compare_optima(result: Comparison, old: Path, new: Path, rtol: float) -> No
 
 
 def _notes(old: Path, new: Path) -> tuple[str, ...]:
-    plans = [store.read_plan(folder) or {} for folder in (old, new)]
+    plans = [store.trusted_plan(folder) or {} for folder in (old, new)]
     notes = [
         f"{folder}: not complete"
         for folder, plan in zip((old, new), plans, strict=True)
@@ -270,5 +273,8 @@ def _seconds(old: Path, new: Path) -> tuple[float, float] | None:
         ends = [line for line in store.read_runs(folder) if line.get("event") == "end"]
         if not ends or ends[-1].get("outcome") != "complete":
             return None
-        times.append(sum(float(line.get("seconds", 0.0)) for line in ends))
+        seconds = [line.get("seconds", 0.0) for line in ends]
+        if not all(isinstance(one, (int, float)) for one in seconds):
+            return None
+        times.append(float(sum(seconds)))
     return times[0], times[1]

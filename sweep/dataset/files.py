@@ -1,24 +1,76 @@
-"""Files that appear as a whole or not at all, and those beside the chunks: the plan and the log of runs."""
+"""The files of a dataset beside its chunks: where they lie, written as a whole or not at all, and read back.
+
+Every reader of Parquet files has its own idea of which files in a folder are data.  So the folder of designs holds
+``part-*.parquet`` and nothing else, and they all read the same rows; everything else lies in a folder beside it.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sweep.dataset.layout import PLAN, RUNS, TEMPORARY, beside
 from sweep.errors import StoreError
 
 if TYPE_CHECKING:
     import pandas as pd
 
+PLAN, RUNS, LOCK, BAD, OLD = "_plan.json", "_runs.jsonl", "_lock", "_bad", "_old"
+OPTIMUM, CURVES = "_optimum.parquet", "_curves.parquet"
+SENSITIVITY, TOLERANCE, PARETO = "_sensitivity.parquet", "_tolerance.parquet", "_pareto.parquet"
+PROOF = "_proof.parquet"
+TEMPORARY = "_tmp-"
+
+DESIGNS = "designs"
+SUFFIX = ".meta"
+
+# Where ``_plan.json`` keeps the hashes of the tables that a finished search has written.
+TABLES = "tables"
+
 # What a file system answers that makes no (more) links to a file.
 UNLINKABLE = (errno.EXDEV, errno.EPERM, errno.EMLINK, errno.ENOTSUP, errno.EOPNOTSUPP)
-PLAN_KEYS = {"identity", "chunks", "chunk_size", "name", "chunk_data", "optimise"}
+# What a system answers where running again alone does not help.
+CLOSED = (errno.ELOOP, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EROFS, errno.ENAMETOOLONG)
+
+# The key under which a plan carries the hash of everything else that it says.
+OWN_HASH = "hash"
+# What a plan says at least, and as what; earlier versions wrote no hash of it.
+PLAN_TYPES: Mapping[str, type] = {
+    "identity": str, "chunks": int, "chunk_size": int, "name": str, "chunk_data": dict, "optimise": bool,
+}  # fmt: skip
+
+
+def located(folder: str | Path) -> Path:
+    """Return the folder of designs that a user means:
+    the given one, or the ``designs`` in it where it holds no chunks.
+    """
+    place = Path(folder)
+    inner = place / DESIGNS
+    return inner if inner.is_dir() and not any(place.glob("part-*.parquet")) else place
+
+
+def beside(folder: Path) -> Path:
+    """Return the folder of plan, log, lock, optimum and report of a folder of designs: see `outside`.
+
+    A dataset of an earlier version keeps these files where it has them, among the chunks.
+    """
+    return folder if is_older(folder) else outside(folder)
+
+
+def outside(folder: Path) -> Path:
+    """Return the parent of a folder called ``designs``, and ``<folder>.meta`` next to any other."""
+    place = folder.resolve() if folder.is_symlink() or folder.name in ("", "..") else folder
+    return place.parent if place.name == DESIGNS else place.with_name(place.name + SUFFIX)
+
+
+def is_older(folder: Path) -> bool:
+    """Return whether an earlier version wrote this dataset, with its plan among the chunks."""
+    return (folder / PLAN).is_file()
 
 
 @contextlib.contextmanager
@@ -28,7 +80,8 @@ def store_errors(place: Path) -> Iterator[None]:
         yield
     except OSError as error:
         where = error.filename or place
-        text = f"{where}: {error.strerror or error}; finished chunks are kept, run again to continue"
+        remedy = "mend that and run again to continue" if error.errno in CLOSED else "run again to continue"
+        text = f"{where}: {error.strerror or error}; finished chunks are kept, {remedy}"
         raise StoreError(text) from error
 
 
@@ -78,7 +131,11 @@ def set_aside(folder: Path, paths: list[Path], where: str) -> None:
     with store_errors(folder):
         target.mkdir(parents=True, exist_ok=True)
         for path in paths:
-            path.replace(target / path.name)
+            to, count = target / path.name, 0
+            while to.is_dir() and not to.is_symlink():  # a folder in place of a chunk, set aside before
+                count += 1
+                to = target / f"{path.name}.{count}"
+            path.replace(to)
 
 
 def link_or_copy(source: Path, target: Path) -> None:
@@ -100,7 +157,7 @@ def remove_temporary(folder: Path) -> None:
 
 
 def read_plan(folder: Path) -> dict[str, Any] | None:
-    """Return the content of ``_plan.json``; None if there is none or it is damaged."""
+    """Return the content of ``_plan.json``; None if there is none, or it is not as it was written."""
     path = beside(folder) / PLAN
     if not path.is_file():
         return None
@@ -110,13 +167,36 @@ def read_plan(folder: Path) -> dict[str, Any] | None:
         data = json.loads(text)
     except (ValueError, RecursionError):
         return None
-    whole = isinstance(data, dict) and data.keys() >= PLAN_KEYS and isinstance(data["chunk_size"], int)
+    if not isinstance(data, dict) or data.pop(OWN_HASH, None) not in (None, _own_hash(data)):
+        return None
+    whole = all(isinstance(data.get(key), kind) for key, kind in PLAN_TYPES.items())
     return data if whole and data["chunk_size"] > 0 else None
 
 
+def trusted_plan(folder: Path) -> dict[str, Any] | None:
+    """Return the content of ``_plan.json``, None where there is none.
+
+    Raises
+    ------
+    StoreError
+        if it is not as it was written.
+    """
+    plan = read_plan(folder)
+    path = beside(folder) / PLAN
+    if plan is None and os.path.lexists(path):
+        raise StoreError(f"{path}: not as a run has written it; run the study again, which writes it anew")
+    return plan
+
+
 def write_plan(folder: Path, data: Mapping[str, Any]) -> None:
-    """Replace ``_plan.json`` as a whole."""
+    """Replace ``_plan.json`` as a whole; it carries its own hash."""
+    data = dict(data) | {OWN_HASH: _own_hash(data)}
     write_atomically(beside(folder) / PLAN, (json.dumps(data, indent=1) + "\n").encode())
+
+
+def _own_hash(data: Mapping[str, Any]) -> str:
+    rest = {key: value for key, value in data.items() if key != OWN_HASH}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def read_table(path: Path) -> pd.DataFrame:
@@ -145,7 +225,7 @@ def read_runs(folder: Path) -> list[dict[str, Any]]:
         return []
     lines = []
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        with contextlib.suppress(ValueError):  # the torn line of a killed run says nothing
+        with contextlib.suppress(ValueError, RecursionError):  # the torn line of a killed run says nothing
             lines.append(json.loads(line))
     return [line for line in lines if isinstance(line, dict)]
 
@@ -163,3 +243,33 @@ def append_run(folder: Path, event: Mapping[str, Any]) -> None:
             file.write(json.dumps(event).encode() + b"\n")
             file.flush()
             os.fsync(file.fileno())
+
+
+def digests(place: Path, names: Iterable[str]) -> dict[str, str]:
+    """Return SHA-256 of those of the tables that are there."""
+    with store_errors(place):
+        return {n: hashlib.sha256((place / n).read_bytes()).hexdigest() for n in names if (place / n).is_file()}
+
+
+def altered(place: Path, note: Mapping[str, Any], names: Iterable[str]) -> list[str]:
+    """Return the tables that are not as their search has written them, or not there; an older plan notes no hashes.
+
+    Parameters
+    ----------
+    place : folder of the tables
+    note : content of ``_plan.json``
+    names : of the tables
+    """
+    known, found = note.get(TABLES) or {}, digests(place, names)
+    return [name for name in names if name not in found or known.get(name, found[name]) != found[name]]
+
+
+def metadata(path: Path) -> dict[bytes, bytes]:
+    """Return what a table says of itself; empty where there is none, or it is damaged."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return dict(pq.read_schema(path).metadata or {}) if path.is_file() else {}
+    except (pa.ArrowException, OSError, ValueError):  # Arrow says OSError, too, of bytes that make no sense
+        return {}

@@ -6,16 +6,18 @@ import contextlib
 import errno
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sweep.dataset.files import read_runs, store_errors
-from sweep.dataset.layout import LOCK, beside
+from sweep.dataset.files import LOCK, beside, read_runs, store_errors
 from sweep.errors import LinksweepWarning, LockedError
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
+
+# Behind the name of a file that stands for a lock by being there.
+SOFT = "-soft"
 
 # What a file system answers that has no locks.
 UNLOCKABLE = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOLCK)
@@ -42,24 +44,43 @@ def locked(folder: Path) -> Iterator[None]:
     with store_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         beside(folder).mkdir(parents=True, exist_ok=True)
-        lock = _acquired(folder)
+    with held(folder, beside(folder) / LOCK, lambda: f"another run is writing here ({_holder(folder)})"):
+        yield
+
+
+@contextlib.contextmanager
+def held(folder: Path, file: Path, taken: Callable[[], str]) -> Iterator[None]:
+    """Hold a folder that is there for this process, by the lock of a file and by that of the folder itself.
+
+    Parameters
+    ----------
+    folder : nobody else gets in, also not by deleting the file
+    file : which is locked
+    taken : what is said where another process holds the folder
+
+    Raises
+    ------
+    LockedError, StoreError
+        as for :func:`locked`.
+    """
+    with store_errors(folder):
+        lock = _acquired(folder, file, taken)
         try:
-            held = _hold(folder)
+            descriptor = _hold(folder, taken)
         except BaseException:
             lock.release()
             raise
     try:
         yield
     finally:
-        if held is not None:
-            os.close(held)
+        if descriptor is not None:
+            os.close(descriptor)
         lock.release()
 
 
-def _acquired(folder: Path) -> BaseFileLock:
+def _acquired(folder: Path, path: Path, taken: Callable[[], str]) -> BaseFileLock:
     from filelock import FileLock, SoftFileLock, Timeout
 
-    path = beside(folder) / LOCK
     lock: BaseFileLock = FileLock(path, timeout=0, fallback_to_soft=False)
     try:
         try:
@@ -67,17 +88,19 @@ def _acquired(folder: Path) -> BaseFileLock:
         except OSError as error:
             if error.errno not in UNLOCKABLE or isinstance(error, Timeout):
                 raise
+            # Not the same file: the lock that could not be had has left one of that name.
+            path = path.with_name(path.name + SOFT)
             lock = SoftFileLock(path, timeout=0)
             lock.acquire()
             text = f"{folder}: this file system has no locks. The file {path} says that a run is at work here; "
             text += "after a crash on another computer delete it yourself, once you know that nothing runs there"
             warnings.warn(text, LinksweepWarning, stacklevel=3)
     except Timeout:
-        raise _refused(folder) from None
+        raise LockedError(f"{folder}: {taken()}") from None
     return lock
 
 
-def _hold(folder: Path) -> int | None:
+def _hold(folder: Path, taken: Callable[[], str]) -> int | None:
     """Return a descriptor that holds a lock on the folder itself; None where the system locks no folders."""
     try:
         import fcntl
@@ -88,15 +111,11 @@ def _hold(folder: Path) -> int | None:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(descriptor)
-        raise _refused(folder) from None
+        raise LockedError(f"{folder}: {taken()}") from None
     except OSError:  # network file systems lock files only
         os.close(descriptor)
         return None
     return descriptor
-
-
-def _refused(folder: Path) -> LockedError:
-    return LockedError(f"{folder}: another run is writing here ({_holder(folder)})")
 
 
 def _holder(folder: Path) -> str:

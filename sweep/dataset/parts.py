@@ -11,14 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
-from sweep.dataset.files import read_plan, store_errors
+from sweep.dataset.files import is_older, read_plan, store_errors
 from sweep.errors import InputError, StoreError
 
 if TYPE_CHECKING:
     import pandas as pd
 
 METADATA = b"linksweep"
+MOST_BYTES = 2**30  # of a chunk; they are planned to be a thirtieth of that
 REMEDY = "run the study again to have it computed anew"
+
+# What the metadata of a chunk say at least, and as what.
+ABOUT_TYPES = {"chunk": int, "identity": str, "start": int, "stop": int, "counts": dict, "missed": dict}
 
 _PART = re.compile(r"part-(\d{6,})-([0-9a-f]{12})-([0-9a-f]{16})\.parquet")
 
@@ -42,12 +46,26 @@ class Part:
         StoreError
             if it is damaged, or is another chunk than its name says.
         """
+        self.check_file()
         with store_errors(self.path):
             data = self.path.read_bytes()
         if content_hash(data) != self.digest:
             raise StoreError(f"{self.path}: damaged chunk; {REMEDY}")
         about(self, data)
         return data
+
+    def check_file(self) -> None:
+        """See that a file of a chunk's size is there, before anybody opens it: a pipe would never end.
+
+        Raises
+        ------
+        StoreError
+            if it is a folder, a pipe, a link that leads nowhere, or too large.
+        """
+        with store_errors(self.path):
+            sound = self.path.is_file() and self.path.stat().st_size <= MOST_BYTES
+        if not sound:
+            raise StoreError(f"{self.path}: damaged chunk; {REMEDY}")
 
     def rows(self, columns: list[str] | None = None) -> pd.DataFrame:
         """Return all columns or some, after the checks of `read`."""
@@ -72,13 +90,18 @@ def about(part: Part, data: bytes | None = None) -> dict[str, Any]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    if data is None:
+        part.check_file()
     try:
         with store_errors(part.path):
             source = part.path if data is None else pa.BufferReader(data)
             found = json.loads(pq.read_metadata(source).metadata[METADATA])
         own = found["chunk"], found["identity"]
-        for key in ("start", "stop", "counts", "missed"):
-            found[key]
+        for key, kind in ABOUT_TYPES.items():
+            if not isinstance(found[key], kind):
+                raise TypeError(key)
+        if not all(isinstance(found.get(key, 0), int) for key in ("chunks", "designs")):
+            raise TypeError("chunks")
     except (pa.ArrowException, ValueError, KeyError, TypeError) as error:
         raise StoreError(f"{part.path}: damaged chunk; {REMEDY}") from error
     if own != (part.index, part.identity):
@@ -104,15 +127,27 @@ def parts(folder: Path) -> list[Part]:
     Raises
     ------
     InputError
-        if the folder holds a Parquet file that is no chunk: other readers would take it for a part of the data.
+        if the folder holds something else: other readers would take it for a part of the data.
     """
-    found = []
-    for path in folder.glob("[!_.]*.parquet"):
-        part = part_of(path)
-        if part is None:
-            raise InputError("file", path.name, "chunks named part-<index>-<identity>-<hash>.parquet", str(folder))
-        found.append(part)
-    return sorted(found, key=lambda part: (part.index, part.path.name))
+    found, strangers = listing(folder)
+    strangers = [path for path in strangers if not path.name.startswith("_")]  # pandas and pyarrow pass these over
+    if strangers:
+        names = ", ".join(path.name for path in strangers[:3])
+        raise InputError("file", names, "chunks named part-<index>-<identity>-<hash>.parquet", str(folder))
+    return found
+
+
+def listing(folder: Path) -> tuple[list[Part], list[Path]]:
+    """Return the chunks of a folder by their names, in design order, and what lies there besides; nothing is opened.
+
+    A hidden file is nobody's data; in a dataset of an earlier version nor is one that begins with an underscore.
+    """
+    apart = "._" if is_older(folder) else "."
+    with store_errors(folder):
+        entries = sorted(path for path in folder.iterdir() if path.name[0] not in apart) if folder.is_dir() else []
+    chunks = {path: part for path in entries if (part := part_of(path)) is not None}
+    ordered = sorted(chunks.values(), key=lambda part: (part.index, part.path.name))
+    return ordered, [path for path in entries if path not in chunks]
 
 
 def is_whole(part: Part) -> bool:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.chunks.cascade import compared
 from sweep.dataset import store
 from sweep.errors import InputError, StoreError, nearest
+from sweep.quantities.limits import compared
 
 if TYPE_CHECKING:
     import pandas as pd

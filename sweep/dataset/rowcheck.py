@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweep.chunks.parameters import parameter_matrix
 from sweep.dataset.parts import STATUS_NAMES
-from sweep.quantities.names import is_error
+from sweep.families.base import Columns
+from sweep.families.names import is_error
+from sweep.study import Study
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.families.base import Columns
-    from sweep.study import Study
+# What plan and chunks both say.
+SHARED = ("format", "study", "code", "designs", "chunks", "name")
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
@@ -40,6 +43,13 @@ def row_faults(rows: pd.DataFrame, own: Mapping[str, Any], about: Mapping[str, A
     there = [(str(name), str(dtype)) for name, dtype in rows.dtypes.items()]
     if wanted and wanted != there:
         return [*faults, f"columns {there}, the plan says {wanted}"]
+    lacking = [name for name in ("design", "status") if name not in rows.columns]
+    if lacking:
+        return [*faults, f"no column {', '.join(lacking)}"]
+    apart = [key for key in SHARED if key in about and own.get(key) != about[key]]
+    apart += ["data"] if own.get("data") != about.get("chunk_data", own.get("data")) else []
+    if apart:
+        faults.append(f"its metadata say another {', '.join(apart)} than the plan")
     designs, status = rows["design"].to_numpy(), rows["status"].to_numpy()
     if np.any(np.diff(designs) <= 0) or np.any((designs < own["start"]) | (designs >= own["stop"])):
         return [*faults, f"design numbers not growing inside {own['start']}:{own['stop']}"]
@@ -73,8 +83,6 @@ def _parameter_faults(rows: pd.DataFrame, own: Mapping[str, Any], study: Study) 
     """Return parameters that are not those of the design space;
     what [fit] sets or scales is left to the recomputing.
     """
-    from sweep.chunks.parameters import parameter_matrix
-
     matrix, _ = parameter_matrix(study, own["start"], own["stop"])
     at = rows["design"].to_numpy() - own["start"]
     fitted = () if study.fit is None else (*study.fit.parameters(study.family), *study.rescaled)

@@ -20,17 +20,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sweep.dataset.files import (
-    append_run,
-    read_plan,
-    read_runs,
-    read_table,
-    remove_temporary,
-    set_aside,
-    store_errors,
-    write_atomically,
-    write_plan,
-)
-from sweep.dataset.layout import (
     BAD,
     CURVES,
     DESIGNS,
@@ -44,9 +33,20 @@ from sweep.dataset.layout import (
     SENSITIVITY,
     TEMPORARY,
     TOLERANCE,
+    append_run,
     beside,
     is_older,
     located,
+    metadata,
+    read_plan,
+    read_runs,
+    read_table,
+    remove_temporary,
+    set_aside,
+    store_errors,
+    trusted_plan,
+    write_atomically,
+    write_plan,
 )
 from sweep.dataset.lock import locked
 from sweep.dataset.parts import (
@@ -57,11 +57,11 @@ from sweep.dataset.parts import (
     about,
     content_hash,
     is_whole,
+    listing,
     missing_chunks,
     part_of,
     parts,
 )
-from sweep.dataset.tables import metadata
 from sweep.errors import IncompleteWarning, InputError, StoreError
 
 if TYPE_CHECKING:
@@ -99,6 +99,7 @@ __all__ = [
     "is_complete",
     "is_older",
     "is_whole",
+    "listing",
     "load",
     "located",
     "locked",
@@ -113,6 +114,7 @@ __all__ = [
     "set_aside",
     "store_errors",
     "totals",
+    "trusted_plan",
     "write_atomically",
     "write_chunk",
     "write_plan",
@@ -129,11 +131,9 @@ def encode(plan: Plan, index: int, result: ChunkResult) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    from sweep.chunks.plan import FORMAT
-
     start, stop = plan.bounds(index)
     own = {
-        "format": FORMAT, "name": plan.name, "study": plan.study, "code": plan.code, "identity": plan.identity,
+        "format": plan.format, "name": plan.name, "study": plan.study, "code": plan.code, "identity": plan.identity,
         "chunk": index, "chunks": plan.chunks, "start": start, "stop": stop, "designs": plan.designs,
         "counts": named_counts(result.counts_by_status), "missed": result.missed_by_limit, "data": plan.chunk_data,
     }  # fmt: skip

@@ -9,15 +9,17 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sweep.chunks import plan as plans
+from sweep.chunks.chunk import compute_chunk
 from sweep.dataset import store
+from sweep.dataset.files import TABLES, altered
 from sweep.dataset.rowcheck import row_faults, spread, unequal
-from sweep.dataset.tables import TABLES, altered
 from sweep.errors import InputError, LinksweepError, StoreError
+from sweep.study import Study
+from sweep.study.load import study_from_data
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from sweep.study import Study
 
 # What `sweep verify` ends with: chunks or the optimum are missing; something is damaged or wrong.
 INCOMPLETE, DAMAGED = 11, 74
@@ -71,7 +73,9 @@ class Verification:
         verdict = "complete and undamaged"
         if self.findings:
             verdict = f"{damaged} damaged, {len(self.findings) - damaged} missing"
-        return [*words, *self.notes, *map(str, self.findings), f"{self.folder}: {verdict}"]
+        words += [*self.notes, *map(str, self.findings), f"{self.folder}: {verdict}"]
+        # The name of a file may be anything; bytes that are no letters are shown as such.
+        return [line.encode("utf-8", "backslashreplace").decode() for line in words]
 
 
 def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
@@ -111,11 +115,12 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
         raise InputError("designs", designs, "a whole number from 0", "verify")
     place = store.located(folder)
     plan = store.read_plan(place)
-    files = sorted(place.glob("[!_.]*.parquet")) if place.is_dir() else []
-    if plan is None and not files:
+    chunks, strangers = store.listing(place)
+    if plan is None and not chunks and not strangers:
         raise InputError("folder", str(folder), "a dataset that sweep run wrote", "verify")
     found = Verification(place)
-    chunks = _chunks(found, place, files)
+    words = "no chunk, but every reader of the folder takes it for one"
+    found.findings += [Finding(path, words, "the next run refuses it; move it away") for path in strangers]
     about = plan or _about_without_plan(chunks)
     study = None if plan is None else _study(found, plan, place)
     if plan is None:
@@ -132,22 +137,6 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
     return found
 
 
-def _chunks(found: Verification, place: Path, files: list[Path]) -> list[store.Part]:
-    """Return the chunks by their names; a Parquet file with another name is a finding."""
-    try:
-        return store.parts(place)
-    except InputError:
-        chunks = []
-    for path in files:
-        part = store.part_of(path)
-        if part is None:
-            words = "no chunk, but every reader of the folder takes it for one"
-            found.findings.append(Finding(path, words, "the next run refuses it; move it away"))
-        else:
-            chunks.append(part)
-    return sorted(chunks, key=lambda part: (part.index, part.path.name))
-
-
 def _about_without_plan(chunks: Iterable[store.Part]) -> dict[str, Any]:
     """Return what the first readable chunk says of the study."""
     for part in chunks:
@@ -161,8 +150,6 @@ def _about_without_plan(chunks: Iterable[store.Part]) -> dict[str, Any]:
 
 def _study(found: Verification, plan: dict[str, Any], place: Path) -> Study | None:
     """Return the study the dataset answers; None, with a note, if this version does not understand it."""
-    from sweep.study.load import study_from_data
-
     data = plan.get("data") or plan["chunk_data"]
     try:
         title = plan.get("about") or {"name": plan["name"]}
@@ -265,10 +252,7 @@ def _recompute(
     found: Verification, study: Study, about: dict[str, Any], whole: dict[int, store.Part], number: int
 ) -> None:
     """Compute some designs again, each by itself: what a design gets does not depend on its company."""
-    from sweep.chunks.chunk import compute_chunk
-    from sweep.chunks.plan import code_hash
-
-    if about.get("code") != code_hash():
+    if about.get("code") != plans.code_hash():
         found.notes.append("computed by other sources or libraries than these: no design was computed again")
         return
     bounds = {index: (store.about(part)["start"], store.about(part)["stop"]) for index, part in whole.items()}

@@ -13,34 +13,33 @@ from functools import lru_cache, partial
 from importlib import import_module
 from types import MappingProxyType
 
-from sweep.effects.base import CURVED, Effect
+from sweep.effects.base import CURVED, Effect, Placed
+from sweep.effects.curve_features import bends, bent, paces, piercing
 from sweep.effects.evaluation import effect_poses, on_own_columns, run_design
-from sweep.effects.pace import bends, bent, paces, piercing
-from sweep.effects.placing import Placed, stages_of
+from sweep.effects.scene import stages_of
 from sweep.errors import InputError
-from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work
+from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
 from sweep.families.chain import Chain
-from sweep.families.derived import of_family
-from sweep.families.members import Machine
+from sweep.families.machines import Machine
+from sweep.families.names import stem
+from sweep.families.reduction import reduced
 from sweep.families.relations import Reading
 from sweep.numerics.curves import Curve
-from sweep.quantities.names import stem
-from sweep.quantities.reduction import reduced
 
 # Name of each effect's entry: module and constant.  A new effect is a kernel file, an entry file and its line here.
 _ENTRIES = {
     "pressure": ("pressure", "EFFECT"),
-    "pressure_extrema": ("pressure_extrema", "EFFECT"),
-    "coupler": ("coupler", "EFFECT"),
-    "shaking": ("shaking", "EFFECT"),
-    "kinetostatics": ("kinetostatics", "EFFECT"),
-    "slider_kinetostatics": ("kinetostatics", "SLIDER"),
-    "friction": ("friction", "EFFECT"),
-    "slider_friction": ("friction", "SLIDER"),
+    "pressure_extrema": ("pressure", "EXTREMA_EFFECT"),
+    "coupler": ("motion", "EFFECT"),
+    "shaking": ("motion", "SHAKING_EFFECT"),
+    "kinetostatics": ("load_effects", "KINETOSTATICS"),
+    "slider_kinetostatics": ("load_effects", "SLIDER_KINETOSTATICS"),
+    "friction": ("load_effects", "CLOSED_FRICTION"),
+    "slider_friction": ("load_effects", "SLIDER_FRICTION"),
     "speed_fluctuation": ("speed", "EFFECT"),
     "slider_speed_fluctuation": ("speed", "SLIDER"),
-    "speed_fluctuation_friction": ("speed_friction", "EFFECT"),
-    "slider_speed_fluctuation_friction": ("speed_friction", "SLIDER"),
+    "speed_fluctuation_friction": ("speed", "RUBBING_EFFECT"),
+    "slider_speed_fluctuation_friction": ("speed", "RUBBING_SLIDER"),
     "sliding_bearings": ("bearings", "SLIDING"),
     "rolling_bearings": ("bearings", "ROLLING"),
     "sliding_limits": ("bearings", "SLIDING_LIMIT"),
@@ -58,12 +57,12 @@ _ENTRIES = {
 }
 # Of the effects of every family with a tree of links: module, and the function of the family's name that makes it.
 _OF_TREES = {
-    "loads": ("links", "loads_of"),
-    "friction": ("link_friction", "friction_of"),
+    "loads": ("load_effects", "loads_of"),
+    "friction": ("load_effects", "friction_of"),
     "sliding_bearings": ("link_bearings", "sliding_of"),
     "rolling_bearings": ("link_bearings", "rolling_of"),
     "speed_fluctuation": ("speed", "of_tree"),
-    "speed_fluctuation_friction": ("speed_friction", "of_tree"),
+    "speed_fluctuation_friction": ("speed", "rubbing_tree"),
 }
 _TREES = ("five_link", "slotted", "swivel", "spherical_looper", "cylindrical_looper")
 _MADE = {f"{tree}_{kind}": (tree, *made) for kind, made in _OF_TREES.items() for tree in _TREES}
@@ -79,7 +78,7 @@ _INPUT_NAMES: dict[tuple[tuple[str, str], ...], frozenset[str]] = {}
 
 @lru_cache
 def effect(name: str) -> Effect:
-    """Return the register's entry of that name."""
+    """Look up the register's entry of that name."""
     if name in _MADE:
         tree, module, function = _MADE[name]
         made: Effect = getattr(import_module(f"sweep.effects.{module}"), function)(tree)
@@ -90,7 +89,7 @@ def effect(name: str) -> Effect:
 
 
 def serving(family: Family) -> tuple[Effect, ...]:
-    """Return the effects that a family has what they require for, in the order of the register.
+    """Effects that a family has what they require for, in the order of the register.
 
     Entries of other families' trees of links are not made for it.
     """
@@ -100,7 +99,7 @@ def serving(family: Family) -> tuple[Effect, ...]:
 
 @of_family
 def applicable(family: Family) -> tuple[Placed, ...]:
-    """Return effects that can be asked of a family or of the stages of a chain, in the order of the register.
+    """Effects that can be asked of a family or of the stages of a chain, in the order of the register.
 
     A later stage of a chain turns unevenly; a stage whose load comes from stages behind it needs them to hand it back.
     """
@@ -119,9 +118,7 @@ def applicable(family: Family) -> tuple[Placed, ...]:
 
 
 def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
-    """Return the effects that some wanted pose output, design output or reduction belongs to,
-    in the order of the register.
-    """
+    """Effects that some wanted output or reduction belongs to, in the order of the register."""
     names = {about for name in wanted for about in reduced(name, family.domain)}  # max_abs_force_d asks for force_d
     if names.isdisjoint(_effect_names(family)):
         return ()
@@ -131,12 +128,12 @@ def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
 
 @of_family
 def _effect_names(family: Family) -> frozenset[str]:
-    """Return names of the outputs of all effects that can be asked of a family."""
+    """Names of the outputs of all effects that can be asked of a family."""
     return frozenset(o.name for placed in applicable(family) for o in placed.outputs)
 
 
 def _carriers(family: Family, placed: Placed) -> list[Placed]:
-    """Return the effects of the later stages that hand back the load of this one."""
+    """Effects of the later stages that hand back the load of this one."""
     stages, key = stages_of(family), placed.entry.takes_load
     return [
         Placed(entry, k, number, False)
@@ -147,13 +144,13 @@ def _carriers(family: Family, placed: Placed) -> list[Placed]:
 
 
 def _handing(family: Family, placed: Placed) -> list[Placed]:
-    """Return the effects of all later stages that hand back the load of this one; none if a stage cannot."""
+    """Effects of all later stages that hand back the load of this one; none if a stage cannot."""
     found = _carriers(family, placed)
     return found if len(found) == len(stages_of(family)) - 1 - placed.stage else []
 
 
 def input_names(family: Family) -> frozenset[str]:
-    """Return inputs of all effects that can be asked of a family, or of the stages of a chain."""
+    """Collect the inputs of all effects that can be asked of a family, or of the stages of a chain."""
     if isinstance(family, Machine):
         return frozenset(f"{m.name}.{name}" for m in family.members for name in input_names(m.family))
     # Asked at every call of the reductions; it depends on nothing but the names of the stages.
@@ -164,7 +161,7 @@ def input_names(family: Family) -> frozenset[str]:
 
 
 def curved_inputs(family: Family) -> tuple[str, ...]:
-    """Return inputs of effects that a load over the turn can add to, for a family, a chain or a machine."""
+    """List the inputs of effects that a load over the turn can add to, for a family, a chain or a machine."""
     if isinstance(family, Machine):
         return tuple(f"{m.name}.{name}" for m in family.members for name in curved_inputs(m.family))
     numbers = [number for _, number in stages_of(family)]
@@ -174,16 +171,14 @@ def curved_inputs(family: Family) -> tuple[str, ...]:
 
 
 def offered(family: Family) -> tuple[Output, ...]:
-    """Return the pose and design outputs of all effects that can be asked of a family, or of the stages of a chain."""
+    """Pose and design outputs of all effects that can be asked of a family, or of the stages of a chain."""
     if isinstance(family, Machine):
         return tuple(replace(o, name=f"{m.name}.{o.name}") for m in family.members for o in offered(m.family))
     return tuple(o for placed in applicable(family) for o in placed.outputs)
 
 
 def elsewhere(family: Family, name: str) -> str:
-    """Return words for an error: which effects have an output that this family, or this stage of a chain,
-    cannot be asked.
-    """
+    """Words for an error: effects with an output that this family, or this stage of a chain, cannot be asked for."""
     if isinstance(family, Machine):
         found = family.split(name)
         return elsewhere(found[0].family, found[1]) if found else ""
@@ -200,7 +195,7 @@ def elsewhere(family: Family, name: str) -> str:
 
 
 def extended(family: Family, wanted: Iterable[str], curves: Mapping[str, Curve] = NO_CURVES) -> Family:
-    """Return the family with the effects that ``wanted`` calls for; the family itself where it calls for none.
+    """Family with the effects that ``wanted`` calls for; the family itself where it calls for none.
 
     The inputs of the effects become further parameters, after the family's own.  In a chain an effect belongs to a
     stage, and its inputs and outputs carry the stage's number.  ``curves`` are loads over the turn of the crank, by the
@@ -234,7 +229,7 @@ def _check_even(machine: Machine, found: Mapping[str, Family]) -> None:
 
 
 def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
-    """Return dotted names that wanted names are about, those behind relations included."""
+    """Dotted names that wanted names are about, those behind relations included."""
     names = {about for name in wanted for about in reduced(name, machine.domain)}
     asked = [timing for timing in machine.timings if timing.name in names]
     places = [place for timing in asked for place in timing.places]
@@ -247,7 +242,7 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
 
 
 def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[str, Curve] = NO_CURVES) -> Family:
-    """Return the family with the outputs and inputs of these effects."""
+    """Family with the outputs and inputs of these effects."""
     if not effects:
         return family
     added = inputs(family, effects)
@@ -285,7 +280,7 @@ def _design_ns(entry: Effect, accuracy: Accuracy) -> float:
 
 
 def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:
-    """Return inputs of these effects and of those that hand back their load, with their stage's number.
+    """List the inputs of these effects and of those that hand back their load, with their stage's number.
 
     One that several share stands once, and is required if any of them requires it.
     """

@@ -9,8 +9,8 @@ import numpy as np
 
 from sweep.costs import nanoseconds
 from sweep.effects import applicable, called_for, effect, inputs
-from sweep.effects.base import Advice, Effect
-from sweep.effects.placing import Placed, first_scene
+from sweep.effects.base import Advice, Effect, Placed
+from sweep.effects.scene import first_scene
 from sweep.families.base import Angles, Array, Family
 
 SAMPLES = 64
@@ -38,7 +38,7 @@ class Finding(NamedTuple):
 
 
 def closure(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Return the effects with all they need, each after what it needs."""
+    """Effects with all they need, each after what it needs."""
     found: dict[str, Effect] = {}
 
     def visit(entry: Effect) -> None:
@@ -52,10 +52,10 @@ def closure(effects: Iterable[Effect]) -> tuple[Effect, ...]:
 
 
 def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str, str, str, str]]:
-    """Return rows of a small tree: effect, key, cost, share;
-    what an effect needs stands below it and is part of its cost.
+    """Rows of a small tree: effect, key, cost, share.
 
-    ``poses`` is the number of poses of one design, for the cost of what is computed per design.
+    What an effect needs stands below it and is part of its cost.  ``poses`` is the number of poses of one
+    design, for the cost of what is computed per design.
     """
     names = frozenset(wanted)
     own = called_for(family, names)
@@ -74,7 +74,7 @@ def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str,
 
 
 def cost(placed: Placed, wanted: frozenset[str], poses: float) -> float:
-    """Return nanoseconds per design of what is wanted of an effect."""
+    """Nanoseconds per design of what is wanted of an effect."""
     per_design = not wanted.isdisjoint(o.name for o in placed.design_outputs)
     reduced = (name for name in wanted if not any(name == o.name for o in placed.design_outputs))
     per_pose = any(name.endswith(o.name) for name in reduced for o in placed.pose_outputs)
@@ -86,7 +86,7 @@ def _needs(entry: Effect, depth: int) -> list[tuple[int, Effect]]:
 
 
 def left_out(family: Family, wanted: Iterable[str]) -> tuple[str, ...]:
-    """Return names of the effects that could be asked for and are not needed here."""
+    """Names of the effects that could be asked for and are not needed here."""
     used = {
         f"{entry.name}{placed.number}" for placed in called_for(family, wanted) for entry in closure([placed.entry])
     }

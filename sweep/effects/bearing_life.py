@@ -1,54 +1,269 @@
-"""B2: rolling bearings of the rocker under the joint reactions: loads over the turn, mean load, life."""
+"""B2: loads, mean load over the turn and life of the two rolling bearings of a shaft; the entry of the rocker's."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 
-from sweep.effects import kinetostatics, loads
-from sweep.effects.base import DesignResult, Effect, Scene, refuse
-from sweep.effects.bearings import CATALOGUE, SUPPORTS, together
-from sweep.effects.shaft_life import BLOCK, FORMULAS, Shaft, bends, load_outputs, per_turn, turn_outputs
-from sweep.families.base import Array, Columns
+import numpy as np
 
-EQUATION = "B2 (1)-(3)"
-TEXT = "the rocker's bearings"
-_FORCE, _MOMENT = 9, 15  # columns of the joint reactions: of the frame on the rocker
+from kernels import status as st
+from kernels.effects.bearings import bearing_loads
+from sweep.effects import loads
+from sweep.effects.base import Bend, DesignResult, Effect
+from sweep.effects.bearings import CATALOGUE, SUPPORTS
+from sweep.effects.load_passing import LOADS, reactions
+from sweep.effects.scene import Rows, Scene, Status, refuse
+from sweep.effects.turn import chosen
+from sweep.families.base import Accuracy, Array, Columns, Output
+from sweep.families.capabilities import Assembly
+from sweep.families.poses import filled_each
+from sweep.numerics.events import sign_changes, with_events
+from sweep.numerics.quadrature import integrate
+from sweep.numerics.singularities import TWO_PI, crowded, singularities, turn_edges
+
+FORMULAS = (
+    "(1) F2 = (M x k - z1 F_r)/(z2 - z1), F1 = F_r - F2 from force F and moment M on the shaft; F_r across its axis k",
+    "(2) P_m = (integral of P^p |w| d phi/integral of |w| d phi)^(1/p), w the shaft's turning per crank angle, ours",
+    "(3) life = 10^6 (C/P_m)^p turns; the shaft's travel counts in full turns, ours",
+)
+PANEL = 1.0  # length of the first panels of a turn against the distance of the nearest singularity
+LOOK = 1.0 / 16.0  # spacing of the poses among which kinks and jumps are looked for, against that distance
+SIZING = 64  # poses from which the size of the loads is taken, so that no power of them leaves float64
+BLOCK = 256  # designs at once: bisections ask for one pose of each kink
+EPS = 2.0**-53
 
 
-def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Return the wanted loads of every pose."""
-    if "forces" not in scene.memo:
-        kinetostatics.compute(scene, frozenset({"force_d", "moment_d"}))
-    forces, status = scene.memo["forces"]
-    status = status.copy()
-    refuse(status, together(scene, "d"))
-    axis = scene.records[1][:, None, 3:6]
-    return ROCKER.of_reactions(scene, forces, (_FORCE, _MOMENT), axis, wanted, status)
+def load_names(shaft: str) -> tuple[str, ...]:
+    """Names of the loads of a shaft's two bearings, in the order of :func:`bearing_loads`."""
+    radial, equivalent = f"radial_load_{shaft}", f"equivalent_load_{shaft}"
+    return f"{radial}1", f"{radial}2", f"axial_load_{shaft}", f"{equivalent}1", f"{equivalent}2"
 
 
-def turning(scene: Scene) -> Array:
-    """Return psi', (n, m)."""
+def load_outputs(shaft: str, text: str, equation: str) -> tuple[Output, ...]:
+    """List the loads of a shaft's two bearings; ``text`` says of which shaft.
+
+    An equivalent load jumps where the axial one passes e_limit.
+    """
+    words = (
+        "radial load of support 1", "radial load of support 2", "axial load", "equivalent load of rolling bearing 1",
+        "equivalent load of rolling bearing 2",
+    )  # fmt: skip
+    return tuple(
+        Output(name, "force", f"{one}, from the joint reactions: {text}", equation, kinks="equivalent" in one)
+        for name, one in zip(load_names(shaft), words, strict=True)
+    )
+
+
+def turn_outputs(shaft: str, text: str, equation: str) -> tuple[Output, ...]:
+    """Mean loads and lives of a shaft's two bearings."""
+    return tuple(
+        o
+        for k in "12"
+        for o in (
+            Output(f"mean_load_{shaft}{k}", "force", f"load of equal effect over the turn, by travel: {text}, bearing "
+                   f"{k}", equation),
+            Output(f"life_{shaft}{k}", "time", f"running time that 90 % of bearings {k} of {text} reach; travel "
+                   "counted as turns", equation),
+        )
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """A shaft on two rolling bearings.
+
+    Parameters
+    ----------
+    name : in the names of outputs and of its supports
+    tail : what the names of its catalogue inputs end on
+    columns : of its force and its moment among the reactions of :func:`sweep.effects.load_passing.reactions`
+    axis : the axis that it turns about, (n, m or 1, 3), of a scene
+    turning : its angular velocity in its bearings per unit crank speed, (n, m), of a scene
+    """
+
+    name: str
+    tail: str
+    columns: tuple[int, int]
+    axis: Callable[[Scene], Array]
+    turning: Callable[[Scene], Array]
+
+    def given(self, scene: Scene, name: str) -> Array:
+        """Input of its catalogue, (n,)."""
+        return scene.inputs[f"{name}{self.tail}"]
+
+    def data(self, scene: Scene) -> Array:
+        """Columns of :class:`kernels.effects.bearings.Rolling`; the radius, which nothing reads here, is 0."""
+        supports = (f"support_{self.name}{k}" for k in "12")
+        names = (*supports, *(f"{p.name}{self.tail}" for p in CATALOGUE))
+        return np.column_stack([np.zeros(len(scene.designs)), scene.table(names)])
+
+    def loads(self, scene: Scene, wanted: frozenset[str]) -> Columns:
+        """Wanted ones of :func:`load_outputs`, and the status."""
+        forces, status = reactions(scene)
+        status, names = status.copy(), load_names(self.name)
+        refuse(status, loads.together(scene, self.name))
+        arguments = (forces, *self.columns, np.ascontiguousarray(self.axis(scene)), self.data(scene))
+        return filled_each(bearing_loads, arguments, names, wanted & frozenset(names), status)
+
+
+def bends(shaft: Shaft, *more: str) -> tuple[Bend, ...]:
+    """Where the equivalent loads of a shaft's bearings, and outputs made of them, bend.
+
+    That is where they change their formula, and where a support is nearly free.
+    """
+    names = (*load_names(shaft.name)[3:], *more)
+    return Bend(names, partial(formula, shaft=shaft)), Bend(names, partial(squares, shaft=shaft), squares=True)
+
+
+def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, shaft: Shaft) -> Columns:
+    """Mean loads and lives, on samples without errors, or with the integrals refined to the accuracy asked for.
+
+    The travel has a kink where the shaft turns back, and a load jumps where the axial one passes e_limit: the integrals
+    are split at these places, and on panels that close in on whatever else there is.  A bearing that carries nothing,
+    or a shaft that does not turn, has no life: INVALID_INPUT.
+    """
+    n = len(scene.designs)
+    look = scene.on_grid(accuracy.samples or SIZING)
+    load, way, worst = _loads(look, shaft)
+    size = np.maximum(load.max(axis=1, initial=0.0), np.finfo(float).tiny)
+    # Poses that do not assemble, or lie at a dead point, are those of a crank that does not turn.
+    status = _of_turn(worst)
+    good = np.flatnonzero(status == st.OK)
+    exponent = shaft.given(scene, "life_exponent")
+    total, err = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    if accuracy.target is None:
+        values = _integrands(load[good], way[good], size[good], exponent[good])
+        total[good] = values.mean(axis=1) * TWO_PI
+    else:
+        total[good], err[good], status[good] = _refined(scene, good, size[good], accuracy.target, shaft)
+    travel, err_travel = total[:, 2], err[:, 2]
+    columns: Columns = {}
+    for k, bearing in enumerate("12"):
+        mean_name, life_name = f"mean_load_{shaft.name}{bearing}", f"life_{shaft.name}{bearing}"
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = size[:, k] * (total[:, k] / travel) ** (1.0 / exponent)
+            share = err[:, k] / total[:, k] + err_travel / travel + 8.0 * EPS
+            life = 1e6 * (shaft.given(scene, "dynamic_capacity") / mean) ** exponent
+            life *= TWO_PI**2 / (travel * np.abs(scene.inputs["speed"]))
+        err_mean = np.where(mean > 0.0, mean * np.expm1(np.log1p(share) / exponent), 0.0)
+        columns |= {mean_name: mean, f"err_{mean_name}": err_mean}
+        columns |= {life_name: life, f"err_{life_name}": life * (share + err_travel / travel)}
+        for name, values in ((mean_name, mean), (life_name, life)):
+            if name in wanted:
+                status[(status == st.OK) & ~np.isfinite(values)] = st.INVALID_INPUT
+        life[~np.isfinite(life)] = np.nan
+    return chosen(columns, wanted, status)
+
+
+def _of_turn(worst: Status) -> Status:
+    turns: Status = np.where(worst == st.OK, st.OK, np.maximum(worst, st.NOT_ROTATABLE)).astype(np.uint8)
+    return turns
+
+
+def _loads(scene: Scene, shaft: Shaft) -> tuple[Array, Array, Status]:
+    """Equivalent loads of both bearings (n, m, 2), rate of travel (n, m), worst status of each design."""
+    names = load_names(shaft.name)[3:]
+    found = shaft.loads(scene, frozenset(names))
+    load = np.stack([np.asarray(found[name], np.float64) for name in names], axis=2)
+    return load, np.abs(shaft.turning(scene)), np.asarray(found["status"].max(axis=1), np.uint8)
+
+
+def _integrands(load: Array, way: Array, size: Array, exponent: Array) -> Array:
+    """(P/size)^p |w| of both bearings and |w|, (k, m, 3)."""
+    power = (load / size[:, None, :]) ** exponent[:, None, None]
+    return np.concatenate([power * way[:, :, None], way[:, :, None]], axis=2)
+
+
+def _switches(scene: Scene, shaft: Shaft) -> Array:
+    """Compute what changes its sign where the integrands have kinks or jumps, (k, m, 3).
+
+    The shaft's turning; the axial load; and by how much it exceeds the part e V of the radial load of its bearing.
+    """
+    names = load_names(shaft.name)[:3]
+    found = shaft.loads(scene, frozenset(names))
+    first, second, axial = (np.asarray(found[name], np.float64) for name in names)
+    radial = np.where(shaft.given(scene, "axial_support")[:, None] == 1.0, first, second)
+    limit = (shaft.given(scene, "e_limit") * shaft.given(scene, "rotation_factor"))[:, None] * radial
+    return np.stack([shaft.turning(scene), axial, np.abs(axial) - limit], axis=2)
+
+
+def formula(scene: Scene, shaft: Shaft) -> Array:
+    """Compute what changes its sign where an equivalent load has a kink or jumps, (n, m, 2)."""
+    return _switches(scene, shaft)[:, :, 1:]
+
+
+def squares(scene: Scene, shaft: Shaft) -> Array:
+    """Squares of the loads across the shaft of both supports, (n, m, 2)."""
+    names = load_names(shaft.name)[:2]
+    found = shaft.loads(scene, frozenset(names))
+    return np.stack([np.square(np.asarray(found[name], np.float64)) for name in names], axis=2)
+
+
+def _discriminant(scene: Scene, rows: Rows, stage: int, name: str, which: Rows, phi: Array) -> Array:
+    posed = scene.posed(rows[which], phi).stage(stage)
+    return np.asarray(posed.family.poses(posed.designs, posed.angles, frozenset([name]))[name], np.float64)
+
+
+def _refined(scene: Scene, rows: Rows, size: Array, target: float, shaft: Shaft) -> tuple[Array, Array, Status]:
+    """Three integrals over the turn of some designs, their errors and the status."""
+    status, scene = np.zeros(rows.size, np.uint8), scene.precise()  # plain poses may be noise near a change point
+    exponent = shaft.given(scene, "life_exponent")[rows]
+
+    def integrands(which: Rows, origins: Rows, phi: Array) -> Array:
+        load, way, worst = _loads(scene.posed(rows[which], phi), shaft)
+        bad = worst != st.OK
+        status[which[bad]] = worst[bad]
+        return np.where(bad[:, None, None], np.nan, _integrands(load, way, size[which], exponent[which]))
+
+    def switches(which: Rows, phi: Array) -> Array:
+        return _switches(scene.posed(rows[which], phi), shaft)
+
+    families = [scene.family, *(driven.family for driven in scene.after)]
+    curves = [
+        partial(_discriminant, scene, rows, stage, loop.discriminant)
+        for stage, one in enumerate(families)
+        for loop in one.every(Assembly)
+    ]
+    near = singularities(curves, rows.size)
+    places = sign_changes(switches, crowded(near, LOOK))
+    edges = with_events(turn_edges(near, PANEL), *places)
+    # The mean load is a root of order p, so it is as accurate as the integrals at least where p >= 2.
+    found = integrate(integrands, edges, 0.25 * target)
+    turns = _of_turn(status)
+    turns[(turns == st.OK) & ~found.settled] = st.NOT_CONVERGED
+    return found.value, found.err, turns
+
+
+def _rocker_axis(scene: Scene) -> Array:
+    return scene.records[1][:, None, 3:6]
+
+
+def _rocker_turning(scene: Scene) -> Array:
     return scene.records[0][:, :, 22]
 
 
-ROCKER = Shaft("d", "", compute, turning)
+# Columns of the joint reactions: force and moment of the frame on the rocker.
+ROCKER = Shaft("d", "", (9, 15), _rocker_axis, _rocker_turning)
+_TEXT, _EQUATION = "the rocker's bearings", "B2 (1)-(3)"
 
 EFFECT = Effect(
     key="B2",
     name="bearing_life",
     title="rolling bearings of the rocker under the joint reactions: loads, mean load over the turn, life",
-    equation=EQUATION,
+    equation=_EQUATION,
     formulas=FORMULAS,
     followers=(loads.ROCKER.name,),
     needs=("kinetostatics",),
     inputs=(*loads.ROCKER.parameters, *SUPPORTS, *CATALOGUE),
     tool_inputs=loads.TOOLS,
-    outputs=load_outputs("d", TEXT, EQUATION),
-    compute=compute,
+    outputs=load_outputs("d", _TEXT, _EQUATION),
+    compute=ROCKER.loads,
     called_for="life of the rocker's bearings",
     negligible="sliding bearings; elsewhere never, the life is what is asked for",
     even_crank=True,
-    takes_load=kinetostatics.KEY,
+    takes_load=LOADS,
     bends=bends(ROCKER),
-    design_result=DesignResult(turn_outputs("d", TEXT, EQUATION), partial(per_turn, shaft=ROCKER), BLOCK),
+    design_result=DesignResult(turn_outputs("d", _TEXT, _EQUATION), partial(per_turn, shaft=ROCKER), BLOCK),
 )

@@ -7,14 +7,14 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.effects import bearings, permissible
-from sweep.effects.base import ComputeFunction, Effect, Scene, largest, refuse
-from sweep.effects.bend import Bend
-from sweep.effects.loads import SPEED
+from sweep.effects.base import Bend, ComputeFunction, Effect, largest
+from sweep.effects.loads import SPEED, together
 from sweep.effects.pressure import components
-from sweep.families.base import Array, Columns, Output, Parameter, filled
+from sweep.effects.scene import Scene, refuse
+from sweep.families.base import Array, Columns, Output, Parameter
+from sweep.families.poses import filled_each
 
 EQUATION = "B1 (1)-(4)"
 FORMULAS = (
@@ -92,9 +92,7 @@ ROLLING_LIMITS = (
 
 
 def _data(scene: Scene, inputs: tuple[Parameter, ...]) -> Array:
-    """Return columns of the bearing kernels:
-    the radius c at which the coupler force acts, then the inputs but the torque.
-    """
+    """Columns of the bearing kernels: the radius c at which the coupler force acts, then the inputs but the torque."""
     return np.column_stack([scene.records[1][:, 14], scene.table(tuple(p.name for p in inputs[1:]))])
 
 
@@ -109,22 +107,16 @@ def _compute(
     arguments = [*direction, scene.inputs["resisting_torque"], _data(scene, inputs)]
     if permissible is not None:
         arguments.append(permissible(scene))
-    return filled(kernel, arguments, tuple(o.name for o in results), wanted, status)
-
-
-def together(scene: Scene, shaft: str) -> NDArray[np.bool_]:
-    """Return designs both of whose supports of a shaft stand at one place, (n,)."""
-    same: NDArray[np.bool_] = scene.inputs[f"support_{shaft}1"] == scene.inputs[f"support_{shaft}2"]
-    return same
+    return filled_each(kernel, arguments, tuple(o.name for o in results), wanted, status)
 
 
 def _thrust(scene: Scene) -> Array:
-    """Return the component of the coupler direction along the shaft, of which the collar sees the magnitude."""
+    """Component of the coupler direction along the shaft, of which the collar sees the magnitude."""
     return components(scene)[0][2][:, :, None]
 
 
 def _formula(scene: Scene) -> Array:
-    """Return the same, and by how much the axial load exceeds the share e V of the radial one of its bearing."""
+    """Compute the same, and by how much the axial load exceeds the share e V of the radial one of its bearing."""
     (t_tau, t_rho, t_k), _ = components(scene)
     c, z1, z2 = (x[:, None] for x in (scene.records[1][:, 14], *_supports(scene)))
     z = np.where(scene.inputs["axial_support"][:, None] == 1.0, z2, z1)
@@ -133,8 +125,9 @@ def _formula(scene: Scene) -> Array:
 
 
 def _eased(scene: Scene) -> Array:
-    """Return what vanishes where no force acts along the shaft, where none acts radially, and where theta1 does not
-    load one support: what the bearings permit has narrow peaks and kinks there.
+    """Functions that vanish where what the bearings permit has narrow peaks and kinks.
+
+    No force acts along the shaft there, or none radially, or theta1 does not load one support.
     """
     (_, t_rho, t_k), _ = components(scene)
     c, z1, z2 = (x[:, None] for x in (scene.records[1][:, 14], *_supports(scene)))
@@ -150,7 +143,7 @@ def _pressures(scene: Scene) -> Array:
 
 
 def permissible_load(scene: Scene, tail: str = "") -> Array:
-    """Return C_dyn (60 n L_h/10^6)^(-1/p) with the turns of the crank, (n, 1); ``tail`` ends the inputs' names."""
+    """C_dyn (60 n L_h/10^6)^(-1/p) with the turns of the crank, (n, 1); ``tail`` ends the inputs' names."""
     capacity, life, exponent = (
         scene.inputs[f"{n}{tail}"] for n in ("dynamic_capacity", "required_life", "life_exponent")
     )

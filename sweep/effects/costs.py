@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.effects import NAMES, effect, with_effects
-from sweep.effects.places import ON_TIP, tool_place
-from sweep.effects.placing import Placed, first_scene
+from sweep.effects.base import ON_TIP, Placed, tool_place
+from sweep.effects.scene import first_scene
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Family, Parameter
 from sweep.families.capabilities import JointRecords
@@ -58,9 +58,7 @@ class Cost(NamedTuple):
 
 
 def designs(full: Family, n: int, seed: int = 0) -> Array:
-    """Return crank-rockers or slider-cranks a few percent round a regular one,
-    with the inputs of the family's effects.
-    """
+    """Linkages a few per cent round a regular one, with the inputs of the family's effects."""
     noise = np.random.default_rng(seed).uniform(-0.05, 0.05, (n, len(full.parameters)))
     values = [_value(full, p) for p in full.parameters]
     matrix = np.array(values, dtype=np.float64) * (1.0 + noise)
@@ -71,7 +69,7 @@ def designs(full: Family, n: int, seed: int = 0) -> Array:
 
 
 def _value(full: Family, p: Parameter) -> float | None:
-    """Return a parameter or an input of the small machine, or of the family's example and by the kind of input."""
+    """Choose a parameter's or input's value: of the small machine, of the family's example, or by the kind of input."""
     linked = full.find(LinkTree) is not None
     if tool_place(full) == ON_TIP:
         # a tool at the tip loads whatever else is measured: it is there for its own effect alone
@@ -88,7 +86,7 @@ def _value(full: Family, p: Parameter) -> float | None:
 
 
 def least_time(run: Callable[[], object], repeats: int = 5) -> float:
-    """Return the least processor time of several runs [s], the first one, which compiles, not counted."""
+    """Least processor time of several runs [s], the first one, which compiles, not counted."""
     run()
     times = []
     for _ in range(repeats):
@@ -134,7 +132,7 @@ def costs(names: Sequence[str] = NAMES, *, n: int = 64, each: bool = False, repe
 
 
 def motion_ns(name: str, n: int, repeats: int) -> float:
-    """Return nanoseconds per pose of a family's motion and the joint records made of it, where it has any."""
+    """Nanoseconds per pose of a family's motion and the joint records made of it, where it has any."""
     bare = family(name)
     matrix, angles = designs(bare, n), Angles.of(2.0 * np.pi * np.arange(POSES)[None] / POSES)
     linked = bare.find(JointRecords) is not None

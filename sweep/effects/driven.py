@@ -10,16 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.effects import loads
-from sweep.effects.base import Driven, Scene
-from sweep.effects.handed import INERTIAS, LOADS, behind, computed, inputs_of_loads
-from sweep.effects.places import ON_TIP, tool_place
+from sweep.effects.base import ON_TIP, tool_place
+from sweep.effects.load_passing import INERTIAS, LOADS, behind, compute_loads, inputs_of_loads
+from sweep.effects.scene import Driven, Scene
 from sweep.families.base import Array, Parameter
 
 # Units of what a stage has to be given to need a torque.
 WEIGHING = frozenset({"mass", "inertia", "force", "torque"})
 
 STEP = 2e-3  # of the follower's angle, for the slope of the load: error of fourth order against rounding
-_DRIVE = frozenset({"drive_torque"})
 
 
 class DrivenSide(NamedTuple):
@@ -36,13 +35,13 @@ class DrivenSide(NamedTuple):
 
 
 def drives_something(scene: Scene) -> NDArray[np.bool_]:
-    """Return whether each design's follower drives a mass or works against a load besides its own, (n,)."""
+    """Whether each design's follower drives a mass or works against a load besides its own, (n,)."""
     tip = _weighs(scene, scene.inputs, loads.FREE_TOOL) if tool_place(scene.family) == ON_TIP else False
     return np.asarray(_behind_weighs(scene) | tip)
 
 
 def _behind_weighs(scene: Scene) -> NDArray[np.bool_]:
-    """Return whether any stage behind has a mass or a load in each design, (n,)."""
+    """Whether any stage behind has a mass or a load in each design, (n,)."""
     found = np.zeros(len(scene.designs), np.bool_)
     for stage in scene.after:
         found |= _weighs(stage, stage.inputs, inputs_of_loads(stage.family))
@@ -50,7 +49,7 @@ def _behind_weighs(scene: Scene) -> NDArray[np.bool_]:
 
 
 def _weighs(stage: Scene | Driven, given: dict[str, Array], inputs: Sequence[Parameter]) -> NDArray[np.bool_]:
-    """Return whether one of these inputs that are a mass, an inertia or a load is not zero, (n,)."""
+    """Whether one of these inputs that are a mass, an inertia or a load is not zero, (n,)."""
     found = np.zeros(len(stage.designs), np.bool_)
     for p in inputs:
         if p.unit in WEIGHING:
@@ -60,7 +59,7 @@ def _weighs(stage: Scene | Driven, given: dict[str, Array], inputs: Sequence[Par
 
 
 def driven_side(scene: Scene, slopes: bool) -> DrivenSide | None:
-    """Return what the follower drives besides itself; None where that is nothing. Slopes are zero unless asked for."""
+    """Compute what the follower drives besides itself; None where that is nothing. Slopes are zero unless asked for."""
     found = _stages(scene, slopes) if _behind_weighs(scene).any() else None
     tip = _tip(scene)
     if found is None or tip is None:
@@ -69,8 +68,8 @@ def driven_side(scene: Scene, slopes: bool) -> DrivenSide | None:
 
 
 def _stages(scene: Scene, slopes: bool) -> DrivenSide | None:
-    """Return the stages behind: phi of the next one is kappa psi + offset."""
-    handed_back = behind(scene, LOADS, _DRIVE | frozenset(INERTIAS))
+    """Compute what the stages behind need: phi of the next one is kappa psi + offset."""
+    handed_back = behind(scene, LOADS)
     if handed_back is None:
         return None
     kappa, weighs = scene.after[0].kappa[:, None], _behind_weighs(scene)[:, None]
@@ -88,8 +87,7 @@ def _stages(scene: Scene, slopes: bool) -> DrivenSide | None:
 
 
 def _moved(scene: Scene, angle: float) -> Array:
-    """Return the torque that the next stage needs of the rocker where that stands further by an angle,
-    at the same rates.
+    """Torque that the next stage needs of a rocker which stands further by an angle, at the same rates.
 
     A force that jumps where a tool pierces has no slope: it is left out of the difference.
     """
@@ -102,11 +100,13 @@ def _moved(scene: Scene, angle: float) -> Array:
     first = first._replace(offset=first.offset + first.kappa * angle)
     there = replace(scene, after=(first, *rest), memo={}).driven
     assert there is not None
-    return first.kappa[:, None] * np.asarray(computed(there, LOADS, _DRIVE)["drive_torque"], np.float64)
+    return first.kappa[:, None] * np.asarray(
+        compute_loads(there, frozenset({"drive_torque"}))["drive_torque"], np.float64
+    )
 
 
 def _tip(scene: Scene) -> DrivenSide | None:
-    """Return a tool at the tip of the rocker."""
+    """Compute what a tool at the tip of the rocker needs."""
     if tool_place(scene.family) != ON_TIP or "m_tool" not in scene.inputs:
         return None
     names = tuple(p.name for p in loads.FREE_TOOL[1:])

@@ -8,12 +8,14 @@ from kernels import status as st
 from kernels.effects.elastic_drive import driven_steady_state
 from kernels.effects.elasticity import quasi_static, steady_state
 from sweep.effects import loads
-from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status, take_over
+from sweep.effects.base import Advice, DesignResult, Effect
 from sweep.effects.driven import DrivenSide, driven_side, drives_something
-from sweep.effects.handed import INERTIAS, LOADS, behind
+from sweep.effects.load_passing import LOADS, behind
 from sweep.effects.loads import SPEED
+from sweep.effects.scene import Scene, Status, take_over
 from sweep.effects.turn import at_poses, backwards, on_finer_grids, per_turn, reduction_outputs
-from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, optional_outputs
+from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
+from sweep.families.poses import optional_outputs
 
 EQUATION = "E1 (1), (2), (5), E2 (3)-(5)"
 FORMULAS = (
@@ -94,7 +96,7 @@ def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
-    """Return what a curve and the driven side add to the constant load, (n, m); None where the load is constant."""
+    """Sum what a curve and the driven side add to the constant load, (n, m); None where the load is constant."""
     load = loads.follower(scene).load.name
     if load not in scene.curves and driven is None:
         return None
@@ -103,7 +105,7 @@ def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
 
 
 def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pointwise quantities; status NOT_LINEAR where the deflection is no longer small."""
+    """Wanted pointwise quantities; status NOT_LINEAR where the deflection is no longer small."""
     outputs = optional_outputs(_KERNEL_NAMES, wanted, scene.shape)
     lag, displacement, ratio = outputs
     status = scene.status()
@@ -122,19 +124,17 @@ def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def _status_behind(scene: Scene) -> Status:
-    handed_back = behind(scene, LOADS, frozenset({"drive_torque", *INERTIAS}))
+    handed_back = behind(scene, LOADS)
     return scene.status() if handed_back is None else np.asarray(handed_back["status"], np.uint8)
 
 
 def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Return the steady state on its own grid, carried to the wanted angles."""
+    """Steady state on its own grid, carried to the wanted angles."""
     return at_poses(scene, *on_finer_grids(scene, scene.angles.phi, GRIDS + FINER, _solve), wanted)
 
 
 def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
-    """Solve the designs that drive something apart from those that do not, so that no design depends on the others,
-    and those that turn backwards apart.
-    """
+    """Solve designs that drive something, and that turn backwards, each apart: no design depends on the others."""
     kind = 2 * drives_something(grid) + (grid.inputs["speed"] < 0.0)
     kinds = np.unique(kind)
     if kinds.size <= 1:  # there may be no design at all: none that turns
@@ -176,7 +176,7 @@ def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Stat
 
 
 def _equation(scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenSide) -> tuple[Array, Array, Array]:
-    """Return factors of eta' and of eta, and the right side, over that of eta''; (3) with (5), (n, N)."""
+    """Factors of eta' and of eta, and the right side, over that of eta''; (3) with (5), (n, N)."""
     inertia, stiffness, damping, speed, _ = (data[:, k, None] for k in range(5))
     square = p * p
     orders = np.arange(p.shape[1] // 2 + 1)
@@ -191,9 +191,7 @@ def _equation(scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenS
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return the Floquet multiplier and the reductions of lag and elongation;
-    finer grids for the designs that need them.
-    """
+    """Floquet multiplier and reductions of lag and elongation, on finer grids for the designs that need them."""
     columns = _turn(scene, wanted, GRIDS)
     late = np.flatnonzero(columns["status"] == st.NOT_CONVERGED)
     if late.size:
@@ -214,7 +212,7 @@ def _turn(scene: Scene, wanted: frozenset[str], grids: tuple[int, ...]) -> Colum
 
 
 def advise_static(scene: Scene) -> Advice | None:
-    """Return the largest quasi-static lag over the turn: an angle, or the share of the coupler's length."""
+    """Largest quasi-static lag over the turn: an angle, or the share of the coupler's length."""
     found = compute_static(scene, frozenset({"lag"}))
     lag = np.abs(np.asarray(found["lag"], np.float64))
     turning = np.isfinite(lag).all(axis=1)
@@ -226,7 +224,7 @@ def advise_static(scene: Scene) -> Advice | None:
 
 
 def advise_dynamic(scene: Scene) -> Advice | None:
-    """Return max|eta_qs''/nu^2|/max|eta_qs|; dynamics adds 0.7 to 2.8 times this share to the lag."""
+    """Estimate max|eta_qs''/nu^2|/max|eta_qs|; dynamics adds 0.7 to 2.8 times this share to the lag."""
     found = compute_static(scene.on_grid(GRIDS[-1]), frozenset({"lag", "frequency_ratio"}))
     lag, ratio = (np.asarray(found[name], np.float64) for name in ("lag", "frequency_ratio"))
     turning = np.isfinite(lag).all(axis=1)

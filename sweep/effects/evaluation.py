@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sweep.effects.base import Status, take_over
-from sweep.effects.bend import Bend
-from sweep.effects.placing import Placed, first_scene
+from sweep.effects.base import Bend, Placed
+from sweep.effects.scene import Status, first_scene, take_over
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Parameter, Step
 from sweep.numerics.curves import Curve
 
@@ -31,7 +30,7 @@ def effect_poses(
     angles: Angles,
     wanted: frozenset[str],
 ) -> Columns:
-    """Return the family's own poses, then each effect with a wanted output; the status is the first that is not OK.
+    """Family's own poses, then each effect with a wanted output; the status is the first that is not OK.
 
     Parameters
     ----------
@@ -109,7 +108,7 @@ def run_design(
     wanted: frozenset[str],
     accuracy: Accuracy,
 ) -> Columns:
-    """Return design outputs of an effect, block by block."""
+    """Design outputs of an effect, block by block."""
     whole_turn = placed.entry.design_result
     assert whole_turn is not None
     bare = np.ascontiguousarray(designs[:, :own])
@@ -140,7 +139,7 @@ def bend_curves(
     designs: Array,
     angles: Angles,
 ) -> Array:
-    """Return functions at whose zeros outputs of an effect bend, (n, m, q), block by block."""
+    """Functions at whose zeros outputs of an effect bend, (n, m, q), block by block."""
     bare, given = np.ascontiguousarray(designs[:, :own]), input_columns(inputs, designs, own)
     shape = len(designs), angles.cos.shape[1]
     found: list[Array] = []
@@ -154,7 +153,7 @@ def bend_curves(
 
 
 def on_own_columns(step: Step, own: int) -> Step:
-    """Return a family's own step for a design matrix with further columns behind the family's."""
+    """Adapt a family's own step to a design matrix with further columns behind the family's."""
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         return step.run(np.ascontiguousarray(designs[:, :own]), wanted, accuracy)
@@ -163,7 +162,7 @@ def on_own_columns(step: Step, own: int) -> Step:
 
 
 def input_columns(inputs: tuple[Parameter, ...], designs: Array, own: int) -> dict[str, Array]:
-    """Return the inputs of the effects by name, each (n,)."""
+    """Split off the inputs of the effects by name, each (n,)."""
     return {p.name: np.ascontiguousarray(designs[:, own + k]) for k, p in enumerate(inputs)}
 
 

@@ -1,49 +1,23 @@
-"""D1, D3: joint reactions, driving torque, reduced inertia, for a rocker and for a slider."""
+"""D1-D3 in closed form: reactions, driving torque and friction of crank, coupler and a rocker or a slider.
+
+What a family needs for this is :class:`sweep.families.capabilities.JointRecords`.  The same of any number of links, at
+four times the time without friction and eleven times with it: :mod:`sweep.effects.link_loads`.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from kernels import status as st
+from kernels.effects.friction import friction_loads
 from kernels.effects.kinetostatics import kinetostatics
 from sweep.effects import loads
-from sweep.effects.base import Advice, Effect, Scene, take_over
-from sweep.effects.handed import LOADS, carried, on_output
-from sweep.effects.handed import behind as handed_behind
+from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT, Named, together
+from sweep.effects.scene import Scene, Status, refuse
 from sweep.effects.tool import weighs
-from sweep.families.base import Array, Columns, Output
+from sweep.families.base import Array, Columns, Parameter
+from sweep.families.poses import optional_outputs
 
-KEY = LOADS
-EQUATION = "D1 (1)-(4), D3 (5)-(7)"
-FORMULAS = (
-    "(1) F_i = m_i (a_Gi - gravity), T_i = J_i eps_i + omega_i x J_i omega_i; Q = T2 + (d2 - b s) x F2; q = n x w",
-    "(2) finger couple m = Q . s/(q . s); R_B = s x (Q - m q)/b + S s",
-    "(3) S t_tau = K/c - (s x (Q - m q)/b - F2) . tau;",
-    "    rocker: K = (T3 + d3 x F3) . k - load_torque (+ m q . k if driven);",
-    "    slider: K/c becomes F3 . tau - load_force",
-    "(4) R_C = R_B - F2; R_D = F3 - R_C; R_A = F1 + R_B; M_A = T1 + d1 x F1 + a rho_B x R_B (+ m q if driving);",
-    "    drive_torque = M_A . u",
-    "(5) J = J_A + m2 v2^2 + omega2 . J2 omega2 + J_D psi'^2 at unit crank speed (slider: m3 s'^2)",
-    "(6) drive_torque = J eps + J' omega^2/2 - sum m_i gravity . v_Gi - load psi'",
-    "(7) chain: the next stage turns by phi2 = kappa psi + offset, loads the rocker with -kappa drive_torque2 and adds",
-    "    psi'^2 J2 to J",
-)
-
-
-def forces(follower: str) -> dict[str, str]:
-    """Return the six vectors, in the order in which the kernel gives them."""
-    about = "about D" if follower == "rocker" else "about C"
-    return {
-        "force_a": "force of the frame on the crank",
-        "force_b": "force of the crank on the coupler",
-        "force_c": f"force of the coupler on the {follower}",
-        "force_d": f"force of the frame on the {follower}",
-        "moment_a": "moment of the frame on the crank about A, drive torque included",
-        "moment_d": f"moment of the frame on the {follower} {about}",
-    }
-
-
-FORCES = tuple(forces("rocker"))
+SHAKING = "shaking_force"
 COUPLES = {
     "finger_couple": ("torque", "couple of the finger along n x w"),
     "drive_torque": ("torque", "torque that drives the crank, about its axis"),
@@ -52,67 +26,179 @@ INERTIAS = {
     "reduced_inertia": ("inertia", "inertia of all links, of later stages too, reduced to the crank"),
     "dreduced_inertia": ("inertia", "derivative of the reduced inertia by the crank angle"),
 }
+COUPLES_WITH_FRICTION = {
+    f"finger_couple{FRICTION_SUFFIX}": ("torque", "couple of the finger along n x w" + FRICTION_TEXT),
+    f"drive_torque{FRICTION_SUFFIX}": ("torque", "torque that drives the crank" + FRICTION_TEXT),
+}
+CONTRACTION = "friction_contraction"
+PASSES = "friction_passes"
 
 
-def force_outputs(follower: str, suffix: str = "", text: str = "", equation: str = EQUATION) -> tuple[Output, ...]:
-    """Return the magnitude and components of the six vectors, and the force and the moment on the frame."""
-    found = []
-    for name, meaning in forces(follower).items():
-        unit = name.split("_")[0].replace("moment", "torque")
-        found.append(Output(f"{name}{suffix}", unit, f"magnitude: {meaning}{text}", equation))
-        found += [Output(f"{name}{suffix}_{axis}", unit, f"{axis}: {meaning}{text}", equation) for axis in "xyz"]
-    found.append(Output(f"shaking_force{suffix}", "force", f"magnitude of the force on the frame{text}", equation))
-    about = f"moment on the frame about the origin of the family's frame, drive torque included{text}"
-    found.append(Output(f"shaking_moment{suffix}", "torque", f"magnitude: {about}", equation))
-    found += [Output(f"shaking_moment{suffix}_{axis}", "torque", f"{axis}: {about}", equation) for axis in "xyz"]
-    return tuple(found)
+def forces(follower: str, suffix: str = "", text: str = "") -> Named:
+    """Six vectors in the order in which the kernel gives them, with unit and meaning."""
+    about = "about D" if follower == "rocker" else "about C"
+    found = {
+        "force_a": ("force", "force of the frame on the crank"),
+        "force_b": ("force", "force of the crank on the coupler"),
+        "force_c": ("force", f"force of the coupler on the {follower}"),
+        "force_d": ("force", f"force of the frame on the {follower}"),
+        "moment_a": ("torque", "moment of the frame on the crank about A, drive torque included"),
+        "moment_d": ("torque", f"moment of the frame on the {follower} {about}"),
+    }
+    return {f"{name}{suffix}": (unit, f"{words}{text}") for name, (unit, words) in found.items()}
 
 
-def _outputs(follower: str) -> tuple[Output, ...]:
+FORCES = tuple(forces("rocker"))
+
+
+def vectors(follower: str, suffix: str = "", text: str = "") -> Named:
+    """Vectors that are given: the six of the joints, and what the frame bears."""
+    moment = "moment on the frame about the origin of the family's frame, drive torque included"
+    return forces(follower, suffix, text) | {
+        f"{SHAKING}{suffix}": ("force", f"force on the frame{text}"),
+        f"shaking_moment{suffix}": ("torque", f"{moment}{text}"),
+    }
+
+
+_JOINTS = {"a": "crank bearing", "b": "ball joint at B", "c": "ball joint at C"}
+
+
+def friction_inputs(kind: loads.Follower) -> tuple[Parameter, ...]:
+    """Coefficients, radii and places of supports of the four joints."""
+    rocker = kind is loads.ROCKER
+    joints = _JOINTS | {"d": f"{kind.name} bearing" if rocker else "slide"}
+    along, place = ("rocker axis", "D") if rocker else ("slide, moving with the slider", "C")
+    thrust = tuple(
+        Parameter(
+            f"thrust_radius_{j}", "length", f"mean thrust radius of the {joints[j]}", default=0.0, not_negative=True
+        )
+        for j in ("ad" if rocker else "a")
+    )
     return (
-        *force_outputs(follower),
-        *(Output(name, unit, text, EQUATION) for name, (unit, text) in (COUPLES | INERTIAS).items()),
+        *(
+            Parameter(f"mu_{j}", "ratio", f"coefficient of friction of the {text}", not_negative=True)
+            for j, text in joints.items()
+        ),
+        *(
+            Parameter(f"radius_{j}", "length", f"friction radius of the {text}", not_negative=True)
+            for j, text in joints.items()
+            if rocker or j != "d"
+        ),
+        *thrust,
+        Parameter("support_a1", "length", "first support along the crank axis, from A"),
+        Parameter("support_a2", "length", "second support along the crank axis, from A"),
+        Parameter("support_d1", "length", f"first support along the {along}, from {place}"),
+        Parameter("support_d2", "length", f"second support along the {along}, from {place}"),
     )
 
 
-def wanted_groups(wanted: frozenset[str], suffix: str = "") -> tuple[bool, bool, bool]:
-    """Return whether any force or moment, any couple, any inertia is wanted: what is not is not compiled."""
-    vectors = (
-        f"{name}{suffix}{tail}"
-        for name in (*FORCES, "shaking_force", "shaking_moment")
-        for tail in ("", "_x", "_y", "_z")
+# In the order of the columns of kernels.effects.friction.Friction; a slide has an arm of 1 and no thrust.
+_FRICTION_COLUMNS = tuple(p.name for p in friction_inputs(loads.ROCKER))
+_OF_A_SLIDE = {"radius_d": 1.0, "thrust_radius_d": 0.0}
+
+
+def losses(kind: loads.Follower) -> Named:
+    """Name what the kernel gives as losses, in its order."""
+    follower = ("torque", "friction torque on the rocker about its axis")
+    of_slide = {"slide_friction": ("force", "friction force on the slider")}
+    found = {
+        "shaft_torque_a": ("torque", "friction torque on the crank about its axis"),
+        **({"shaft_torque_d": follower} if kind is loads.ROCKER else of_slide),
+        "ball_couple_b": ("torque", "magnitude: friction couple of the ball joint at B"),
+        "ball_couple_c": ("torque", "magnitude: friction couple of the ball joint at C"),
+    }
+    supports = ("load_support_a1", "load_support_a2", "load_support_d1", "load_support_d2")
+    found |= {name: ("force", f"load across the axis of the support {name[-2:]}{FRICTION_TEXT}") for name in supports}
+    return found | {PASSES: ("1", "passes of the friction iteration")}
+
+
+def load_name(scene: Scene) -> str:
+    """Name of the useful load on the follower."""
+    return loads.follower(scene).load.name
+
+
+def force_name(scene: Scene) -> str:
+    """Name of a force that leaves all reactions in the scene when it is computed."""
+    return "force_d"
+
+
+def _drive(scene: Scene, load: Array) -> Array:
+    """Load of the follower, speed of the crank and its rate, (n, m or 1, 3), as the kernels take them."""
+    return np.stack(np.broadcast_arrays(load, *scene.crank()), axis=2)
+
+
+def _bodies(scene: Scene) -> Array:
+    """Masses, centres, inertias and gravity in the order of the kernels."""
+    return scene.table(loads.follower(scene).bodies)
+
+
+def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
+    """Wanted reactions and inertias; a group none of whose outputs is wanted is not compiled."""
+    groups = loads.asked(vectors(""), wanted), not wanted.isdisjoint(COUPLES), not wanted.isdisjoint(INERTIAS)
+    sizes = zip((18, 2, 2), groups, strict=True)
+    forces, couples, inertia = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
+    drive = _drive(scene, load)
+    tool = weighs(scene, drive, inertia is not None)
+    kinetostatics(
+        *scene.records, _bodies(scene), drive, scene.inputs["finger"], status, forces, couples, inertia, tool.coupler,
+        tool.follower,
+    )  # fmt: skip
+    if inertia is not None and tool.inertia is not None:
+        inertia += tool.inertia
+    if forces is not None:
+        scene.memo["reactions"] = forces, status
+    columns = _vector_columns(forces, scene.records, wanted)
+    for names, values in ((COUPLES, couples), (INERTIAS, inertia)):
+        columns |= loads.scalar_columns(names, values, wanted)
+    return columns
+
+
+def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
+    """Wanted quantities with friction; status JAMMED where the iteration does not contract."""
+    refuse(status, together(scene, "a") | together(scene, "d"))
+    lost = tuple(losses(loads.follower(scene)))
+    sizes = (
+        (18, loads.asked(vectors("", FRICTION_SUFFIX), wanted)),
+        (2, not wanted.isdisjoint(COUPLES_WITH_FRICTION)),
+        (len(lost), not wanted.isdisjoint(lost)),
     )
-    couples, inertias = ({f"{name}{suffix}" for name in names} for names in (COUPLES, INERTIAS))
-    return not wanted.isdisjoint(vectors), not wanted.isdisjoint(couples), not wanted.isdisjoint(inertias)
+    forces, couples, given = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
+    (contraction,) = optional_outputs((CONTRACTION,), wanted, scene.shape)
+    data = np.column_stack(
+        [
+            scene.inputs.get(name, np.full(len(scene.designs), _OF_A_SLIDE.get(name, np.nan)))
+            for name in _FRICTION_COLUMNS
+        ]
+    )
+    drive = _drive(scene, load)
+    tool = weighs(scene, drive, False)
+    friction_loads(
+        *scene.records, _bodies(scene), drive, data, scene.inputs["finger"], status, forces, couples, given,
+        contraction, tool.coupler, tool.follower,
+    )  # fmt: skip
+    columns = _vector_columns(forces, scene.records, wanted, FRICTION_SUFFIX)
+    for names, values in ((tuple(COUPLES_WITH_FRICTION), couples), (lost, given)):
+        columns |= loads.scalar_columns(names, values, wanted)
+    return columns if contraction is None else columns | {CONTRACTION: contraction}
 
 
-def vector_columns(
+def _vector_columns(
     forces: Array | None, records: tuple[Array, Array], wanted: frozenset[str], suffix: str = ""
 ) -> Columns:
-    """Return the wanted magnitudes and components of the six vectors, (n, m, 18),
-    and of force and moment on the frame.
-    """
-    columns: Columns = {}
+    """Wanted magnitudes and components of the six vectors, (n, m, 18), and of force and moment on the frame."""
     if forces is None:
-        return columns
-    for k, name in enumerate(FORCES):
-        values = forces[:, :, 3 * k : 3 * k + 3]
-        if f"{name}{suffix}" in wanted:
-            columns[f"{name}{suffix}"] = magnitude(values)
-        for at, axis in enumerate("xyz"):
-            if f"{name}{suffix}_{axis}" in wanted:
-                columns[f"{name}{suffix}_{axis}"] = values[:, :, at]
-    if f"shaking_force{suffix}" in wanted:
-        columns[f"shaking_force{suffix}"] = magnitude(forces[:, :, 0:3] + forces[:, :, 9:12])
-    moment = f"shaking_moment{suffix}"
-    if not wanted.isdisjoint((moment, *(f"{moment}_{axis}" for axis in "xyz"))):
-        found = frame_moment(forces, records)
-        columns |= {moment: magnitude(found)} | {f"{moment}_{axis}": found[:, :, k] for k, axis in enumerate("xyz")}
-    return {name: values for name, values in columns.items() if name in wanted}
+        return {}
+    found = {f"{name}{suffix}": forces[:, :, 3 * k : 3 * k + 3] for k, name in enumerate(FORCES)}
+    shaking, moment = f"{SHAKING}{suffix}", f"shaking_moment{suffix}"
+    if shaking in wanted:
+        found[shaking] = forces[:, :, 0:3] + forces[:, :, 9:12]
+    if loads.asked((moment,), wanted):
+        found[moment] = _frame_moment(forces, records)
+    return loads.vector_columns(found, wanted)
 
 
-def frame_moment(forces: Array, records: tuple[Array, Array]) -> Array:
-    """Return the moment of crank and follower on the frame about the origin of the family's frame, (n, m, 3).
+def _frame_moment(forces: Array, records: tuple[Array, Array]) -> Array:
+    """Moment of crank and follower on the frame about the origin of the family's frame, (n, m, 3).
 
     The moments of the bearings are about A, and about D or, where a slider moves, about C; each force adds its arm.
     """
@@ -123,96 +209,3 @@ def frame_moment(forces: Array, records: tuple[Array, Array]) -> Array:
     on_links += forces[:, :, 15:18] + np.cross(follower, forces[:, :, 9:12])
     moment: Array = -on_links
     return moment
-
-
-def magnitude(vectors: Array) -> Array:
-    """Return the length of vectors (n, m, 3)."""
-    x, y, z = vectors[:, :, 0], vectors[:, :, 1], vectors[:, :, 2]
-    length: Array = np.sqrt(x * x + y * y + z * z)
-    return length
-
-
-def drive(scene: Scene, handed_back: Columns | None, name: str = "drive_torque") -> Array:
-    """Load of the follower, speed of the crank and its rate, (n, m or 1, 3), as the kernels of loads take them.
-
-    In a chain the crank turns as the stage before drives it, and the next stage's driving torque, column ``name`` of
-    ``handed_back``, acts on the rocker besides its own load.
-    """
-    speed, change = scene.crank()
-    load = on_output(scene, scene.load(loads.follower(scene).load.name), handed_back, name)
-    return np.stack(np.broadcast_arrays(load, speed, change), axis=2)
-
-
-def bodies(scene: Scene) -> Array:
-    """Return masses, centres, inertias and gravity in the order of the kernels."""
-    return scene.table(loads.follower(scene).bodies)
-
-
-def behind(scene: Scene) -> Columns | None:
-    """Return the driving torque, reduced inertia and status of the next stage; None at the end of the chain."""
-    return handed_behind(scene, KEY, frozenset({"drive_torque", *INERTIAS}))
-
-
-def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Return the wanted reactions and inertias; a group none of whose outputs is wanted is not compiled."""
-    status, handed_back = scene.status(), behind(scene)
-    sizes = zip((18, 2, 2), wanted_groups(wanted), strict=True)
-    forces, couples, inertia = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
-    load = drive(scene, handed_back)
-    tool = weighs(scene, load, inertia is not None)
-    kinetostatics(
-        *scene.records, bodies(scene), load, scene.inputs["finger"], status, forces, couples, inertia, tool.coupler,
-        tool.follower,
-    )  # fmt: skip
-    if inertia is not None and tool.inertia is not None:
-        inertia += tool.inertia
-    if handed_back is not None:
-        take_over(status, handed_back["status"])
-        if inertia is not None:
-            inertia += carried(scene, handed_back)
-    if forces is not None:
-        scene.memo["forces"] = forces, status
-    columns = vector_columns(forces, scene.records, wanted)
-    for names, values in ((COUPLES, couples), (INERTIAS, inertia)):
-        if values is not None:
-            columns |= {name: values[:, :, k] for k, name in enumerate(names) if name in wanted}
-    return columns | {"status": status}
-
-
-def advise(scene: Scene) -> Advice | None:
-    """Return the share of the largest force at C that inertia and weight make; 1 where there is no useful load."""
-    load = loads.follower(scene).load.name
-    whole = compute(scene, frozenset({"force_c"}))
-    still = {name: np.zeros_like(x) if name.startswith(("m_", "j_")) else x for name, x in scene.inputs.items()}
-    alone = Scene(scene.family, scene.designs, scene.angles, still, scene.after, scene.before, scene.curves)
-    useful = compute(alone, frozenset({"force_c"}))
-    turning = (whole["status"] == st.OK).all(axis=1)
-    if not turning.any():
-        return None
-    most, static = (np.asarray(c["force_c"], np.float64)[turning].max(axis=1) for c in (whole, useful))
-    share = np.abs(most - static) / np.where(most > 0.0, most, 1.0)
-    return Advice(f"share of the largest force at C that is not due to {load}", share, 0.1)
-
-
-def _effect(kind: loads.Follower) -> Effect:
-    return Effect(
-        key=KEY,
-        name=f"{kind.prefix}kinetostatics",
-        title=f"joint reactions of crank, coupler and {kind.name}, finger couple, driving torque, reduced inertia",
-        equation=EQUATION,
-        formulas=FORMULAS,
-        followers=(kind.name,),
-        needs=("coupler",),
-        inputs=kind.parameters,
-        tool_inputs=loads.TOOLS,
-        outputs=_outputs(kind.name),
-        compute=compute,
-        called_for="joint loads, drive torque, shaking force, balancing",
-        negligible="inertia and weight make less than 10 % of the joint load (low speed): then statics, pressure",
-        takes_load=KEY,
-        advise=advise,
-    )
-
-
-EFFECT = _effect(loads.ROCKER)
-SLIDER = _effect(loads.SLIDER)

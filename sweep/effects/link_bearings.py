@@ -7,19 +7,23 @@ from functools import partial
 
 import numpy as np
 
-from kernels.effects.bearing_life import journal_pressures
-from sweep.effects import link_friction, link_stops, links
-from sweep.effects.base import DesignResult, Effect, Scene, Status, refuse, take_over
-from sweep.effects.bearings import CATALOGUE, REQUIRED_LIFE, permissible_load, together
-from sweep.effects.bend import Bend
-from sweep.effects.handed import FRICTION, LOADS
-from sweep.effects.shaft_life import BLOCK, Shaft, load_outputs, turn_outputs
-from sweep.effects.shaft_life import FORMULAS as LIFE_FORMULAS
-from sweep.effects.shaft_life import bends as bends_of_shaft
-from sweep.effects.shaft_life import per_turn as turn_of_shaft
+from kernels.effects.bearings import journal_pressures
+from sweep.effects import stops
+from sweep.effects.base import Bend, DesignResult, Effect
+from sweep.effects.bearing_life import BLOCK, Shaft, load_outputs, turn_outputs
+from sweep.effects.bearing_life import FORMULAS as LIFE_FORMULAS
+from sweep.effects.bearing_life import bends as bends_of_shaft
+from sweep.effects.bearing_life import per_turn as turn_of_shaft
+from sweep.effects.bearings import CATALOGUE, REQUIRED_LIFE, permissible_load
+from sweep.effects.link_loads import SUPPORTED, friction_inputs, tree_of
+from sweep.effects.load_effects import friction_of, loads_of
+from sweep.effects.load_passing import FRICTION, LOADS, compute_friction
+from sweep.effects.loads import AXES, FRICTION_SUFFIX, FRICTION_TEXT
+from sweep.effects.scene import Scene, refuse, take_over
 from sweep.families import family
-from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, filled
+from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
 from sweep.families.link_tree import LinkJoint, LinkTree
+from sweep.families.poses import filled_each
 
 EQUATION = "docs/links.md (10)-(13)"
 SLIDING_FORMULAS = (
@@ -30,21 +34,20 @@ ROLLING_FORMULAS = (
     *LIFE_FORMULAS,
     "(4) P = K V F if |F_axial| <= e V F else K (X V F + Y |F_axial|); permissible P = C (60 n L_h/10^6)^(-1/p)",
 )
-AXES = "xyz"
 
 
 def shafts(tree: LinkTree) -> tuple[LinkJoint, ...]:
-    """Return the joints that roll in two bearings: those that turn about an axis and do not slide along it."""
+    """Joints that roll in two bearings: those that turn about an axis and do not slide along it."""
     return tuple(j for j in tree.joints if j.kind == "shaft")
 
 
 def journals(tree: LinkTree) -> tuple[LinkJoint, ...]:
-    """Return the joints that slide in two journals: shafts, and guides, which have no collar."""
-    return tuple(j for j in tree.joints if j.kind in link_friction.SUPPORTED)
+    """Joints that slide in two journals: shafts, and guides, which have no collar."""
+    return tuple(j for j in tree.joints if j.kind in SUPPORTED)
 
 
 def _sliding_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
-    """Return dimensions of the journals, of the collar of a shaft, in the order of the kernel's columns."""
+    """Dimensions of the journals, of the collar of a shaft, in the order of the kernel's columns."""
     j, words = joint.name, joint.text
     found = [Parameter(f"journal_diameter_{j}", "length", f"diameter of both journals: {words}", positive=True)]
     found += [Parameter(f"journal_length_{j}{k}", "length", f"length of journal {k}: {words}", positive=True)
@@ -65,8 +68,8 @@ def _pressure_limits(joint: LinkJoint) -> tuple[Parameter, ...]:
 
 
 def _sliding_outputs(joint: LinkJoint) -> tuple[Output, ...]:
-    """Return pressures and utilisation, in the order of the kernel's results."""
-    j, words = joint.name, f"{joint.text}{link_friction.TEXT}"
+    """Pressures and utilisation, in the order of the kernel's results."""
+    j, words = joint.name, f"{joint.text}{FRICTION_TEXT}"
     found = [Output(f"journal_pressure_{j}{k}", "pressure", f"mean pressure of journal {k}: {words}", EQUATION)
              for k in "12"]  # fmt: skip
     if joint.kind == "shaft":
@@ -76,24 +79,24 @@ def _sliding_outputs(joint: LinkJoint) -> tuple[Output, ...]:
 
 
 def _columns(scene: Scene, inputs: tuple[Parameter, ...], size: int) -> Array:
-    """Return inputs side by side, (n, size); zeros behind those that the joint has."""
+    """Put inputs side by side, (n, size); zeros behind those that the joint has."""
     table = np.zeros((len(scene.designs), size))
     table[:, : len(inputs)] = scene.table(tuple(p.name for p in inputs))
     return table
 
 
 def _axis(scene: Scene, joint: LinkJoint) -> Array:
-    """Return the axis of a shaft or a guide, (n, m, 3)."""
+    """Axis of a shaft or a guide, (n, m, 3)."""
     return np.ascontiguousarray(scene.links.axes[:, :, joint.freedom])
 
 
 def sliding(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pressures and utilisations under the loads with friction."""
-    asked = [j for j in journals(links.tree_of(scene)) if not wanted.isdisjoint(o.name for o in _sliding_outputs(j))]
+    """Wanted pressures and utilisations under the loads with friction."""
+    asked = [j for j in journals(tree_of(scene)) if not wanted.isdisjoint(o.name for o in _sliding_outputs(j))]
     supports = {j.name: [f"load_support_{j.name}{k}" for k in "12"] for j in asked}
-    axial = {j.name: [f"force_{j.name}{link_friction.SUFFIX}_{x}" for x in AXES] for j in asked if j.kind == "shaft"}
+    axial = {j.name: [f"force_{j.name}{FRICTION_SUFFIX}_{x}" for x in AXES] for j in asked if j.kind == "shaft"}
     names = frozenset(name for found in (supports, axial) for part in found.values() for name in part)
-    loads = link_friction.compute(scene, names)
+    loads = compute_friction(scene, names)
     columns: Columns = {}
     status = np.array(loads["status"], np.uint8)
     for joint in asked:
@@ -110,14 +113,14 @@ def sliding(scene: Scene, wanted: frozenset[str]) -> Columns:
         size = _columns(scene, _sliding_inputs(joint), 4)
         shaft = joint.kind == "shaft"
         named = outputs if shaft else (*outputs[:2], f"collar_pressure_{joint.name}", outputs[-1])
-        columns |= filled(
+        columns |= filled_each(
             journal_pressures, (first, second, along, size, limits), named, wanted & frozenset(outputs), status
         )  # fmt: skip
     return columns | {"status": status}
 
 
 def _rolling_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
-    supports = [p for p in link_friction.of_joint(joint) if p.name.startswith("support_")]
+    supports = [p for p in friction_inputs(joint) if p.name.startswith("support_")]
     catalogue = [replace(p, name=f"{p.name}_{joint.name}", text=f"{p.text}: {joint.text}") for p in CATALOGUE]
     return (*supports, *catalogue)
 
@@ -134,27 +137,8 @@ def _rolling_outputs(joint: LinkJoint) -> tuple[Output, ...]:
     )
 
 
-def _of_shaft(scene: Scene, wanted: frozenset[str], joint: LinkJoint) -> Columns:
-    """Return the wanted loads of one shaft's bearings, and the status."""
-    forces, status = _reactions(scene)
-    status = status.copy()
-    refuse(status, together(scene, joint.name))
-    tree = links.tree_of(scene)
-    at = 6 * tree.joints.index(joint)
-    return _shaft(joint).of_reactions(scene, forces, (at, at + 3), _axis(scene, joint), wanted, status)
-
-
-def _reactions(scene: Scene) -> tuple[Array, Status]:
-    """Return the reactions of all joints, (n, m, 6 Q), and the status; computed once for all shafts of a scene."""
-    if "reactions" not in scene.memo:
-        first = links.tree_of(scene).joints[0].name
-        links.compute(scene, frozenset({f"force_{first}"}))
-    found: tuple[Array, Status] = scene.memo["reactions"]
-    return found
-
-
 def _turning(scene: Scene, joint: LinkJoint) -> Array:
-    """Return the turning of a shaft in its bearings per unit crank speed, (n, m)."""
+    """Compute the turning of a shaft in its bearings per unit crank speed, (n, m)."""
     bodies, parents = scene.links.bodies, scene.links.parents
     turn = bodies[:, :, joint.body, 9:12]
     if parents[joint.body] >= 0:
@@ -163,22 +147,26 @@ def _turning(scene: Scene, joint: LinkJoint) -> Array:
     return rate
 
 
-def _shaft(joint: LinkJoint) -> Shaft:
-    return Shaft(joint.name, f"_{joint.name}", partial(_of_shaft, joint=joint), partial(_turning, joint=joint))
+def _shaft(tree: LinkTree, joint: LinkJoint) -> Shaft:
+    at = 6 * tree.joints.index(joint)
+    return Shaft(
+        joint.name, f"_{joint.name}", (at, at + 3), partial(_axis, joint=joint), partial(_turning, joint=joint)
+    )
 
 
 def rolling(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Return the wanted loads of bearings, and the share that they make of the permissible load."""
+    """Wanted loads of bearings, and the share that they make of the permissible load."""
     columns: Columns = {}
     status = scene.status()
-    for joint in shafts(links.tree_of(scene)):
+    tree = tree_of(scene)
+    for joint in shafts(tree):
         names = tuple(o.name for o in _rolling_outputs(joint))
         used = names[-1]
         own = wanted & frozenset(names)
         if not own:
             continue
         pair = frozenset(names[3:5]) if used in own else frozenset[str]()
-        found = _of_shaft(scene, own - {used} | pair, joint)
+        found = _shaft(tree, joint).loads(scene, own - {used} | pair)
         take_over(status, found.pop("status"))
         if used in own:
             larger = np.maximum(*(np.asarray(found[name], np.float64) for name in names[3:5]))
@@ -188,21 +176,22 @@ def rolling(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def rolling_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return mean loads and lives of the shafts asked for; see :mod:`sweep.effects.shaft_life`."""
+    """Mean loads and lives of the shafts asked for; see :mod:`sweep.effects.bearing_life`."""
     columns: Columns = {}
     status = np.zeros(len(scene.designs), np.uint8)
-    for joint in shafts(links.tree_of(scene)):
+    tree = tree_of(scene)
+    for joint in shafts(tree):
         own = wanted & frozenset(o.name for o in turn_outputs(joint.name, "", EQUATION))
         if own:
-            found = turn_of_shaft(scene, own, accuracy, _shaft(joint))
+            found = turn_of_shaft(scene, own, accuracy, _shaft(tree, joint))
             take_over(status, found.pop("status"))
             columns |= found
     return columns | {"status": status}
 
 
 def sliding_of(name: str) -> Effect:
-    """Return the entry of the sliding bearings of a family with a tree of links."""
-    rubbing = link_friction.friction_of(name)
+    """Entry of the sliding bearings of a family with a tree of links."""
+    rubbing = friction_of(name)
     tree = rubbing.tree
     assert tree is not None
     found = {j: (_sliding_inputs(j), _pressure_limits(j), _sliding_outputs(j)) for j in journals(tree)}
@@ -225,13 +214,13 @@ def sliding_of(name: str) -> Effect:
         takes_load=FRICTION,
         requires=LinkTree,
         tree=tree,
-        bends=link_stops.bends(tree, tuple(o.name for _, _, out in found.values() for o in out)),
+        bends=stops.tree_bends(tree, tuple(o.name for _, _, out in found.values() for o in out)),
     )
 
 
 def rolling_of(name: str) -> Effect:
-    """Return the entry of the rolling bearings of a family with a tree of links."""
-    bare = links.loads_of(name)
+    """Entry of the rolling bearings of a family with a tree of links."""
+    bare = loads_of(name)
     tree = bare.tree
     assert tree is not None
     poses: list[Output] = []
@@ -246,7 +235,7 @@ def rolling_of(name: str) -> Effect:
         poses += out
         lives += turn
         only |= {p.name: tuple(o.name for o in (*out, *turn)) for p in own} | {life.name: (out[-1].name,)}
-        bends += bends_of_shaft(_shaft(joint), out[-1].name)
+        bends += bends_of_shaft(_shaft(tree, joint), out[-1].name)
     return Effect(
         key="B2",
         name=f"{name}_rolling_bearings",

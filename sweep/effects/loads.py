@@ -1,13 +1,23 @@
-"""Inputs that the load effects share: bodies, weight, speed, load."""
+"""What the load effects share: inputs of bodies, weight, speed, load; outputs that are vectors and their columns."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Collection, Mapping
+from typing import NamedTuple, TypeAlias
 
-from sweep.effects.base import Scene
-from sweep.effects.coupler import CONSTRUCTION
-from sweep.families.base import Parameter
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.effects.motion import CONSTRUCTION
+from sweep.effects.scene import Scene
+from sweep.families.base import Array, Columns, Family, Output, Parameter
 from sweep.families.capabilities import JointRecords
+
+FRICTION_SUFFIX, FRICTION_TEXT = "_friction", ", friction included"
+AXES = "xyz"
+
+Named: TypeAlias = dict[str, tuple[str, str]]
+"""Unit and meaning by name."""
 
 _FRAMES = {
     "crank": "along the crank, tangential, along its axis, from A",
@@ -18,7 +28,7 @@ _FRAMES = {
 
 
 def body_inputs(body: str, frame: str, default: float | None = None) -> tuple[Parameter, ...]:
-    """Return the mass, centre of mass and inertia of a body whose axes lie as ``frame`` says; ``default`` mass."""
+    """Mass, centre of mass and inertia of a body whose axes lie as ``frame`` says; ``default`` mass."""
     centre = (
         Parameter(f"com_{body}_{axis}", "length", f"centre of mass of the {body} ({frame})", default=0.0)
         for axis in "xyz"
@@ -41,7 +51,7 @@ def _body(body: str) -> tuple[Parameter, ...]:
 
 
 def rod_inputs(body: str, frame: str) -> tuple[Parameter, ...]:
-    """Return the mass, centre of mass and inertia of a slender rod."""
+    """Mass, centre of mass and inertia of a slender rod."""
     return (
         Parameter(f"m_{body}", "mass", f"mass of {body}", default=0.0, not_negative=True),
         Parameter(f"com_{body}_x", "length", f"centre of mass of {body} ({frame})", default=0.0),
@@ -115,6 +125,61 @@ SLIDER = _follower("slider", "slider_", _FORCE)
 
 
 def follower(scene: Scene) -> Follower:
-    """Return the kind of follower of a scene's family."""
-    joints = scene.family.find(JointRecords)
+    """Kind of follower of a scene's family."""
+    return follower_of(scene.family)
+
+
+def follower_of(family: Family) -> Follower:
+    """Kind of follower of a family."""
+    joints = family.find(JointRecords)
     return SLIDER if joints is not None and joints.follower == SLIDER.name else ROCKER
+
+
+def vector_outputs(named: Named, equation: str, whole: Collection[str] = ()) -> tuple[Output, ...]:
+    """Magnitude and components of vectors; of those in ``whole`` the magnitude alone."""
+    found = []
+    for name, (unit, text) in named.items():
+        if name in whole:
+            found.append(Output(name, unit, f"magnitude of the {text}", equation))
+            continue
+        found.append(Output(name, unit, f"magnitude: {text}", equation))
+        found += [Output(f"{name}_{axis}", unit, f"{axis}: {text}", equation) for axis in AXES]
+    return tuple(found)
+
+
+def scalar_outputs(named: Named, equation: str, jumps: str = "") -> tuple[Output, ...]:
+    """List outputs that are no vectors; the one called ``jumps`` jumps."""
+    return tuple(Output(name, unit, text, equation, name == jumps) for name, (unit, text) in named.items())
+
+
+def asked(names: Collection[str], wanted: frozenset[str]) -> bool:
+    """Whether a vector, or a component of one, is wanted."""
+    return any(f"{name}{tail}" in wanted for name in names for tail in ("", "_x", "_y", "_z"))
+
+
+def vector_columns(found: Mapping[str, Array], wanted: frozenset[str]) -> Columns:
+    """Wanted magnitudes and components of vectors, (n, m, 3) each."""
+    columns: Columns = {}
+    for name, values in found.items():
+        if name in wanted:
+            columns[name] = magnitude(values)
+        columns |= {f"{name}_{a}": values[:, :, k] for k, a in enumerate(AXES) if f"{name}_{a}" in wanted}
+    return columns
+
+
+def scalar_columns(names: Collection[str], values: Array | None, wanted: frozenset[str]) -> Columns:
+    """Wanted columns of an array (n, m, len(names)); none where there is no array."""
+    return {} if values is None else {name: values[:, :, k] for k, name in enumerate(names) if name in wanted}
+
+
+def magnitude(vectors: Array) -> Array:
+    """Length of vectors (n, m, 3)."""
+    x, y, z = vectors[:, :, 0], vectors[:, :, 1], vectors[:, :, 2]
+    length: Array = np.sqrt(x * x + y * y + z * z)
+    return length
+
+
+def together(scene: Scene, shaft: str) -> NDArray[np.bool_]:
+    """Designs both of whose supports of a shaft stand at one place, (n,)."""
+    same: NDArray[np.bool_] = scene.inputs[f"support_{shaft}1"] == scene.inputs[f"support_{shaft}2"]
+    return same

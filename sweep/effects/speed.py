@@ -1,18 +1,19 @@
-"""D4: fluctuation of the crank speed over the turn, with constant motor torque or a motor line, without friction."""
+"""D4: fluctuation of the crank speed over the turn, with constant motor torque or a motor line, also with friction."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED, speed_fluctuation
-from sweep.effects import kinetostatics, links, loads
-from sweep.effects.base import Advice, DesignResult, Effect, Scene, Status
-from sweep.effects.handed import LOADS, computed
+from sweep.effects import load_effects, loads
+from sweep.effects.base import Advice, DesignResult, Effect
+from sweep.effects.load_passing import FRICTION, LOADS, compute_friction, compute_loads
+from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
+from sweep.effects.scene import Scene, Status, take_over
 from sweep.effects.turn import at_poses, backwards, on_finer_grids, per_turn, reduction_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
@@ -26,6 +27,8 @@ FORMULAS = (
     "(4) motor line: d(J omega^2/2)/d phi = X + M - motor_slope (omega - omega_mean), X the excess of loads, M from",
     "    omega_mean; its time constant is mean J/motor_slope",
 )
+
+FRICTION_FORMULA = "(5) friction takes drive_torque_friction - drive_torque, both at omega(phi), eps(phi)"
 
 TITLE = "fluctuation of the crank speed at constant mean speed"
 FLYWHEEL = Parameter(
@@ -45,23 +48,25 @@ LEFT = 1e-3  # share of J omega^2 that the last of these may miss of the torque
 LEFT_OF_CURVE = 1e-4  # and of a curve: more than this is a jump, beside which a series overshoots
 PER_LEFT = 5.0  # a jump h leaves h/(pi K) in harmonic K and shifts the energy by h pi/N at most, N = 2 K + 1
 ERROR = 1e-9
+SUFFIX = ("", FRICTION_SUFFIX)  # of the outputs, by whether the joints rub
 _NEEDED_NAMES = ("reduced_inertia", "dreduced_inertia", "drive_torque")
 _NEEDED = frozenset(_NEEDED_NAMES)
 
-Loss: TypeAlias = Callable[[Scene, Array], tuple[Array, Status]]
-"""``loss(grid, slope)``: torque lost to friction on the grid, (n, N), and status (n,)."""
+# Friction grows with the loads, and these with the speed: it is computed again with the speed that it makes.
+PASSES = 24
+SETTLED = 1e-7  # share of the largest torque excess or loss by which the last pass changes the loss
 
 
-def outputs(suffix: str, text: str) -> tuple[Output, ...]:
-    """Return the curves over the turn."""
+def _outputs(suffix: str, text: str) -> tuple[Output, ...]:
+    """Curves over the turn."""
     return (
         Output(f"crank_speed{suffix}", "rad/s", f"speed of the crank in the steady state{text}", EQUATION),
         Output(f"crank_acceleration{suffix}", "rad/s^2", f"its angular acceleration{text}", EQUATION),
     )
 
 
-def numbers(suffix: str, text: str) -> tuple[Output, ...]:
-    """Return what a turn has one of."""
+def _numbers(suffix: str, text: str) -> tuple[Output, ...]:
+    """List outputs of which a turn has one."""
     return (
         Output(f"unevenness{suffix}", "1", f"(largest - smallest crank speed)/mean{text}", EQUATION),
         Output(f"fastest{suffix}", "rad/s", f"largest magnitude of the crank speed{text}", EQUATION),
@@ -69,17 +74,13 @@ def numbers(suffix: str, text: str) -> tuple[Output, ...]:
     )
 
 
-OF_CONSTANT_MEAN = " of constant mean speed"
-OUTPUTS, _PER_TURN = outputs("", OF_CONSTANT_MEAN), numbers("", "")
-
-
-def _solve(loss: Loss | None, finest: int, grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
+def _solve(rubs: bool, finest: int, grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
     inertia, excess = samples(grid)
     slope = grid.inputs["motor_slope"]
     motor = slope if slope.any() else None
     jammed = np.zeros(len(grid.designs), np.uint8)
-    if loss is not None:
-        lost, jammed = loss(grid, slope)
+    if rubs:
+        lost, jammed = _friction_loss(grid, slope)
         excess = excess - lost
     coarsest = LEFT if last and finest > GRIDS[-1] else RESOLVED
     found, status = steady(inertia, excess, grid.inputs["speed"], motor, phi, coarsest)
@@ -90,7 +91,7 @@ def _solve(loss: Loss | None, finest: int, grid: Scene, phi: Array, last: bool) 
 def steady(
     inertia: Array, excess: Array, speed: Array, slope: Array | None, phi: Array, coarsest: float
 ) -> tuple[dict[str, Array], Status]:
-    """Return the kernel's numbers, (n,), and curves at phi, (n, m), without a suffix, and the status.
+    """Kernel's numbers, (n,), and curves at phi, (n, m), without a suffix, and the status.
 
     Numbers are of the magnitude of the speed.  A crank that turns backwards is one that turns forwards in -phi, where
     the torque that is left over acts the other way.
@@ -112,7 +113,7 @@ def steady(
 def _of_both_senses(
     inertia: Array, excess: Array, speed: Array, slope: Array | None, phi: Array, coarsest: float
 ) -> tuple[dict[str, Array], Status]:
-    """Return the same where some cranks turn backwards."""
+    """Do the same where some cranks turn backwards."""
     found: dict[str, Array] = {}
     status = np.empty(len(speed), np.uint8)
     for rows, sense in ((np.flatnonzero(speed > 0.0), 1.0), (np.flatnonzero(speed < 0.0), -1.0)):
@@ -128,36 +129,39 @@ def _of_both_senses(
 
 
 def samples(grid: Scene) -> tuple[Array, Array]:
-    """Return the reduced inertia and torque excess J'w^2/2 - M_drive(w, 0): weights and load reduced to the crank."""
+    """Reduced inertia and torque excess J'w^2/2 - M_drive(w, 0): weights and load reduced to the crank."""
     even = grid.inputs | {"speed_change": np.zeros(len(grid.designs))}
     after = tuple(d._replace(inputs=d.inputs | {"speed_change": even["speed_change"]}) for d in grid.after)
     turning = Scene(grid.family, grid.designs, grid.angles, even, after, curves=grid.curves)
-    found = computed(turning, LOADS, _NEEDED)
+    found = compute_loads(turning, _NEEDED)
     inertia, slope, drive = (np.asarray(found[name], np.float64) for name in _NEEDED_NAMES)
     speed = grid.inputs["speed"][:, None]
     return inertia + grid.inputs["flywheel"][:, None], 0.5 * slope * speed * speed - drive
 
 
-def _grids(scene: Scene, loss: Loss | None) -> tuple[int, ...]:
-    if loss is not None:
+def _grids(scene: Scene, rubs: bool) -> tuple[int, ...]:
+    if rubs:
         return RUBBING
     return GRIDS if scene.smooth else GRIDS + FINER
 
 
-def compute(scene: Scene, wanted: frozenset[str], loss: Loss | None = None, suffix: str = "") -> Columns:
-    """Return the speed and acceleration of the crank at the wanted angles."""
-    grids = _grids(scene, loss)
-    found, status = on_finer_grids(scene, scene.angles.phi, grids, partial(_solve, loss, grids[-1]))
-    return at_poses(scene, {f"{name}{suffix}": x for name, x in found.items()}, status, wanted)
+def _solved(scene: Scene, phi: Array, rubs: bool) -> tuple[dict[str, Array], Status, tuple[int, ...]]:
+    """Numbers and curves at phi by their names, the status, and the grids that were tried."""
+    grids = _grids(scene, rubs)
+    found, status = on_finer_grids(scene, phi, grids, partial(_solve, rubs, grids[-1]))
+    return {f"{name}{SUFFIX[rubs]}": x for name, x in found.items()}, status, grids
 
 
-def turn(
-    scene: Scene, wanted: frozenset[str], accuracy: Accuracy, loss: Loss | None = None, suffix: str = ""
-) -> Columns:
-    """Return the unevenness, extreme speeds and the reductions of speed and acceleration."""
-    grids = _grids(scene, loss)
-    found, status = on_finer_grids(scene, scene.on_grid(grids[-1]).angles.phi, grids, partial(_solve, loss, grids[-1]))
-    found = {f"{name}{suffix}": x for name, x in found.items()}
+def compute(scene: Scene, wanted: frozenset[str], rubs: bool = False) -> Columns:
+    """Speed and acceleration of the crank at the wanted angles."""
+    found, status, _ = _solved(scene, scene.angles.phi, rubs)
+    return at_poses(scene, found, status, wanted)
+
+
+def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, rubs: bool = False) -> Columns:
+    """Unevenness, extreme speeds and the reductions of speed and acceleration."""
+    finest, suffix = _grids(scene, rubs)[-1], SUFFIX[rubs]
+    found, status, grids = _solved(scene, scene.on_grid(finest).angles.phi, rubs)
     columns: Columns = {f"{name}{suffix}": found[f"{name}{suffix}"] for name in ("unevenness", "fastest", "slowest")}
     one, fastest = np.ones(len(scene.designs)), found[f"fastest{suffix}"]
     known = np.maximum(ERROR, PER_LEFT * found[f"missed{suffix}"])
@@ -170,7 +174,74 @@ def turn(
     size = np.abs(found[change]).max(axis=1)
     ratio = np.divide(fastest**2, size, out=one.copy(), where=size > 0.0)
     of_change = np.maximum(known, PER_LEFT * found[f"missed{suffix}"] * ratio)
-    return per_turn(found, status, columns, outputs(suffix, ""), wanted, limit, known, {change: of_change})
+    return per_turn(found, status, columns, _outputs(suffix, ""), wanted, limit, known, {change: of_change})
+
+
+def _friction_loss(grid: Scene, slope: Array) -> tuple[Array, Status]:
+    """Torque on the crank that friction takes, (n, N), at the speed over the turn that it makes, and the status.
+
+    The speed is found on a grid of GRIDS[-1] poses: what that misses of it changes the loss by as small a share.  Where
+    that grid resolves no steady state, the speed is found on the whole grid.
+    """
+    if grid.shape[1] <= GRIDS[-1]:
+        lost, status, _ = _settled(grid, grid, slope)
+        return lost, status
+    lost, status, steady_state = _settled(grid.on_grid(GRIDS[-1]), grid, slope)
+    again = np.flatnonzero(steady_state != st.OK)
+    if again.size:
+        whole = grid.only(again)
+        lost[again], status[again], _ = _settled(whole, whole, slope[again])
+    return lost, status
+
+
+def _settled(coarse: Scene, grid: Scene, slope: Array) -> tuple[Array, Status, Status]:
+    """Loss on the grid at a speed that is found on a coarse one, and the status, NOT_CONVERGED if it does not settle.
+
+    The second status is what the last search for a steady state said.
+    """
+    inertia, excess = samples(coarse)
+    mean, motor = grid.inputs["speed"], slope if slope.any() else None
+    status = np.zeros(len(grid.designs), np.uint8)
+    even = np.broadcast_to(mean[:, None], coarse.shape)
+    lost = _lost(coarse, even, np.zeros(coarse.shape), status)
+    phi = coarse.angles.phi
+    for _ in range(PASSES):
+        before = lost
+        turning, change, code = _turning(inertia, excess - lost, mean, motor, phi)
+        lost = _lost(coarse, turning, change, status)
+        size = np.maximum(np.abs(excess).max(axis=1), np.abs(lost).max(axis=1))
+        moved: NDArray[np.bool_] = np.asarray(np.abs(lost - before).max(axis=1) > SETTLED * size)
+        if not moved.any():
+            break
+    take_over(status, np.where(moved & (code == st.OK), st.NOT_CONVERGED, code))
+    if coarse is not grid:
+        turning, change, code = _turning(inertia, excess - lost, mean, motor, grid.angles.phi)
+        take_over(status, code)
+        lost = _lost(grid, turning, change, status)
+    return lost, status, code
+
+
+def _turning(
+    inertia: Array, excess: Array, mean: Array, motor: Array | None, phi: Array
+) -> tuple[Array, Array, Status]:
+    """Speed and acceleration over the turn, and the status; without a steady state the turning is even."""
+    found, status = steady(inertia, excess, mean, motor, phi, LEFT)
+    usable = np.logical_and.reduce(np.isfinite(found["crank_speed"]), axis=1, keepdims=True)
+    speed = np.where(usable, found["crank_speed"], mean[:, None])
+    return speed, np.where(usable, found["crank_acceleration"], 0.0), status
+
+
+def _lost(grid: Scene, speed: Array, change: Array, status: Status) -> Array:
+    """Driving torque with friction minus that without, where the crank turns like this; ``status`` is worsened."""
+    turning = Scene(
+        grid.family, grid.designs, grid.angles, grid.inputs, grid.after, curves=grid.curves, uneven=(speed, change)
+    )
+    rubbing = compute_friction(turning, frozenset({"drive_torque_friction"}))
+    smooth = compute_loads(turning, frozenset({"drive_torque"}))
+    worst = np.asarray(rubbing["status"], np.uint8).max(axis=1)
+    np.copyto(status, worst, where=status == st.OK)
+    with_friction = np.asarray(rubbing["drive_torque_friction"], np.float64)
+    return with_friction - np.asarray(smooth["drive_torque"], np.float64)
 
 
 def advise(scene: Scene) -> Advice | None:
@@ -190,36 +261,53 @@ def advise(scene: Scene) -> Advice | None:
     return Advice("estimated unevenness of the crank speed", estimate, 0.01)
 
 
-def _effect(name: str, title: str, loaded: Effect) -> Effect:
-    """Return the entry of that name for the mechanisms whose loads ``loaded`` gives."""
+def _effect(name: str, title: str, loaded: Effect, rubbing: Effect | None = None) -> Effect:
+    """Entry for the mechanisms whose loads ``loaded`` gives; with the friction of ``rubbing``, where it is given."""
+    rubs = rubbing is not None
+    suffix, text = SUFFIX[rubs], FRICTION_TEXT if rubs else ""
+    curves = _outputs(suffix, f" of constant mean speed{text}")
+    results = (*_numbers(suffix, text), *reduction_outputs(curves))
     return Effect(
-        key="D4",
-        name=name,
-        title=title,
-        equation=EQUATION,
-        formulas=FORMULAS,
+        key="D4, D2" if rubs else "D4",
+        name=f"{name}{suffix}",
+        title=title.replace(TITLE, f"{TITLE}{text}"),
+        equation="D4 (1)-(5)" if rubs else EQUATION,
+        formulas=(*FORMULAS, FRICTION_FORMULA) if rubs else FORMULAS,
         followers=loaded.followers,
         requires=loaded.requires,
         tree=loaded.tree,
-        needs=(loaded.name,),
-        inputs=(*loaded.inputs, FLYWHEEL, MOTOR),
+        needs=(loaded.name,) if rubbing is None else (name, rubbing.name),
+        inputs=(*(loaded if rubbing is None else rubbing).inputs, FLYWHEEL, MOTOR),
         tool_inputs=loaded.tool_inputs,
-        outputs=OUTPUTS,
-        compute=compute,
-        called_for="unevenness of the speed asked for, a light drive",
-        negligible="estimated unevenness below 1 %",
+        outputs=curves,
+        compute=partial(compute, rubs=rubs),
+        called_for="unevenness of a drive whose joints rub"
+        if rubs
+        else "unevenness of the speed asked for, a light drive",
+        negligible="friction takes less than a tenth of the torque" if rubs else "estimated unevenness below 1 %",
         whole_turn=True,
         even_crank=True,
-        takes_load=LOADS,
-        design_result=DesignResult((*_PER_TURN, *reduction_outputs(OUTPUTS)), turn),
+        takes_load=FRICTION if rubs else LOADS,
+        design_result=DesignResult(results, partial(turn, rubs=rubs), block=8 if rubs else 32),
         advise=advise,
     )
 
 
 def of_tree(name: str) -> Effect:
-    """Return the entry of a family with a tree of links."""
-    return _effect(f"{name}_speed_fluctuation", f"{TITLE}: {family(name).title}", links.loads_of(name))
+    """Entry of a family with a tree of links."""
+    return _effect(f"{name}_speed_fluctuation", f"{TITLE}: {family(name).title}", load_effects.loads_of(name))
 
 
-EFFECT = _effect("speed_fluctuation", TITLE, kinetostatics.EFFECT)
-SLIDER = _effect(f"{loads.SLIDER.prefix}speed_fluctuation", TITLE, kinetostatics.SLIDER)
+def rubbing_tree(name: str) -> Effect:
+    """Entry of a family with a tree of links, friction included."""
+    return _effect(
+        f"{name}_speed_fluctuation", f"{TITLE}: {family(name).title}", load_effects.loads_of(name),
+        load_effects.friction_of(name),
+    )  # fmt: skip
+
+
+_SLIDER_NAME = f"{loads.SLIDER.prefix}speed_fluctuation"
+EFFECT = _effect("speed_fluctuation", TITLE, load_effects.KINETOSTATICS)
+SLIDER = _effect(_SLIDER_NAME, TITLE, load_effects.SLIDER_KINETOSTATICS)
+RUBBING_EFFECT = _effect("speed_fluctuation", TITLE, load_effects.KINETOSTATICS, load_effects.CLOSED_FRICTION)
+RUBBING_SLIDER = _effect(_SLIDER_NAME, TITLE, load_effects.SLIDER_KINETOSTATICS, load_effects.SLIDER_FRICTION)

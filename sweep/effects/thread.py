@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.effects.capstan import capstan
-from kernels.effects.thread_contour import thread_contour
-from kernels.effects.thread_speed import thread_speed
-from sweep.effects.base import Effect, Scene
+from kernels.effects.thread import capstan, thread_contour, thread_speed
+from sweep.effects.base import Effect
+from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Output, Parameter
 from sweep.families.capabilities import ThreadPath
-from sweep.families.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY, EXPONENT, REFERENCE_SPEED, SHARE
+from sweep.families.thread_balance import ALPHA, BENDING, BETA, COUNT, DENSITY, EXPONENT, REFERENCE_SPEED, SHARE
 
 MM_PER_M = 1e3
 
@@ -74,7 +73,7 @@ def _per_pose(scene: Scene, name: str) -> Array:
 
 
 def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Return the tension behind the eyelet and its parts."""
+    """Tension behind the eyelet and its parts."""
     wrap, motion = _wrap(scene)
     names = ("eyelet_radius", "thread_adhesion", "thread_friction", "thread_bending", "thread_count", "thread_density")
     outputs = {o.name: np.empty(scene.shape) if o.name in wanted else None for o in CONTOUR_OUTPUTS}
@@ -87,7 +86,7 @@ def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def euler(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Return the tension by Euler's law and force on the eyelet."""
+    """Tension by Euler's law and force on the eyelet."""
     wrap, motion = _wrap(scene)
     outputs = {o.name: np.empty(scene.shape) if o.name in wanted else None for o in CAPSTAN_OUTPUTS}
     status = np.array(motion["status"], np.uint8)
@@ -96,7 +95,7 @@ def euler(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def speed(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Return the speed and acceleration of the thread, and the ratio of tensions that the speed makes."""
+    """Speed and acceleration of the thread, and the ratio of tensions that the speed makes."""
     path = _path(scene)
     found = scene.family.poses(scene.designs, scene.angles, frozenset({path.rate, path.rate2}))
     first, second = (np.asarray(found[name], np.float64) for name in (path.rate, path.rate2))

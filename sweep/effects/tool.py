@@ -8,9 +8,9 @@ import numpy as np
 
 from kernels.effects.tool import free_tool, tool_load
 from sweep.effects import loads
-from sweep.effects.base import Effect, Scene
-from sweep.effects.coupler import CONSTRUCTION
-from sweep.effects.places import ON_LINE, ON_TIP, tool_place
+from sweep.effects.base import ON_LINE, ON_TIP, Effect, tool_place
+from sweep.effects.motion import CONSTRUCTION
+from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Output
 from sweep.families.capabilities import ToolPoint
 
@@ -37,14 +37,14 @@ class Weighs(NamedTuple):
 
 
 def _loaded(scene: Scene) -> bool:
-    """Return whether a tool with mass or force hangs on the linkage: without one nothing is computed."""
+    """Whether a tool with mass or force hangs on the linkage: without one nothing is computed."""
     names = ("m_tool", "tool_force", "pierce_force", *_FORCES)
     given = [scene.inputs[name] for name in names if name in scene.inputs]
     return not scene.curves.keys().isdisjoint(names) or any(bool(values.any()) for values in given)
 
 
 def _data(scene: Scene) -> tuple[Array, Array]:
-    """Return columns of the kernel of a tool on a line, and the working force, (n, 1) or over the turn (n, m)."""
+    """Columns of the kernel of a tool on a line, and the working force, (n, 1) or over the turn (n, m)."""
     place = scene.family.find(ToolPoint)
     assert place is not None and place.direction is not None
     gravity = scene.table(tuple(p.name for p in loads.GRAVITY))
@@ -54,7 +54,7 @@ def _data(scene: Scene) -> tuple[Array, Array]:
 
 
 def _free_data(scene: Scene) -> tuple[Array, Array]:
-    """Return columns of the kernel of a tool that moves freely, and the working force, (n, m or 1, 3)."""
+    """Columns of the kernel of a tool that moves freely, and the working force, (n, m or 1, 3)."""
     place = scene.family.find(ToolPoint)
     tip = scene.table(tuple(p.name for p in loads.TIP)) if place is None else place.point(scene.designs)
     gravity = scene.table(tuple(p.name for p in loads.GRAVITY))
@@ -63,7 +63,7 @@ def _free_data(scene: Scene) -> tuple[Array, Array]:
 
 
 def weighs(scene: Scene, drive: Array, reduced: bool) -> Weighs:
-    """Return what the tool puts on the links, and the inertia that it adds if ``reduced``.
+    """Compute what the tool puts on the links, and the inertia that it adds if ``reduced``.
 
     The status of the poses is what the kernel of loads finds as well.
     """
@@ -84,7 +84,7 @@ def weighs(scene: Scene, drive: Array, reduced: bool) -> Weighs:
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Return the force at the working point and its share in the driving torque."""
+    """Force at the working point and its share in the driving torque."""
     speed, change = scene.crank()
     drive = np.stack(np.broadcast_arrays(np.zeros_like(speed), speed, change), axis=2)
     status, place = scene.status(), tool_place(scene.family)

@@ -9,11 +9,11 @@ from typing import TypeAlias
 import numpy as np
 
 from kernels import status as st
-from kernels.turn_series import turn_extremes
-from sweep.effects.base import Scene, Status, take_over
+from kernels.curves.turn_series import turn_extremes
+from sweep.effects.scene import Scene, Status, take_over
 from sweep.families.base import Array, Columns, Output
 from sweep.families.domain import Turn
-from sweep.quantities.reduction import REDUCTIONS
+from sweep.families.reduction import REDUCTIONS
 
 RESOLVED = 1e-9
 NONE: Mapping[str, Array] = MappingProxyType({})
@@ -23,7 +23,7 @@ Solver: TypeAlias = Callable[[Scene, Array, bool], tuple[dict[str, Array], Statu
 
 
 def backwards(phi: Array, *curves: Array) -> tuple[Array, list[Array]]:
-    """Return crank angles and curves on an even grid of a turn as a crank sees them that turns the other way.
+    """Crank angles and curves on an even grid of a turn as a crank sees them that turns the other way.
 
     A turn backwards in phi is one forwards in -phi, (n, N) curves are its samples at the same grid.  Done twice it
     gives what was there before.
@@ -52,9 +52,7 @@ def on_finer_grids(scene: Scene, phi: Array, grids: Sequence[int], solve: Solver
 
 
 def at_poses(scene: Scene, found: dict[str, Array], turn: Status, wanted: frozenset[str]) -> Columns:
-    """Return the wanted curves of a whole-turn effect at the scene's poses;
-    a turn that is not OK speaks for all of them.
-    """
+    """Curves of a whole-turn effect at the scene's poses; a turn that is not OK speaks for all of them."""
     status = scene.status()
     take_over(status, np.broadcast_to(turn[:, None], status.shape))
     columns: Columns = {name: found[name] for name in wanted}
@@ -71,8 +69,7 @@ def per_turn(
     known: Array | float = RESOLVED,
     known_of: Mapping[str, Array] = NONE,
 ) -> Columns:
-    """Return the wanted ones of ``numbers`` and of the reductions of ``curves``,
-    sampled on an odd grid in ``found``.
+    """Wanted ones of ``numbers``, and reductions of ``curves`` that are sampled on an odd grid in ``found``.
 
     ``limit`` is the share of a curve that the grid may miss, ``known`` the relative error of what it is made of,
     ``known_of`` that of single curves.
@@ -85,14 +82,14 @@ def per_turn(
 
 
 def reduction_outputs(outputs: Sequence[Output]) -> tuple[Output, ...]:
-    """Return the reductions over the turn of these pose outputs, as design outputs of the effect itself."""
+    """Reductions over the turn of these pose outputs, as design outputs of the effect itself."""
     return tuple(reduction.output(o, Turn()) for o in outputs for reduction in REDUCTIONS)
 
 
 def reductions(
     name: str, values: Array, status: Status, limit: float = RESOLVED, known: Array | float = RESOLVED
 ) -> Columns:
-    """Return all reductions of one curve from its samples on a uniform odd grid, (n, N), with their errors.
+    """Compute all reductions of one curve from its samples on a uniform odd grid, (n, N), with their errors.
 
     ``status`` (n,) becomes NOT_CONVERGED where the grid misses more than the share ``limit`` of the curve; what is not
     OK gives nan.
@@ -124,5 +121,5 @@ def reductions(
 
 
 def chosen(columns: Columns, wanted: frozenset[str], status: Status) -> Columns:
-    """Return the wanted outputs with their errors, and the status."""
+    """Wanted outputs with their errors, and the status."""
     return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}

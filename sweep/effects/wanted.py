@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from sweep.effects import NAMES, applicable
-from sweep.effects.placing import Placed
+from sweep.effects.base import Placed
 from sweep.families.base import Family, Output
-from sweep.families.members import Machine
-from sweep.quantities.names import stem
-from sweep.quantities.reduction import prefixes
+from sweep.families.machines import Machine
+from sweep.families.names import stem
+from sweep.families.reduction import prefixes
 
 AXES = ("_x", "_y", "_z")
 
 
 def expanded(family: Family, wanted: Iterable[str], *, poses: bool = False) -> list[str]:
-    """Return the wanted names, with the outputs of an effect in place of its name.
+    """Wanted names, with the outputs of an effect in place of its name.
 
     ``friction`` stands for the design outputs that the friction effect has of its own, and for the largest magnitude
     over the turn of each of its pose outputs; of some, such as a life, for the least value.  A vector counts by its
@@ -37,7 +37,7 @@ def expanded(family: Family, wanted: Iterable[str], *, poses: bool = False) -> l
 
 
 def names_of_effects(family: Family, poses: bool = False) -> dict[str, tuple[str, ...]]:
-    """Return the outputs that the name of each effect stands for, by the name."""
+    """List the outputs that the name of each effect stands for, by the name."""
     found: dict[str, tuple[str, ...]] = {}
     if isinstance(family, Machine):
         for m in family.members:

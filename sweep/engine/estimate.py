@@ -7,8 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sweep.chunks.cascade import CALL_SECONDS, levels
+from sweep.chunks.plan import choose_chunk_size, describe_columns, pilot, row_bytes
 from sweep.errors import BudgetError
-from sweep.quantities.names import is_error, is_flag
+from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
+from sweep.families.names import is_error, is_flag
+from sweep.reductions.steps import certified_names
+from sweep.study.load import study_from_data, with_accuracy
 from sweep.study.study import Study
 
 # With no survivor in the pilot, this share is assumed.
@@ -63,9 +68,6 @@ def estimate(study: Study, jobs: int, tell: Callable[[int, int], None] = lambda 
         assumed.  ``disk_bytes`` takes every result of a row as computed and free of repetition, which is too much where
         rows of infeasible designs are kept or symmetries make values repeat.
     """
-    from sweep.chunks.cascade import CALL_SECONDS, levels
-    from sweep.chunks.plan import choose_chunk_size, describe_columns, pilot, row_bytes
-
     found = pilot(study, tell)
     chunk_size = choose_chunk_size(study, found)
     designs = study.space.count
@@ -114,10 +116,6 @@ def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
     With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range
     of `sweep.summarise` is left out.
     """
-    from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
-    from sweep.reductions.steps import certified_names
-    from sweep.study.load import study_from_data, with_accuracy
-
     target, samples = study.accuracy.target, study.accuracy.samples
     if target is not None:
         digits = (("one digit less", 10.0 * target), ("one digit more", 0.1 * target))

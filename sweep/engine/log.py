@@ -8,12 +8,16 @@ import shlex
 import socket
 import subprocess
 import time
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from sweep.study import Study
+from sweep.dataset import store
+from sweep.errors import StoreError
+from sweep.study import Study
 
 LIBRARIES = ("linksweep", "numpy", "numba", "llvmlite", "scipy", "pandas", "pyarrow", "joblib")
 
@@ -48,3 +52,23 @@ def _commit() -> str | None:
     except (FileNotFoundError, subprocess.TimeoutExpired):
         return None
     return done.stdout.strip() or None if done.returncode == 0 else None
+
+
+@contextmanager
+def logged(folder: Path, said: str, jobs: int, backend: str) -> Iterator[list[str]]:
+    """Log the start of a run and its end: the error that ended it, or what the caller appends to the list."""
+    head = {"run": uuid.uuid4().hex[:12]}
+    begin = time.monotonic()
+    store.append_run(folder, head | {"event": "start", "command": said} | circumstances(jobs, backend))
+    words: list[str] = []
+    try:
+        yield words
+    except Exception as error:
+        if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
+            store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
+        raise
+    store.append_run(folder, head | _end(begin, "complete", "; ".join(words)))
+
+
+def _end(begin: float, outcome: str, text: str) -> dict[str, Any]:
+    return {"event": "end", "outcome": outcome, "seconds": round(time.monotonic() - begin, 3), "text": text}

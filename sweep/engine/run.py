@@ -3,34 +3,24 @@
 from __future__ import annotations
 
 import math
-import signal
 import time
-import uuid
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
+from sweep.chunks.chunk import warm
+from sweep.chunks.plan import Plan
 from sweep.dataset import store
-from sweep.dataset.tables import TABLES, altered, digests, metadata
-from sweep.engine.ahead import compiling_ahead
-from sweep.engine.log import circumstances, command
+from sweep.engine.estimate import check_budget, estimate
+from sweep.engine.log import command, logged
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
-from sweep.engine.proving import prove, refuse_unprovable
-from sweep.errors import Interrupted, SearchCutShort, StoreError, TimeUsedUp, WorkerDied
-from sweep.jobs.executors import at_work, executor, for_tasks
+from sweep.engine.searches import refuse_unprovable, search
+from sweep.engine.worker import ChunkTask, Done
+from sweep.errors import Interrupted, StoreError, TimeUsedUp, WorkerDied
+from sweep.jobs.executors import Executor, at_work, executor, for_tasks
 from sweep.jobs.progress import Phases, Progress
 from sweep.jobs.signals import Stop, stop_on_signal
-
-if TYPE_CHECKING:
-    from sweep.chunks.plan import Plan
-    from sweep.engine.worker import Done
-    from sweep.jobs.flow import Executor
-    from sweep.study import Study
-
-# What is written together with the optimum.
-OF_OPTIMUM = (store.CURVES, store.SENSITIVITY, store.TOLERANCE)
+from sweep.study import Study
+from sweep.study.load import load_study, with_accuracy
 
 # So often chunks are computed that somebody removes or damages while the run goes on.
 ROUNDS = 3
@@ -89,64 +79,30 @@ def run(
     >>> len(sweep.load(folder))
     4
     """
-    from sweep.chunks.chunk import warm
-
     place = executor(backend, jobs)  # refuses what there is not
     model = _model(study, smoke, accuracy, certify)
     refuse_unprovable(model)
-    with compiling_ahead(model, jobs):
-        with Phases(progress) as phases:
-            warm(model, lambda done, total: phases.say("compiling", done, total))
-            _check_budget(model, jobs, force, lambda done, total: phases.say("planning", done, total))
-        default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
-        folder = default if out is None else store.located(out)
-        refuse_or_clear_older(folder, force)
-        said = command(model, folder, smoke, accuracy, certify)
-        with store.locked(folder), _logged(folder, said, jobs, backend) as end, at_work(place):
-            computed = _sweep(model, folder, jobs, place, force, progress)
-            if not is_part(folder):
-                _search(model, folder, jobs, backend, progress)
-            end.append(f"{computed} chunks computed")
+    with Phases(progress) as phases:
+        warm(model, lambda done, total: phases.say("compiling", done, total))
+        _check_budget(model, jobs, force, lambda done, total: phases.say("planning", done, total))
+    default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
+    folder = default if out is None else store.located(out)
+    refuse_or_clear_older(folder, force)
+    said = command(model, folder, smoke, accuracy, certify)
+    with store.locked(folder), logged(folder, said, jobs, backend) as end, at_work(place):
+        computed = _sweep(model, folder, jobs, place, force, progress)
+        if not is_part(folder):
+            search(model, folder, jobs, backend, progress)
+        end.append(f"{computed} chunks computed")
     return folder
 
 
-def _search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> None:
-    """Compute optimum, proof and front, as far as the study asks for them."""
-    if study.optimise is not None:
-        _optimise(replace(study, pareto=None), folder, jobs, progress)
-    proof_cut_short = prove(study, folder, jobs, backend, progress)
-    _front(study, folder, jobs, progress)
-    _raise_if_cut_short(folder)
-    if proof_cut_short:
-        raise SearchCutShort(folder, f"{folder}: optimise.prove.time ran out; run again, and the proof goes on")
-
-
-@contextmanager
-def _logged(folder: Path, said: str, jobs: int, backend: str) -> Iterator[list[str]]:
-    """Log the start of a run and its end: the error that ended it, or what the caller appends to the list."""
-    head = {"run": uuid.uuid4().hex[:12]}
-    begin = time.monotonic()
-    store.append_run(folder, head | {"event": "start", "command": said} | circumstances(jobs, backend))
-    words: list[str] = []
-    try:
-        yield words
-    except Exception as error:
-        if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
-            store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
-        raise
-    store.append_run(folder, head | _end(begin, "complete", "; ".join(words)))
-
-
 def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certify: bool | None) -> Study:
-    from sweep.study.load import load_study, with_accuracy
-
     model = load_study(study, smoke=smoke) if isinstance(study, (str, Path)) else study
     return model if accuracy is None and certify is None else with_accuracy(model, accuracy, certify)
 
 
 def _check_budget(study: Study, jobs: int, force: bool, tell: Callable[[int, int], None]) -> None:
-    from sweep.engine.estimate import check_budget, estimate
-
     if not force:
         check_budget(study, estimate(study, jobs, tell))
 
@@ -223,9 +179,6 @@ def _results(
     allowed: float,
 ) -> Iterator[Done]:
     """Yield finished chunks in the order they become ready; no new one is begun when the allowed time [s] is over."""
-    from sweep.chunks.chunk import warm
-    from sweep.engine.worker import ChunkTask
-
     with stop.raising():
         warm(study)  # one process compiles, the others load the machine code
     deadline = time.monotonic() + allowed  # compiling does not count, so that every run gets on
@@ -242,78 +195,3 @@ def _raise_if_signalled(stop: Stop, folder: Path) -> None:
     if stop.signal_number is not None:
         text = f"{folder}: stopped by signal {stop.signal_number}; finished chunks are kept, run again to continue"
         raise Interrupted(stop.signal_number, text)
-
-
-def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
-    """Return what an optimum or a front depends on:
-    the chunks by their plan's note, the study, the optimiser's sources.
-    """
-    from sweep.chunks.plan import optimiser_hash
-
-    return f"{note['identity']}-{study.fingerprint[:12]}-{optimiser_hash()}"
-
-
-def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
-    """Run the optimiser unless its result for these very sources is there already, whole."""
-    from sweep.optimise import optimise_study, read_survey
-
-    note = store.read_plan(folder) or {}
-    key = optimum_key(study, note)
-    place = store.beside(folder)
-    found = read_survey(place / store.OPTIMUM)
-    noted = [name for name in OF_OPTIMUM if name in (note.get(TABLES) or {})]
-    whole = not altered(place, note, [store.OPTIMUM, *noted])
-    if note.get("optimised") == key and whole and (found is None or found.ended != "time"):
-        return
-    assert study.optimise is not None
-    store.write_plan(folder, note | {"optimised": None})
-    with stop_on_signal() as stop, Phases(progress) as phases:
-        phases.say("optimum", 0, study.optimise.starts, "starts")
-        try:
-            optimise_study(study, folder, lambda: bool(stop), jobs, phases.say)
-        except KeyboardInterrupt:
-            number = stop.signal_number or signal.SIGINT
-            text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
-            raise Interrupted(number, text) from None
-    store.write_plan(folder, note | {"optimised": key, TABLES: digests(place, [store.OPTIMUM, *OF_OPTIMUM])})
-
-
-def _raise_if_cut_short(folder: Path) -> None:
-    """Raise where the optimum stands there but the emergency brake has kept some starts from being searched."""
-    from sweep.optimise import read_survey
-
-    found = read_survey(store.beside(folder) / store.OPTIMUM)
-    if found is not None and found.ended == "time":
-        text = f"{folder}: {found.warnings[0]} searched; run again with a greater optimise.time_budget for all of them"
-        raise SearchCutShort(folder, text)
-
-
-def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
-    """Search the study's front, from where an earlier run of these very sources left it."""
-    if study.pareto is None:
-        (store.beside(folder) / store.PARETO).unlink(missing_ok=True)
-        return
-    from sweep.optimise import front_study
-
-    note = store.read_plan(folder) or {}
-    key = optimum_key(study, note)
-    place, known = store.beside(folder), dict(note.get(TABLES) or {})
-    damaged = altered(place, note, [store.PARETO])
-    if damaged:
-        (place / store.PARETO).unlink(missing_ok=True)
-    if store.PARETO in known and (damaged or metadata(place / store.PARETO).get(b"key") != key.encode()):
-        del known[store.PARETO]  # of a front that is over: the new one grows step by step
-        store.write_plan(folder, note | {TABLES: known})
-    with stop_on_signal() as stop, Phases(progress) as phases:
-        try:
-            front_study(study, folder, key, lambda: bool(stop), jobs, phases.say)
-        except KeyboardInterrupt:
-            number = stop.signal_number or signal.SIGINT
-            text = f"{folder}: stopped by signal {number} while searching the front; run again to continue"
-            raise Interrupted(number, text) from None
-    if digests(place, [store.PARETO]).items() - known.items():
-        store.write_plan(folder, note | {TABLES: known | digests(place, [store.PARETO])})
-
-
-def _end(begin: float, outcome: str, text: str) -> dict[str, Any]:
-    return {"event": "end", "outcome": outcome, "seconds": round(time.monotonic() - begin, 3), "text": text}

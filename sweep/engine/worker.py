@@ -6,18 +6,15 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sweep.chunks import plan as plans
 from sweep.chunks.cascade import Dropped
 from sweep.chunks.chunk import compute_chunk
 from sweep.dataset.store import parts, write_chunk
 from sweep.errors import InputError, LinksweepError, ProgramFault, StoreError
-
-if TYPE_CHECKING:
-    from sweep.chunks.plan import Plan
-    from sweep.families.base import Columns
-    from sweep.study import Study
+from sweep.families.base import Columns
+from sweep.study import Study
 
 
 @dataclass(frozen=True)
@@ -41,7 +38,7 @@ class ChunkTask:
     """
 
     study: Study
-    plan: Plan
+    plan: plans.Plan
     folder: Path
     known: Path | None = None
 

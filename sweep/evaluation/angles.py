@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kernels.types import TWO_PI
 from sweep.errors import InputError
 from sweep.evaluation.tables import Parametrised, numbers
 from sweep.families.base import Array
-from sweep.families.domain import TWO_PI, Domain, reads_as_degrees
-from sweep.quantities.names import stem
+from sweep.families.domain import Domain, reads_as_degrees
+from sweep.families.names import stem
 
 if TYPE_CHECKING:
     from sweep.evaluation.tables import Table

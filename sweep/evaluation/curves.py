@@ -8,9 +8,9 @@ from typing import NamedTuple
 from sweep.families.base import Family
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.chain import Chain
-from sweep.families.members import Machine
-from sweep.families.placing import AXES
-from sweep.quantities.names import parts
+from sweep.families.machines import Machine
+from sweep.families.names import parts
+from sweep.families.parts import AXES
 
 _OF_FAMILY = re.compile(r"([xyz])_([a-z][a-z_]*)")
 _OF_MACHINE = re.compile(r"([a-z][a-z_0-9]*)_([xyz])")

@@ -19,8 +19,8 @@ from sweep.families import family as find_family
 from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import Link, OutputLink, Points, Skeleton
 from sweep.families.chain import Chain, drive, driving_names, stages_of
-from sweep.families.located import TIP
-from sweep.families.members import Machine, Member
+from sweep.families.machines import Machine
+from sweep.families.parts import TIP, Member
 
 if TYPE_CHECKING:
     import pandas as pd

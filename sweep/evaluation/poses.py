@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kernels.types import TWO_PI
 from sweep.effects import elsewhere, extended, input_names, offered
 from sweep.effects.wanted import expanded
 from sweep.errors import InputError, nearest
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.statuses import explained, meanings
-from sweep.evaluation.tables import design_matrix, kept_columns, numbers, wanted_names
+from sweep.evaluation.tables import design_matrix, kept_columns, numbers, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Columns, Family
-from sweep.families.domain import TWO_PI, March
-from sweep.reductions.catalogue import output_names
+from sweep.families.domain import March
+from sweep.quantities.resolve import output_names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,12 +87,13 @@ def evaluate(
     names = expanded(bare, wanted_names(want, f"pose outputs of {bare.name}"), poses=True)
     mechanism = extended(bare, names, curves_of(bare, loads))
     wanted = pose_wants(mechanism, names)
-    table = in_radians(mechanism, given := table, angles, input_names(bare), mechanism.domain)
+    given = table
+    table = in_radians(mechanism, plain_columns(table), angles, input_names(bare), mechanism.domain)
     phi = None if phi is None else grid_in_radians(mechanism.domain.name, mechanism.domain.unit, phi, angles)
     variable = mechanism.domain.name
     extra = () if phi is not None else (variable,)
     matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))
-    index = table.index if isinstance(table, pd.DataFrame) else None
+    index = given.index if isinstance(given, pd.DataFrame) else None
     if phi is None:
         _check_column(mechanism, extras)
         at, head, repeats = np.ascontiguousarray(extras[variable])[:, None], {}, 1

@@ -1,13 +1,26 @@
-"""What a route is: some design outputs that are computed together, by whatever computes them."""
+"""What a route is: some design outputs that are computed together, by a family's own step or a general reduction."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from numbers import Real
 from typing import Literal, TypeAlias
 
-from sweep.families.base import Accuracy, Array, Columns, Work
-from sweep.reductions.turn import Group
+import numpy as np
+
+from sweep.errors import InputError
+from sweep.families.base import Accuracy, Array, Columns, Family, Step, Work
+from sweep.families.names import at_stage, error_of
+from sweep.families.parts import Stage
+from sweep.quantities.kinds import Group, Reduced
+from sweep.quantities.resolve import find
+from sweep.reductions.events import event_outputs
+from sweep.reductions.means import mean_squares
+from sweep.reductions.rounding import sharpen_maxima
+from sweep.reductions.steps import group_ns, group_order, step_ns, steps_of
+from sweep.reductions.turn import limits_and_reductions, margin_group
 
 Part: TypeAlias = tuple[float, float] | None
 """A window of the stroke as two fractions, or none."""
@@ -36,3 +49,76 @@ class Route:
     general: Group | Literal[""] = ""
     order: tuple[Work, int] = (Work.SEARCH, 0)
     columns: int | None = None
+
+
+def check_window(window: tuple[float, float] | None) -> None:
+    """Refuse a window that is no part of the stroke."""
+    if window is None:
+        return
+    two = isinstance(window, Sequence) and len(window) == 2 and all(isinstance(x, Real) for x in window)
+    if not (two and 0.0 <= window[0] < window[1] <= 1.0):
+        raise InputError("window", window, "two fractions of the stroke, 0 <= from < to <= 1", "design outputs")
+
+
+def own_route(family: Family, step: Step, stage: Stage | None, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
+    """Make the route by a family's own step, or by one of a chain's first stage."""
+    name = f"stage {stage.number}: {step.name}" if stage else step.name
+    owner = stage.family if stage else family
+    place = [own.name for own in steps_of(owner)].index(step.name)
+    run, cost = partial(_run_step, family, step, stage, outputs), step_ns(owner, step, accuracy)
+    return Route(name, outputs, cost, run, order=(step.work, place), columns=stage.columns.stop if stage else None)
+
+
+def general_route(family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
+    """Make the route by a general reduction over poses."""
+    run = partial(_run_general, family, general, outputs)
+    cost = group_ns(family, general, outputs, accuracy)
+    order = group_order(family, general, outputs)
+    return Route(f"{general} {effect}".rstrip(), outputs, cost, run, general, order)
+
+
+def _run_general(
+    family: Family, general: Group, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy, window: Part
+) -> Columns:
+    match general:
+        case "margin":
+            return margin_group(family, designs, outputs, accuracy)
+        case "means":
+            return mean_squares(family, designs, outputs, accuracy)
+        case "events":
+            return event_outputs(family, designs, outputs, accuracy)
+        case _:
+            return limits_and_reductions(family, designs, outputs, accuracy, window)
+
+
+def _run_step(
+    family: Family, step: Step, stage: Stage | None, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy,
+    window: Part,
+) -> Columns:  # fmt: skip
+    own = {name: at_stage(name, str(stage.number)) if stage else name for name in outputs}
+    part, mechanism = (stage.designs(designs), stage.family) if stage else (designs, family)
+    found = step.run(part, frozenset(own.values()), accuracy)
+    if accuracy.target is not None:
+        for plain in own.values():
+            # A step that serves a target promises it; one that estimates its error says so itself.
+            found.setdefault(error_of(plain), accuracy.target * np.abs(np.asarray(found[plain], np.float64)))
+            # The poses of an effect come from the same solution of the whole turn: they are wrong alike.
+            if not accuracy.certify and step.work is not Work.EFFECT:
+                _sharpen(mechanism, step, part, plain, found, accuracy.target)
+    return {"status": found["status"]} | {
+        key: found[own_key]
+        for name, plain in own.items()
+        for key, own_key in ((name, plain), (error_of(name), error_of(plain)))
+        if own_key in found
+    }
+
+
+def _sharpen(family: Family, step: Step, designs: Array, name: str, columns: Columns, target: float) -> None:
+    """Take a step's maxima that rounding left less accurate than was asked from the family's precise poses."""
+    if family.precise_poses is None:
+        return
+    place = f"{family.domain.name}_{name}"
+    located = any(o.name == place for o in step.provides)
+    asked = find(family, name)
+    if located and isinstance(asked, Reduced) and asked.reduction.modes == (0,):
+        sharpen_maxima(family, step, designs, asked.of, name, columns, target)

@@ -1,38 +1,124 @@
-"""The routes to design outputs: a family's own steps, effects, and general reductions, all run in the same way."""
+"""The routes to design outputs, chosen and run: own steps, effects, general reductions, members, outputs of others.
+
+An output made of others, and one of a member of a machine, asks `design_outputs` for those in turn.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
+from kernels import status as st
 from sweep import costs
 from sweep.errors import InputError
-from sweep.evaluation.boxes import box_route
-from sweep.evaluation.members import machine_routes
-from sweep.evaluation.negatives import negative_route
-from sweep.evaluation.route import Part, Route
-from sweep.families.base import Accuracy, Array, Columns, Family, Step, Work
-from sweep.families.chain import Stage
-from sweep.families.derived import of_family
-from sweep.families.domain import March
-from sweep.families.members import Machine
-from sweep.quantities.names import at_stage, error_of, without_minus
-from sweep.quantities.reduction import reduction_of
-from sweep.reductions.box import box
-from sweep.reductions.catalogue import output, quantity
-from sweep.reductions.events import event_outputs
-from sweep.reductions.means import mean_squares
-from sweep.reductions.precise import sharpen_maxima
-from sweep.reductions.steps import applying_step, step_ns, steps_of
-from sweep.reductions.turn import Group, limits_and_reductions, margin_group
-from sweep.reductions.work import group_ns, group_order
+from sweep.evaluation import composed
+from sweep.evaluation.route import Part, Route, check_window, general_route, own_route
+from sweep.evaluation.statuses import explained
+from sweep.families.base import Accuracy, Array, Columns, Family, Step, Work, of_family
+from sweep.families.capabilities import Assembly
+from sweep.families.domain import Interval, March
+from sweep.families.machines import Machine
+from sweep.families.names import error_of, is_place
+from sweep.families.parts import Member, Stage
+from sweep.families.relations import Reading
+from sweep.quantities.kinds import Extent, Group, Margin, Negative, Quantity, TimingOf, group_of
+from sweep.quantities.resolve import resolve
+from sweep.reductions.margins import NAMES as MARGINS
+from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
+from sweep.reductions.sampling import TWO_PI, Index, on_closed_turn
+from sweep.reductions.steps import applying_step, group_ns
+from sweep.reductions.turn import margin_group
+
+# With these some outputs are missing or rough, the others are worth having.
+PARTIAL = (
+    st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
+    st.NO_EVENT,
+)  # fmt: skip
+GOES_ON = np.isin(np.arange(256), PARTIAL)
+
+Compose: TypeAlias = Callable[[Array, Columns, Accuracy], Columns]
+"""What makes an output of others: from designs (n, P), and the columns of those others."""
+
+
+def design_outputs(
+    family: Family,
+    designs: Array,
+    wanted: Sequence[str],
+    accuracy: Accuracy,
+    window: Part = None,
+) -> Columns:
+    """Compute design outputs of a design matrix, cheapest first; what does not turn is left out of the dear ones.
+
+    Parameters
+    ----------
+    family : any family or chain
+    designs : (n, P) matrix with the columns of ``family.parameters``
+    wanted : names of design outputs
+    accuracy : dense grid or refined
+    window : see `summarise`
+
+    Returns
+    -------
+    Columns
+        each wanted name (n,), its ``err_`` where ``accuracy.target`` is set, and ``status``: of several causes the one
+        met first
+
+    Raises
+    ------
+    InputError
+        for an unknown name, or a window that is no part of the stroke.
+    """
+    check_window(window)
+    family = on_closed_turn(family)
+    designs, n = np.ascontiguousarray(designs), len(designs)
+    status = np.zeros(n, np.uint8)
+    columns: Columns = {}
+    ways = routes(family, wanted, accuracy)
+    kinds = {route.general for route in ways if route.general}
+    if accuracy.samples is not None and kinds and "margin" not in kinds and margin_suffixes(family):
+        # Refinement meets a dead point between samples, a plain grid does not.
+        status = margin_group(family, designs, (), accuracy)["status"].astype(np.uint8)
+    for route in ways:
+        assert route.run is not None
+        # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
+        alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None is all of them
+        of_these = designs if alive is None or alive.size == n else designs[alive]
+        with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+            found = route.run(of_these, accuracy, window)
+        for name in route.outputs:
+            for key in (name, error_of(name)) if accuracy.target is not None else (name,):
+                columns[key] = _spread(found[key], alive, n)
+        now = found["status"].astype(np.uint8)
+        if alive is None:
+            status = now
+        else:
+            status[alive] = np.where(status[alive] == st.OK, now, status[alive])
+    if isinstance(family.domain, Interval):
+        status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
+    chosen = {name: columns[name] for name in dict.fromkeys(with_errors(wanted, accuracy))}
+    return explained(chosen | {"status": status}, dict.fromkeys(wanted))
+
+
+def _spread(values: NDArray[np.generic], rows: Index | None, n: int) -> NDArray[np.generic]:
+    """Lay values of some rows, or of all, out as a whole column: False or nan in the others."""
+    if rows is None or rows.size == n:
+        return values
+    whole: NDArray[np.generic] = np.zeros(n, np.bool_) if values.dtype == np.bool_ else np.full(n, np.nan)
+    whole[rows] = values
+    return whole
+
+
+def with_errors(wanted: Sequence[str], accuracy: Accuracy) -> list[str]:
+    """List the wanted names, and behind them those of their errors where a target is set."""
+    return [*wanted, *(error_of(name) for name in wanted if accuracy.target is not None)]
 
 
 def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
-    """Return what will be computed and how, in order; each route's outputs can be asked of `design_outputs` alone.
+    """Choose what will be computed and how, in order; each route's outputs can be asked of `design_outputs` alone.
 
     Raises
     ------
@@ -47,109 +133,162 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[R
 
 @of_family
 def _known(family: Family) -> dict[tuple[tuple[str, ...], Accuracy], tuple[Any, tuple[Route, ...]]]:
-    """Return the memory of `routes`, with the prices they have: it is asked the same for every chunk of a sweep."""
+    """Remember routes with the prices they have: they are asked the same for every chunk of a sweep."""
     return {}
 
 
 def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
-    _check_domain(family, accuracy)
-    found = [negative_route(family, name, accuracy) for name in dict.fromkeys(wanted) if without_minus(name)]
-    wanted = [name for name in wanted if not without_minus(name)]
-    if isinstance(family, Machine):
-        of_members, wanted = machine_routes(family, wanted, accuracy)
-        found += of_members
-    steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
-    groups: dict[tuple[Group, str], list[str]] = {}
-    asked = {name: (applying_step(family, name, accuracy), quantity(family, name)) for name in dict.fromkeys(wanted)}
-    # The margin of a whole chain asks all stages: a first one judged by itself would take its designs from the others.
-    together = any(
-        own is None and one is not None and one.route == "margin" and not one.stage for own, one in asked.values()
-    )
-    for name, (own, one) in asked.items():
-        extent = box(family, name)
-        if extent is not None:
-            found.append(box_route(family, extent, accuracy))
-            continue
-        if own is not None and not (together and one is not None and one.route == "margin"):
-            step, stage = own
-            steps.setdefault((step.name, stage.number if stage else 0), (step, stage, []))[2].append(name)
-        elif one is not None:
-            about_position: Group = "limits" if one.of in family.positions else "reductions"
-            general: Group = {"margin": "margin", "mean": "means", "event": "events"}.get(one.route, about_position)  # type: ignore[assignment]
-            # Each effect by itself: one that jams or leaves its range takes nothing from the others.
-            effect = family.dear.get(one.of, ("", 0.0))[0]
-            groups.setdefault((general, effect), []).append(name)
-        else:
-            output(family, name)  # unknown names end here, with the nearest known one
-            allowed = "another accuracy: this output is only computed " + (
-                "with accuracy=, not on samples" if accuracy.samples is not None else "on samples, not with accuracy="
-            )
-            raise InputError("output", name, allowed, f"design outputs of {family.name}")
-    found += [_own(family, step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
-    found += [_general(family, *key, tuple(names), accuracy) for key, names in groups.items()]
-    return tuple(sorted(found, key=lambda route: (*route.order, route.name)))
-
-
-def _check_domain(family: Family, accuracy: Accuracy) -> None:
     if isinstance(family.domain, March) and accuracy.target is not None:
         allowed = "samples=: a pose depends on those before it, so values exist on the grid that is marched only"
         raise InputError("accuracy", accuracy.target, allowed, f"design outputs of {family.name}")
+    asked = {name: resolve(family, name) for name in dict.fromkeys(wanted)}
+    found: list[Route] = []
+    if isinstance(family, Machine):
+        found, asked = _of_members(family, asked, accuracy)
+    own = {name: applying_step(family, name, accuracy) for name in asked}
+    # The margin of a whole chain asks all stages: a first one judged by itself would take its designs from the others.
+    together = any(own[name] is None and isinstance(one, Margin) and not one.stage for name, one in asked.items())
+    steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
+    groups: dict[tuple[Group, str], list[str]] = {}
+    for name, one in asked.items():
+        step, group = own[name], group_of(family, one)
+        if isinstance(one, Negative | Extent | TimingOf):
+            found.append(_composed(family, one, accuracy))
+        elif step is not None and not (together and group == "margin"):
+            number = step[1].number if step[1] else 0
+            steps.setdefault((step[0].name, number), (*step, []))[2].append(name)
+        elif group is not None:
+            # Each effect by itself: one that jams or leaves its range takes nothing from the others.
+            effect = family.dear.get(one.of, ("", 0.0))[0]
+            groups.setdefault((group, effect), []).append(name)
+        else:
+            raise _unserved(family, name, accuracy)
+    found += [own_route(family, step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
+    found += [general_route(family, *key, tuple(names), accuracy) for key, names in groups.items()]
+    return tuple(sorted(found, key=lambda route: (*route.order, route.name)))
 
 
-def _own(family: Family, step: Step, stage: Stage | None, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
-    name = f"stage {stage.number}: {step.name}" if stage else step.name
-    owner = stage.family if stage else family
-    place = [own.name for own in steps_of(owner)].index(step.name)
-    run, cost = partial(_run_step, family, step, stage, outputs), step_ns(owner, step, accuracy)
-    return Route(name, outputs, cost, run, order=(step.work, place), columns=stage.columns.stop if stage else None)
+def _unserved(family: Family, name: str, accuracy: Accuracy) -> InputError:
+    if isinstance(family, Machine):
+        allowed = "an output made of poses: this member's crank does not turn with the main shaft"
+    elif accuracy.samples is not None:
+        allowed = "another accuracy: this output is only computed with accuracy=, not on samples"
+    else:
+        allowed = "another accuracy: this output is only computed on samples, not with accuracy="
+    return InputError("output", name, allowed, f"design outputs of {family.name}")
 
 
-def _general(family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
-    run = partial(_run_general, family, general, outputs)
-    cost = group_ns(family, general, outputs, accuracy)
-    order = group_order(family, general, outputs)
-    return Route(f"{general} {effect}".rstrip(), outputs, cost, run, general, order)
+def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Accuracy) -> Route:
+    """Make the route to an output made of others; it costs what those do."""
+    name, order = asked.output.name, (Work.SEARCH, 0)
+    of: Sequence[str]
+    compose: Compose
+    match asked:
+        case Negative(inner=inner):
+            of = (inner.output.name,)
+            title, compose = f"negative of {of[0]}", partial(composed.negative, name, of[0])
+        case Extent(box=box):
+            of, title, compose = box.asked, f"box {name}", partial(composed.extent, box)
+        case TimingOf(timing=timing):
+            of = timing.places
+            order = max(route.order for route in routes(family, of, accuracy))
+            if isinstance(timing, Reading):
+                assert isinstance(family, Machine)
+                title, compose = f"value {name}", partial(composed.value_at, family, timing)
+            else:
+                title, compose = f"timing {name}", partial(composed.difference, timing)
+    cost = sum(route.ns_per_design for route in routes(family, of, accuracy))
+    whole = isinstance(asked, Extent)  # joints reach as far as they do, whatever window counts for deviations
+    return Route(title, (name,), cost, partial(_run_composed, family, of, compose, whole), order=order)
 
 
-def _run_general(
-    family: Family, general: Group, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy, window: Part
+def _run_composed(
+    family: Family, of: Sequence[str], compose: Compose, whole: bool, designs: Array, accuracy: Accuracy, window: Part
 ) -> Columns:
-    if general == "margin":
-        return margin_group(family, designs, outputs, accuracy)
-    if general == "means":
-        return mean_squares(family, designs, outputs, accuracy)
-    if general == "events":
-        return event_outputs(family, designs, outputs, accuracy)
-    return limits_and_reductions(family, designs, outputs, accuracy, window)
+    return compose(designs, design_outputs(family, designs, of, accuracy, None if whole else window), accuracy)
 
 
-def _run_step(
-    family: Family, step: Step, stage: Stage | None, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy,
-    window: Part,
-) -> Columns:  # fmt: skip
-    own = {name: at_stage(name, str(stage.number)) if stage else name for name in outputs}
-    part, mechanism = (stage.designs(designs), stage.family) if stage else (designs, family)
-    found = step.run(part, frozenset(own.values()), accuracy)
-    if accuracy.target is not None:
-        for plain in own.values():
-            # A step that serves a target promises it; one that estimates its error says so itself.
-            found.setdefault(error_of(plain), accuracy.target * np.abs(np.asarray(found[plain], np.float64)))
-            # The poses of an effect come from the same solution of the whole turn: they are wrong alike.
-            if not accuracy.certify and step.work is not Work.EFFECT:
-                _sharpen(mechanism, step, part, plain, found, accuracy.target)
-    return {"status": found["status"]} | {
-        key: found[own_key]
-        for name, plain in own.items()
-        for key, own_key in ((name, plain), (error_of(name), error_of(plain)))
-        if own_key in found
-    }
+def _of_members(
+    machine: Machine, asked: dict[str, Quantity], accuracy: Accuracy
+) -> tuple[list[Route], dict[str, Quantity]]:
+    """Make the routes of members by themselves and of the machine's margins, and keep what is left.
+
+    A member that the main shaft drives turn by turn is asked by itself, by its own exact routes; only what depends on
+    several members, or on a gear between, is searched for on the poses of the whole machine.
+    """
+    left: dict[str, Quantity] = {}
+    own: dict[str, list[str]] = {m.name: [] for m in machine.members}
+    margin: list[str] = []
+    for name, one in asked.items():
+        member = machine.split(name)
+        if member is not None and is_alone(member[0]) and not _is_of_point(member[0], one):
+            own[member[0].name].append(member[1])
+        elif isinstance(one, Margin) and member is None:
+            margin.append(name)
+        else:
+            left[name] = one
+    found: list[Route] = []
+    for m in machine.members:
+        for inner in routes(m.family, own[m.name], accuracy):
+            names = tuple(f"{m.name}.{name}" for name in inner.outputs)
+            run = partial(_of_member, m, inner)
+            found.append(Route(f"{m.name}: {inner.name}", names, inner.ns_per_design, run, order=inner.order))
+    if margin:
+        cost = sum(group_ns(m.family, "margin", (), accuracy) for m in machine.members)
+        found.append(Route("margins", tuple(margin), cost, partial(_margins, machine), order=(Work.QUICK, 0)))
+    return found, left
 
 
-def _sharpen(family: Family, step: Step, designs: Array, name: str, columns: Columns, target: float) -> None:
-    """Take a step's maxima that rounding left less accurate than was asked from the family's precise poses."""
-    place = f"{family.domain.name}_{name}"
-    located = any(o.name == place for o in step.provides)
-    found = reduction_of(family, name)
-    if found is None or found[0].modes != (0,) or not located or family.precise_poses is None:
-        return
-    sharpen_maxima(family, step, designs, found[1].name, name, columns, target)
+def is_alone(member: Member) -> bool:
+    """Tell whether the member turns with the main shaft, so that its extrema over a turn are those of its family."""
+    return member.driver is None and member.ratio == 1
+
+
+def _is_of_point(member: Member, asked: Quantity) -> bool:
+    """Tell whether a quantity is about a point in the machine's frame, which the member alone does not know."""
+    return bool(asked.of) and member.own(asked.of) not in member.family.pose_output
+
+
+def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+    """Run a member's own route under the machine's names; once where no design varies the member."""
+    own = m.designs(designs)
+    once = len(own) > 1 and bool((own[1:] == own[0]).all())
+    found = design_outputs(m.family, own[:1] if once else own, inner.outputs, accuracy, window)
+    phase = designs[:, m.columns.stop]
+    columns: Columns = {"status": found["status"]}
+    for name in inner.outputs:
+        dotted = f"{m.name}.{name}"
+        columns[dotted] = found[name]
+        if accuracy.target is not None:
+            columns[error_of(dotted)] = found[error_of(name)]
+    if once:
+        columns = {name: np.repeat(values, len(own)) for name, values in columns.items()}
+    for name in filter(is_place, inner.outputs):  # from the member's crank to the main shaft
+        at_crank = np.asarray(columns[f"{m.name}.{name}"], np.float64)
+        columns[f"{m.name}.{name}"] = np.mod(at_crank - phase, TWO_PI)
+    return columns
+
+
+def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+    """Find the margin of the weakest member; one that another drives has to assemble at the angles that it gets."""
+    status = np.zeros(len(designs), np.uint8)
+    columns: Columns = {}
+    suffixes: list[str] = []
+    for m in machine.members:
+        loops = tuple(loop.stage for loop in machine.every(Assembly) if m.own(loop.stage) or loop.stage == f"{m.name}.")
+        if not loops:
+            continue
+        if is_alone(m):
+            found = design_outputs(m.family, m.designs(designs), MARGINS, accuracy, None)
+            now, none = found["status"], np.zeros(len(designs))
+            for name in MARGINS:
+                columns[f"{name}{m.name}"] = found[name]
+                columns[f"{error_of(name)}{m.name}"] = found.get(error_of(name), none)
+            suffixes.append(m.name)
+        else:
+            found = margins(machine, designs, loops, accuracy)
+            now = found.pop("status")
+            columns |= found
+            suffixes += loops
+        status = np.where(status == st.OK, now, status).astype(np.uint8)
+    return with_transmission(combined(columns, tuple(suffixes)), ("",)) | {"status": status}

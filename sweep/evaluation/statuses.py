@@ -8,7 +8,7 @@ import numpy as np
 
 from kernels.status import INVALID_INPUT, MEANING, OK
 from sweep.families.base import Columns
-from sweep.quantities.names import error_of
+from sweep.families.names import error_of
 
 
 def meaning(code: int) -> str:

@@ -7,29 +7,23 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kernels import status as st
 from sweep.effects import extended, input_names
 from sweep.effects.wanted import expanded
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians
 from sweep.evaluation.loads import Loads, curves_of
-from sweep.evaluation.route import Part, Route
-from sweep.evaluation.routes import routes
-from sweep.evaluation.statuses import explained, meanings
-from sweep.evaluation.tables import design_matrix, kept_columns, wanted_names
+from sweep.evaluation.route import Route
+from sweep.evaluation.routes import design_outputs, routes, with_errors
+from sweep.evaluation.statuses import meanings
+from sweep.evaluation.tables import design_matrix, kept_columns, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.families.domain import Domain, Interval, March
-from sweep.quantities.names import error_of
-from sweep.reductions.catalogue import check_certifiable, output, output_names
-from sweep.reductions.closing import on_closed_turn
-from sweep.reductions.margins import margin_suffixes
-from sweep.reductions.sampling import Index
-from sweep.reductions.steps import proofs
-from sweep.reductions.turn import margin_group
+from sweep.families.base import Accuracy
+from sweep.families.domain import Domain, March
+from sweep.families.names import error_of
+from sweep.quantities.resolve import output, output_names
+from sweep.reductions.steps import check_certifiable, proofs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,13 +37,6 @@ DEFAULT_SAMPLES = 720  # of a march, which no accuracy can be asked of
 FINEST_TARGET = 1e-14
 MOST_SAMPLES = 2**20
 FEWEST_SAMPLES = 8
-
-# With these some outputs are missing or rough, the others are worth having.
-PARTIAL = (
-    st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
-    st.NO_EVENT,
-)  # fmt: skip
-GOES_ON = np.isin(np.arange(256), PARTIAL)
 
 
 def summarise(
@@ -127,89 +114,17 @@ def summarise(
     if certify:
         check_certifiable(mechanism, wanted, chosen, window is not None)
     given = table
-    table = in_radians(mechanism, table, angles, input_names(bare))
+    table = in_radians(mechanism, plain_columns(table), angles, input_names(bare))
     matrix, _ = design_matrix(mechanism, table, unused=input_names(bare))
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
-    made: dict[str, Any] = {name: columns[name] for name in (*_with_errors(wanted, chosen), "status")}
+    made: dict[str, Any] = {name: columns[name] for name in (*with_errors(wanted, chosen), "status")}
     if status_text:
         made["status_text"] = np.array(meanings(columns["status"]), dtype=object)
-    index = table.index if isinstance(table, pd.DataFrame) else None
+    index = given.index if isinstance(given, pd.DataFrame) else None
     found = pd.DataFrame(kept_columns(given, keep, made, len(matrix)) | made, index=index)
     units = {name: output(mechanism, name).unit for name in wanted}
     found.attrs["units"] = units | {error_of(name): unit for name, unit in units.items() if error_of(name) in made}
     return found
-
-
-def design_outputs(
-    family: Family,
-    designs: Array,
-    wanted: Sequence[str],
-    accuracy: Accuracy,
-    window: Part = None,
-) -> Columns:
-    """Return design outputs of a design matrix, cheapest first; what does not turn is left out of the dear ones.
-
-    Parameters
-    ----------
-    family : any family or chain
-    designs : (n, P) matrix with the columns of ``family.parameters``
-    wanted : names of design outputs
-    accuracy : dense grid or refined
-    window : see `summarise`
-
-    Returns
-    -------
-    Columns
-        each wanted name (n,), its ``err_`` where ``accuracy.target`` is set, and ``status``: of several causes the one
-        met first
-
-    Raises
-    ------
-    InputError
-        for an unknown name, or a window that is no part of the stroke.
-    """
-    _check_window(window)
-    family = on_closed_turn(family)
-    designs, n = np.ascontiguousarray(designs), len(designs)
-    status = np.zeros(n, np.uint8)
-    columns: Columns = {}
-    ways = routes(family, wanted, accuracy)
-    kinds = {route.general for route in ways if route.general}
-    if accuracy.samples is not None and kinds and "margin" not in kinds and margin_suffixes(family):
-        # Refinement meets a dead point between samples, a plain grid does not.
-        status = margin_group(family, designs, (), accuracy)["status"].astype(np.uint8)
-    for route in ways:
-        assert route.run is not None
-        # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
-        alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None is all of them
-        of_these = designs if alive is None or alive.size == n else designs[alive]
-        with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
-            found = route.run(of_these, accuracy, window)
-        for name in route.outputs:
-            for key in (name, error_of(name)) if accuracy.target is not None else (name,):
-                columns[key] = _spread(found[key], alive, n)
-        now = found["status"].astype(np.uint8)
-        if alive is None:
-            status = now
-        else:
-            status[alive] = np.where(status[alive] == st.OK, now, status[alive])
-    if isinstance(family.domain, Interval):
-        status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
-    chosen = {name: columns[name] for name in dict.fromkeys(_with_errors(wanted, accuracy))}
-    return explained(chosen | {"status": status}, dict.fromkeys(wanted))
-
-
-def _spread(values: NDArray[np.generic], rows: Index | None, n: int) -> NDArray[np.generic]:
-    """Return values of some rows, or of all, as a whole column: False or nan in the others."""
-    if rows is None or rows.size == n:
-        return values
-    whole: NDArray[np.generic] = np.zeros(n, np.bool_) if values.dtype == np.bool_ else np.full(n, np.nan)
-    whole[rows] = values
-    return whole
-
-
-def _with_errors(wanted: Sequence[str], accuracy: Accuracy) -> list[str]:
-    return [*wanted, *(error_of(name) for name in wanted if accuracy.target is not None)]
 
 
 def _accuracy(
@@ -234,11 +149,3 @@ def _accuracy(
         raise InputError("accuracy", accuracy, f"a relative error from {FINEST_TARGET:g} to 0.1", "summarise")
     prove, proven = proofs(certify)
     return Accuracy(target=float(target), certify=prove, proven=proven)
-
-
-def _check_window(window: tuple[float, float] | None) -> None:
-    if window is None:
-        return
-    two = isinstance(window, Sequence) and len(window) == 2 and all(isinstance(x, Real) for x in window)
-    if not (two and 0.0 <= window[0] < window[1] <= 1.0):
-        raise InputError("window", window, "two fractions of the stroke, 0 <= from < to <= 1", "design outputs")

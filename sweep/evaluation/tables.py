@@ -61,6 +61,23 @@ def design_matrix(
     return matrix, extras
 
 
+def plain_columns(table: Table) -> Table:
+    """Take the columns of a DataFrame out of it once, as arrays; what is no plain number stays as it is.
+
+    Every look at a column of a DataFrame takes as long as a pose.  A table with two columns of one name is handed on
+    whole: whoever reads it says so.
+    """
+    import pandas as pd
+
+    if not isinstance(table, pd.DataFrame) or not table.columns.is_unique:
+        return table
+    columns: dict[Any, Any] = {}
+    for name, values in table.items():
+        plain = isinstance(values.dtype, np.dtype) and values.dtype.kind in "fiu"
+        columns[name] = values.to_numpy() if plain else values
+    return columns
+
+
 def wanted_names(want: str | Sequence[str], place: str) -> list[str]:
     """Return the names of wanted outputs without repetition, from a list or from one text between commas.
 

@@ -12,7 +12,11 @@ import numpy as np
 
 from sweep.errors import InputError, StoreError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
+from sweep.exchange.dxf import write_dxf
+from sweep.exchange.glb import write_glb
+from sweep.exchange.mjcf import write_mjcf
 from sweep.exchange.scene import turn
+from sweep.exchange.tables import write_hardpoints, write_law
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 
@@ -102,26 +106,16 @@ def _writer(
 ) -> Callable[[Path], None]:
     """Return what writes the file once its path is known; what can be wrong with the design is found here."""
     if kind == "csv":
-        from sweep.exchange.hardpoints import write_hardpoints
-
         return lambda path: write_hardpoints(mechanism, design, path, phi, unit)
     if kind == "law":
-        from sweep.exchange.law import write_law
-
         return lambda path: write_law(mechanism, design, path, phi, poses, unit, speed)
     placed = turn(mechanism, design, phi, poses)
     family = find_family(mechanism)
     if kind == "glb":
-        from sweep.exchange.glb import write_glb
-
         seconds = SECONDS if speed is None else 2.0 * math.pi / speed
         return lambda path: write_glb(family.name, placed, path, UNITS[unit], seconds)
     if kind == "dxf":
-        from sweep.exchange.dxf import write_dxf
-
         return lambda path: write_dxf(placed, path, unit)
-    from sweep.exchange.mjcf import write_mjcf
-
     return lambda path: write_mjcf(family, placed, _numbers(design), path, unit)
 
 

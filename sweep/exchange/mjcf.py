@@ -14,16 +14,15 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from sweep.effects.base import Scene
+from sweep.effects.scene import Scene
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part
 from sweep.evaluation.poses import evaluate
-from sweep.exchange.inertia import inertial
 from sweep.exchange.scene import Placed, extent
+from sweep.families import names
 from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import JointRecords
-from sweep.families.members import Machine
-from sweep.quantities import names
+from sweep.families.machines import Machine
 
 METRES = {"mm": 1e-3, "m": 1.0}
 THICK = 0.008  # of a bar, of the extent of all joints
@@ -133,7 +132,7 @@ def _loop(one: Placed, finger: float, metres: float) -> Loop:
     matrix, angles = part.design[None, :], Angles.of(part.crank[None, :1])
     poses, designs = Scene(part.family, matrix, angles, {}).records
     pose, own = poses[0, 0], designs[0]
-    # as kernels/joints.py writes them: B C s rho_b tau_b rho tau per pose, u k A D per design
+    # as kernels/linkage/joints.py writes them: B C s rho_b tau_b rho tau per pose, u k A D per design
     s, rho_b, tau_b, rho, tau = (pose[k : k + 3] for k in (6, 9, 12, 15, 18))
     u, k, center, d = (own[n : n + 3] for n in (0, 3, 6, 9))
     found = evaluate(
@@ -214,4 +213,53 @@ def _body(parent: Xml.Element, name: str, at: Array, frame: Array) -> Xml.Elemen
 
 def words(values: Array) -> str:
     """Return numbers as MuJoCo reads them, to the last bit."""
+    return " ".join(repr(float(x)) for x in values)
+
+
+MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+KILOGRAMS = {"mm": 1e3, "m": 1.0}  # masses of designs in mm are tonnes, as N and s want
+SPARE = 2.0  # moments that do not count are made so many times what they have to be at least
+
+
+def inertial(design: Mapping[str, float], name: str, stage: str, unit: str) -> Xml.Element:
+    """Return the mass, centre and inertia of a body.
+
+    A body about a fixed axis turns by its moment about that axis and its products with it alone, a slider by none: what
+    does not count is filled up, so that the tensor is that of a body.
+
+    Raises
+    ------
+    InputError
+        for a mass without the inertia that counts, or with one that no body has.
+    """
+    kilograms, metres = KILOGRAMS[unit], METRES[unit]
+    mass = float(design[f"m_{name}{stage}"])
+    centre = np.array([float(design.get(f"com_{name}_{axis}{stage}", 0.0)) for axis in "xyz"])
+    xx, yy, zz, xy, xz, yz = (float(design.get(f"j_{name}_{entry}{stage}", 0.0)) for entry in MOMENTS)
+    if not mass > 0.0:
+        raise InputError(f"m_{name}{stage}", mass, "a positive mass: MuJoCo moves none", "export")
+    if name == "slider":
+        xx = yy = zz = mass
+        xy = xz = yz = 0.0
+    elif name != "coupler" and zz > 0.0:
+        xx = yy = SPARE * (zz + (xz * xz + yz * yz) / zz)
+        xy = 0.0
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    low, middle, high = np.linalg.eigvalsh(tensor)
+    if not low > 0.0:
+        allowed = "the inertias of a body: MuJoCo takes no mass without"
+        raise InputError(f"j_{name}_xx{stage}", f"least moment {low:.3g}", allowed, "export")
+    if high > (low + middle) * (1.0 + 1e-9):
+        allowed = "moments of which none exceeds the sum of the others, as of any body"
+        raise InputError(
+            f"j_{name}_xx{stage}", f"principal moments {low:.3g}, {middle:.3g}, {high:.3g}", allowed, "export"
+        )
+    scale = kilograms * metres**2
+    return Xml.Element(
+        "inertial", pos=_words(centre * metres), mass=repr(mass * kilograms),
+        fullinertia=_words(np.array([xx, yy, zz, xy, xz, yz]) * scale),
+    )  # fmt: skip
+
+
+def _words(values: Array) -> str:
     return " ".join(repr(float(x)) for x in values)

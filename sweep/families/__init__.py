@@ -1,20 +1,20 @@
-"""The register of mechanism families: a new family is one kernel file, one entry file here, and its name below."""
+"""The register of mechanism families: a new family is one folder of kernels, one entry here, and its name below."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import sweep.sources  # noqa: F401 (read before any source that makes a value is imported, and all of those begin here)
 from sweep.errors import InputError, nearest
 from sweep.families.base import Family
+from sweep.families.chain import chain as chain_of  # the name of the module stays that of the module
 from sweep.families.check import check_family
-
-if TYPE_CHECKING:
-    from sweep.families.members import Machine
+from sweep.families.machines import Machine
+from sweep.families.specification import Specification, built
+from sweep.families.specification import specification as specified
 
 NAMES = (
     "rssr",
@@ -46,22 +46,26 @@ NAMES = (
     "foot",
     "feed_foot",
 )
-
-
-@dataclass(frozen=True)
-class Specification:
-    """A machine as it was written: hashable, so that the machine it makes is made once."""
-
-    members: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
-    relations: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
-
+# Families that stand in the file of a relative: the file, and the name there.
+_IN_FILE_OF = {
+    "slider_crank": ("rssp", "PLANAR"),
+    "inverted_slider_crank": ("slotted", "PLANAR"),
+    "swivel": ("slotted", "SWIVEL"),
+    "epicyclic_dwell": ("geared_dwell", "EPICYCLIC"),
+    "cam_lever": ("cam", "LEVER"),
+    "free_cam_friction": ("free_cam", "WITH_FRICTION"),
+    "backrest_tension": ("backrest", "TENSION"),
+    "backrest_closure": ("backrest", "CLOSURE"),
+    "feed_triad": ("feed", "TRIAD"),
+    "feed_foot": ("foot", "ON_FEED"),
+}
 
 Mechanism: TypeAlias = "str | Sequence[str] | Mapping[str, Any] | Specification | Family"
 """A family's name, a list of them for a chain, a table of members for a machine, or what `sweep.machine` made."""
 
 
 def chain_names(text: str) -> tuple[str, ...]:
-    """Return names of the families of a chain in one text.
+    """Names of the families of a chain in one text.
 
     >>> chain_names("rssr+guide"), chain_names("rssr, guide"), chain_names("rssr")
     (('rssr', 'guide'), ('rssr', 'guide'), ('rssr',))
@@ -70,8 +74,7 @@ def chain_names(text: str) -> tuple[str, ...]:
 
 
 def family(name: Mechanism) -> Family:
-    """Return the family of that name, the chain of the families named in a list or as "rssr+guide",
-    or a machine of members.
+    """Find the family of a name, the chain of those in a list or in "rssr+guide", or the machine of members.
 
     Raises
     ------
@@ -96,7 +99,7 @@ def family(name: Mechanism) -> Family:
 
 
 def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = None) -> Machine:
-    """Return several mechanisms on one main shaft, accepted wherever a family's name is.
+    """Several mechanisms on one main shaft, accepted wherever a family's name is.
 
     Parameters
     ----------
@@ -133,28 +136,23 @@ def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = No
     """
     if not isinstance(members, Mapping):
         raise InputError("members", members, "a table of members by name", "machine")
-    from sweep.families.specification import specification
-
-    return _machine(specification(members, relations))
+    return _machine(specified(members, relations))
 
 
 @lru_cache
 def _single(name: str) -> Family:
     if name not in NAMES:
         raise InputError("family", name, f"one of {', '.join(NAMES)}{nearest(name, NAMES)}", "family")
-    entry: Family = import_module(f"sweep.families.{name}").FAMILY
+    file, attribute = _IN_FILE_OF.get(name, (name, "FAMILY"))
+    entry: Family = getattr(import_module(f"sweep.families.{file}"), attribute)
     return check_family(entry)
 
 
 @lru_cache
 def _chain(names: tuple[str, ...]) -> Family:
-    from sweep.families.chain import chain
-
-    return chain(tuple(_single(name) for name in names))
+    return chain_of(tuple(_single(name) for name in names))
 
 
 @lru_cache
 def _machine(given: Specification) -> Machine:
-    from sweep.families.specification import built
-
     return built(given, family)

@@ -1,14 +1,23 @@
-"""Registry entry of the moving back-rest whose bracket angle a let-off regulator sets over the beam radius."""
+"""Registry entries of the moving back-rest, whose bracket angle is set over the radius of the yarn on the beam.
+
+A let-off regulator sets it (`backrest`); or it is the one that holds a wanted warp tension (`backrest_tension`), or
+that of the closure of the source, for comparison: f N2 H = f N1 r0 (`backrest_closure`).
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from kernels.families import backrest
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, guarded
-from sweep.families.capabilities import Points
+from kernels.types import Array
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton
 from sweep.families.domain import Interval
-from sweep.families.warp import skeleton
+from sweep.families.poses import guarded
+from sweep.families.skeletons import ORIGIN, parameter, standing
 
 FRAME = (
     Parameter("a1", "length", "warp stop motion, where the warp ends, to the right of the beam axis"),
@@ -83,6 +92,7 @@ BAND = (
 )
 
 DRIFT = Output("drift", "N", "K_couple - K0", "(11)")
+PHI = Output("phi", "rad", "bracket angle that solves the equation", "(12)")
 # The worked example of docs/backrest.md
 EXAMPLE = {
     "a1": 0.75, "b1": 0.5625, "a2": 0.125, "b2": 0.4375, "H": 0.03125, "r": 0.0625, "r0": 0.046875, "psi": 1.5,
@@ -90,15 +100,23 @@ EXAMPLE = {
     "cs": 512.0, "l0": 0.5, "F0": 1856.0, "rg": 0.1875, "nug": 0.125, "rho_full": 0.375, "rho_empty": 0.09375,
 }  # fmt: skip
 
+SOUGHT = (
+    Parameter("phi_lo", "angle", "bracket angles are sought from here"),
+    Parameter("phi_hi", "angle", "bracket angles are sought up to here"),
+    Parameter("root", "count", "which of the bracket angles, counted from phi_lo", default=1.0, positive=True),
+)
 K0 = Parameter("K0", "force", "warp tension wanted", default=0.0)
+HELD = (
+    Parameter("K0", "force", "warp tension to be held"),
+    Parameter("couple", "choice", "1: the slider bears a couple; 0: its reaction acts at the axis of the back-rest",
+              default=1.0, choices=(0.0, 1.0)),
+)  # fmt: skip
 
 _COLUMNS = backrest.Design._fields
 
 
 def kernel_matrix(designs: Array, names: tuple[str, ...]) -> Array:
-    """Return columns of the kernel's design matrix from those of an entry;
-    what the entry lacks is 0, the root the first.
-    """
+    """Design matrix of the kernel from that of an entry; what the entry lacks is 0, the root the first."""
     matrix = np.zeros((len(designs), len(_COLUMNS)), designs.dtype)
     matrix[:, -1] = 1.0
     for k, name in enumerate(names):
@@ -108,7 +126,7 @@ def kernel_matrix(designs: Array, names: tuple[str, ...]) -> Array:
 
 
 def solved(matrix: Array, modes: np.ndarray, angles: Angles, wanted: frozenset[str], position: str) -> Columns:
-    """Return the wanted outputs and status from the kernel; ``position`` is the entry's name of the bracket angle."""
+    """Wanted outputs and status from the kernel; ``position`` is the entry's name of the bracket angle."""
     shape, dtype = (len(matrix), angles.phi.shape[1]), np.result_type(matrix, angles.phi)
     # the complex step goes through the radius too, or no extremum over the beam could be followed
     matrix, radius = matrix.astype(dtype, copy=False), np.ascontiguousarray(angles.phi, dtype)
@@ -126,18 +144,19 @@ def solved(matrix: Array, modes: np.ndarray, angles: Angles, wanted: frozenset[s
     return {name: x for name, x in found.items() if name in wanted} | {"status": status}
 
 
-PARAMETERS = (*FRAME, *LAW, *BEAM, K0)
-_NAMES = tuple(p.name for p in PARAMETERS)
+def mode_of(mode: backrest.Mode, designs: Array) -> np.ndarray:
+    """Choose the same equation of the bracket angle for all designs."""
+    return np.full(len(designs), int(mode), np.uint8)
 
 
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted outputs and status of every design at its beam radii, each (n, m)."""
-    modes = np.full(len(designs), int(backrest.Mode.LAW), np.uint8)
-    return solved(kernel_matrix(designs, _NAMES), modes, angles, wanted, "phi_rho")
+def tension_mode(couple: int, designs: Array) -> np.ndarray:
+    """Choose the equation that holds the tension: with a couple at the slider, or without one."""
+    with_couple, without = int(backrest.Mode.COUPLE), int(backrest.Mode.TENSION)
+    return np.where(designs[:, couple].real == 1.0, with_couple, without).astype(np.uint8)
 
 
 def beam_of(names: tuple[str, ...]) -> Interval:
-    """Return the beam radius, from empty to full, for an entry with those parameters."""
+    """Make the domain: beam radii from empty to full, for an entry with those parameters."""
     empty, full = names.index("rho_empty"), names.index("rho_full")
 
     def ends(designs: Array) -> tuple[Array, Array]:
@@ -146,16 +165,125 @@ def beam_of(names: tuple[str, ...]) -> Interval:
     return Interval("rho", "length", "radius of the yarn on the beam", ends)
 
 
-POINTS = Points({"axis": ("x_axis", "y_axis", None)})
+LINKS = (
+    Link("bracket", ("o2", "s", "m")), Link("slider", ("s", "axis")), Link("pin", ("axis", "p")),
+    Link("spring", ("m", "q")), Link("beam", ("o", "t1")), Link("back-rest", ("axis", "t2", "t3")),
+    Link("warp 1", ("t1", "t2")), Link("warp 2", ("t3", "w")),
+)  # fmt: skip
 
-FAMILY = Family(
-    name="backrest",
-    title="moving back-rest, bracket angle set by the let-off regulator",
-    parameters=PARAMETERS,
-    position="K_couple",
-    pose_outputs=GEOMETRY[:-1] + LOADS + BAND + (DRIFT,),
-    poses=guarded(poses),
-    example=EXAMPLE | {"phi": 0.4, "turn": -0.15, "K0": 1482.0},
-    domain=beam_of(_NAMES),
-    capabilities=(POINTS, skeleton(PARAMETERS, "phi_rho")),
-)
+
+def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
+    """Draw the back-rest in the plane of the beam; ``angle`` is the entry's output of the bracket's angle."""
+
+    def column(name: str, designs: Array) -> Array:
+        return parameter(parameters, name, designs)[:, None]
+
+    def guide(designs: Array) -> Array:
+        psi = parameter(parameters, "psi", designs)
+        return np.stack([-np.cos(psi), np.sin(psi), 0.0 * psi], axis=1)
+
+    def made(needs: tuple[str, ...], at: Callable[..., tuple[Array, Array]]) -> Made:
+        """Make a point of the plane: ``at(column, designs, rho, *needs)`` gives its x and y, each (n, m)."""
+
+        def place(designs: Array, angles: Angles, found: Columns) -> Array:
+            values = (np.asarray(found[name], np.float64) for name in needs)
+            x, y = at(lambda name: column(name, designs), angles.phi, *values)
+            return np.stack([x, y, 0.0 * x], axis=-1)
+
+        return Made(needs, place)
+
+    axis = ("x_axis", "y_axis")
+    return Skeleton(
+        {
+            "o": ORIGIN,
+            "o2": standing(parameters, "a2", "b2"),
+            "guide": Fixed(standing(parameters, "xE", "yE").at, guide, "slide"),
+            "q": standing(parameters, "x3", "y3", axis=None, kind="point"),
+            "w": standing(parameters, "a1", "b1", axis=None, kind="point"),
+        },
+        LINKS,
+        {
+            "s": made((angle, "R1"), _slider),
+            "m": made((angle,), _spring),
+            "p": made(("h",), _pin),
+            "t1": made(("theta",), _on_beam),
+            "t2": made((*axis, "theta"), _from_beam),
+            "t3": made((*axis, "gamma"), _to_fell),
+        },
+    )
+
+
+Columned = Callable[[str], Array]
+
+
+def _slider(of: Columned, rho: Array, phi: Array, reach: Array) -> tuple[Array, Array]:
+    """Foot of the slider on the line of the bracket; (1)."""
+    return of("a2") - reach * np.cos(phi), of("b2") + reach * np.sin(phi)
+
+
+def _spring(of: Columned, rho: Array, phi: Array) -> tuple[Array, Array]:
+    """End of the spring on the bracket; (6)."""
+    turn = phi + of("nu")
+    return of("a2") - of("lM") * np.cos(turn), of("b2") + of("lM") * np.sin(turn)
+
+
+def _pin(of: Columned, rho: Array, h: Array) -> tuple[Array, Array]:
+    """Point where the pin touches the guide; (2)."""
+    return of("xE") - h * np.cos(of("psi")), of("yE") + h * np.sin(of("psi"))
+
+
+def _on_beam(of: Columned, rho: Array, theta: Array) -> tuple[Array, Array]:
+    """Point where the yarn leaves the beam, on the side away from the fell; (3)."""
+    return -rho * np.cos(theta), rho * np.sin(theta)
+
+
+def _from_beam(of: Columned, rho: Array, x: Array, y: Array, theta: Array) -> tuple[Array, Array]:
+    """Point where the yarn meets the back-rest; (3)."""
+    return x - of("r") * np.cos(theta), y + of("r") * np.sin(theta)
+
+
+def _to_fell(of: Columned, rho: Array, x: Array, y: Array, gamma: Array) -> tuple[Array, Array]:
+    """Point where the yarn leaves the back-rest; (4)."""
+    return x + of("r") * np.sin(gamma), y + of("r") * np.cos(gamma)
+
+
+def _entry(
+    name: str, title: str, parameters: tuple[Parameter, ...], modes: Callable[[Array], np.ndarray],
+    outputs: tuple[Output, ...], position: str, example: dict[str, float],
+) -> Family:  # fmt: skip
+    """Make a family of the back-rest; its first output is the bracket angle, ``modes`` the equation that gives it."""
+    names, angle = tuple(p.name for p in parameters), outputs[0].name
+
+    def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+        return solved(kernel_matrix(designs, names), modes(designs), angles, wanted, angle)
+
+    return Family(
+        name=name,
+        title=title,
+        parameters=parameters,
+        position=position,
+        pose_outputs=outputs,
+        poses=guarded(poses),
+        example=EXAMPLE | example,
+        domain=beam_of(names),
+        capabilities=(Points({"axis": ("x_axis", "y_axis", None)}), skeleton(parameters, angle)),
+    )
+
+
+_SOLVED = (PHI, *GEOMETRY[1:], *LOADS, *BAND)
+
+FAMILY = _entry(
+    "backrest", "moving back-rest, bracket angle set by the let-off regulator", (*FRAME, *LAW, *BEAM, K0),
+    partial(mode_of, backrest.Mode.LAW), GEOMETRY[:-1] + LOADS + BAND + (DRIFT,), "K_couple",
+    {"phi": 0.4, "turn": -0.15, "K0": 1482.0},
+)  # fmt: skip
+
+TENSION = _entry(
+    "backrest_tension", "moving back-rest, bracket angle that holds a tension", (*FRAME, *HELD, *SOUGHT, *BEAM),
+    partial(tension_mode, len(FRAME) + 1), _SOLVED, "phi", {"K0": 1482.0, "phi_lo": -0.1, "phi_hi": 1.2},
+)  # fmt: skip
+
+CLOSURE = _entry(
+    "backrest_closure", "moving back-rest, closure of the source", (*FRAME, *SOUGHT, *BEAM),
+    partial(mode_of, backrest.Mode.CLOSURE), _SOLVED, "phi", {"phi_lo": -0.5, "phi_hi": 0.6},
+)  # fmt: skip

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from functools import cached_property
+from functools import cached_property, wraps
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
-from kernels.status import INVALID_INPUT, OK
+from kernels.types import Array as Array
 from sweep.families.domain import Domain, Turn
 from sweep.families.parameter import Parameter as Parameter
 from sweep.families.parameter import Unit as Unit
 
-Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = dict[str, NDArray[np.generic]]
 
 
@@ -194,7 +193,13 @@ class Family:
 
     def precise(self) -> Family:
         """Give the same family with the most accurate poses it has: for single poses, not for sweeps."""
-        return self if self.precise_poses is None else replace(self, poses=self.precise_poses)
+        return self if self.precise_poses is None else self._precise
+
+    @cached_property
+    def _precise(self) -> Family:
+        """Made once, so that what is found of it and kept beside it serves every call."""
+        assert self.precise_poses is not None
+        return replace(self, poses=self.precise_poses)
 
     def find(self, kind: type[Capability]) -> Capability | None:
         """Return the first capability of a type, None where the family has none."""
@@ -206,7 +211,7 @@ class Family:
 
     @cached_property
     def derived(self) -> dict[object, Any]:
-        """What follows from this family alone, by the function that found it: see :mod:`sweep.families.derived`."""
+        """What follows from this family alone, by the function that found it: see :func:`of_family`."""
         return {}
 
     @cached_property
@@ -224,92 +229,39 @@ class Family:
         """The pose outputs by name."""
         return {o.name: o for o in self.pose_outputs}
 
+    def orders(self, name: str) -> list[str]:
+        """List the derivatives 1..k up to ``name`` of the output it derives from; empty if it is no derivative."""
+        lower = {derivative: of for of, derivative in self.derivative_of.items()}
+        names: list[str] = []
+        while name in lower:
+            names.insert(0, name)
+            name = lower[name]
+        return names
+
     @cached_property
     def positions(self) -> Mapping[str, str]:
         """Pose outputs that are the position of a follower, with the number of its stage in a chain."""
         return {self.position: ""}
 
     def outward_sign(self, position: str) -> str:
-        """Return the sign parameter that tells the extended from the folded limit of a position;
-        "" where there is none.
-        """
+        """Name the sign parameter that tells extended from folded limits of a position; "" where there is none."""
         return self.outward
 
 
-def guarded(poses: PoseFunction) -> PoseFunction:
-    """Return poses that answer a parameter that is no number, and a value beyond float64, by INVALID_INPUT and nan.
+Found = TypeVar("Found")
 
-    For kernels that read some parameters only where they matter.
+
+def of_family(function: Callable[[Family], Found]) -> Callable[[Family], Found]:
+    """Let a function of a family, which never changes, find its result once.
+
+    The result is shared by all who ask for it, so it must not be changed.
     """
 
-    def safe(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-        with np.errstate(all="ignore"):  # what is no number has its status
-            columns = poses(designs, angles, wanted)
-        status = np.array(columns["status"], np.uint8)
-        bad = np.zeros(status.shape, np.bool_)
-        for name in wanted:
-            bad |= ~np.isfinite(columns[name])
-        bad &= status == OK  # any other status explains its nan
-        bad[~np.all(np.isfinite(designs), axis=1)] = True
-        status[bad & (status == OK)] = INVALID_INPUT
-        found: Columns = {name: np.where(bad, np.nan, columns[name]) for name in wanted}
-        return found | {"status": status}
+    @wraps(function)
+    def found(family: Family) -> Found:
+        if function not in family.derived:
+            family.derived[function] = function(family)
+        result: Found = family.derived[function]
+        return result
 
-    return safe
-
-
-def filled(
-    kernel: Callable[..., object],
-    arguments: Sequence[object],
-    names: tuple[str, ...],
-    wanted: frozenset[str],
-    status: NDArray[np.uint8],
-    dtype: DTypeLike = np.float64,
-) -> Columns:
-    """Call ``kernel(*arguments, status, *outputs)``; the wanted outputs, shaped like ``status``, and ``status``."""
-    outputs = optional_outputs(names, wanted, status.shape, dtype)
-    kernel(*arguments, status, *outputs)
-    columns: Columns = {name: out for name, out in zip(names, outputs, strict=True) if out is not None}
-    return columns | {"status": status}
-
-
-def poses_of(kernel: Callable[..., object], names: tuple[str, ...]) -> PoseFunction:
-    """Return the poses of a kernel(designs, cos, sin, status, one array or None per output)."""
-
-    def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-        status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-        dtype = np.result_type(designs, angles.cos)
-        return filled(kernel, (designs, angles.cos, angles.sin), names, wanted, status, dtype)
-
-    return poses
-
-
-def filled_with_places(
-    kernel: Callable[..., object],
-    designs: Array,
-    angles: Angles,
-    names: tuple[str, ...],
-    places: tuple[str, ...],
-    wanted: frozenset[str],
-) -> Columns:
-    """Call a kernel of poses whose last output is one array (k, n, m) of all joint coordinates ``places`` or None."""
-    shape, dtype = (len(designs), angles.cos.shape[1]), np.result_type(designs, angles.cos)
-    room = None if wanted.isdisjoint(places) else np.empty((len(places), *shape), dtype)
-
-    def with_places(*given: object) -> None:
-        kernel(*given, room)
-
-    columns = filled(with_places, (designs, angles.cos, angles.sin), names, wanted, np.empty(shape, np.uint8), dtype)
-    if room is not None:
-        columns |= {name: x for name, x in zip(places, room, strict=True) if name in wanted}
-    return columns
-
-
-def optional_outputs(
-    names: tuple[str, ...], wanted: frozenset[str], shape: tuple[int, ...], dtype: DTypeLike = np.float64
-) -> list[Array | None]:
-    """Return an empty array for each wanted name and None for the others, in the order of a kernel's out arguments.
-
-    ``dtype`` is complex128 where the designs or angles are (exact gradients by the complex step).
-    """
-    return [np.empty(shape, dtype) if name in wanted else None for name in names]
+    return found

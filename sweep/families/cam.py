@@ -1,4 +1,4 @@
-"""Registry entry of the cam with a roller follower that slides along a line; the laws that all cams share."""
+"""Registry entries of the cams with a roller: on a follower that slides along a line, or on a swinging lever."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from kernels.families.cam import law, translating
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled
-from sweep.families.capabilities import Link, Points, Skeleton
-from sweep.families.pace import Switches
-from sweep.families.skeletons import ORIGIN, X, line, parameter
+from kernels.families.cam import law, swinging, translating
+from kernels.types import Array
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.capabilities import Dimensions, Link, Made, OutputLink, Points, Skeleton
+from sweep.families.curve_features import Switches
+from sweep.families.outputs import angle_outputs, ladders, place_outputs
+from sweep.families.poses import filled
+from sweep.families.skeletons import ORIGIN, X, line, links, parameter, standing
 
 PHASES = (
     Parameter("rise", "angle", "cam angle of the rise", positive=True, default=0.5 * np.pi),
@@ -40,10 +43,7 @@ PARAMETERS = (
 )
 
 PROFILE_OUTPUTS = (
-    Output("s", "length", "displacement of the follower from its rest", "(1)"),
-    Output("ds", "length", "velocity analogue ds/dphi", "(1)"),
-    Output("d2s", "length", "acceleration analogue", "(1)"),
-    Output("d3s", "length", "jerk analogue", "(1)"),
+    *place_outputs("s", "displacement of the follower from its rest", "(1)", "(1)"),
     Output("pressure_angle", "rad", "between the normal of the cam and the direction of the follower", "(7)"),
     Output("x_p", "length", "pitch curve in the frame of the cam, along the direction of lift at phi = 0", "(8)"),
     Output("y_p", "length", "pitch curve in the frame of the cam, to the left of it", "(8)"),
@@ -53,7 +53,6 @@ ROLLER_OUTPUTS = (
     Output("y_r", "length", "roller's centre in the fixed frame, to the left of it", "(6)"),
 )
 _LAW = ("rise", "dwell", "fall", "start", "law")
-_PROFILE = tuple(o.name for o in PROFILE_OUTPUTS)
 
 
 def with_kinks(outputs: tuple[Output, ...]) -> tuple[Output, ...]:
@@ -70,18 +69,18 @@ def phase_ends(designs: Array) -> Array:
 
 
 def cam_poses(
-    kernel: Callable[..., object], names: tuple[str, ...], designs: Array, angles: Angles, wanted: frozenset[str]
+    kernel: Callable[..., object], outputs: Any, designs: Array, angles: Angles, wanted: frozenset[str]
 ) -> Columns:
-    """Return the wanted pose outputs and status of a cam's kernel, each (n, m)."""
+    """Compute the wanted pose outputs and status of a cam's kernel, each (n, m)."""
     status = np.empty((len(designs), angles.phi.shape[1]), np.uint8)
     dtype = np.result_type(designs, angles.phi)
-    return filled(kernel, (designs, angles.phi), names, wanted, status, dtype)
+    return filled(kernel, (designs, angles.phi), outputs, wanted, status, dtype)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
+    """Compute the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
     of_roller = wanted & {o.name for o in ROLLER_OUTPUTS}
-    found = cam_poses(translating.poses, _PROFILE, designs, angles, wanted | ({"s"} if of_roller else set()))
+    found = cam_poses(translating.poses, translating.Outputs, designs, angles, wanted | ({"s"} if of_roller else set()))
     if of_roller:
         s: Any = found["s"] if "s" in wanted else found.pop("s")
         r0, e = (parameter(PARAMETERS, name, designs)[:, None] for name in ("r0", "e"))
@@ -106,10 +105,70 @@ FAMILY = Family(
     pose_outputs=with_kinks(PROFILE_OUTPUTS + ROLLER_OUTPUTS),
     poses=poses,
     example={"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0},
-    derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
+    derivative_of=ladders("s"),
     capabilities=(
         Switches(phase_ends),
         Points({"r": ("x_r", "y_r", None)}),
         Skeleton({"a": ORIGIN, "d": line(follower_line)}, (Link("cam", ("a",)), Link("follower", ("r",)))),
+    ),
+)
+
+
+LEVER_PARAMETERS = (
+    Parameter("lift", "angle", "swing of the lever", positive=True),
+    *PHASES,
+    Parameter("r0", "length", "radius of the prime circle, on which the roller's centre rests", positive=True),
+    Parameter("c", "length", "lever, from its axis to the roller's centre", positive=True),
+    Parameter("e", "length", "distance of the lever's axis from the cam's along x", positive=True),
+    Parameter("branch", "sign", "sign of psi: the side of the line of axes on which the roller is", default=1.0,
+              choices=(-1.0, 1.0)),
+    *TABLE,
+)  # fmt: skip
+
+LEVER_OUTPUTS = (
+    *angle_outputs("psi", "lever angle in (-pi, pi), 0 away from the cam", "(9)", "(9)"),
+    Output("pressure_angle", "rad", "between the normal of the cam and the velocity of the roller's centre", "(10)"),
+    Output("x_p", "length", "pitch curve in the frame of the cam, towards the lever's axis at phi = 0", "(11)"),
+    Output("y_p", "length", "pitch curve in the frame of the cam, to the left of it", "(11)"),
+)
+
+
+def lever_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Compute the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
+    return cam_poses(swinging.poses, swinging.Outputs, designs, angles, wanted)
+
+
+def lever_origin(designs: Array) -> Array:
+    """Return the axis of the lever, (n, 3)."""
+    origin = np.zeros((len(designs), 3), designs.dtype)
+    origin[:, 0] = parameter(LEVER_PARAMETERS, "e", designs)
+    return origin
+
+
+def roller(designs: Array, angles: Angles, motion: Columns) -> Array:
+    """Return the roller's centre in the fixed frame, (n, m, 3)."""
+    psi = np.asarray(motion["psi"], np.float64)
+    e, c = (parameter(LEVER_PARAMETERS, name, designs)[:, None] for name in ("e", "c"))
+    return np.stack([e + c * np.cos(psi), c * np.sin(psi), np.zeros_like(psi)], axis=-1)
+
+
+LEVER = Family(
+    name="cam_lever",
+    title="cam with a roller on a swinging lever",
+    parameters=LEVER_PARAMETERS,
+    position="psi",
+    pose_outputs=with_kinks(LEVER_OUTPUTS),
+    poses=lever_poses,
+    example={"lift": 0.4, "r0": 3.0, "c": 5.0, "e": 6.0, "branch": -1.0},
+    derivative_of=ladders("psi"),
+    capabilities=(
+        Switches(phase_ends),
+        Dimensions(links("c")),
+        OutputLink(lever_origin),
+        Skeleton(
+            {"a": ORIGIN, "d": standing(LEVER_PARAMETERS, "e")},
+            (Link("cam", ("a",)), Link("lever", ("d", "r"))),
+            {"r": Made(("psi",), roller)},
+        ),
     ),
 )

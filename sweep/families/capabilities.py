@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from kernels.series.form import Form
-    from sweep.families.base import Angles, Columns
+from kernels.types import Array, Numbers
+from sweep.families.base import Angles, Columns
 
-Array: TypeAlias = NDArray[np.float64]
-Numbers: TypeAlias = NDArray[Any]
+if TYPE_CHECKING:  # families without such kernels do not wait for them
+    from kernels.chains.form import Form
+
 DesignMap: TypeAlias = Callable[[Array], Array]
-FillFunction: TypeAlias = "Callable[[Array, Angles, Columns, Array, Array], None]"
+FillFunction: TypeAlias = Callable[[Array, Angles, Columns, Array, Array], None]
 Coordinates: TypeAlias = tuple[str | None, str | None, str | None]
 
 
@@ -48,8 +48,9 @@ def constant(*numbers: float) -> DesignMap:
 class JointRecords:
     """Positions, directions and their rates at the joints, from which the effects of loads work.
 
-    ``fill(designs, angles, motion, per_pose, per_design)`` writes the records that :mod:`kernels.joints` describes,
-    from the pose outputs ``needs`` in ``motion``, in the frame of the family.  ``follower`` is what the coupler drives.
+    ``fill(designs, angles, motion, per_pose, per_design)`` writes the records that :mod:`kernels.linkage.joints`
+    describes, from the pose outputs ``needs`` in ``motion``, in the frame of the family.  ``follower`` is what the
+    coupler drives.
     """
 
     fill: FillFunction
@@ -78,7 +79,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class InSeries:
-    """A stage whose motion can be fused with that of the stages before and behind it (:mod:`kernels.series`).
+    """A stage whose motion can be fused with that of the stages before and behind it (:mod:`kernels.chains`).
 
     Parameters
     ----------
@@ -146,7 +147,7 @@ class Searched:
 
     ``branch``; the number of the ``objective``; least ``cos2`` of the pressure angle; least and most of all ``links``;
     the ``target`` of the objective; the ``tube``, crank angles with the least and most angle of a follower that reaches
-    it (:mod:`kernels.proof.tube`), empty where none is known; low and high ends and known bounds of the boxes it
+    it (:mod:`kernels.boxes.tube`), empty where none is known; low and high ends and known bounds of the boxes it
     ``starts`` from; widths of the ``whole`` space; numbers of the ``free`` coordinates, and all of them as ``given``;
     the share of the whole below which a box is not halved; the ``most`` boxes to judge.
     """

@@ -9,30 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from kernels.chain import chain_rule, input_angle
+from kernels.chains.derivatives import chain_rule, input_angle
 from kernels.status import OK
+from kernels.types import Array
 from sweep.errors import InputError
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink, Points
+from sweep.families.curve_features import of_stages
 from sweep.families.domain import Turn
-from sweep.families.pace import of_stages
+from sweep.families.parts import Stage
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One mechanism of a chain: its number from 1, and where its parameters stand in the chain's design matrix."""
-
-    number: int
-    family: Family
-    columns: slice
-    kappa: int | None = None  # columns of the coupling to the stage before; none for stage 1
-    offset: int | None = None
-
-    def designs(self, designs: Array) -> Array:
-        """Return the design matrix of this stage alone."""
-        return np.ascontiguousarray(designs[:, self.columns])
 
 
 @dataclass(frozen=True)
@@ -79,8 +66,7 @@ def stages_of(family: Family) -> tuple[Stage, ...]:
 
 
 def driven_guide(family: Family) -> tuple[Stage, Stage] | None:
-    """Return both stages of a chain in which a crank-rocker drives a linkage with a guided point;
-    None for any other family.
+    """Find both stages of a chain in which a crank-rocker drives a guided point; None for any other family.
 
     The crank-rocker is one whose limit positions can be prescribed (`LimitLocus`).
     """
@@ -165,9 +151,7 @@ def _loops(stage: Stage) -> list[Assembly]:
 
 
 def _of_last(stage: Stage) -> list[object]:
-    """Return points and output link of the last stage:
-    its outputs also stand without a number, in the frame of that stage.
-    """
+    """Carry over points and output link of the last stage, whose outputs also stand without a number."""
     links = [OutputLink(partial(_on_stage, stage, link.origin)) for link in stage.family.every(OutputLink)]
     return [*stage.family.every(Points), *links]
 
@@ -203,16 +187,6 @@ def _with_respect_to_chain(output: Output, last: Family) -> Output:
     return replace(output, text=f"{output.text}, with respect to phi of stage 1")
 
 
-def _derivatives(family: Family, name: str) -> list[str]:
-    """Return the derivatives 1..k up to ``name`` of the output it derives from; empty if it is no derivative."""
-    lower = {derivative: of for of, derivative in family.derivative_of.items()}
-    names: list[str] = []
-    while name in lower:
-        names.insert(0, name)
-        name = lower[name]
-    return names
-
-
 def _plan(stages: tuple[Stage, ...], outputs: Mapping[str, Output], wanted: frozenset[str]) -> _Plan:
     last = stages[-1].family
     plan = _Plan(needed=[set() for _ in stages])
@@ -220,7 +194,7 @@ def _plan(stages: tuple[Stage, ...], outputs: Mapping[str, Output], wanted: froz
     for name in wanted:
         if name in last.pose_names:
             plan.source[name] = len(stages) - 1, name
-            derivatives = _derivatives(last, name)
+            derivatives = last.orders(name)
             if derivatives:
                 chains[derivatives[0]] = max(chains.get(derivatives[0], []), derivatives, key=len)
         else:
@@ -241,9 +215,7 @@ def _plan(stages: tuple[Stage, ...], outputs: Mapping[str, Output], wanted: froz
 
 
 def driving_names(family: Family, driven: Family) -> set[str]:
-    """Return pose outputs of a stage from which the next one gets its input angle:
-    cosine and sine where it has them.
-    """
+    """Name the outputs of a stage that give the next one its input angle: cosine and sine where it has them."""
     angle = family.position
     turned = {f"cos_{angle}", f"sin_{angle}"}
     if not turned <= set(family.pose_names):
@@ -266,8 +238,7 @@ def _poses(
     angles: Angles,
     wanted: frozenset[str],
 ) -> Columns:
-    """Return the wanted pose outputs and status,
-    computed in blocks so that the intermediate arrays stay in the cache.
+    """Compute the wanted pose outputs and status, in blocks so that intermediate arrays stay in the cache.
 
     ``plans`` keeps what was planned before: the optimiser asks the same of one design at a time.
     """
@@ -325,9 +296,7 @@ def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angle
 
 
 def drive(result: dict[str, Any], angle: str, kappa: Array, offset: Array) -> Angles:
-    """Return the input angles of the stage driven by ``result``:
-    status, and the output ``angle`` or its cosine and sine.
-    """
+    """Make the input angles of the stage driven by ``result``: status, and ``angle`` or its cosine and sine."""
     shape = result["status"].shape
     # a family that says it works from cos and sin alone gets no angle at all
     phi: Array = np.broadcast_to(np.float64(np.nan), shape)

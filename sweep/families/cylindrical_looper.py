@@ -7,13 +7,21 @@ from itertools import chain
 import numpy as np
 
 from kernels.families import cylindrical_looper
-from kernels.families.cylindrical_looper.links import links as fill_links
-from kernels.links import DRIVEN, FRAME, SLIDE, TURN
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from kernels.families.cylindrical_looper.motion import links as fill_links
+from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
+from kernels.types import Array
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Points, Skeleton
-from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
-from sweep.families.linked import filled_by, point_of
-from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
+from sweep.families.outputs import (
+    angle_outputs,
+    joint_outputs,
+    ladders,
+    magnitude_outputs,
+    place_outputs,
+    point_outputs,
+)
+from sweep.families.poses import filled_blocks
 from sweep.families.skeletons import crank_axis, links, parameter, standing
 
 PARAMETERS = (
@@ -46,18 +54,8 @@ PARAMETERS = (
 
 _D2 = [p.name for p in PARAMETERS].index("d2")
 
-SHAFT_OUTPUTS = (
-    Output("psi", "rad", "angle of the shaft", "(3)", wraps=True),
-    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(3)"),
-    Output("d2psi", "1", "acceleration analogue", "(3)"),
-    Output("d3psi", "1", "jerk analogue", "(3)"),
-)
-SLIDE_OUTPUTS = (
-    Output("s", "length", "place of the shaft along its axis", "(1)"),
-    Output("ds", "length", "velocity analogue ds/dphi", "(1)"),
-    Output("d2s", "length", "acceleration analogue of s", "(1)"),
-    Output("d3s", "length", "jerk analogue of s", "(1)"),
-)
+SHAFT_OUTPUTS = angle_outputs("psi", "angle of the shaft", "(3)", "(3)")
+SLIDE_OUTPUTS = place_outputs("s", "place of the shaft along its axis", "(1)", "(1)", of_name=True)
 SHAFT_LOOP_OUTPUTS = (
     Output("discriminant1", "length^2", "b1^2 cos^2(pressure_angle1); negative where the links do not reach", "(3)"),
     Output("pressure_angle1", "rad", "between the force of coupler 1 and the turning velocity of the rocker's ball",
@@ -78,14 +76,13 @@ _BLOCKS = (
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     # what is no number counts even where the place of the ball does not
     beside = (designs[:, _D2] != 0.0) | ~np.isfinite(designs[:, _D2:]).all(axis=1)
-    if not beside.any():
-        return filled_blocks(cylindrical_looper.poses, designs, angles, _BLOCKS, wanted)
-    if beside.all():
-        return filled_blocks(cylindrical_looper.coupled_poses, designs, angles, _BLOCKS, wanted)
-    return _of_both(designs, angles, wanted, beside)
+    if beside.any() and not beside.all():
+        return _of_both(designs, angles, wanted, beside)
+    kernel = cylindrical_looper.coupled_poses if beside.any() else cylindrical_looper.poses
+    return filled_blocks(kernel, cylindrical_looper.Outputs, designs, angles, _BLOCKS, wanted)
 
 
 def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.ndarray) -> Columns:
@@ -158,7 +155,7 @@ LINKS = LinkTree(
     needs=_RATES,
     fill=filled_by(fill_links, _RATES),
     carrier=2,
-    tip=point_of(PARAMETERS, "p0x", "p0y", "p0z"),
+    tip=standing(PARAMETERS, "p0x", "p0y", "p0z").at,
 )  # fmt: skip
 
 FAMILY = Family(

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
+from kernels.types import TWO_PI, Array
+
 EndsFunction: TypeAlias = Callable[[Array], tuple[Array, Array]]
 
-TWO_PI = 2.0 * np.pi
 TWO_TURNS, TWO_TURNS_DEG = 2.0 * TWO_PI * (1.0 + 1e-9), 720.0
 
 
@@ -72,9 +71,7 @@ Domain: TypeAlias = Turn | Interval | March
 
 
 def equal_steps(domain: Domain, designs: Array, poses: int) -> Array:
-    """Return so many values of the variable for the first design:
-    one turn from 0 in equal steps, or a whole interval.
-    """
+    """Spread values of the variable for the first design: one turn from 0 in equal steps, or a whole interval."""
     if isinstance(domain, Interval):
         first, last = domain.ends(designs)
         return np.linspace(float(first[0]), float(last[0]), poses, dtype=np.float64)

@@ -7,9 +7,11 @@ from functools import partial
 import numpy as np
 
 from kernels.families import eyelet
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, poses_of
+from kernels.types import Array
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Fixed, Link, Points, Skeleton, ThreadPath
-from sweep.families.pace import Singular
+from sweep.families.curve_features import Singular
+from sweep.families.poses import poses_of
 from sweep.families.skeletons import crank_axis, parameter
 
 PARAMETERS = (
@@ -37,10 +39,9 @@ POSE_OUTPUTS = (
     Output("Y_E", "length", "eyelet, across that and the line of the guides", "(5)"),
     Output("Z_E", "length", "eyelet, along the line of the guides", "(5)"),
 )
-_NAMES = tuple(o.name for o in POSE_OUTPUTS)
 
 # Wanted pose outputs and status of every design at its angles, each (n, m).
-poses = poses_of(eyelet.poses, _NAMES)
+poses = poses_of(eyelet.poses, eyelet.Outputs)
 
 
 def guide(number: int) -> Fixed:

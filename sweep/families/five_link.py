@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from kernels.families import five_link
-from kernels.families.five_link.links import links as fill_links
-from kernels.links import DRIVEN, FRAME, TURN
+from kernels.families.five_link.motion import links as fill_links
+from kernels.linkage.bodies import DRIVEN, FRAME, TURN
+from kernels.types import Array
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Link, OutputLink, Points, Skeleton
-from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
-from sweep.families.linked import filled_by
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
+from sweep.families.outputs import angle_outputs, ladders
+from sweep.families.poses import filled_with_places
 from sweep.families.skeletons import CRANK, CRANK_ROCKER_SIZES, ROCKER, crank_axis, standing
 
 PARAMETERS = (
@@ -27,10 +29,7 @@ PARAMETERS = (
 )
 
 VALUE_OUTPUTS = (
-    Output("psi", "rad", "rocker angle in (-pi, pi]", "(1)", wraps=True),
-    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(5)"),
-    Output("d2psi", "1", "acceleration analogue", "(5)"),
-    Output("d3psi", "1", "jerk analogue", "(5)"),
+    *angle_outputs("psi", "rocker angle in (-pi, pi]", "(1)", "(5)"),
     Output("sin_psi", "1", "sine of the rocker angle", "(1)"),
     Output("cos_psi", "1", "cosine of the rocker angle", "(1)"),
     Output("discriminant", "length^4", "(2 b c)^2 cos^2(pressure angle); negative where the links do not reach", "(7)"),
@@ -38,13 +37,8 @@ VALUE_OUTPUTS = (
 )
 
 PLACE_OUTPUTS = (
-    Output(
-        "theta",
-        "rad",
-        "angle of the coupler's plane about the crank pin, from the common perpendicular",
-        "(8)",
-        wraps=True,
-    ),
+    Output("theta", "rad", "angle of the coupler's plane about the crank pin, from the common perpendicular", "(8)",
+           wraps=True),
     Output("beta", "rad", "angle of the coupler against the crank plane, in (-pi/2, pi/2)", "(8)"),
     Output("x_b", "length", "crank pin, along the common perpendicular of the axes", "(9)"),
     Output("y_b", "length", "crank pin, across it and the rocker axis", "(9)"),
@@ -55,15 +49,14 @@ PLACE_OUTPUTS = (
     Output("x_c", "length", "rocker ball, along the common perpendicular of the axes", "(9)"),
     Output("y_c", "length", "rocker ball, across it and the rocker axis", "(9)"),
     Output("z_c", "length", "rocker ball, along the rocker axis", "(9)"),
-)
+)  # fmt: skip
 
-_VALUES = tuple(o.name for o in VALUE_OUTPUTS)
 _PLACES = tuple(o.name for o in PLACE_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_with_places(five_link.poses, designs, angles, _VALUES, _PLACES, wanted)
+    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return filled_with_places(five_link.poses, designs, angles, five_link.Outputs, _PLACES, wanted)
 
 
 _RATES = ("psi", "dpsi", "d2psi", "theta", "beta")
@@ -98,7 +91,7 @@ FAMILY = Family(
     pose_outputs=VALUE_OUTPUTS + PLACE_OUTPUTS,
     poses=poses,
     example={"a": 1.0, "b": 3.9, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "h": 0.3, "s2": 0.1},
-    derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
+    derivative_of=ladders("psi"),
     outward="branch",
     uses_phi=False,
     capabilities=(

@@ -5,14 +5,13 @@ The rocker is the crank-rocker's with alpha = f = g = 0; the coupler point is th
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from kernels import status as st
+from kernels.types import Array
 from sweep.families import guide
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, PoseFunction
 from sweep.families.capabilities import (
     Arm,
     Assembly,
@@ -26,7 +25,9 @@ from sweep.families.capabilities import (
     Skeleton,
     ToolPoint,
 )
+from sweep.families.converted import of_matrix, step_of
 from sweep.families.hardpoints import FOUR_BAR_POINTS
+from sweep.families.outputs import angle_outputs, ladders
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, links, standing
 
 PARAMETERS = (
@@ -40,10 +41,7 @@ PARAMETERS = (
 )
 
 ROCKER_OUTPUTS = (
-    Output("psi", "rad", "rocker angle in (-pi, pi]", "(1)", wraps=True),
-    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(1)"),
-    Output("d2psi", "1", "acceleration analogue", "(1)"),
-    Output("d3psi", "1", "jerk analogue", "(1)"),
+    *angle_outputs("psi", "rocker angle in (-pi, pi]", "(1)", "(1)"),
     Output("sin_psi", "1", "sine of the rocker angle", "(1)"),
     Output("cos_psi", "1", "cosine of the rocker angle", "(1)"),
     Output("discriminant", "length^4", "A1^2 + A2^2 - A3^2; the links reach where it is not negative", "(1)"),
@@ -68,9 +66,7 @@ _POINT = {"x_m": "s", "y_m": "dev", "dx_m": "ds", "dy_m": "ddev", "d2x_m": "d2s"
 
 
 def as_crank_rocker(designs: Array) -> Array:
-    """Return the design matrix of the same linkage as a crank-rocker, (n, 8);
-    no number where the coupler point is none.
-    """
+    """Design matrix of the same linkage as a crank-rocker, (n, 8); nan where the coupler point is no number."""
     matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)), designs.dtype)
     matrix[:, :4], matrix[:, 7] = designs[:, :4], designs[:, 6]
     with np.errstate(invalid="ignore"):
@@ -103,7 +99,7 @@ def _poses(
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return _poses(crank_rocker.poses, guide.poses, designs, angles, wanted)
 
 
@@ -112,23 +108,9 @@ def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Col
     return _poses(crank_rocker.precise_poses, guide.precise_poses, designs, angles, wanted)
 
 
-def _as_ours(step: Step) -> Step:
-    """Return a step of the crank-rocker for this design matrix."""
-
-    def run(designs: Array, *rest: object) -> Columns:
-        return step.run(as_crank_rocker(designs), *rest)  # type: ignore[arg-type]
-
-    return replace(step, provides=tuple(replace(o, equation="") for o in step.provides), run=run)
-
-
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
     """Fill the joint records that effects work from."""
     crank_rocker.joint_records(as_crank_rocker(designs), angles, motion, per_pose, per_design)
-
-
-def ellipse(designs: Array) -> Array:
-    """Return the curve of the coupler direction across the rocker's motion, (n, 7)."""
-    return crank_rocker.ellipse(as_crank_rocker(designs))
 
 
 FAMILY = Family(
@@ -139,18 +121,15 @@ FAMILY = Family(
     pose_outputs=ROCKER_OUTPUTS + POINT_OUTPUTS,
     poses=poses,
     example={"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "branch": 1.0},
-    steps=tuple(_as_ours(step) for step in crank_rocker.FAMILY.steps),
-    derivative_of={
-        "psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi",
-        "x_m": "dx_m", "dx_m": "d2x_m", "y_m": "dy_m", "dy_m": "d2y_m",
-    },
+    steps=tuple(step_of(step, as_crank_rocker) for step in crank_rocker.FAMILY.steps),
+    derivative_of=ladders("psi") | {"x_m": "dx_m", "dx_m": "d2x_m", "y_m": "dy_m", "dy_m": "d2y_m"},
     outward="branch",
     uses_phi=False,
     capabilities=(
         Dimensions(links("a b c"), arms=(Arm(("xi", "eta"), ("b",)),)),
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         JointRecords(joint_records, crank_rocker.JOINT_NEEDS, "rocker"),
-        PressureEllipse(ellipse),
+        PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
         CrankRockerLoop(as_crank_rocker),
         Points({name: (f"x_{name}", f"y_{name}", None) for name in ("b", "c", "m")}),
         OutputLink(crank_rocker.rocker_origin),

@@ -1,4 +1,4 @@
-"""Registry entry of the thread take-up by a turning cam over whose bare edge the thread runs without friction."""
+"""Registry entries of the thread take-up by the bare edge of a turning cam, without friction and with it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from kernels.families import free_cam
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, poses_of
+from kernels.types import Array
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Link, Made, Points, Skeleton, ThreadPath
+from sweep.families.domain import March
+from sweep.families.poses import filled, poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
@@ -36,10 +39,9 @@ POSE_OUTPUTS = (
     ),
     Output("minima", "1", "number of minima of the length along the edge", "(19)", jumps=True),
 )
-_NAMES = tuple(o.name for o in POSE_OUTPUTS)
 
 # Wanted pose outputs and status of every design at its angles, each (n, m).
-poses = poses_of(free_cam.poses, _NAMES)
+poses = poses_of(free_cam.poses, free_cam.Outputs)
 
 
 EDGE = {"k1": -1.0, "k2": -0.5, "k3": 0.5, "k4": 1.0}
@@ -90,4 +92,69 @@ FAMILY = Family(
         ThreadPath("wrap", "dP", "d2P"),
         Skeleton(SKELETON_FIXED, LINKS, EDGE_POINTS),
     ),
+)
+
+
+FRICTION_PARAMETERS = (
+    *PARAMETERS,
+    Parameter("mu", "ratio", "coefficient of friction along the edge, across the thread", not_negative=True),
+    Parameter("tension_ratio", "ratio", "tension at guide 2 over tension at guide 1", default=1.0, positive=True),
+    Parameter("mu_thread", "ratio", "friction along the thread; the ratio grows by e^(mu_thread wrap)", default=0.0,
+              not_negative=True),
+)  # fmt: skip
+
+FRICTION_OUTPUTS = (
+    Output("P", "length", "thread taken up, L - P_h", "(6)"),
+    Output("L", "length", "length of thread between the guides", "(18)"),
+    Output("wrap", "rad", "angle by which the thread turns at the edge, 0 without contact", "(1)"),
+    Output("y_contact", "length", "place where the thread passes the plane of the cam, along the edge's y", "(25)"),
+    Output(
+        "contact", "1", "1 where the thread lies on the edge, 0 where it runs straight beside it", "(18)", jumps=True
+    ),
+    Output("sticking", "1", "1 where it lies where it lay before, 0 where it slides or is off", "(25)", jumps=True),
+)
+_FRICTIONLESS = len(PARAMETERS)
+DOMAIN = March(text="cam angle")
+
+
+def sliding_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Compute the wanted pose outputs and status, each (n, m), of the last of the turns that are marched."""
+    needed = wanted | {"L"} if "P" in wanted else wanted
+    own = np.ascontiguousarray(designs[:, :_FRICTIONLESS])
+    friction = np.ascontiguousarray(designs[:, [_FRICTIONLESS + 1, _FRICTIONLESS + 2, _FRICTIONLESS]])
+    arguments = own, friction, angles.cos, angles.sin, DOMAIN.turns
+    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
+    found = filled(free_cam.march, arguments, free_cam.MarchOutputs, needed, status)
+    if "P" in wanted:
+        found["P"] = np.asarray(found["L"], np.float64) - designs[:, _FRICTIONLESS - 1 : _FRICTIONLESS]
+    return {name: found[name] for name in (*wanted, "status")}
+
+
+def contact_place(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Place where the thread passes the plane of the cam: on the edge, or on the line between the guides."""
+    y, on = (np.asarray(found[name], np.float64) for name in ("y_contact", "contact"))
+    at = turned(parameter(PARAMETERS, "a", designs)[:, None] * y * y, y, angles)
+    guides = (np.stack([parameter(PARAMETERS, f"{axis}{k}", designs) for axis in "XYZ"], axis=1) for k in (1, 2))
+    first, second = (guide[:, None, :] for guide in guides)
+    straight = first + (second - first) * (first[..., 2:] / (first[..., 2:] - second[..., 2:]))
+    return np.where(on[..., None] == 1.0, at, straight)
+
+
+WITH_FRICTION = Family(
+    name="free_cam_friction",
+    title="thread take-up by the bare edge of a turning cam, with friction",
+    parameters=FRICTION_PARAMETERS,
+    position="P",
+    pose_outputs=FRICTION_OUTPUTS,
+    poses=sliding_poses,
+    domain=DOMAIN,
+    analytic=False,
+    capabilities=(
+        Skeleton(
+            SKELETON_FIXED,
+            LINKS,
+            EDGE_POINTS | {"contact": Made(("y_contact", "contact"), contact_place)},
+        ),
+    ),
+    example={**FAMILY.example, "mu": 0.3, "tension_ratio": 1.5},
 )

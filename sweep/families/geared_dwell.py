@@ -1,4 +1,4 @@
-"""Registry entry of the geared dwell drive with a slotted output link."""
+"""Registry entries of the geared dwell drives with a slotted output link: gears of one size, or of any whole ratio."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from kernels.families import geared_dwell
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, optional_outputs
+from kernels.families import epicyclic_dwell, geared_dwell
+from kernels.types import EPS, Array
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import Link, Made, Points, Skeleton
-from sweep.families.pace import Singular
+from sweep.families.curve_features import Singular, Waves
+from sweep.families.outputs import angle_outputs, ladders
+from sweep.families.poses import filled, optional_outputs, poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
@@ -42,19 +45,14 @@ MAX_OUTPUTS = (
     Output("max_abs_d3psi", "1", "largest jerk analogue over the turn", "(9)"),
 )
 
-ROUNDING = 2.0**-53
-_POSE_NAMES = tuple(o.name for o in POSE_OUTPUTS)
 _SAMPLED_OUTPUTS = tuple(o for o in MAX_OUTPUTS if o.name.startswith("max"))
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its carrier angles, each (n, m)."""
-    shape = (designs.shape[0], angles.cos.shape[1])
-    status = np.empty(shape, np.uint8)
-    outputs = optional_outputs(_POSE_NAMES, wanted, shape, np.result_type(designs, angles.cos))
-    geared_dwell.poses(designs, angles.phi, angles.cos, angles.sin, status, *outputs)
-    columns: Columns = {name: out for name, out in zip(_POSE_NAMES, outputs, strict=True) if out is not None}
-    return columns | {"status": status}
+    """Compute the wanted pose outputs and status of every design at its carrier angles, each (n, m)."""
+    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
+    dtype = np.result_type(designs, angles.cos)
+    return filled(geared_dwell.poses, (designs, *angles), geared_dwell.Outputs, wanted, status, dtype)
 
 
 def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Array:
@@ -73,7 +71,7 @@ def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
     columns = _columns(outputs, status)
     for name, value in outputs.items():
         if value is not None and accuracy.target is not None:
-            columns[f"err_{name}"] = 0.0 * value if name == "turns" else 32.0 * ROUNDING * abs(value)
+            columns[f"err_{name}"] = 0.0 * value if name == "turns" else 32.0 * EPS * abs(value)
     return columns
 
 
@@ -88,7 +86,7 @@ def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> 
     geared_dwell.turn_maxima(designs, status, *outputs.values())
     columns = _columns(outputs, status)
     with np.errstate(all="ignore"):  # what is no number has its status
-        growth = 128.0 * ROUNDING * (1.0 + np.hypot(designs[:, 0] - 1.0, designs[:, 1] + 1.0) ** -1.25)
+        growth = 128.0 * EPS * (1.0 + np.hypot(designs[:, 0] - 1.0, designs[:, 1] + 1.0) ** -1.25)
     for name, value in outputs.items():
         if value is not None:
             columns[f"err_{name}"] = growth * (1.0 + 0.0 * value if name.startswith("phi") else abs(value))
@@ -105,8 +103,7 @@ def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -
 
 @lru_cache(maxsize=32)
 def half_turn(samples: int) -> tuple[Array, Array]:
-    """Return the equidistant grid of one turn, folded:
-    rows 1 -+ cos(phi) and sin(phi) around phi = 0 and around phi = pi.
+    """Tabulate one turn, folded: rows 1 -+ cos(phi) and sin(phi) around phi = 0 and around phi = pi.
 
     phi and -phi have the same magnitudes, so half of the samples stand for all.  The last angle is repeated up to a
     multiple of 16, which the vectorised loop takes without a remainder; the grid of an odd number misses phi = pi.
@@ -155,7 +152,7 @@ FAMILY = Family(
         Step("stationary points", MAX_OUTPUTS, exact_maxima, lambda accuracy: accuracy.target is not None),
         Step("grid", _SAMPLED_OUTPUTS, sampled_maxima, lambda accuracy: accuracy.samples is not None),
     ),
-    derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
+    derivative_of=ladders("psi"),
     capabilities=(
         Singular(pin_distance_squared, ("x_b", "y_b")),
         Points({"b": ("x_b", "y_b", None)}),
@@ -166,4 +163,79 @@ FAMILY = Family(
         ),
     ),
     example={"k": 1.4, "a": 0.3},
+)
+
+
+EPICYCLIC_PARAMETERS = (
+    Parameter("k", "ratio", "distance of the pin from the planet centre, in planet radii", positive=True),
+    Parameter("a", "ratio", "offset of the output axis from the carrier axis, in planet radii"),
+    Parameter(
+        "n", "count", "radius of the fixed gear in planet radii, a whole number", positive=True, default=1.0,
+        choices=tuple(float(n) for n in range(1, epicyclic_dwell.MOST_TEETH + 1)),
+    ),
+    Parameter("mesh", "sign", "+1: planet outside the fixed gear, -1: inside a ring", default=1.0, choices=(-1.0, 1.0)),
+)  # fmt: skip
+
+EPICYCLIC_OUTPUTS = (
+    *angle_outputs("psi", "output angle in (-pi, pi]", "(2)", "(3)"),
+    Output("sin_psi", "1", "sine of the output angle", "(2)"),
+    Output("cos_psi", "1", "cosine of the output angle", "(2)"),
+    Output("x_b", "1", "pin from the output axis towards phi = 0, in planet radii", "(1)"),
+    Output("y_b", "1", "pin from the output axis across it, in planet radii", "(1)"),
+)
+
+EPICYCLIC_DWELL = (
+    Output("dwell_angle", "rad", "return dwell: carrier angle between first and third passage of mid-dwell", "(5)"),
+    Output("dwell_deviation", "rad", "largest deviation of psi from mid-dwell, half the peak to peak", "(6)"),
+    Output("dwell_band", "rad", "carrier angle during which psi stays within +-dwell_deviation", "(7)"),
+)
+
+# Wanted pose outputs and status of every design at its angles, each (n, m).
+epicyclic_poses = poses_of(epicyclic_dwell.poses, epicyclic_dwell.Outputs)
+
+
+def epicyclic_measures(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+    """Return dwell measures to rounding: every root is bisected."""
+    n = len(designs)
+    status, values = np.empty(n, np.uint8), [np.empty(n) for _ in EPICYCLIC_DWELL]
+    epicyclic_dwell.dwell_measures(designs, status, *values)
+    columns: Columns = {o.name: x for o, x in zip(EPICYCLIC_DWELL, values, strict=True) if o.name in wanted}
+    return columns | {"status": status}
+
+
+def planet_turns(designs: Array) -> Array:
+    """Return how often the planet turns while the carrier turns once, (n,)."""
+    n, mesh = (parameter(EPICYCLIC_PARAMETERS, name, designs) for name in ("n", "mesh"))
+    found: Array = np.abs(n + mesh)
+    return found
+
+
+def epicyclic_planet(designs: Array, angles: Angles, motion: Columns) -> Array:
+    """Return the planet's centre, (n, m, 3), in planet radii."""
+    n, mesh, a = (parameter(EPICYCLIC_PARAMETERS, name, designs)[:, None] for name in ("n", "mesh", "a"))
+    x = a + (n + mesh) * angles.cos
+    return np.stack([x, (n + mesh) * angles.sin, np.zeros_like(x)], axis=-1)
+
+
+EPICYCLIC = Family(
+    name="epicyclic_dwell",
+    title="geared dwell drive with a whole gear ratio",
+    parameters=EPICYCLIC_PARAMETERS,
+    position="psi",
+    pose_outputs=EPICYCLIC_OUTPUTS,
+    poses=epicyclic_poses,
+    example={"k": 1.3, "a": 0.2, "n": 3.0},
+    steps=(Step("dwell", EPICYCLIC_DWELL, epicyclic_measures, work=Work.LONG),),
+    derivative_of=ladders("psi"),
+    uses_phi=False,
+    capabilities=(
+        Singular(pin_distance_squared, ("x_b", "y_b")),
+        Waves(planet_turns),
+        Points({"b": ("x_b", "y_b", None)}),
+        Skeleton(
+            {"a": standing(EPICYCLIC_PARAMETERS, "a"), "d": ORIGIN},
+            (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),
+            {"o": Made((), epicyclic_planet)},
+        ),
+    ),
 )

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.families import guide
 from kernels.families import rssr as rssr_kernels
+from kernels.types import Array
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, PoseFunction, filled_with_places
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, PoseFunction
 from sweep.families.capabilities import (
     Arm,
     Assembly,
@@ -28,9 +29,11 @@ from sweep.families.capabilities import (
     ToolPoint,
     constant,
 )
+from sweep.families.converted import of_matrix
 from sweep.families.hardpoints import GUIDE_POINTS
+from sweep.families.outputs import ladders, place_outputs
+from sweep.families.poses import filled_with_places, together
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
-from sweep.families.together import together
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -45,10 +48,7 @@ PARAMETERS = (
 )
 
 VALUE_OUTPUTS = (
-    Output("s", "length", "coupler point along the line, from the foot of the crank pivot", "(4)"),
-    Output("ds", "length", "velocity analogue ds/dphi", "(5)"),
-    Output("d2s", "length", "acceleration analogue", "(5)"),
-    Output("d3s", "length", "jerk analogue", "(5)"),
+    *place_outputs("s", "coupler point along the line, from the foot of the crank pivot", "(4)", "(5)"),
     Output("dev", "length", "deviation of the coupler point from the line, to its left", "(4)", windowed=True),
     Output("ddev", "length", "first derivative of the deviation with respect to phi", "(5)"),
     Output("d2dev", "length", "second derivative of the deviation", "(5)"),
@@ -72,19 +72,18 @@ POINT_OUTPUTS = (
     Output("d2y_m", "length", "acceleration analogue of the coupler point across the frame", "(6)"),
 )
 
-_VALUES = tuple(o.name for o in VALUE_OUTPUTS)
 _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 _POINT = {"dx_m": ("ds", "ddev"), "dy_m": ("ds", "ddev"), "d2x_m": ("d2s", "d2dev"), "d2y_m": ("d2s", "d2dev")}
 _LAM = [p.name for p in PARAMETERS].index("lam")
 
 
-@together(*_VALUES, *_JOINTS)
+@together(*guide.Outputs._fields, *_JOINTS)
 def _motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    return filled_with_places(guide.poses, designs, angles, _VALUES, _JOINTS, wanted)
+    return filled_with_places(guide.poses, designs, angles, guide.Outputs, _JOINTS, wanted)
 
 
 def _precise_motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    return filled_with_places(guide.precise_poses, designs, angles, _VALUES, _JOINTS, wanted)
+    return filled_with_places(guide.precise_poses, designs, angles, guide.Outputs, _JOINTS, wanted)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
@@ -123,11 +122,6 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
     matrix = as_crank_rocker(designs)
     turned = crank_rocker.poses(matrix, angles, frozenset(crank_rocker.JOINT_NEEDS))
     crank_rocker.joint_records(matrix, angles, turned, per_pose, per_design)
-
-
-def ellipse(designs: Array) -> Array:
-    """Return the curve of the coupler direction across the rocker's motion, (n, 7)."""
-    return crank_rocker.ellipse(as_crank_rocker(designs))
 
 
 def point_shares(designs: Array) -> Array:
@@ -201,10 +195,8 @@ FAMILY = Family(
     position="s",
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS + POINT_OUTPUTS,
     poses=poses,
-    derivative_of={
-        "s": "ds", "ds": "d2s", "d2s": "d3s", "dev": "ddev", "ddev": "d2dev",
-        "x_m": "dx_m", "dx_m": "d2x_m", "y_m": "dy_m", "dy_m": "d2y_m",
-    },
+    derivative_of=ladders("s")
+    | {"dev": "ddev", "ddev": "d2dev", "x_m": "dx_m", "dx_m": "d2x_m", "y_m": "dy_m", "dy_m": "d2y_m"},
     outward="branch",
     uses_phi=False,
     capabilities=(
@@ -212,7 +204,7 @@ FAMILY = Family(
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         IN_SERIES,
         JointRecords(joint_records, (), "rocker"),
-        PressureEllipse(ellipse),
+        PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
         CrankRockerLoop(as_crank_rocker),
         GuidedPoint(
             point_shares,

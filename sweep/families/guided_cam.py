@@ -5,20 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.families import guided_cam
-from sweep.families.base import (
-    Accuracy,
-    Angles,
-    Array,
-    Columns,
-    Family,
-    Output,
-    Parameter,
-    Step,
-    Work,
-    filled_with_places,
-)
+from kernels.types import EPS, Array
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton, ThreadPath
-from sweep.families.pace import Singular
+from sweep.families.curve_features import Singular
+from sweep.families.poses import filled_with_places
 from sweep.families.skeletons import Y, line, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
@@ -58,9 +49,7 @@ DESIGN_OUTPUTS = (
     Output("jam_angle", "rad", "pressure angle at which the follower jams", "(13)"),
     Output("least_displacement", "length", "least displacement of the follower over the turn", "(10)"),
 )
-_VALUES = tuple(o.name for o in (*VALUE_OUTPUTS, CURVATURE))
 _PROFILE = tuple(o.name for o in PROFILE_OUTPUTS)
-ROUNDING = 2.0**-53
 
 
 def displacement_squared(designs: Array, angles: Angles, found: Columns) -> Array:
@@ -69,9 +58,9 @@ def displacement_squared(designs: Array, angles: Angles, found: Columns) -> Arra
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
+    """Compute the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
     asked = wanted | {"S"} if WRAP.name in wanted else wanted
-    columns = filled_with_places(guided_cam.poses, designs, angles, _VALUES, _PROFILE, asked)
+    columns = filled_with_places(guided_cam.poses, designs, angles, guided_cam.Outputs, _PROFILE, asked)
     if WRAP.name in wanted:
         x1, z1, e = (designs[:, [k]] for k in (1, 2, 3))
         # The guides stand symmetrically, so the thread makes the same angle with their line on both sides.
@@ -80,8 +69,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return the least radius and what it is made of;
-    maxima of smooth functions found to rounding, whatever the accuracy asked.
+    """Find the least radius and what it is made of: maxima of smooth functions, to rounding whatever is asked.
 
     The errors are bounds of those measured against 10^5 samples: a maximum to 64 roundings of the lengths it is made
     of, its place to the root of them.
@@ -91,16 +79,14 @@ def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     guided_cam.least_radius(np.ascontiguousarray(designs), status, *columns.values())
     found: Columns = {name: columns[name] for name in columns if name in wanted}
     if accuracy.target is not None:
-        length = 64.0 * ROUNDING * (np.abs(columns["least_radius"]) + designs[:, 0])
-        errors = {"phi_least_radius": np.full(n, 1e-7), "jam_angle": np.full(n, 4.0 * ROUNDING)}
+        length = 64.0 * EPS * (np.abs(columns["least_radius"]) + designs[:, 0])
+        errors = {"phi_least_radius": np.full(n, 1e-7), "jam_angle": np.full(n, 4.0 * EPS)}
         found |= {f"err_{name}": errors.get(name, length) for name in list(found)}
     return found | {"status": status}
 
 
 def cam_axis(designs: Array) -> Array:
-    """Return the centre of the cam on the follower's way:
-    R0 behind the least displacement, which is one of the whole turn.
-    """
+    """Place the cam's centre on the follower's way: R0 behind the least displacement of the whole turn."""
     least = np.asarray(size(designs, frozenset({"least_displacement"}), Accuracy())["least_displacement"], np.float64)
     e, radius = (parameter(PARAMETERS, name, designs) for name in ("e", "R0"))
     return np.stack([e, least - radius, np.zeros(len(designs))], axis=1)

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from kernels.types import Array
 from sweep.errors import InputError
-from sweep.families.base import Array
 from sweep.families.capabilities import Hardpoints, Reading
 
 PARALLEL = 1e-9  # sine of the angle below which two directions are read as one
@@ -51,9 +51,7 @@ def crank_rocker(points: Mapping[str, Array]) -> Reading:
 
 
 def slider_crank(points: Mapping[str, Array]) -> Reading:
-    """Return dimensions of a spatial slider-crank from A, axis_A, B, C, axis_D and,
-    if the line is given by a point, D.
-    """
+    """Read a spatial slider-crank off A, axis_A, B, C, axis_D and, if the line is given by a point, D."""
     a, b, c, u, y = (points[name] for name in ("A", "B", "C", "axis_A", "axis_D"))
     d = points.get("D", c)
     small = NOTHING * size(points)
@@ -80,15 +78,12 @@ def slider_crank(points: Mapping[str, Array]) -> Reading:
 
 
 def four_bar(points: Mapping[str, Array]) -> Reading:
-    """Return dimensions of a planar four-bar from A, B, C, D and, if wanted,
-    axis_A (else z) and the coupler point M.
-    """
+    """Read a planar four-bar off A, B, C, D and, if wanted, axis_A (else z) and the coupler point M."""
     return _planar(points, points.get("M"))
 
 
 def guide(points: Mapping[str, Array]) -> Reading:
-    """Read what :func:`four_bar` does, the coupler point ``point``,
-    and ``axis_line`` and ``line`` (else ``point``) of a line.
+    """Read what :func:`four_bar` does, the coupler ``point``, and ``axis_line`` and ``line`` of a line.
 
     Without ``line`` the guiding line runs through the coupler point, which then is where it deviates by 0.
     """

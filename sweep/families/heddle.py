@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.families import heddle
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
+from kernels.types import Array
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, Made, Points, Skeleton
+from sweep.families.outputs import ladders
+from sweep.families.poses import filled_with_places
 from sweep.families.skeletons import ORIGIN, Y, Z, line, links, parameter, standing
 
 PARAMETERS = (
@@ -51,13 +54,12 @@ PLACE_OUTPUTS = (
     Output("y_c", "length", "upper end of the bell crank, across O2O3", "(4)"),
 )
 
-_VALUES = tuple(o.name for o in VALUE_OUTPUTS)
 _PLACES = tuple(o.name for o in PLACE_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its cam-lever angles, each (n, m)."""
-    return filled_with_places(heddle.poses, designs, angles, _VALUES, _PLACES, wanted)
+    """Compute the wanted pose outputs and status of every design at its cam-lever angles, each (n, m)."""
+    return filled_with_places(heddle.poses, designs, angles, heddle.Outputs, _PLACES, wanted)
 
 
 def rod_square(designs: Array) -> Array:
@@ -77,9 +79,7 @@ def shaft_pivot(designs: Array) -> Array:
 
 
 def shaft_line(designs: Array) -> tuple[Array, Array]:
-    """Return the vertical on which the shaft moves:
-    through the slide of its rod, of a long rod through E at mid-stroke.
-    """
+    """Place the vertical on which the shaft moves: through its rod's slide, or through E at mid-stroke."""
     at = shaft_pivot(designs)
     at[:, 0] += np.where(_column("EG", designs) > 0.0, _column("x_s", designs), _column("O4E", designs))
     return at, np.tile(np.array(Y), (len(designs), 1))
@@ -127,7 +127,7 @@ FAMILY = Family(
     pose_outputs=VALUE_OUTPUTS + PLACE_OUTPUTS,
     poses=poses,
     example=EXAMPLE,
-    derivative_of={"chi": "dchi", "dchi": "d2chi", "d2chi": "d3chi", "y": "dy", "dy": "d2y", "d2y": "d3y"},
+    derivative_of=ladders("chi", "y"),
     uses_phi=False,
     capabilities=(
         Dimensions(links("O2B BC O3C O4E"), optional=("O3D", "O4F", "DF", "EG")),

@@ -6,14 +6,13 @@ alpha = 90 deg, branch = -branch; psi is its alpha.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from kernels import status as st
 from kernels.families import rssr
+from kernels.types import Array
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, PoseFunction, Step
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
 from sweep.families.capabilities import (
     Assembly,
     CrankRockerLoop,
@@ -23,7 +22,8 @@ from sweep.families.capabilities import (
     PressureEllipse,
     Skeleton,
 )
-from sweep.families.placing import move_records
+from sweep.families.converted import move_records, of_matrix, step_of
+from sweep.families.outputs import angle_outputs, ladders
 from sweep.families.skeletons import CRANK_ROCKER, links, standing
 
 PARAMETERS = (
@@ -41,20 +41,13 @@ PARAMETERS = (
 _FROM_CRANK_ROCKER = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 MOTION_OUTPUTS = (
-    Output("alpha", "rad", "rocker angle in (-pi, pi]", "(4)", wraps=True),
-    Output("dalpha", "1", "velocity analogue dalpha/dphi", "(5)"),
-    Output("d2alpha", "1", "acceleration analogue", "(5)"),
-    Output("d3alpha", "1", "jerk analogue", "(5)"),
+    *angle_outputs("alpha", "rocker angle in (-pi, pi]", "(4)", "(5)"),
     Output("sin_alpha", "1", "sine of the rocker angle", "(4)"),
     Output("cos_alpha", "1", "cosine of the rocker angle", "(4)"),
-    Output(
-        "discriminant",
-        "length^4",
-        "4 h^2 times the square of the ball's distance from a dead point; negative out of reach",
-        "(3)",
-    ),
+    Output("discriminant", "length^4", "4 h^2 times the square of the ball's distance from a dead point; negative out "
+           "of reach", "(3)"),
     Output("pressure_angle", "rad", "between the coupler force and the velocity of the rocker ball", "(6)"),
-)
+)  # fmt: skip
 
 OWN_OUTPUTS = (
     Output("omega3", "rad/s", "angular velocity of the rocker", "(7)"),
@@ -93,9 +86,7 @@ def _ours(name: str) -> str:
 
 
 def as_crank_rocker(designs: Array) -> Array:
-    """Return the design matrix of the same linkage as a crank-rocker, (n, 8);
-    no number where the crank's motion is none.
-    """
+    """Design matrix of the same linkage as a crank-rocker, (n, 8); nan where the crank's motion is no number."""
     matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)), designs.dtype)
     matrix[:, :5] = designs[:, :5]
     with np.errstate(invalid="ignore"):
@@ -131,7 +122,7 @@ def _poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return _poses(crank_rocker.poses, designs, angles, wanted)
 
 
@@ -141,9 +132,7 @@ def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Col
 
 
 def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return both limit positions and the angle between them, to rounding:
-    the crank is then in the plane of the rocker.
-    """
+    """Both limit positions, where the crank is in the plane of the rocker, and the angle between them, to rounding."""
     n = len(designs)
     status, values = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
     errors = np.empty_like(values)
@@ -154,35 +143,15 @@ def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
     # Extended is phi = 0 or pi, whichever places the ball beyond the crank pin: y_C > 0 or < 0.
     first = np.cos(values[:, names.index("phi_ext")]) > 0.0
     found = {
-        "alpha_at_phi0": (
-            np.where(first, values[:, ext], values[:, fold]),
-            np.where(first, errors[:, ext], errors[:, fold]),
-        ),
-        "alpha_at_phipi": (
-            np.where(first, values[:, fold], values[:, ext]),
-            np.where(first, errors[:, fold], errors[:, ext]),
-        ),
-        "swing": (np.abs(values[:, whole]), errors[:, whole]),
+        "alpha_at_phi0": [np.where(first, x[:, ext], x[:, fold]) for x in (values, errors)],
+        "alpha_at_phipi": [np.where(first, x[:, fold], x[:, ext]) for x in (values, errors)],
+        "swing": [np.abs(values[:, whole]), errors[:, whole]],
     }
     columns: Columns = {"status": status}
     for name, (value, error) in found.items():
         if name in wanted:
             columns |= {name: value, f"err_{name}": error} if accuracy.target is not None else {name: value}
     return columns
-
-
-def _as_ours(step: Step) -> Step:
-    """Return a step of the crank-rocker under the symbols of this family."""
-
-    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-        asked = frozenset(_theirs(name) for name in wanted)
-        found = step.run(
-            as_crank_rocker(designs), asked, replace(accuracy, proven=tuple(map(_theirs, accuracy.proven)))
-        )
-        return {_ours(name): values for name, values in found.items()}
-
-    provides = tuple(replace(o, name=_ours(o.name), equation="") for o in step.provides)
-    return replace(step, provides=provides, run=run)
 
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
@@ -195,11 +164,6 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
     move_records(_FROM_CRANK_ROCKER, origin, per_pose, per_design)
 
 
-def ellipse(designs: Array) -> Array:
-    """Return the curve of the coupler direction across the rocker's motion, (n, 7)."""
-    return crank_rocker.ellipse(as_crank_rocker(designs))
-
-
 FAMILY = Family(
     name="kim_dison",
     title="spatial crank-rocker of Kim and Dison",
@@ -210,15 +174,19 @@ FAMILY = Family(
     example={"r": 1.0, "l": 6.0, "h": 3.2, "a": 2.9, "b": 4.0, "branch": -1.0},
     steps=(
         Step("swing", SWING_OUTPUTS, swing),
-        *(_as_ours(step) for step in crank_rocker.FAMILY.steps if step.name != "limit positions"),
+        *(
+            step_of(step, as_crank_rocker, _ours, _theirs)
+            for step in crank_rocker.FAMILY.steps
+            if step.name != "limit positions"
+        ),
     ),
-    derivative_of={"alpha": "dalpha", "dalpha": "d2alpha", "d2alpha": "d3alpha"},
+    derivative_of=ladders("alpha"),
     uses_phi=False,
     capabilities=(
         Dimensions(links("r l h")),
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         JointRecords(joint_records, (), "rocker"),
-        PressureEllipse(ellipse),
+        PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
         CrankRockerLoop(as_crank_rocker),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         Skeleton(

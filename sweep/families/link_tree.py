@@ -6,11 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from sweep.families.capabilities import Array, DesignMap
+import numpy as np
 
-if TYPE_CHECKING:
-    from kernels.links import Links
-    from sweep.families.base import Angles, Columns
+from kernels.types import Array
+from sweep.families.base import Angles, Columns
+from sweep.families.capabilities import DesignMap
+
+if TYPE_CHECKING:  # families without such kernels do not wait for them
+    from kernels.linkage.bodies import Links
 
 
 @dataclass(frozen=True)
@@ -53,12 +56,12 @@ LinkFill: TypeAlias = "Callable[[Array, Angles, Columns, Links], None]"
 
 @dataclass(frozen=True)
 class LinkTree:
-    """Bodies of any number with the joints between them, from which loads are computed: :mod:`kernels.links`.
+    """Bodies of any number with the joints between them, from which loads are computed: :mod:`kernels.linkage.bodies`.
 
     Parameters
     ----------
     bodies, joints : in the order of their numbers
-    parents, freedoms, ends : the tree as :class:`kernels.links.Links` takes it, of an ordinary design
+    parents, freedoms, ends : the tree as :class:`kernels.linkage.bodies.Links` takes it, of an ordinary design
     needs : pose outputs that ``fill(designs, angles, motion, links)`` writes the poses of the bodies from
     carrier : number of the body that a tool hangs on
     tip : place of the tool in the axes of that body, (n, 3); None where it is an input
@@ -75,3 +78,15 @@ class LinkTree:
     carrier: int
     tip: DesignMap | None = None
     output: int = -1
+
+
+def filled_by(kernel: Callable[..., object], needs: tuple[str, ...], stacked: tuple[str, ...] = ()) -> LinkFill:
+    """Fill by a kernel that takes pose outputs one by one, then those ``stacked`` in one array, if any."""
+
+    def fill(designs: Array, angles: Angles, motion: Columns, out: Links) -> None:
+        given = [np.asarray(motion[name], np.float64) for name in needs]
+        if stacked:
+            given.append(np.stack([np.asarray(motion[name], np.float64) for name in stacked]))
+        kernel(designs, angles.cos, angles.sin, *given, out)
+
+    return fill

@@ -1,7 +1,11 @@
-"""A parameter of a mechanism family: a column of the design matrix, with its unit and what it may be."""
+"""A parameter of a mechanism family, and the words in which parameters and outputs say their units.
+
+Internal units are mm, t, s and rad and what follows from them.  A word may be a product such as "force/length".
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -47,3 +51,52 @@ class Parameter:
         """The values it may have, in words; signs are shown where they are the choice."""
         signed = any(x < 0.0 for x in self.choices or ())
         return " or ".join(f"{x:+g}" if signed else f"{x:g}" for x in self.choices or ())
+
+
+WORDS = {
+    "length": "mm",
+    "angle": "rad",
+    "mass": "t",
+    "inertia": "t*mm^2",
+    "force": "N",
+    "torque": "N*mm",
+    "pressure": "MPa",
+    "stiffness": "N/mm",
+    "damping": "N*s/mm",
+    "rotary_damping": "N*mm*s",
+    "speed": "rad/s",
+    "angular_acceleration": "rad/s^2",
+    "acceleration": "mm/s^2",
+    "time": "s",
+}
+_WORD = re.compile(r"[a-z_]{2,}")
+_PRODUCT = re.compile(r"(1|rad|s|N|[a-z_]{2,})(\^[2-9])?([*/](rad|s|N|[a-z_]{2,})(\^[2-9])?)*")
+
+
+def spelt_out(word: str) -> str:
+    """Return the internal unit of a product of words.
+
+    >>> spelt_out("length^4"), spelt_out("force/length"), spelt_out("1/length")
+    ('mm^4', 'N/mm', '1/mm')
+    """
+    return _WORD.sub(lambda found: WORDS.get(found[0], found[0]), word)
+
+
+def is_known(word: str) -> bool:
+    """Return whether a unit is written in these words, so that study files can convert it and results can name it.
+
+    >>> is_known("length/time"), is_known("parsec"), is_known("N s")
+    (True, False, False)
+    """
+    return bool(_PRODUCT.fullmatch(word)) and set(_WORD.findall(word)) <= {*WORDS, "rad"}
+
+
+def of_derivative(unit: str, variable: str) -> str:
+    """Find the unit of the derivative of a quantity by a variable of the domain; radians are left out of quotients.
+
+    >>> of_derivative("length", "rad"), of_derivative("rad", "rad"), of_derivative("N", "length")
+    ('length', '1', 'N/length')
+    """
+    if unit == variable:
+        return "1"
+    return unit if variable == "rad" else f"{unit}/{variable}"

@@ -7,7 +7,8 @@ from functools import cache
 from kernels.families.rssr import box_by_axes, box_by_rocker, proof
 from kernels.families.rssr.box_problem import Problem
 from kernels.families.rssr.box_turn import Formulas
-from sweep.families.capabilities import Numbers, ProvableLocus, Searched
+from kernels.types import Numbers
+from sweep.families.capabilities import ProvableLocus, Searched
 
 _by_axes = cache(box_by_axes.recorded)
 _by_rocker = cache(box_by_rocker.recorded)

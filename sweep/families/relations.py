@@ -8,8 +8,9 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from sweep.families.base import Array, Output, Parameter
-from sweep.families.placing import AXES
+from kernels.types import Array
+from sweep.families.base import Output, Parameter
+from sweep.families.parts import AXES
 
 
 class Frame(NamedTuple):
@@ -214,9 +215,7 @@ class Shaking:
         return not wanted.isdisjoint((self._moment, *(f"{self._moment}_{axis}" for axis in AXES)))
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return the frame's forces on crank and follower of every member,
-        and the members' moments where one is wanted.
-        """
+        """Name the frame's forces on crank and follower of every member, and moments where one is wanted."""
         kinds = ["force_a{}_{}", "force_d{}_{}", *(["shaking_moment{}_{}"] if self._turning(wanted) else [])]
         return frozenset(
             f"{member}.{kind.format(stage, axis)}" for member, stage in self.members for kind in kinds for axis in AXES

@@ -1,12 +1,19 @@
-"""Registry entry of the spatial slider-crank (RSSP)."""
+"""Registry entries of the slider-cranks: the spatial one (RSSP), and the planar one, also offset.
+
+The planar one is the spatial one with alpha = 0, turned by a quarter, and has its kernels; its x runs along the slide
+line and its phi is counted from there.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels.families import rssp
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step, filled_with_places
+from kernels.types import EPS, Array
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
 from sweep.families.capabilities import (
     Assembly,
     Curve,
@@ -18,8 +25,11 @@ from sweep.families.capabilities import (
     Skeleton,
     constant,
 )
-from sweep.families.hardpoints import SLIDER_CRANK_POINTS
-from sweep.families.skeletons import SLIDER_CRANK, SLIDER_CRANK_SIZES, Y, crank_axis, standing
+from sweep.families.converted import move_records, step_of
+from sweep.families.hardpoints import PLANAR_SLIDER_POINTS, SLIDER_CRANK_POINTS
+from sweep.families.outputs import ladders, place_outputs
+from sweep.families.poses import filled_with_places
+from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, Y, crank_axis, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -31,10 +41,7 @@ PARAMETERS = (
 )
 
 VALUE_OUTPUTS = (
-    Output("s", "length", "slider displacement from the foot of the common perpendicular", "(2)"),
-    Output("ds", "length", "velocity analogue ds/dphi", "(5)"),
-    Output("d2s", "length", "acceleration analogue", "(5)"),
-    Output("d3s", "length", "jerk analogue", "(5)"),
+    *place_outputs("s", "slider displacement from the foot of the common perpendicular", "(2)", "(5)"),
     Output("discriminant", "length^2", "Q; the links reach where it is not negative", "(1)"),
     Output("pressure_angle", "rad", "between the coupler force and the velocity of the slider", "(3)"),
 )
@@ -64,19 +71,17 @@ LIMIT_OUTPUTS = (
     Output("stroke", "length", "largest minus smallest s over one turn", "(10)"),
 )
 
-EPS = 2.0**-53
-_VALUES = tuple(o.name for o in VALUE_OUTPUTS)
 _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_with_places(rssp.poses, designs, angles, _VALUES, _JOINTS, wanted)
+    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return filled_with_places(rssp.poses, designs, angles, rssp.Outputs, _JOINTS, wanted)
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute what :func:`poses` does, in twice the working precision; for float64 only."""
-    return filled_with_places(rssp.precise_poses, designs, angles, _VALUES, _JOINTS, wanted)
+    return filled_with_places(rssp.precise_poses, designs, angles, rssp.Outputs, _JOINTS, wanted)
 
 
 def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -180,7 +185,7 @@ FAMILY = Family(
         Step("margin", MARGIN_OUTPUTS, margins),
         Step("limit positions", LIMIT_OUTPUTS, limit_positions),
     ),
-    derivative_of={"s": "ds", "ds": "d2s", "d2s": "d3s"},
+    derivative_of=ladders("s"),
     outward="branch",
     uses_phi=False,
     capabilities=(
@@ -199,4 +204,108 @@ FAMILY = Family(
     ),
     precise_poses=precise_poses,
     example={"a": 1.3, "b": 5.2, "e": 0.7, "f": 0.4, "alpha": 0.3, "branch": -1.0},
+)
+
+
+PLANAR_PARAMETERS = (
+    Parameter("a", "length", "crank", positive=True),
+    Parameter("b", "length", "connecting rod", positive=True),
+    Parameter("e", "length", "offset of the slide line from the crank pivot, to its left", default=0.0),
+    Parameter("branch", "sign", "assembly mode: sign of s - x_B", default=1.0, choices=(-1.0, 1.0)),
+)
+
+PLANAR_OUTPUTS = (
+    *place_outputs("s", "slider displacement from the foot of the crank pivot", "(1)", "(3)"),
+    Output("discriminant", "length^2", "Q; the links reach where it is not negative", "(1)"),
+    Output("pressure_angle", "rad", "between the rod and the slide line", "(2)"),
+    Output("x_b", "length", "crank pin, along the slide line", "(1)"),
+    Output("y_b", "length", "crank pin, across the slide line", "(1)"),
+    Output("x_c", "length", "slider pin, along the slide line", "(1)"),
+    Output("y_c", "length", "slider pin, across the slide line", "(1)"),
+)
+
+# The spatial linkage has its slide line along y: its x is minus this y, and its crank angle a quarter turn more.
+_THEIRS = {"x_b": "y_b", "y_b": "x_b", "x_c": "y_c", "y_c": "x_c"}
+_ANGLES = ("phi_ext", "phi_fold")
+_FROM_SPATIAL = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def as_spatial(designs: Array) -> Array:
+    """Return the design matrix of the same linkage as a spatial slider-crank, (n, 6)."""
+    matrix = np.zeros((len(designs), len(PARAMETERS)), designs.dtype)
+    matrix[:, 0], matrix[:, 1], matrix[:, 2], matrix[:, 5] = designs[:, 0], designs[:, 1], -designs[:, 2], designs[:, 3]
+    return matrix
+
+
+def turned(angles: Angles) -> Angles:
+    """Return the crank angles counted from the common perpendicular, with the same bits."""
+    return Angles(angles.phi + 0.5 * np.pi, np.ascontiguousarray(-angles.sin), angles.cos)
+
+
+def _turned_poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    found = run(as_spatial(designs), turned(angles), frozenset(_THEIRS.get(name, name) for name in wanted))
+    columns: Columns = {"status": found["status"]}
+    for name in wanted - {"status"}:
+        values: Array = np.asarray(found[_THEIRS.get(name, name)])
+        columns[name] = 0.0 - values if name in ("y_b", "y_c") else values
+    return columns
+
+
+def planar_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return _turned_poses(poses, designs, angles, wanted)
+
+
+def planar_precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Compute what :func:`poses` does, in twice the working precision; for float64 only."""
+    return _turned_poses(precise_poses, designs, angles, wanted)
+
+
+def _planar_step(step: Step) -> Step:
+    """Take a step of the spatial slider-crank with the planar one's crank angle."""
+    spatial = step_of(step, as_spatial)
+
+    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+        found = spatial.run(designs, wanted, accuracy)
+        for name in _ANGLES:
+            if name in found:
+                found[name] = (np.asarray(found[name], np.float64) - 0.5 * np.pi) % (2.0 * np.pi)
+        return found
+
+    return replace(spatial, run=run)
+
+
+def planar_joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
+    """Fill the joint records that effects work from."""
+    joint_records(as_spatial(designs), turned(angles), motion, per_pose, per_design)
+    move_records(_FROM_SPATIAL, np.zeros((len(designs), 3)), per_pose, per_design)
+
+
+def planar_opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
+    """Tell whether the crank turns, and how near the motion's nearest singularity is."""
+    rssp.opening(as_spatial(designs), status, distance)
+
+
+PLANAR = Family(
+    name="slider_crank",
+    title="planar slider-crank",
+    parameters=PLANAR_PARAMETERS,
+    position="s",
+    pose_outputs=PLANAR_OUTPUTS,
+    poses=planar_poses,
+    example={"a": 1.0, "b": 3.0, "e": 0.4, "branch": -1.0},
+    steps=tuple(_planar_step(step) for step in FAMILY.steps),
+    derivative_of=ladders("s"),
+    outward="branch",
+    uses_phi=False,
+    capabilities=(
+        SLIDER_CRANK_SIZES,
+        Assembly("discriminant", "pressure_angle", coupler_square),
+        InSeries(rssp.PLANAR_FORM, CURVES, COMPONENTS, planar_opening),
+        JointRecords(planar_joint_records, _JOINT_NEEDS, "slider"),
+        Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
+        PLANAR_SLIDER_POINTS,
+        Skeleton({"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, None, "e", axis=X, kind="slide")}, SLIDER_CRANK),
+    ),
+    precise_poses=planar_precise_poses,
 )

@@ -10,19 +10,8 @@ from numpy.typing import DTypeLike
 
 from kernels import status as st
 from kernels.families import rssr
-from sweep.families.base import (
-    Accuracy,
-    Angles,
-    Array,
-    Columns,
-    Family,
-    Output,
-    Parameter,
-    Step,
-    Work,
-    filled,
-    optional_outputs,
-)
+from kernels.types import Array
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import (
     Assembly,
     CrankRockerLoop,
@@ -37,9 +26,10 @@ from sweep.families.capabilities import (
     constant,
 )
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
+from sweep.families.outputs import ladders
+from sweep.families.poses import optional_outputs, together
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
-from sweep.families.together import together
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -101,7 +91,6 @@ MAXIMA_OUTPUTS = tuple(
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up; 100 suffice within 1e-9 of a change point
 _JOINTS = rssr.Joints._fields
 _VALUES = tuple(o.name for o in POSE_OUTPUTS if o.name not in _JOINTS)
-_NO_JOINTS = (*_VALUES, "joints")  # a name that nobody wants: its argument is None
 
 
 def _filled(
@@ -109,11 +98,11 @@ def _filled(
 ) -> Columns:
     """Call a kernel of poses whose last output is the record of joints, or None if no joint is wanted."""
     status = np.empty((len(arguments[0]), columns), np.uint8)
-    if wanted.isdisjoint(_JOINTS):
-        return filled(kernel, arguments, _NO_JOINTS, wanted, status, dtype)
-    room = optional_outputs(_JOINTS, wanted, status.shape, dtype)
-    found = filled(lambda *given: kernel(*given, rssr.Joints(*room)), arguments, _VALUES, wanted, status, dtype)
-    return found | {name: x for name, x in zip(_JOINTS, room, strict=True) if x is not None}
+    values = optional_outputs(_VALUES, wanted, status.shape, dtype)
+    joints = optional_outputs(_JOINTS, wanted, status.shape, dtype)
+    kernel(*arguments, status, *values, None if wanted.isdisjoint(_JOINTS) else rssr.Joints(*joints))
+    every = zip((*_VALUES, *_JOINTS), (*values, *joints), strict=True)
+    return {name: x for name, x in every if x is not None} | {"status": status}
 
 
 @together(*_VALUES, *_JOINTS)
@@ -323,7 +312,7 @@ FAMILY = Family(
         Step("grid", MAXIMA_OUTPUTS, sampled_maxima, _sampled),
         Step("certified maxima", MAXIMA_OUTPUTS, certified_maxima, _certified, Work.PROOF, certifies=True),
     ),
-    derivative_of={"psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi"},
+    derivative_of=ladders("psi"),
     outward="branch",
     uses_phi=False,
     capabilities=(

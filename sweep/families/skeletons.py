@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from sweep.families.base import Array, Parameter
+from kernels.types import Array
+from sweep.families.base import Parameter
 from sweep.families.capabilities import Dimensions, Fixed, Link
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -54,9 +55,7 @@ def standing(
     axis: tuple[float, float, float] | None = Z,
     kind: Literal["axis", "slide", "point"] = "axis",
 ) -> Fixed:
-    """Return a point whose coordinates are parameters, or 0 where none is named,
-    and a constant direction through it.
-    """
+    """Fix a point whose coordinates are parameters, or 0 where none is named, and a constant direction."""
     return Fixed(partial(_coordinates, parameters, (x, y, z)), None if axis is None else partial(_same, axis), kind)
 
 

@@ -1,20 +1,28 @@
-"""Registry entry of the spatial slotted link: fork slot and bar."""
+"""Registry entries of cranks whose pin slides along another link, which turns with it.
+
+The slotted link is spatial, with a fork slot or a bar; the inverted slider-crank is the planar one with a slot; of the
+swivel linkage the rod slides through a block that swivels, with a working point on the rod.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from itertools import chain
 
 import numpy as np
 
-from kernels.families import slotted
-from kernels.families.slotted.links import links as fill_links
-from kernels.links import DRIVEN, FRAME, SLIDE, TURN
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter, filled_with_places
-from sweep.families.capabilities import Assembly, Dimensions, Link, OutputLink, Points, Skeleton
-from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
-from sweep.families.linked import filled_by
-from sweep.families.skeletons import CRANK, crank_axis, links, standing
+from kernels.families import inverted_slider_crank, slotted, swivel
+from kernels.families.slotted.motion import links as fill_links
+from kernels.families.swivel import links as fill_swivel_links
+from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
+from kernels.types import Array
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.capabilities import Assembly, Dimensions, Link, Made, OutputLink, Points, Skeleton
+from sweep.families.curve_features import Singular
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
+from sweep.families.outputs import angle_outputs, joint_outputs, ladders, place_outputs, point_outputs
+from sweep.families.parts import AXES
+from sweep.families.poses import filled_blocks, filled_with_places
+from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, links, parameter, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -32,16 +40,12 @@ PARAMETERS = (
 )  # fmt: skip
 
 VALUE_OUTPUTS = (
-    Output("psi", "rad", "angle of the driven link: direction of the slot or bar", "(3)", wraps=True),
-    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(5)"),
-    Output("d2psi", "1", "acceleration analogue", "(5)"),
-    Output("d3psi", "1", "jerk analogue", "(5)"),
+    *angle_outputs("psi", "angle of the driven link: direction of the slot or bar", "(3)", "(5)"),
     Output("sin_psi", "1", "sine of psi", "(3)"),
     Output("cos_psi", "1", "cosine of psi", "(3)"),
-    Output("rho", "length", "place of the ball along the slot or bar, from the foot of the driven axis", "(2)"),
-    Output("drho", "length", "sliding velocity analogue drho/dphi", "(6)"),
-    Output("d2rho", "length", "sliding acceleration analogue", "(6)"),
-    Output("d3rho", "length", "sliding jerk analogue", "(6)"),
+    *place_outputs(
+        "rho", "place of the ball along the slot or bar, from the foot of the driven axis", "(2)", "(6)", "sliding"
+    ),
     Output("discriminant", "1", "cos^2(pressure angle); negative where slot or arm do not reach the ball", "(7)"),
     Output("pressure_angle", "rad", "between the force on the driven link at the ball and its velocity there", "(7)"),
 )
@@ -55,19 +59,12 @@ JOINT_OUTPUTS = (
     Output("z_c", "length", "point of the driven link that guides the ball, along the driven axis", "(2)"),
 )
 
-_VALUES = tuple(o.name for o in VALUE_OUTPUTS)
 _JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_with_places(_with_slide, designs, angles, _VALUES, _JOINTS, wanted)
-
-
-def _with_slide(*given: Any) -> None:
-    """Call the kernel with rho and its derivatives in one record; they follow its six outputs of the angle."""
-    kernel: Callable[..., None] = slotted.poses
-    kernel(*given[:10], slotted.Slide(*given[10:14]), *given[14:])
+    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return filled_with_places(slotted.poses, designs, angles, slotted.Outputs, _JOINTS, wanted)
 
 
 def unit(designs: Array) -> Array:
@@ -111,9 +108,7 @@ FAMILY = Family(
     position="psi",
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
     poses=poses,
-    derivative_of={
-        "psi": "dpsi", "dpsi": "d2psi", "d2psi": "d3psi", "rho": "drho", "drho": "d2rho", "d2rho": "d3rho",
-    },
+    derivative_of=ladders("psi", "rho"),
     example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "s": 0.5},
     uses_phi=False,
     capabilities=(
@@ -128,3 +123,154 @@ FAMILY = Family(
         ),
     ),
 )  # fmt: skip
+
+
+PLANAR_PARAMETERS = (
+    Parameter("a", "length", "crank", positive=True),
+    Parameter("e", "length", "frame, from crank pivot to rocker pivot along x"),
+    Parameter("h", "length", "offset of the slot from the rocker pivot, to its left", default=0.0),
+    Parameter("branch", "sign", "assembly mode: side of the rocker on which the pin is", default=1.0,
+              choices=(-1.0, 1.0)),
+)  # fmt: skip
+
+PLANAR_VALUES = (
+    *angle_outputs("psi", "rocker angle in (-pi, pi]", "(2)", "(4)"),
+    Output("s", "length", "place of the crank pin along the slot, from the foot of the rocker pivot", "(2)"),
+    Output("ds", "length", "sliding velocity analogue ds/dphi", "(5)"),
+    Output("d2s", "length", "sliding acceleration analogue", "(5)"),
+    Output(
+        "discriminant", "1", "1 - h^2/r^2, r from pin to rocker pivot; the slot reaches where it is not negative", "(1)"
+    ),
+    Output("pressure_angle", "rad", "between the force of the slot and the velocity of the rocker there", "(3)"),
+)
+
+PLANAR_JOINTS = (
+    Output("x_b", "length", "crank pin, along the frame", "(1)"),
+    Output("y_b", "length", "crank pin, across the frame", "(1)"),
+)
+
+_PIN = tuple(o.name for o in PLANAR_JOINTS)
+
+
+def planar_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return filled_with_places(inverted_slider_crank.poses, designs, angles, inverted_slider_crank.Outputs, _PIN, wanted)
+
+
+def slot_squared(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the square of the pin's place in the slot, (n, m): where it nearly vanishes the rocker turns at once."""
+    return np.square(np.asarray(found["s"], np.float64))
+
+
+def rocker_origin(designs: Array) -> Array:
+    """Return the rocker pivot, (n, 3)."""
+    origin = np.zeros((len(designs), 3))
+    origin[:, 0] = designs[:, 1]
+    return origin
+
+
+def slot_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
+    """Return the foot of the rocker pivot on the slot, (n, m, 3): ``h`` from the pivot, square to the slot."""
+    psi = np.asarray(motion["psi"], np.float64)
+    h, e = (parameter(PLANAR_PARAMETERS, name, designs)[:, None] for name in ("h", "e"))
+    return np.stack([e - h * np.sin(psi), h * np.cos(psi), np.zeros_like(psi)], axis=-1)
+
+
+PLANAR = Family(
+    name="inverted_slider_crank",
+    title="inverted slider-crank",
+    parameters=PLANAR_PARAMETERS,
+    position="psi",
+    pose_outputs=PLANAR_VALUES + PLANAR_JOINTS,
+    poses=planar_poses,
+    example={"a": 1.0, "e": 2.2, "h": 0.3, "branch": -1.0},
+    derivative_of=ladders("psi") | {"s": "ds", "ds": "d2s"},
+    uses_phi=False,
+    capabilities=(
+        Singular(slot_squared, ("s",)),
+        Dimensions(links("a")),
+        Assembly("discriminant", "pressure_angle", unit),
+        Points({"b": ("x_b", "y_b", None)}),
+        OutputLink(rocker_origin),
+        Skeleton(
+            {"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, "e")},
+            (CRANK, Link("rocker", ("d", "c", "b"))),
+            {"c": Made(("psi",), slot_foot)},
+        ),
+    ),
+)
+
+
+SWIVEL_PARAMETERS = (
+    Parameter("a", "length", "crank", positive=True),
+    Parameter("e", "length", "block's centre from the origin along x"),
+    Parameter("f", "length", "offset of the crank plane along the crank axis", default=0.0),
+    Parameter("g", "length", "block's centre from the origin along z", default=0.0),
+    Parameter("alpha", "angle", "angle from the crank axis to z, about x", default=0.0),
+    Parameter("Lw", "length", "working point from the crank pin along the rod, towards the block", default=0.0),
+)
+
+ROD_OUTPUTS = place_outputs("rho", "rod between crank pin and the block's centre", "(2)", "(3)", "sliding")
+POINT_OUTPUTS = point_outputs("(4)")
+ROD_JOINT_OUTPUTS = (
+    *joint_outputs((("b", "crank pin"),), "(1)"),
+    *(Output(f"{axis}_n", "1", f"direction of the rod from the crank pin, along {axis}", "(2)") for axis in AXES),
+)
+
+_BLOCKS = (ROD_OUTPUTS, *POINT_OUTPUTS, ROD_JOINT_OUTPUTS)
+
+
+def swivel_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return filled_blocks(swivel.poses, swivel.Outputs, designs, angles, _BLOCKS, wanted)
+
+
+def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the square of the rod between pin and block, (n, m): where it nearly vanishes the rod turns at once."""
+    return np.square(np.asarray(found["rho"], np.float64))
+
+
+_ROD_RATES, _DIRECTION = ("rho", "drho", "d2rho"), ("x_n", "y_n", "z_n")
+SWIVEL_LINKS = LinkTree(
+    bodies=(
+        LinkBody("crank", "along the crank, tangential, along its axis, from A"),
+        LinkBody("rod", "along the rod, from B", slender=True),
+    ),
+    joints=(
+        LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
+        LinkJoint("b", "ball at the crank pin", "hinge", "crank on the rod", body=1),
+        LinkJoint("q", "swivel block", "contact", "block on the rod", lines=(0, 2)),
+    ),
+    parents=(FRAME, 0),
+    freedoms=((0, DRIVEN), (1, TURN), (1, TURN)),
+    ends=((1, FRAME),) * 2,
+    needs=(*_ROD_RATES, *_DIRECTION),
+    fill=filled_by(fill_swivel_links, _ROD_RATES, _DIRECTION),
+    carrier=1,
+    tip=standing(SWIVEL_PARAMETERS, "Lw").at,
+)
+
+SWIVEL = Family(
+    name="swivel",
+    title="crank and rod through a swivel block",
+    parameters=SWIVEL_PARAMETERS,
+    position="rho",
+    pose_outputs=tuple(chain.from_iterable(_BLOCKS)),
+    poses=swivel_poses,
+    derivative_of=ladders("rho", "x_p", "y_p", "z_p"),
+    example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "Lw": 5.0},
+    uses_phi=False,
+    capabilities=(
+        Singular(pin_distance_squared, ("rho",)),
+        Dimensions(links("a")),
+        SWIVEL_LINKS,
+        Points({"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")}),
+        Skeleton(
+            {
+                "a": crank_axis(SWIVEL_PARAMETERS, "f", "alpha"),
+                "q": standing(SWIVEL_PARAMETERS, "e", None, "g", axis=None, kind="point"),
+            },
+            (CRANK, Link("rod", ("b", "q", "p"))),
+        ),
+    ),
+)

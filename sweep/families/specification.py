@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sweep.errors import InputError, nearest
-from sweep.families import Specification
 from sweep.families.base import Event, Family, Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.domain import Turn, reads_as_degrees
-from sweep.families.located import coupler_joints, is_planar
-from sweep.families.members import Machine, Member, assemble
-from sweep.families.placing import place, vector
+from sweep.families.machines import Machine, assemble
+from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
 from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Shaking, Speed, Timing
 from sweep.families.thread_balance import thread_balance
 
@@ -26,6 +24,14 @@ _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
 
 FindFamily = Callable[[str | Sequence[str]], Family]
+
+
+@dataclass(frozen=True)
+class Specification:
+    """A machine as it was written: hashable, so that the machine it makes is made once."""
+
+    members: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
+    relations: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
 
 
 def specification(members: Mapping[str, Any], relations: Mapping[str, Any] | None) -> Specification:
@@ -125,15 +131,13 @@ def _member(name: str, table: dict[str, Any], earlier: Mapping[str, Member], fin
         raise InputError("tip", tip, f"a member whose output link turns; {family.name} has none", where)
     driver = _driver(table.get("driver"), earlier, where)
     drives = {} if driver is None else dict(earlier[driver[0]].family.derivative_of)
-    spot = place(name, None if table.get("place") is None else dict(table["place"]))
+    spot = placement(name, None if table.get("place") is None else dict(table["place"]))
     member = Member(name, family, int(ratio), float(offset), driver, drives, spot, tip)
     return member if table.get("eye") is None else replace(member, eye=_eye(member, table["eye"], f"{where}.eye"))
 
 
 def _eye(member: Member, given: Any, where: str) -> tuple[float, ...]:
-    """Return a point of the coupler; how a spatial one turns about its own line is not known,
-    so it lies on that line.
-    """
+    """Read a point of the coupler; a spatial one turns about its own line nobody knows how, so it lies on that."""
     x, y, z = vector(given, where)
     if coupler_joints(member) is None:
         raise InputError("eye", given, f"a member with a coupler; {member.family.name} has none", where)

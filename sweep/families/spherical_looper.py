@@ -7,13 +7,20 @@ from itertools import chain
 import numpy as np
 
 from kernels.families import spherical_looper
-from kernels.families.spherical_looper.links import links as fill_links
-from kernels.links import DRIVEN, FRAME, TURN
-from sweep.families.base import Angles, Array, Columns, Family, Output, Parameter
+from kernels.families.spherical_looper import links as fill_links
+from kernels.linkage.bodies import DRIVEN, FRAME, TURN
+from kernels.types import Array
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Points, Skeleton
-from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
-from sweep.families.linked import filled_by, point_of
-from sweep.families.moving_point import filled_blocks, joint_outputs, ladders, magnitude_outputs, point_outputs
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
+from sweep.families.outputs import (
+    angle_outputs,
+    joint_outputs,
+    ladders,
+    magnitude_outputs,
+    point_outputs,
+)
+from sweep.families.poses import filled_blocks
 from sweep.families.skeletons import crank_axis, links, parameter, standing
 
 PARAMETERS = (
@@ -45,18 +52,8 @@ PARAMETERS = (
     Parameter("branch2", "sign", "assembly mode of the looper's drive", default=1.0, choices=(-1.0, 1.0)),
 )
 
-CARRIER_OUTPUTS = (
-    Output("psi", "rad", "angle of the carrier", "(1)", wraps=True),
-    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(1)"),
-    Output("d2psi", "1", "acceleration analogue", "(1)"),
-    Output("d3psi", "1", "jerk analogue", "(1)"),
-)
-LOOPER_OUTPUTS = (
-    Output("chi", "rad", "angle of the looper in the carrier", "(3)", wraps=True),
-    Output("dchi", "1", "velocity analogue dchi/dphi", "(4)"),
-    Output("d2chi", "1", "acceleration analogue of chi", "(4)"),
-    Output("d3chi", "1", "jerk analogue of chi", "(4)"),
-)
+CARRIER_OUTPUTS = angle_outputs("psi", "angle of the carrier", "(1)", "(1)")
+LOOPER_OUTPUTS = angle_outputs("chi", "angle of the looper in the carrier", "(3)", "(4)", of_name=True)
 CARRIER_LOOP_OUTPUTS = (
     Output("discriminant1", "length^2", "b1^2 cos^2(pressure_angle1); negative where the links do not reach", "(1)"),
     Output("pressure_angle1", "rad", "between the force of coupler 1 and the velocity of the carrier's ball", "(1)"),
@@ -79,8 +76,8 @@ _BLOCKS = (
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_blocks(spherical_looper.poses, designs, angles, _BLOCKS, wanted)
+    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return filled_blocks(spherical_looper.poses, spherical_looper.Outputs, designs, angles, _BLOCKS, wanted)
 
 
 def first_coupler_square(designs: Array) -> Array:
@@ -132,7 +129,7 @@ LINKS = LinkTree(
     needs=_RATES,
     fill=filled_by(fill_links, _RATES),
     carrier=3,
-    tip=point_of(PARAMETERS, "p0x", "p0y", "p0z"),
+    tip=standing(PARAMETERS, "p0x", "p0y", "p0z").at,
 )
 
 FAMILY = Family(

@@ -18,28 +18,50 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from sweep.errors import InputError, nearest
 from sweep.families.base import Output, Parameter
 from sweep.families.capabilities import ThreadPath
-from sweep.families.placing import AXES, vector
+from sweep.families.parts import AXES, Member, vector
 from sweep.families.relations import Frame
-from sweep.families.thread_inputs import ALPHA, BENDING, BETA, COUNT, DENSITY
 from sweep.numerics.curves import TableCurve, table_curve
-
-if TYPE_CHECKING:
-    from sweep.families.members import Member
-    from sweep.families.relations import Frame
 
 KEYS = ("thread", "stock", "tension", "stiffness", "radius", "allowed")
 GF = 9.80665e-3  # N
 EQUATION = "docs/thread.md (9)-(13)"
 PHI = "phi"
 
-Vector: TypeAlias = "tuple[Any, Any, Any]"
+Vector: TypeAlias = tuple[Any, Any, Any]
+
+
+class Range(NamedTuple):
+    """The values of a quantity between which the reported constants were measured."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+# Polukhin 1971, chapter VI; what is assumed is said so (docs/thread.md, section 3).
+ALPHA = Parameter("alpha", "none", "adhesion, gf/(mm deg); reported 6.17e-3", not_negative=True, default=6.17e-3)
+BETA = Parameter("beta", "none", "friction, 1/deg; reported 1.12e-2", not_negative=True, default=1.12e-2)
+BENDING = Parameter("B", "none", "bending, gf mm^2; reported 0.714", not_negative=True, default=0.714)
+COUNT = Parameter("N", "none", "metric count of the thread, m/g; reported No. 98/3", positive=True, default=98.0 / 3.0)
+DENSITY = Parameter("gamma", "none", "density of the thread, g/cm^3; assumed", positive=True, default=0.8)
+RADIUS = Parameter("R", "none", "radius of the contour, mm", not_negative=True)
+CONTOUR_CONSTANTS = (ALPHA, BETA, BENDING, COUNT, DENSITY)
+MEASURED_RADIUS = Range("R", "mm", 0.125, 7.5)
+
+# Through all three reported points: x 1.19 from 0.08 to 1.23 m/s, x 1.16 from there to 7.4 m/s.
+REFERENCE_SPEED = Parameter("v_ref", "none", "speed at which the tension is known, m/s", positive=True, default=1.23)
+SHARE = Parameter("K", "none", "share of the tension that grows with the speed", default=0.39494858849527207)
+EXPONENT = Parameter("n", "none", "exponent of the speed", positive=True, default=0.189538228897548)
+SPEED_CONSTANTS = (REFERENCE_SPEED, SHARE, EXPONENT)
+MEASURED_SPEED = Range("v", "m/s", 0.08, 7.4)
 
 
 @dataclass(frozen=True)
@@ -51,7 +73,7 @@ class TakeUp:
     wrap: str
 
 
-Place: TypeAlias = "tuple[float, float, float] | str | TakeUp"
+Waypoint: TypeAlias = tuple[float, float, float] | str | TakeUp
 
 
 @dataclass(frozen=True)
@@ -70,7 +92,7 @@ class ThreadBalance:
     """
 
     name: str
-    path: tuple[Place, ...]
+    path: tuple[Waypoint, ...]
     stock: float = 0.0
     tension: float = 0.0
     stiffness: float = 0.0
@@ -98,9 +120,7 @@ class ThreadBalance:
         return (Parameter(f"{self.name}_stock", "length", text, default=self.stock),)
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return coordinates of the moving points, and what the take-ups give;
-        where they are bent too if that is wanted.
-        """
+        """Name coordinates of the moving points, what the take-ups give, and their bends if wanted."""
         names = [f"{place}_{axis}" for place in self.path if isinstance(place, str) for axis in AXES]
         taken = [place.taken for place in self.path if isinstance(place, TakeUp)]
         wraps = [place.wrap for place in self.path if isinstance(place, TakeUp) and self._bent(wanted)]
@@ -153,9 +173,7 @@ class ThreadBalance:
 
 
 def bend(before: Vector, after: Vector) -> Any:
-    """Return the angle by which a thread turns between unit vectors, (13):
-    2 arctan(|e1 - e2|/|e1 + e2|), exact near 0 and pi.
-    """
+    """Measure the angle between unit vectors of a thread, (13): 2 arctan(|e1 - e2|/|e1 + e2|), exact near 0, pi."""
     off, both = (_size([a + sign * b for a, b in zip(before, after, strict=True)]) for sign in (-1.0, 1.0))
     with np.errstate(divide="ignore", invalid="ignore"):  # folded back upon itself: arctan of infinity, half a turn
         folded = np.real(both) == 0.0
@@ -214,10 +232,8 @@ def thread_balance(name: str, table: Mapping[str, Any], members: Mapping[str, Me
     return ThreadBalance(name, path, stock, tension, stiffness, radii, _allowed(table.get("allowed"), where))
 
 
-def _bends(path: Sequence[Place]) -> int | None:
-    """Return the number of bends along a path: take-ups, and points between two others;
-    None where no piece is straight.
-    """
+def _bends(path: Sequence[Waypoint]) -> int | None:
+    """Count the bends along a path, take-ups and points between two others; None if no piece is straight."""
     bends, row, pieces = 0, 0, 0
     for place in path:
         row = 0 if isinstance(place, TakeUp) else row + 1
@@ -226,7 +242,7 @@ def _bends(path: Sequence[Place]) -> int | None:
     return bends if pieces else None
 
 
-def _place(given: Any, members: Mapping[str, Member], where: str) -> Place:
+def _place(given: Any, members: Mapping[str, Member], where: str) -> Waypoint:
     if not isinstance(given, str):
         return vector(given, f"{where}.thread")
     if given in members:

@@ -11,14 +11,16 @@ import sys
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import suppress
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from sweep.errors import InputError, WorkerDied
-from sweep.jobs.flow import Task, flow
 from sweep.jobs.signals import Stop, unheard
+
+if TYPE_CHECKING:
+    from sweep.jobs.executors import Task
 
 T = TypeVar("T")
 
@@ -28,6 +30,7 @@ COUNT_SECONDS = 2.0  # between two counts of the cluster's threads
 CONNECT_SECONDS = 20
 CLOSE_SECONDS = 10
 FIRST_WORKER_SECONDS = 60.0
+POLL = 0.05  # between two looks at the flag [s]
 
 
 class Dask:
@@ -66,7 +69,7 @@ class Dask:
         stop.tell(lambda: client.loop.add_callback(flag.set))  # a signal handler cannot wait for the scheduler
         pool = client.get_executor(pure=False)
         try:
-            yield from flow(lambda n: pool.submit(_at_worker, task, n, name), numbers, self._jobs(jobs), stop, GRACE)
+            yield from _flow(lambda n: pool.submit(_at_worker, task, n, name), numbers, self._jobs(jobs), stop)
         except KilledWorker as error:
             raise WorkerDied(f"several workers died over one task ({error})") from error
         except CancelledError as error:
@@ -127,3 +130,31 @@ def _at_worker(task: Task[T], number: int, name: str) -> T:
         return told
 
     return task(number, should_stop)
+
+
+def _flow(
+    submit: Callable[[int], Future[T]],
+    numbers: Iterator[int],
+    jobs: Callable[[], int],
+    stop: Stop,
+) -> Iterator[T]:
+    """Yield outcomes as they come; one number more than there are workers is on its way, so that none of them waits.
+
+    Parameters
+    ----------
+    submit : begin the task of a number
+    numbers, stop : as for `Executor`
+    jobs : how many workers there are now
+    """
+    waiting: set[Future[T]] = set()
+    late = math.inf
+    while True:
+        while not stop and len(waiting) <= jobs() and (number := next(numbers, None)) is not None:
+            waiting.add(submit(number))
+        if not waiting or time.monotonic() > late:
+            return
+        done, waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED)
+        for future in done:
+            yield future.result()
+        if stop and late == math.inf:
+            late = time.monotonic() + GRACE

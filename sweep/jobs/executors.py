@@ -8,25 +8,54 @@ parent dies, is the affair of its executor.
 from __future__ import annotations
 
 import os
-import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from sweep.errors import InputError, WorkerDied, nearest
 from sweep.jobs.cluster import Dask
-from sweep.jobs.flow import Executor, Task, flow
 from sweep.jobs.signals import Stop, depend_on_parent, unheard
 
 T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
 
 GRACE = 1.0  # for processes to hand back what they have once they are to stop [s]
+POLL = 0.05  # between two looks at the flag [s]
 MOST_JOBS = 1024
-UNTRACKED = "ignore:resource_tracker:UserWarning"
+
+
+class Task(Protocol[T_co]):
+    """What a worker does with one number; ``should_stop`` is to be asked often."""
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> T_co:
+        """Do it."""
+        ...
+
+
+class Executor(Protocol):
+    """Runs a task for many numbers."""
+
+    def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
+        """Yield what the task gives, in the order in which it is ready.
+
+        Parameters
+        ----------
+        task : called once for every number
+        numbers : the next one is taken when a worker is about to be free
+        jobs : how many workers
+        stop : once it is true, no number is taken any more, and tasks may be dropped
+
+        Raises
+        ------
+        WorkerDied
+            if a worker was lost.
+        """
+        ...
 
 
 class Here:
@@ -34,8 +63,7 @@ class Here:
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """See `Executor`."""
-        while not stop and (number := next(numbers, None)) is not None:
-            yield task(number, stop.event.is_set)
+        return (task(number, stop.event.is_set) for number in _until(stop, numbers))
 
 
 class Threads:
@@ -43,52 +71,95 @@ class Threads:
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """See `Executor`."""
-        pool = ThreadPoolExecutor(jobs, thread_name_prefix="linksweep")
-        try:
-            yield from flow(lambda number: pool.submit(task, number, stop.event.is_set), numbers, lambda: jobs, stop)
-        finally:
-            pool.shutdown(cancel_futures=True)
+        from joblib import delayed
+
+        with _watched(stop):
+            calls = (delayed(task)(number, stop.event.is_set) for number in _until(stop, numbers))
+            yield from _pool(jobs, backend="threading")(calls)
 
 
 class Processes:
-    """Processes of this machine.  They learn by a file that they are to stop, and end with their parent."""
+    """Processes of this machine.
+
+    Joblib tells them nothing once they are at work.  So they learn by a file that they are to stop; who does not listen
+    (a compiler) is killed soon after; and they end with their parent, whose folder they would otherwise write into.
+    """
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """See `Executor`."""
-        from concurrent.futures.process import BrokenProcessPool
+        from joblib import delayed
+        from joblib.externals.loky.backend import resource_tracker
 
+        resource_tracker.ensure_running()  # begun later it would unblock signals in the middle
         with tempfile.TemporaryDirectory(prefix="linksweep-", ignore_cleanup_errors=True) as folder:
             flag = Path(folder, "stop")
+            calls = (delayed(_until_flag)(task, number, flag) for number in _until(stop, numbers))
+            killed = threading.Event()
+            pool = _pool(jobs, backend="loky", initializer=depend_on_parent, initargs=(os.getpid(),))
+
+            def kill() -> None:
+                killed.set()
+                _kill_workers()
+
             stop.tell(flag.touch)
-            pool = worker_processes(jobs)
-
-            def submit(number: int) -> Future[T]:
-                with unheard():
-                    return pool.submit(_until_flag, task, number, flag)  # type: ignore[no-any-return]
-
-            try:
-                yield from flow(submit, numbers, lambda: jobs, stop, GRACE)
-            except BrokenProcessPool as error:
-                reason = str(error).partition("\n")[0]  # the rest is about the exit codes of all of them
-                raise WorkerDied(f"a worker process died ({reason.rstrip('.')})") from error
-            finally:
-                if stop:  # whoever is still at work, or still starting up, does not listen
-                    pool.shutdown(wait=False, kill_workers=True)
+            with _watched(stop, kill):
+                try:
+                    with unheard():
+                        results = pool(calls)
+                    yield from results
+                except (BrokenProcessPool, RuntimeError) as error:
+                    if killed.is_set():
+                        return
+                    if not isinstance(error, BrokenProcessPool):
+                        raise
+                    reason = str(error).partition("\n")[0]  # the rest is about the exit codes of all of them
+                    raise WorkerDied(f"a worker process died ({reason.rstrip('.')})") from error
 
 
-def worker_processes(jobs: int) -> Any:
-    """Return the pool of worker processes; they hear no signals and end with this process."""
-    from joblib.externals.loky import get_reusable_executor
-    from joblib.externals.loky.backend import resource_tracker
+def _pool(jobs: int, **settings: Any) -> Callable[..., Iterator[Any]]:
+    """Prepare a call of joblib, which takes the next numbers when a worker has become free."""
+    from joblib import Parallel
 
-    # A program that leaves at once leaves semaphores behind; the tracker removes them and need not warn of it.
-    sys.warnoptions.append(UNTRACKED)
+    return Parallel(
+        n_jobs=jobs,
+        batch_size=1,
+        pre_dispatch="n_jobs",
+        return_as="generator_unordered",
+        max_nbytes=None,
+        **settings,
+    )
+
+
+def _until(stop: Stop, numbers: Iterator[int]) -> Iterator[int]:
+    while not stop and (number := next(numbers, None)) is not None:
+        yield number
+
+
+@contextmanager
+def _watched(stop: Stop, give_up: Callable[[], None] | None = None) -> Iterator[None]:
+    """Look at the flag while this thread waits for results, and give up a second after it is set."""
+    over = threading.Event()
+
+    def watch() -> None:
+        while not stop:
+            if over.wait(POLL):
+                return
+        if give_up is not None and not over.wait(GRACE):
+            give_up()
+
+    watcher = threading.Thread(target=watch, name="linksweep: stop", daemon=True)
+    watcher.start()
     try:
-        resource_tracker.ensure_running()  # it would unblock signals in the middle
+        yield
     finally:
-        sys.warnoptions.remove(UNTRACKED)
-    with unheard():
-        return get_reusable_executor(max_workers=jobs, initializer=depend_on_parent, initargs=(os.getpid(),))
+        over.set()
+        watcher.join()
+
+
+def _kill_workers() -> None:
+    from joblib.externals.loky import get_reusable_executor
+
+    get_reusable_executor(reuse=True).shutdown(wait=False, kill_workers=True)
 
 
 def _until_flag(task: Task[T], number: int, flag: Path) -> T:

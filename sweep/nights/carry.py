@@ -6,15 +6,17 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from sweep.chunks.plan import make_plan
 from sweep.dataset import store
 from sweep.dataset.files import link_or_copy
 from sweep.dataset.verification import verify
-from sweep.engine.run import optimum_key
-
-if TYPE_CHECKING:
-    from sweep.study import Study
+from sweep.engine.searches import optimum_key
+from sweep.errors import LinksweepError
+from sweep.optimise import read_survey
+from sweep.optimise.front.study import saved
+from sweep.proof import known_proof
+from sweep.study import Study
 
 REPORT, FIGURES, SURVIVORS = "report.html", "figures", "survivors.parquet"
 TABLES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO, store.PROOF)
@@ -44,14 +46,15 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
         None where no night has a chunk of this identity.  Every chunk was compared with its hash, and its rows with
         the plan; damaged ones are left out.
     """
-    from sweep.chunks.plan import make_plan
-
     for night in earlier:
         source = night / target.name / store.DESIGNS
         noted = store.read_plan(source)
         if noted is None or make_plan(study, noted["chunk_size"]).identity != noted["identity"]:
             continue
-        found = verify(source, designs=0)
+        try:
+            found = verify(source, designs=0)
+        except LinksweepError:  # whatever is wrong with an earlier night, this one computes
+            continue
         bad = {finding.path for finding in found.findings}
         sound = [path for path in sorted(source.glob("part-*.parquet")) if path not in bad]
         if not sound:
@@ -82,10 +85,6 @@ def searched(study: Study, folder: Path) -> bool:
 
     A search that time has cut short is made again.
     """
-    from sweep.optimise import read_survey
-    from sweep.optimise.front import saved
-    from sweep.proof import known_proof
-
     note = store.read_plan(folder / store.DESIGNS) or {}
     if study.optimise is not None and note.get("optimised") != optimum_key(replace(study, pareto=None), note):
         return False

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from sweep.dataset import store
 from sweep.dataset.comparison import LEAST_SECONDS, ROWS_CHANGED, SLOWER, VALUES_CHANGED, compare
 from sweep.dataset.reading import best
-from sweep.engine.conflict import differences
+from sweep.engine.opening import differences
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sweep.dataset.files import store_errors
-from sweep.errors import LockedError
+from sweep.dataset.lock import held
 from sweep.nights.records import read_night
 
 LATEST, LOCK = "latest", "_lock"
@@ -31,19 +31,10 @@ def one_at_a_time(into: Path) -> Iterator[None]:
     StoreError
         if the folder cannot be made or written to.
     """
-    from filelock import FileLock, Timeout
-
     with store_errors(into):
         into.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(into / LOCK, timeout=0)
-        try:
-            lock.acquire()
-        except Timeout:
-            raise LockedError(f"{into}: another night is at work here") from None
-    try:
+    with held(into, into / LOCK, lambda: "another night is at work here"):
         yield
-    finally:
-        lock.release()
 
 
 def nights(into: Path) -> list[Path]:

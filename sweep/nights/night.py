@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from sweep.dataset import store
 from sweep.errors import InputError, LinksweepError, StoreError, TimeUsedUp, WorkerDied
 from sweep.nights import folders
 from sweep.nights.carry import REPORT, Carried, carry
 from sweep.nights.changes import Changes, changes, figures, slower
-from sweep.nights.chosen import Chosen, chosen, in_order
-from sweep.nights.journal import WORDS, Journal
 from sweep.nights.page import write_page
 from sweep.nights.records import (
+    WORDS,
+    Journal,
     NightRecord,
     State,
     StudyRecord,
@@ -24,7 +26,7 @@ from sweep.nights.records import (
     read_night,
     write_night,
 )
-from sweep.nights.running import RUN_LOG, Ended, call, notify
+from sweep.nights.studies import FIGURE, RUN_LOG, Chosen, Ended, call, chosen, draw, in_order, notify
 from sweep.study import Study
 
 # A run ended so: its own code says why.  Any other end is that of a process that died.
@@ -87,8 +89,8 @@ class _Night:
     def __init__(self, settings: Settings, earlier: list[Path], folder: Path, say: Callable[[str], None]) -> None:
         self.settings, self.earlier, self.folder = settings, earlier, folder
         self.good = folders.good_nights(settings.into)[::-1]
-        self.history = read_history(settings.into)
         self.journal = Journal(folder, say)
+        self.history = read_history(settings.into, lambda words: self.journal.note("history", words))
         self.begin = time.monotonic()
 
     @property
@@ -101,13 +103,16 @@ class _Night:
         names = ", ".join(one.name for one in studies)
         self.journal.note("night", f"night {self.folder.name}: {names}", studies=[one.name for one in studies])
         records: dict[str, StudyRecord] = {}
-        for one in studies:
-            records[one.name] = record = self.study(one)
-            about = {"state": record.state, "code": record.code, "changed": record.changed, "seconds": record.seconds}
-            self.journal.note("study", _words(one.name, record), study=one.name, changes=record.changes, **about)
-        result = NightRecord(self.folder.name, time.monotonic() - self.begin, exit_code(records), records)
-        write_night(self.folder, result)
-        append_history(self.settings.into, result)
+        try:
+            for one in studies:
+                records[one.name] = record = self.study(one)
+                about: dict[str, Any] = {"state": record.state, "code": record.code, "changed": record.changed}
+                about |= {"changes": record.changes, "seconds": record.seconds}
+                self.journal.note("study", _words(one.name, record), study=one.name, **about)
+        except KeyboardInterrupt as error:
+            self.interrupted(studies, records, 128 + getattr(error, "number", signal.SIGINT))
+            raise
+        result = self.written(records, exit_code(records))
         if result.good:
             folders.point_latest(self.settings.into, self.folder)
         gone = folders.drop_old(self.settings.into, self.settings.keep)
@@ -121,6 +126,24 @@ class _Night:
             fault = notify(self.settings.on_change, self.folder, result.exit_code, text)
             self.journal.note("told", f"--on-change {fault or 'ran'}", fault=fault)
         return result
+
+    def written(self, records: Mapping[str, StudyRecord], code: int) -> NightRecord:
+        """Write the record of this night down."""
+        result = NightRecord(self.folder.name, time.monotonic() - self.begin, code, records)
+        write_night(self.folder, result)
+        append_history(self.settings.into, result)
+        return result
+
+    def interrupted(self, studies: list[Chosen], records: Mapping[str, StudyRecord], code: int) -> None:
+        """Write down what a signal has left of the night, and the page with it."""
+        left = [one.name for one in studies if one.name not in records]
+        message = "the night was interrupted"
+        at_work, after = StudyRecord("cut", code, message=message), StudyRecord("waiting", code, message=message)
+        self.written({**records, **{name: after if k else at_work for k, name in enumerate(left)}}, code)
+        kept = ", ".join(records) or "no study"
+        words = f"interrupted at {left[0]}: {kept} kept, with all finished chunks; the next night goes on"
+        self.journal.note("interrupted", words, exit_code=code)
+        write_page(self.settings.into)
 
     def study(self, one: Chosen) -> StudyRecord:
         """Link, compute, report and compare one study."""
@@ -139,6 +162,11 @@ class _Night:
                 state: State = "cut" if ended.code in CUT else "failed"
                 code = ended.code if ended.code in (*TOLD, *CUT) else WorkerDied.exit_code
                 return StudyRecord(state, code, source, linked, seconds=ended.seconds, message=ended.message)
+            figure = one.path.parent / FIGURE
+            if figure.is_file() and not (carried and carried.whole):
+                drawn = draw(figure, target, target / RUN_LOG, self.left)
+                if drawn.code:
+                    self.journal.note("figure", f"{one.name}: {FIGURE} ended with {drawn.code}: {drawn.message}")
             return self.finished(one.study, target, carried, ended)
         except LinksweepError as error:
             return StudyRecord("failed", error.exit_code, message=str(error))

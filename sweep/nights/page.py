@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
 from sweep.dataset.comparison import SLOWER
 from sweep.dataset.files import write_atomically
-from sweep.nights.journal import WORDS
-from sweep.nights.records import NightRecord, StudyRecord, read_history
+from sweep.nights.changes import YIELD
+from sweep.nights.records import WORDS, NightRecord, StudyRecord, read_history
 from sweep.report.figures import TEMPLATES
 from sweep.report.quantities import number, quantity
 
@@ -76,8 +78,6 @@ class NightRow:
 
 def write_page(into: Path) -> Path:
     """Write ``index.html`` from the history, as a whole; it needs no network."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
     nights = read_history(into)[-SHOWN:]
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
@@ -124,6 +124,8 @@ def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[s
 
     def shown(record: StudyRecord) -> str:
         unit = record.units.get(name, "")
+        if name == YIELD:
+            return f"{number(100.0 * record.figures[name], DIGITS)}\u00a0%"
         return quantity(name, unit).show(record.figures[name], DIGITS) if unit else number(record.figures[name], DIGITS)
 
     points = [
@@ -132,7 +134,8 @@ def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[s
         if name in record.figures
     ]
     last = next(record for _, record in reversed(mine) if name in record.figures)
-    return _drawn(name, shown(last), points, len(order))
+    unit = last.units.get(name, "")
+    return _drawn(quantity(name, unit).heading if unit else name, shown(last), points, len(order))
 
 
 def _times(mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> Trend:
@@ -170,6 +173,8 @@ def _state(record: StudyRecord) -> str:
 
 def _night_row(night: NightRecord, into: Path) -> NightRow:
     kinds = [(name, record) for name, record in night.studies.items() if record.changed or record.state != "complete"]
-    verdict = "; ".join(f"{name}: {_state(record)}" for name, record in kinds) or "no change"
+    first = all(record.compared_with is None for record in night.studies.values())
+    quiet = "first night, nothing to compare with" if first else "no change"
+    verdict = "; ".join(f"{name}: {_state(record)}" for name, record in kinds) or quiet
     log = f"{night.name}/{WORDS}" if (into / night.name / WORDS).is_file() else None
     return NightRow(night.name, log, verdict, bool(kinds), f"{night.seconds:.3g} s")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +12,7 @@ from typing import Any, Literal
 from sweep.dataset.files import store_errors, write_atomically
 
 NIGHT, HISTORY = "night.json", "history.jsonl"
+EVENTS, WORDS = "log.jsonl", "log.txt"
 
 State = Literal["complete", "cut", "waiting", "failed"]
 
@@ -84,24 +86,51 @@ def append_history(into: Path, record: NightRecord) -> None:
     write_atomically(into / HISTORY, text.encode())
 
 
-def read_history(into: Path) -> list[NightRecord]:
-    """Return all nights that came to their end, the oldest first; lines that cannot be read are left out."""
+def read_history(into: Path, tell: Callable[[str], None] = lambda words: None) -> list[NightRecord]:
+    """Return all nights that came to their end, the oldest first.
+
+    Lines that cannot be read are left out; ``tell`` is told of them.
+    """
     path = into / HISTORY
     if not path.is_file():
         return []
     with store_errors(path):
         lines = path.read_bytes().splitlines()
-    return [night for night in map(_record, lines) if night is not None]
+    read = [_record(line) for line in lines]
+    unread = [str(k) for k, night in enumerate(read, 1) if night is None]
+    if unread:
+        tell(f"{path}: line {', '.join(unread)} cannot be read and is left out")
+    return [night for night in read if night is not None]
 
 
 def _record(text: bytes) -> NightRecord | None:
+    from pydantic import TypeAdapter, ValidationError
+
     try:
-        noted = json.loads(text)
-        studies = {str(name): _study_record(own) for name, own in noted["studies"].items()}
-        return NightRecord(noted["name"], float(noted["seconds"]), int(noted["exit_code"]), studies)
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return TypeAdapter(NightRecord).validate_json(text, strict=False)
+    except (ValidationError, RecursionError):
         return None
 
 
-def _study_record(noted: dict[str, Any]) -> StudyRecord:
-    return StudyRecord(**noted | {"changes": tuple(noted["changes"]), "moved": tuple(noted["moved"])})
+class Journal:
+    """Writes every event at once, so that a killed night tells how far it came.
+
+    Parameters
+    ----------
+    folder : of the night
+    say : told every line in words as well
+    """
+
+    def __init__(self, folder: Path, say: Callable[[str], None]) -> None:
+        self.folder, self.say = folder, say
+
+    def note(self, event: str, words: str, **about: Any) -> None:
+        """Write down an event; ``about`` is for programs, ``words`` for people."""
+        now = time.gmtime()
+        entry = {"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", now), "event": event, "words": words} | about
+        with store_errors(self.folder):
+            with (self.folder / EVENTS).open("a", encoding="utf-8") as file:
+                file.write(json.dumps(entry) + "\n")
+            with (self.folder / WORDS).open("a", encoding="utf-8") as file:
+                file.write(f"{time.strftime('%H:%M:%S', now)}  {words}\n")
+        self.say(words)

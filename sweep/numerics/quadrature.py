@@ -21,7 +21,7 @@ Integrand: TypeAlias = Callable[[Index, Index, Array], Array]
 first panels in which these lie."""
 
 # Kronrod's extension of the Gauss rule of seven points (Piessens et al., QUADPACK, 1983): nodes and both weights on
-# [-1, 1]; tests/test_quadrature.py checks to which degree they are exact.
+# [-1, 1]; tests/numerics/test_quadrature.py checks to which degree they are exact.
 _NODES = (0.991455371120812639206854697526329, 0.949107912342758524526189684047851, 0.864864423359769072789712788640926,
           0.741531185599394439863864773280788, 0.586087235467691130294144838258730, 0.405845151377397166906606412076961,
           0.207784955007898467600689403773245)  # fmt: skip

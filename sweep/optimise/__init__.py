@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from sweep.optimise.certificate import Result
-from sweep.optimise.eliminate import on_locus
-from sweep.optimise.front import front_study
-from sweep.optimise.optimum import optimum
-from sweep.optimise.pareto import pareto
-from sweep.optimise.problem import Problem
-from sweep.optimise.solve import explore, minimise
+import scipy.optimize  # noqa: F401 (its BLAS is limited below only once it is loaded)
+from threadpoolctl import threadpool_limits
+
+from sweep.optimise.front.pareto import pareto
+from sweep.optimise.front.study import front_study
+from sweep.optimise.local.kkt import Result
+from sweep.optimise.multistart.multistart import explore, minimise, optimum
+from sweep.optimise.multistart.survey import Survey
+from sweep.optimise.problem.on_locus import on_locus
+from sweep.optimise.problem.statement import Problem
 from sweep.optimise.study import optimise_study, read_survey
-from sweep.optimise.survey import Survey
 
 __all__ = [
     "Problem",
@@ -25,3 +27,6 @@ __all__ = [
     "pareto",
     "read_survey",
 ]
+
+# Worker processes have one thread for BLAS each; with more here the sums, and so a search's last bits, would differ.
+threadpool_limits(limits=1, user_api="blas")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.sobol import BITS
+from kernels.arithmetic.sobol import BITS
 from sweep.families.base import Array
 from sweep.study.sobol import DIMENSIONS, direction_numbers
 

@@ -1,40 +1,142 @@
-"""A study's optimum: from its dataset to ``_optimum.parquet`` and ``_curves.parquet``."""
+"""A study's optimum: from its dataset to ``_optimum.parquet``, ``_curves.parquet`` and the tables beside them."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kernels import status as st
+from sweep.chunks.plan import PARAMETER_UNITS, error_words
 from sweep.dataset import store
-from sweep.dataset.tables import metadata
+from sweep.dataset.files import metadata
 from sweep.evaluation.curves import joint_curves, motion_curves
+from sweep.evaluation.summaries import design_outputs, output
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Angles, Array, Columns
 from sweep.families.domain import Interval
+from sweep.families.names import is_error, without_error
+from sweep.jobs.deadline import Deadline
 from sweep.jobs.progress import Say, unsaid
-from sweep.optimise.brake import Brake
-from sweep.optimise.certificate import Result
-from sweep.optimise.discrete import listed, with_neighbours
-from sweep.optimise.form import Program
-from sweep.optimise.globally import insensitive
-from sweep.optimise.model import Model
-from sweep.optimise.posing import problem_and_starts, problem_of
-from sweep.optimise.problem import Problem
-from sweep.optimise.robust import robust, yields
-from sweep.optimise.sensitivity import sensitivities
-from sweep.optimise.solve import explore
-from sweep.optimise.survey import CUT, Survey, later
-from sweep.optimise.tolerance import tolerance_rows
-from sweep.optimise.written import certificates, outputs, write
+from sweep.optimise.local.kkt import CAVEAT, Result
+from sweep.optimise.local.model import Model
+from sweep.optimise.manufacture.robust import robust, yields
+from sweep.optimise.manufacture.tolerance import sensitivities, tolerance_rows
+from sweep.optimise.multistart.discrete import listed, with_neighbours
+from sweep.optimise.multistart.multistart import explore
+from sweep.optimise.multistart.survey import CUT, Survey, later
+from sweep.optimise.problem.program import Program
+from sweep.optimise.problem.statement import Problem
+from sweep.optimise.starts.global_starts import insensitive
+from sweep.optimise.starts.posing import problem_and_starts, problem_of
 
 if TYPE_CHECKING:
     from sweep.study import Study
+
+TEXTS = {
+    "role": (
+        "",
+        "optimum, nominal (best drawing where the optimum is robust), start (another one's), or reference",
+    ),
+    "yield": ("1", "share of toleranced mechanisms that keep all limits on outputs; nan for other starts"),
+    "start": ("", "number of the start, best candidate first; -1 for the reference"),
+    "violation": ("1", "largest violation of a limit, relative to the limit; for pressure angles of its sin^2"),
+    "kkt_residual": ("1", "residual of the optimality conditions, variables scaled to their bounds"),
+    "gap": ("1", "difference of the maximum the search worked with and the verified one, relative"),
+    "active": ("", "limits and bounds that hold the result back"),
+    "relaxation": ("", "where infeasible: by how much each limit would have to give way, in its internal unit"),
+    "agree": ("", "number of starts whose objective is within 1e-4 of the best; 1 for those that are not"),
+    "basin": ("", "number of the value it ended at, 1 for the best, values within 1e-4 are one; 0 where infeasible"),
+    "ended": (
+        "",
+        "converged, stalled, differs (the search followed other extrema), infeasible, looks, time, interrupted",
+    ),
+    "looks": ("", "evaluations of designs by the search from this start"),
+    "status": ("", "see kernels.status"),
+    "parameter": ("", "dimension that changes"),
+    "output": ("", "design output; its unit is that of _optimum.parquet"),
+    "value": ("unit of the output", "its value; swing and stroke by magnitude"),
+    "growing": ("unit of the output per mm or rad", "its derivative where the dimension grows"),
+    "shrinking": ("unit of the output per mm or rad", "its derivative where the dimension shrinks"),
+    "nominal": ("unit of the output", "value of the exact design"),
+    "mean": ("unit of the output", "mean under the tolerances, three standard deviations each"),
+    "low": ("unit of the output", "2.5 % of the designs are below"),
+    "high": ("unit of the output", "2.5 % of the designs are above"),
+    "missing": ("1", "share of designs without this output"),
+    "within": ("1", "share of designs that keep the limits of this output; of all of them in the last row"),
+}
+
+
+def certificates(results: list[Result]) -> dict[str, list[Any]]:
+    """Return what is known of each result, column by column."""
+    return {
+        "violation": [r.violation for r in results],
+        "kkt_residual": [r.kkt_residual for r in results],
+        "gap": [r.gap for r in results],
+        "active": ["; ".join(r.active) for r in results],
+        "relaxation": ["; ".join(f"{k} by {v:.6g}" for k, v in r.relaxation.items()) for r in results],
+        "agree": [r.agree for r in results],
+        "basin": [r.basin for r in results],
+        "ended": [r.ended for r in results],
+        "looks": [r.looks for r in results],
+        "status": [r.status for r in results],
+    }
+
+
+def outputs(study: Study, designs: Array) -> dict[str, Any]:
+    """Return every wanted output of designs (k, P) with its error estimate."""
+    columns = design_outputs(study.family, designs, study.want, study.accuracy, study.window)
+    return {name: values for name, values in columns.items() if name != "status"}
+
+
+def write(
+    path: Path,
+    columns: dict[str, Any],
+    study: Study,
+    own_texts: Mapping[str, tuple[str, str]] = MappingProxyType({}),
+    about: Mapping[str, str] = MappingProxyType({}),
+) -> None:
+    """Write a table whose fields' metadata say unit and definition; ``own_texts`` are those of this table alone.
+
+    The file's metadata name the study and say what is in ``about``.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    family = study.family
+    texts = (
+        {p.name: (PARAMETER_UNITS[p.unit], p.text) for p in family.parameters} | TEXTS | {"phi": ("rad", "crank angle")}
+    )
+    texts |= {o.name: (o.unit.replace("length", "mm"), o.text) for o in family.pose_outputs}
+    texts |= own_texts
+    for name in columns:
+        if name not in texts:
+            plain = without_error(name)
+            wanted = output(family, plain)
+            text = f"{error_words(study, plain)} of {wanted.text}" if is_error(name) else wanted.text
+            texts[name] = (wanted.unit.replace("length", "mm"), text)
+    arrays = {name: pa.array(_plain(values)) for name, values in columns.items()}
+    fields = [
+        pa.field(name, array.type, metadata={"unit": texts[name][0], "definition": texts[name][1]})
+        for name, array in arrays.items()
+    ]
+    metadata = {"study": study.name, "fingerprint": study.fingerprint, "caveat": CAVEAT} | dict(about)
+    schema = pa.schema(fields, metadata=metadata)
+    sink = pa.BufferOutputStream()
+    table = pa.Table.from_arrays(list(arrays.values()), schema=schema)
+    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+    store.write_atomically(path, bytes(sink.getvalue()))
+
+
+def _plain(values: Any) -> Any:
+    array = np.asarray(values)
+    return array.tolist() if array.dtype.kind == "U" else array
+
 
 POSES = 720
 
@@ -72,25 +174,25 @@ def optimise_study(
         if the search was stopped, after the best so far was written.
     """
     place = Path(folder)
-    brake = Brake(None if study.optimise is None else study.optimise.time_budget, stop)
-    settings, (problem, starts, origins) = problem_and_starts(study, place, brake, jobs, say)
-    settings = replace(settings, time_budget=None)  # one brake for all that follows
+    deadline = Deadline(None if study.optimise is None else study.optimise.time_budget, stop)
+    settings, (problem, starts, origins) = problem_and_starts(study, place, deadline, jobs, say)
+    settings = replace(settings, time_budget=None)  # one deadline for all that follows
     results, found = explore(
-        problem, starts, settings, brake, jobs, lambda done, most: say("optimum", done, most, "starts"), origins
+        problem, starts, settings, deadline, jobs, lambda done, most: say("optimum", done, most, "starts"), origins
     )
     catalogue = listed(study)
     if catalogue and found.ended not in CUT:
         say("neighbours in the catalogue", 0, 0, "steps")
-        results = with_neighbours(problem, results, catalogue, settings, brake, jobs)
+        results = with_neighbours(problem, results, catalogue, settings, deadline, jobs)
     nominal = results[0]
     if study.tolerance is not None and study.tolerance.robust is not None and found.ended not in CUT:
-        whole, more = insensitive(study, settings, problem, brake, jobs, say)
+        whole, more = insensitive(study, settings, problem, deadline, jobs, say)
         made = robust(
-            whole, results, study.tolerance, settings, brake, jobs, more,
+            whole, results, study.tolerance, settings, deadline, jobs, more,
             lambda done, total: say("robust design", done, total, "searches"),
         )  # fmt: skip
         results = results if made is None else [made.result, *results]
-    if brake.pulled and found.ended not in CUT:
+    if deadline.pulled and found.ended not in CUT:
         found = later(found)
     side = store.beside(place)
     parts = 3 if study.tolerance is None else 4

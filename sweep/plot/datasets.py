@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.errors import InputError
-from sweep.report import pictures
-from sweep.report.dataset import read_dataset
+from sweep.report import maps, robust
+from sweep.report.dataset import gather, read_dataset
 from sweep.report.figures import house_style
-from sweep.report.made import histogram
-from sweep.report.made_figures import histogram_figure
-from sweep.report.page import gather
+from sweep.report.made import histogram, histogram_figure
 from sweep.report.robust import tolerance_words
 
 if TYPE_CHECKING:
@@ -58,7 +56,7 @@ def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArr
         if pair is None:
             raise InputError("axes", [x, y], "two different swept parameters", str(folder))
     with house_style():
-        figure = pictures.design_map(data, found, cells, None if pair is None else (str(pair[0]), str(pair[1])))
+        figure = maps.design_map(data, found, cells, None if pair is None else (str(pair[0]), str(pair[1])))
     drawn = _drawn(figure, folder, "a study that sweeps a parameter and has feasible designs")
     return np.array(drawn.axes[: 1 if data.study.objective is None else 2], dtype=object)
 
@@ -88,7 +86,7 @@ def front(folder: str | Path) -> Axes:
     """
     data, found, _ = gather(Path(folder))
     with house_style():
-        figure = pictures.trade_off(data, found)
+        figure = maps.trade_off(data, found)
     return _drawn(figure, folder, "a study with an objective and a second criterion").axes[0]
 
 
@@ -123,7 +121,7 @@ def tolerance(folder: str | Path, output: str | None = None) -> Axes:
     allowed = "a dataset with an optimum and [tolerance]"
     if output is None:
         with house_style():
-            return _drawn(pictures.tolerance(data), folder, allowed).axes[0]
+            return _drawn(robust.tolerance(data), folder, allowed).axes[0]
     found = histogram(data, output)
     with house_style():
         figure = None if found is None else histogram_figure(found, tolerance_words(data))
@@ -157,7 +155,7 @@ def sensitivity(folder: str | Path) -> Axes:
     """
     data = read_dataset(Path(folder))
     with house_style():
-        figure = pictures.sensitivity(data)
+        figure = robust.sensitivity(data)
     return _drawn(figure, folder, "a dataset with an optimum and its sensitivities").axes[0]
 
 

@@ -20,8 +20,7 @@ from sweep.families import family as find_family
 from sweep.families.domain import Interval
 from sweep.report.curves import motion_figure
 from sweep.report.figures import OPTIMUM, house_style, new_figure
-from sweep.report.mechanisms import exists, mechanism_figure
-from sweep.report.space import VIEWS
+from sweep.report.mechanisms import VIEWS, exists, mechanism_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from kernels.proof.branching import BOUND, EMPTY, OPEN, TOO_SMALL
+from kernels.boxes.branching import BOUND, EMPTY, OPEN, TOO_SMALL
 from sweep.dataset import store
-from sweep.dataset.tables import metadata
+from sweep.dataset.files import metadata
 from sweep.families.base import Array
 from sweep.proof.question import Question, described
 from sweep.proof.rounds import OUTCOMES, Explored, Leaves

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kernels.proof.tube import HIGH, LOW, least_acceleration, tube
+from kernels.boxes.tube import HIGH, LOW, least_acceleration, tube
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.families.capabilities import ProvableLocus
 from sweep.families.chain import Chain
-from sweep.optimise.discrete import listed
+from sweep.optimise.multistart.discrete import listed
 
 if TYPE_CHECKING:
     from sweep.study import Limit, Study

@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.proof.branching import COMBINED, OPEN
+from kernels.boxes.branching import COMBINED, OPEN
+from kernels.types import Numbers
 from sweep.dataset import store
 from sweep.families.base import Array
-from sweep.families.capabilities import Numbers, Searched
-from sweep.jobs.flow import Executor
+from sweep.families.capabilities import Searched
+from sweep.jobs.executors import Executor
 from sweep.jobs.signals import Stop
 from sweep.proof.question import Question
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 UNITS = 64
 SHARES = (0.1, 0.15, 0.25, 0.5)  # of all boxes, round by round: later ones know better where to look
-OUTCOMES = ("open", "too small", "bound", "empty")  # by their numbers in kernels.proof.branching
+OUTCOMES = ("open", "too small", "bound", "empty")  # by their numbers in kernels.boxes.branching
 Tell: TypeAlias = Callable[[int, int], None]
 
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kernels import status as st
-from kernels._cache import source_hash
+from kernels.cache_folder import source_hash
 from sweep.dataset import store
-from sweep.dataset.tables import metadata
+from sweep.dataset.files import metadata
 from sweep.errors import InputError
 from sweep.proof.certificate import Proof, concluded, read_proof, write
 from sweep.proof.question import Question, described, question_of

@@ -6,24 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kernels import scan
 from kernels import status as st
+from kernels.curves import samples as scan
 from sweep.families.base import Accuracy, Array, Columns, Event, Family
 from sweep.families.domain import Interval
-from sweep.quantities.names import error_of
-from sweep.reductions.closing import variable
-from sweep.reductions.density import denser
-from sweep.reductions.extrema import DESIGN_STATUS
-from sweep.reductions.sampling import TWO_PI, Index, Status, blocks, pose_columns, sample_turn
+from sweep.families.names import error_of
+from sweep.quantities.resolve import event_names
+from sweep.reductions.resolution import denser
+from sweep.reductions.sampling import DESIGN_STATUS, TWO_PI, Index, Status, blocks, pose_columns, sample_turn, variable
 
 START, LIMIT = 256, 16384  # samples of the first look, and those beyond which a design is given up
 PASSES = 80
 EPS = 2.0**-53
-
-
-def event_names(family: Family, event: Event) -> tuple[str, str]:
-    """Return the design outputs of an event: where it happens first, and how often."""
-    return f"{family.domain.name}_{event.name}", f"count_{event.name}"
 
 
 def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
@@ -32,7 +26,7 @@ def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy
     Parameters
     ----------
     family, designs : the (n, P) design matrix; an interval is taken as a closed turn, out and back
-    names : see `event_names`
+    names : see `sweep.quantities.resolve.event_names`
     accuracy : on samples, events that come and go between two of them are missed; otherwise samples are doubled until a
         parabola through three of them leaves no room for that
 

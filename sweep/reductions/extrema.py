@@ -13,17 +13,14 @@ import numpy as np
 
 from kernels import status as st
 from sweep.families.base import Array, Family
-from sweep.families.pace import crossed
-from sweep.reductions import fused, panels
-from sweep.reductions import search as one_search
-from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
-from sweep.reductions.sampling import Mask, Status, blocks
-from sweep.reductions.search import LIMIT, START
+from sweep.families.curve_features import crossed
+from sweep.quantities.kinds import Request
+from sweep.reductions import fused, panels, peak_search
+from sweep.reductions.peak_search import LIMIT
+from sweep.reductions.sampling import Extremum, Mask, Status, blocks
 from sweep.reductions.window import Window
 
 HARD = 512  # samples of the first look at what the fused search has left open
-
-__all__ = ["DESIGN_STATUS", "LIMIT", "START", "Extremum", "Request", "true_extrema"]
 
 
 def true_extrema(
@@ -119,8 +116,8 @@ def _searched(
     window: Window | None, start: int | None = None,
 ) -> tuple[dict[Request, Extremum], Status]:  # fmt: skip
     """As `true_extrema`, from poses alone, ``start`` samples at first; values stand where the status is not OK too."""
-    search = one_search.Search(family, designs, tuple(requests), target, locate, anywhere, window)
-    pending, samples = np.arange(len(designs)), start or one_search.START
+    search = peak_search.Search(family, designs, tuple(requests), target, locate, anywhere, window)
+    pending, samples = np.arange(len(designs)), start or peak_search.START
     while pending.size:
         for rows in blocks(pending[search.needed(pending) <= samples], samples, len(search.names)):
             search.block(rows, samples)

@@ -1,4 +1,4 @@
-"""Extrema over the turn of chains whose stages are fused into one kernel (:mod:`kernels.series`); docs/extrema.md.
+"""Extrema over the turn of chains whose stages are fused into one kernel (:mod:`kernels.chains`); docs/extrema.md.
 
 A family that can only end a chain is one by itself: a guide whose crank is the main shaft.
 """
@@ -10,19 +10,18 @@ from functools import lru_cache
 
 import numpy as np
 
-from kernels import series
+from kernels import chains
 from kernels import status as st
-from kernels.series.curves import MARGIN
+from kernels.chains.curves import MARGIN
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries
 from sweep.families.chain import Chain, stages_of
-from sweep.families.derived import of_family
+from sweep.quantities.kinds import Request
+from sweep.reductions.peak_search import TIE
 from sweep.reductions.refine import EPS, SHRINK, Peaks, confirmed, polished
-from sweep.reductions.request import Extremum, Request
-from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, pose_columns, turn
-from sweep.reductions.search import TIE
+from sweep.reductions.sampling import TWO_PI, Extremum, Index, Mask, Status, pose_columns, turn
 
-sampling_tables = lru_cache(series.sampling_tables)
+sampling_tables = lru_cache(chains.sampling_tables)
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ class FusedCurve:
         status, found = np.empty(n, np.uint8), np.empty((6, n))
         # Positions along and across a line are often asked for together: they share a kernel, which has to be compiled.
         along = self.order >= 1 and not made_of[:, 1].any()
-        series.find_extrema(_chained(self.forms), self.order, along)(
+        chains.find_extrema(_chained(self.forms), self.order, along)(
             designs, opening, distance, *sampling_tables(), made_of, self.request.mode, target, tie, status, found
         )
         value, phi, err, err_phi, scale, spacing = found
@@ -78,23 +77,23 @@ class FusedCurve:
             factor = self.scale(designs)
             value, err, scale = value * factor, err * factor, scale * factor
         extremum = Extremum(value, phi, err, err_phi)
-        rounded = np.flatnonzero(status == series.ROUNDED)
+        rounded = np.flatnonzero(status == chains.ROUNDED)
         if rounded.size:
             self._confirm(designs, extremum, rounded, target * scale[rounded], spacing[rounded])
         if self.request.place:
-            top = np.flatnonzero((status == st.OK) | (status == series.ROUNDED))
+            top = np.flatnonzero((status == st.OK) | (status == chains.ROUNDED))
             slope, known = self.family.derivative_of[self.request.pose], (phi[top], err_phi[top])
             places, err_phi[top] = polished(self.family, designs[top], slope, *known)
             phi[top] = np.mod(places, TWO_PI)
-        undecided = status == series.OPEN
+        undecided = status == chains.OPEN
         # A discriminant is known also where the links do not reach, which is for the slower search to say.
         if self.order == MARGIN:
             undecided |= status == st.NOT_ROTATABLE
-        return extremum, np.where(undecided | (status == series.ROUNDED), st.OK, status).astype(np.uint8), undecided
+        return extremum, np.where(undecided | (status == chains.ROUNDED), st.OK, status).astype(np.uint8), undecided
 
     def _confirm(self, designs: Array, found: Extremum, rows: Index, tolerance: Array, spacing: Array) -> None:
         """Replace extrema that rounding may have moved too far by what precise poses say, in place."""
-        precise, pose, mode = _precise(self.family), self.request.pose, self.request.mode
+        precise, pose, mode = self.family.precise(), self.request.pose, self.request.mode
         phi = found.phi[rows]
         there = self._precisely(precise, designs[rows], phi)
         sign = np.where(there[pose] < 0.0, -1.0, 1.0) if mode == 0 else np.full(rows.size, float(mode))
@@ -131,11 +130,6 @@ class FusedCurve:
         for loop in self._later():
             amplified += np.abs(loop.scale(designs) / there[loop.discriminant])
         return 4.0 * EPS * amplified
-
-
-@of_family
-def _precise(family: Family) -> Family:
-    return family.precise()
 
 
 def curve_of(family: Family, request: Request, anywhere: bool) -> FusedCurve | None:
@@ -185,7 +179,7 @@ def sampled_maxima(family: Family, designs: Array, requests: tuple[Request, ...]
     components = ("x1", "x2", "x3", "y0", "y1", "y2")
     out = {name: np.empty(n) if name in wanted.values() else None for name in components}
     least = np.empty((n, len(forms)))
-    series.dense_maxima(_chained(forms))(
+    chains.dense_maxima(_chained(forms))(
         np.ascontiguousarray(designs), angles.cos[0], angles.sin[0], least, *out.values()
     )
     unsure = ~np.all(least > 0.0, axis=1)
@@ -215,5 +209,5 @@ def _forms(family: Family) -> tuple[InSeries, ...] | None:
     return known if fits and all(form.form.turn is not None for form in known[:-1]) else None
 
 
-def _chained(forms: tuple[InSeries, ...]) -> series.Chained:
-    return series.chained(tuple(form.form for form in forms))
+def _chained(forms: tuple[InSeries, ...]) -> chains.Chained:
+    return chains.chained(tuple(form.form for form in forms))

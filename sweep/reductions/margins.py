@@ -7,10 +7,12 @@ import numpy as np
 from kernels import status as st
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.capabilities import Assembly
-from sweep.families.chain import Chain, Stage
-from sweep.quantities.names import is_flag
-from sweep.reductions.extrema import DESIGN_STATUS, Request, true_extrema
-from sweep.reductions.sampling import pose_columns
+from sweep.families.chain import Chain
+from sweep.families.names import is_flag
+from sweep.families.parts import Stage
+from sweep.quantities.kinds import Request
+from sweep.reductions.extrema import true_extrema
+from sweep.reductions.sampling import DESIGN_STATUS, pose_columns
 
 NAMES = ("rotatable", "margin", "max_pressure_angle")
 TRANSMISSION = "least_transmission_angle"

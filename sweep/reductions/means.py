@@ -11,17 +11,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kernels import scan
 from kernels import status as st
+from kernels.curves import samples as scan
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.families.pace import Singular, Switches, crossed, singular_curves
+from sweep.families.curve_features import Singular, Switches, crossed, singular_curves
 from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import Singularities, crowded, steps, turn_edges
-from sweep.reductions.cuts import ends
-from sweep.reductions.density import denser, nearest
-from sweep.reductions.extrema import DESIGN_STATUS, LIMIT, START
+from sweep.reductions.peak_search import LIMIT, START
+from sweep.reductions.resolution import denser, ends, nearest
 from sweep.reductions.sampling import (
+    DESIGN_STATUS,
     TWO_PI,
     Index,
     Status,

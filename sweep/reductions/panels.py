@@ -15,16 +15,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from kernels import scan
 from kernels import status as st
+from kernels.curves import samples as scan
 from sweep.families.base import Array, Family
-from sweep.families.pace import Bends, Singular, bends
+from sweep.families.curve_features import Bends, Singular, bends
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
-from sweep.reductions.cuts import ends
-from sweep.reductions.density import MATTERS, nearest
-from sweep.reductions.request import DESIGN_STATUS, Extremum, Request
+from sweep.quantities.kinds import Request
+from sweep.reductions.resolution import MATTERS, ends, nearest
 from sweep.reductions.rounding import order_of, singular_share
-from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, blocks, discriminants, pose_columns
+from sweep.reductions.sampling import (
+    DESIGN_STATUS,
+    TWO_PI,
+    Extremum,
+    Index,
+    Mask,
+    Status,
+    blocks,
+    discriminants,
+    pose_columns,
+)
 
 PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
 TAIL = 4  # last coefficients that tell how wrong a polynomial may be; of a tent in the middle three nearly vanish ...
@@ -283,7 +292,7 @@ def _upper(panels: Panels, mode: int) -> Array:
 
 
 def _rounding(guards: Sequence[str], poses: dict[str, Array], good: Mask, row: Index, top: Top, precise: bool) -> Array:
-    """Return what rounding near a dead point may have moved each height by (as in `sweep.reductions.search`)."""
+    """Return what rounding near a dead point may have moved each height by (as in `sweep.reductions.peak_search`)."""
     amplified = np.zeros(top.row.size)
     for name in guards[1:] if precise else guards:
         values = poses[name][good]

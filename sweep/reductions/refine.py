@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from kernels import scan
+from kernels.curves import samples as scan
 from sweep.families.base import Array, Family
 from sweep.reductions.sampling import TWO_PI, Index, Mask, pose_columns
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
-from typing import TypeAlias, cast
+from dataclasses import replace
+from functools import lru_cache, partial
+from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import scan
-from sweep.families.base import Angles, Array, Family
+from kernels import status as st
+from kernels.curves import samples as scan
+from sweep.families.base import Angles, Array, Columns, Family, PoseFunction
 from sweep.families.capabilities import Assembly
+from sweep.families.domain import Interval
 
 Index: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.bool_]
@@ -75,3 +78,58 @@ def _evaluate(family: Family, designs: Array, angles: Angles, names: Sequence[st
     columns = family.poses(designs, angles, frozenset(names))
     # Designs and angles are float64 here, so the pose outputs are too.
     return {name: cast(Array, columns[name]) for name in names}, cast(Status, columns["status"])
+
+
+def on_closed_turn(family: Family) -> Family:
+    """Return the family with poses over a closed turn; the family itself unless its domain is an interval."""
+    domain = family.domain
+    if not isinstance(domain, Interval):
+        return family
+    precise = family.precise_poses
+    return replace(
+        family,
+        poses=partial(_poses, family.poses, domain),
+        precise_poses=None if precise is None else partial(_poses, precise, domain),
+        derivative_of={},  # with respect to x, not to t
+    )
+
+
+def variable(family: Family, designs: Array, turned: Array, err: Array) -> tuple[Array, Array]:
+    """Return the domain's variable at angles of the closed turn, (n,), and its error from that of the angle."""
+    if not isinstance(family.domain, Interval):
+        return turned, err
+    low, high = family.domain.ends(designs)
+    half = 0.5 * (high - low)
+    # Near an end x is stationary in t: the second order counts there.
+    return _place(low, high, np.cos(turned)), np.abs(half) * (np.abs(np.sin(turned)) * err + 0.5 * err**2)
+
+
+def _place(low: Array, high: Array, cos: Array) -> Array:
+    return 0.5 * (low + high) - 0.5 * (high - low) * cos
+
+
+def _poses(poses: PoseFunction, domain: Interval, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    low, high = (end[:, None] for end in domain.ends(designs))
+    place = _place(low, high, angles.cos)
+    still = np.zeros_like(place)
+    return poses(designs, Angles(np.ascontiguousarray(place), still, still), wanted)
+
+
+class Extremum(NamedTuple):
+    """Extremum of every design, each (n,): the measured value, its crank angle in [0, 2 pi), and their errors."""
+
+    value: Array
+    phi: Array
+    err: Array
+    err_phi: Array
+
+    @classmethod
+    def unknown(cls, count: int) -> Extremum:
+        """Return a record that is all nan."""
+        return cls(*(np.full(count, np.nan) for _ in range(4)))
+
+
+# What a pose's status means for its design; the others keep their meaning.
+DESIGN_STATUS = np.arange(256, dtype=np.uint8)
+DESIGN_STATUS[st.NOT_ASSEMBLED] = st.NOT_ROTATABLE
+DESIGN_STATUS[st.DEAD_POINT] = st.UNDECIDABLE

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from sweep.costs import nanoseconds
-from sweep.families.base import Accuracy, Family, Output, Step
-from sweep.families.chain import Chain, Stage
-from sweep.families.derived import of_family
-from sweep.quantities.names import at_stage
-from sweep.quantities.reduction import reduction_of
-from sweep.reductions.dimensions import dimension_step
-from sweep.reductions.size import size_step
+from sweep.errors import InputError
+from sweep.families.base import Accuracy, Family, Output, Step, Work, of_family
+from sweep.families.capabilities import Assembly
+from sweep.families.chain import Chain, stages_of
+from sweep.families.machines import Machine
+from sweep.families.names import at_stage
+from sweep.families.parts import Stage
+from sweep.families.reduction import reduction_of
+from sweep.quantities.dimensions import dimension_step, size_step
+from sweep.quantities.kinds import Group, Reduced, Request, requests
+from sweep.quantities.resolve import resolve
+from sweep.reductions.fused import curve_of
+from sweep.reductions.margins import margin_suffixes, own_step
 from sweep.reductions.travel import certified_travel
 
 
@@ -36,7 +44,7 @@ def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | Non
 
 
 def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
-    """Return the own route to an output that serves this accuracy; there is one at most (tests/test_costs.py)."""
+    """Return the own route to an output that serves this accuracy; there is one at most (tests/run/test_costs.py)."""
     able = ((step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy.of(name)))
     return next(able, None)
 
@@ -73,3 +81,116 @@ def proofs(certify: bool | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
 def is_proven(family: Family, name: str, accuracy: Accuracy) -> bool:
     """Return whether the error of an output is a proven bound."""
     return accuracy.of(name).certify and name in certified_names(family) and name not in place_names(family)
+
+
+def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: bool = False) -> None:
+    """Refuse a proof for what has none.
+
+    Exact outputs need no proof; limit positions, margins and means are no maxima that a search could miss a peak of.
+    Where ``accuracy.proven`` names outputs, it is they that must have one.  With ``windowed`` some outputs count in a
+    part of the stroke only; what is proven is the whole turn.
+
+    Raises
+    ------
+    InputError
+        for an unknown name, if an extremum is wanted that is searched for on poses, or if no wanted maximum can be
+        proven; the message names those that can.
+    """
+    names = certified_names(family)
+    places = place_names(family)
+    known = ", ".join(name for name in names if name not in places) or "none"
+    allowed = f"a proof of the maxima that have one; of {family.name}: {known}"
+    for name in accuracy.proven:
+        if name not in names or name not in wanted:
+            raise InputError(
+                "certify", name, f"{allowed}, as far as they are wanted", f"design outputs of {family.name}"
+            )
+    for name in accuracy.proven or wanted:
+        found = resolve(family, name)  # unknown names end here
+        if not isinstance(found, Reduced) or not found.extreme:
+            continue
+        cut = windowed and family.pose_output[found.of].windowed
+        if cut or applying_step(family, name, accuracy) is None:
+            why = f"{name} in a window" if cut else name
+            raise InputError(
+                "certify", True, f"{allowed}; not of {why}: name those to prove", f"design outputs of {family.name}"
+            )
+    if not set(names) & set(wanted):
+        raise InputError("certify", True, f"{allowed}; none of them is wanted", f"design outputs of {family.name}")
+
+
+# Poses per design on average: of a margin, a mean, an event, of a search without its peaks, per refined extremum.
+POSES_MARGIN = 64.0
+POSES_MEAN = 110.0
+POSES_EVENT = 340.0
+POSES_SEARCH = 180.0
+POSES_PEAK = 30.0
+POSES_PLACE = 240.0  # of a place after a fused search: nine precise poses take as long as so many others
+
+
+def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy) -> float:
+    """Return the estimated time of a general route [ns per design], made of measured times of poses and of searches."""
+    stages, pose = _stages(family), pose_ns(family)
+    if group == "margin":
+        return sum(_margin_ns(family, suffix, accuracy) for suffix in margin_suffixes(family))
+    asked = [resolve(family, name) for name in names]
+    if group == "events":
+        return POSES_EVENT * pose + nanoseconds("work", "event") * len(asked)
+    requested = {r for one in asked for r in requests(family, one, False)}
+    # What effects add is paid once per effect and pose, and far outweighs the motion.
+    effects = sum(dict(family.dear[one.of] for one in asked if one.of in family.dear).values())
+    if accuracy.samples is not None or group == "means":
+        scans = len(asked) if group == "means" else len(requested)
+        return (accuracy.samples or POSES_MEAN) * (pose + nanoseconds("work", "scan") * scans + effects)
+    assert accuracy.target is not None
+    quick = {request for request in requested if curve_of(family, request, False) is not None}
+    fused = _stages(family) * nanoseconds("work", "fused extremum") * len(quick)
+    fused += POSES_PLACE * pose * sum(request.place for request in quick)
+    if quick == requested:
+        return fused
+    peaks = (0.5 - np.log10(accuracy.target) / 16.0) * len(requested - quick)
+    own = nanoseconds("work", "search") + nanoseconds("work", "peak") * peaks
+    return float(fused + stages * own + (POSES_SEARCH + POSES_PEAK * peaks) * (pose + effects))
+
+
+def _margin_ns(family: Family, suffix: str, accuracy: Accuracy) -> float:
+    """Return the estimated time of the margin of a stage, which all stages before it drive."""
+    if isinstance(family, Machine):
+        name, own = suffix.split(".")
+        return _margin_ns(family.member(name).family, own, accuracy)
+    found = own_step(family, suffix, accuracy)
+    loop = next((loop for loop in family.every(Assembly) if loop.stage == suffix), None)
+    if found is None and loop is not None and curve_of(family, Request(loop.discriminant, -1), True) is not None:
+        return int(suffix) * nanoseconds("work", "fused extremum")
+    if found is None:
+        *driving, last = stages_of(family)[: int(suffix or 1)]
+        return nanoseconds("margins", last.family.name) + POSES_MARGIN * sum(pose_ns(s.family) for s in driving)
+    step, stage = found
+    return step_ns(stage.family if stage else family, step, accuracy)
+
+
+def _stages(family: Family) -> int:
+    if isinstance(family, Machine):
+        return sum(_stages(member.family) for member in family.members)
+    return len(family.stages) if isinstance(family, Chain) else 1
+
+
+def pose_ns(family: Family) -> float:
+    """Return the estimated time of the motion of a pose: of a chain or a machine that of all its stages and members."""
+    if isinstance(family, Machine):
+        return sum(pose_ns(member.family) for member in family.members)
+    if isinstance(family, Chain):
+        return sum(pose_ns(stage.family) for stage in family.stages)
+    return nanoseconds("poses", family.name)
+
+
+def group_order(family: Family, group: Group, names: Sequence[str]) -> tuple[Work, int]:
+    """Place of a general route among others: what shows that a design does not turn first, then the fewest extrema."""
+    asked = [resolve(family, name) for name in names]
+    effects = list(dict.fromkeys(effect for effect, _ in family.dear.values()))
+    effect = next((family.dear[one.of][0] for one in asked if one.of in family.dear), None)
+    if effect is not None:
+        return Work.EFFECT, effects.index(effect)
+    first = {"margin": 0, "means": 1, "events": 2}
+    extrema = {r for one in asked for r in requests(family, one, False)} if group not in first else ()
+    return Work.SEARCH, first.get(group, 2 + len(extrema))

@@ -11,8 +11,10 @@ from kernels.families import rssr
 from sweep.costs import nanoseconds
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work
 from sweep.families.capabilities import CrankRockerLoop, GuidedPoint
-from sweep.families.chain import Stage, stages_of
-from sweep.reductions.extrema import Request, true_extrema
+from sweep.families.chain import stages_of
+from sweep.families.parts import Stage
+from sweep.quantities.kinds import Request
+from sweep.reductions.extrema import true_extrema
 
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up
 ORDERS = 3  # derivatives that the proof knows

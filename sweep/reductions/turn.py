@@ -3,30 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
-from kernels import scan
 from kernels import status as st
+from kernels.curves import samples as scan
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.reductions.catalogue import STAY, Quantity, quantity
-from sweep.reductions.closing import variable
-from sweep.reductions.dwell import window_angle
-from sweep.reductions.extrema import DESIGN_STATUS, Extremum, Request, true_extrema
+from sweep.quantities.kinds import LimitPosition, Margin, Quantity, Reduced, Request, WindowAngle, requests
+from sweep.quantities.resolve import STAY, resolve
+from sweep.reductions.extrema import true_extrema
 from sweep.reductions.fused import sampled_maxima
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
-from sweep.reductions.sampling import TWO_PI, Index, Mask, Status, blocks, sample_turn
-from sweep.reductions.window import Window
+from sweep.reductions.sampling import (
+    DESIGN_STATUS,
+    TWO_PI,
+    Extremum,
+    Index,
+    Mask,
+    Status,
+    blocks,
+    sample_turn,
+    variable,
+)
+from sweep.reductions.window import Window, window_angle
 
-Group: TypeAlias = Literal["margin", "limits", "reductions", "means", "events"]
 Found: TypeAlias = dict[Request, Extremum]
 
 
 def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
     """Rotatability, margins and largest pressure angles; only the stages that the names need, all if there are none."""
-    asked = quantities(family, names)
+    asked = [one for name in names if isinstance(one := resolve(family, name), Margin)]
     known = margin_suffixes(family)
     if any("." in one.stage for one in asked):
         return _of_members(family, designs, asked, known, accuracy)
@@ -40,7 +48,7 @@ def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy:
 
 
 def _of_members(
-    family: Family, designs: Array, asked: Sequence[Quantity], known: Sequence[str], accuracy: Accuracy
+    family: Family, designs: Array, asked: Sequence[Margin], known: Sequence[str], accuracy: Accuracy
 ) -> Columns:
     """Margins of members of a machine under their dotted names; a chain's weakest stage speaks for the member."""
     members = {f"{one.stage.rpartition('.')[0]}." for one in asked}
@@ -75,22 +83,22 @@ def limits_and_reductions(
     Columns
         the names and ``err_<name>`` (nan on samples), each (n,), and ``status``
     """
-    asked = quantities(family, names)
+    asked = [resolve(family, name) for name in names]
     windowed = part is not None
-    requests = list(dict.fromkeys(r for one in asked for r in one.requests(family, windowed)))
+    wanted = list(dict.fromkeys(r for one in asked for r in requests(family, one, windowed)))
     window, status = None, np.zeros(len(designs), np.uint8)
     found: Found = {}
-    if part is not None and any(r.windowed for r in requests):
+    if part is not None and any(r.windowed for r in wanted):
         ends = [Request(family.position, 1), Request(family.position, -1)]
         found, status = _extrema(family, designs, ends, accuracy, None)
         most, least = (found[r] for r in ends)
         err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(len(designs))
         window = Window.of_stroke(least.value, most.value, err, part)
-        requests = [r for r in requests if r not in ends]
-    more, now = _extrema(family, designs, requests, accuracy, window)
+        wanted = [r for r in wanted if r not in ends]
+    more, now = _extrema(family, designs, wanted, accuracy, window)
     columns: Columns = {"status": np.where(status == st.OK, now, status).astype(np.uint8)}
     for name, one in zip(names, asked, strict=True):
-        if one.kind == STAY.name:
+        if isinstance(one, WindowAngle):
             columns[name], columns[f"err_{name}"] = _stay(family, designs, one, found | more, accuracy, part)
             continue
         value, err_value = _value(family, designs, one, found | more, windowed)
@@ -99,21 +107,14 @@ def limits_and_reductions(
 
 
 def _stay(
-    family: Family, designs: Array, one: Quantity, found: Found, accuracy: Accuracy, part: tuple[float, float] | None
+    family: Family, designs: Array, one: WindowAngle, found: Found, accuracy: Accuracy, part: tuple[float, float] | None
 ) -> tuple[Array, Array]:
     if part is None:
         raise InputError("window", None, f"two fractions of the stroke, as {STAY.name} is wanted", "design outputs")
-    most, least = (found[r] for r in one.requests(family, False))
+    most, least = (found[r] for r in requests(family, one, False))
     err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(len(designs))
     err = np.where(np.isfinite(most.value), err, np.nan)
     return window_angle(family, designs, Window.of_stroke(least.value, most.value, err, part))
-
-
-def quantities(family: Family, names: Sequence[str]) -> list[Quantity]:
-    """Return the quantities of design outputs that general routes compute."""
-    asked = [quantity(family, name) for name in names]
-    assert all(one is not None for one in asked)
-    return [one for one in asked if one is not None]
 
 
 def _extrema(
@@ -175,16 +176,21 @@ def _best_samples(
 
 def _value(family: Family, designs: Array, one: Quantity, found: Found, windowed: bool) -> tuple[Array, Array]:
     """Return a design output and its error from the extrema it is made of."""
-    first = found[one.requests(family, windowed)[0]]
-    if one.kind in ("phi_max_abs", "phi_max", "phi_min"):
-        return variable(family, designs, first.phi, first.err_phi)
-    if one.kind in ("max_abs", "max", "min"):
-        return first.value, first.err
-    most, least = (found[r] for r in one.requests(family, windowed))
-    if one.kind in ("range", "stroke"):
-        return most.value - least.value, most.err + least.err
-    outward = _extended_is_largest(family, designs, one.of)
-    return _limit(one.kind, family.pose_output[one.of].wraps, most, least, outward)
+    first, *others = (found[r] for r in requests(family, one, windowed))
+    match one:
+        case Reduced(reduction=reduction) if reduction.place:
+            return variable(family, designs, first.phi, first.err_phi)
+        case Reduced() if not others:
+            return first.value, first.err
+        case Reduced() | LimitPosition(kind="stroke"):
+            (least,) = others
+            return first.value - least.value, first.err + least.err
+        case LimitPosition(kind=kind):
+            (least,) = others
+            outward = _extended_is_largest(family, designs, one.of)
+            return _limit(kind, family.pose_output[one.of].wraps, first, least, outward)
+        case _:
+            raise TypeError(f"{one.output.name} is not made of extrema")
 
 
 def _extended_is_largest(family: Family, designs: Array, position: str) -> Mask:

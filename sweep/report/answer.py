@@ -1,4 +1,4 @@
-"""The answer in words: what was reached, against what, which limits bind, what was not reached, what it proves."""
+"""The answer in words: what was reached, against what, which limits bind, what was not reached, what is proven."""
 
 from __future__ import annotations
 
@@ -7,16 +7,22 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from kernels import status as codes
-from sweep.chunks.cascade import compared
-from sweep.report import proof
+from sweep.dataset import store
+from sweep.optimise.local.start import DIFFERS
+from sweep.proof import read_proof
+from sweep.proof.study import EVENT
+from sweep.proof.words import proof_words
+from sweep.quantities.limits import compared
+from sweep.report.dataset import Dataset, Row
 from sweep.report.front import front_sentence
-from sweep.report.limits import LimitState, Row, limit_state, limit_states, limited, value_of
 from sweep.report.quantities import Quantity, change, number, quantity
-from sweep.report.tables import fates, parameter_rows
+from sweep.report.tables import LimitState, fates, limit_state, limit_states, limited, parameter_rows, value_of
 
 if TYPE_CHECKING:
+    from sweep.optimise.multistart.survey import Survey
     from sweep.report.dataset import Dataset
     from sweep.report.scan import Scan
+
 
 KKT = 1e-6  # residual above which the optimiser's result is not called a local optimum
 MISSED = ("missed", "unknown")
@@ -45,7 +51,7 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
     second = data.second
     if second is not None and _is_number(data.result, second):
         sentences.append(_comparison(data, second))
-    proven = proof.proof_sentence(data)
+    proven = proof_sentence(data)
     sentences += [f"{proven[0].upper()}{proven[1:]}."] if proven else []
     sentences += further
     sentences += [] if cut else search_warnings(data)
@@ -168,9 +174,7 @@ def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
 def search_warnings(data: Dataset) -> list[str]:
     """Return what a reader has to know before trusting the optimum: time that ran out, fewer starts than asked."""
     found = (
-        []
-        if data.survey is None
-        else [f"{text[0].upper()}{text[1:]}." for text in proof.search_warnings(data, data.survey)]
+        [] if data.survey is None else [f"{text[0].upper()}{text[1:]}." for text in survey_warnings(data, data.survey)]
     )
     front = data.front_steps
     return found if front is None else [*found, f"Time ran out: {front} steps of the front."]
@@ -194,7 +198,7 @@ def _search(data: Dataset, found: Scan, *, proven: bool) -> str:
         text += f", {number(agree)} of which ended at this value"
     if data.survey is not None:
         # What comes from one valley is one meeting, so the survey may count fewer than ended at the value.
-        text += f"; {'' if populations else 'counting distinct valleys, '}{data.survey.words}"
+        text += f"; {'' if populations else 'counting distinct valleys, '}{search_words(data, data.survey)}"
     residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
     words = "" if math.isnan(residual) else f"{_residual(residual)}, "
     return f"{text}. {words}{'l' if words else 'L'}argest violation of a limit {number(violation, 3)}."
@@ -207,3 +211,39 @@ def _is_number(row: Row, name: str) -> bool:
 def _count(n: float) -> str:
     """Write 1 234 567 with thin no-break spaces."""
     return f"{int(n):,}".replace(",", "\u202f")
+
+
+def proof_sentence(data: Dataset) -> str:
+    """Return one sentence; empty where the study asked for no proof."""
+    found = read_proof(store.beside(data.folder) / store.PROOF)
+    if found is None:
+        return ""
+    shown = quantity(found.objective, data.units.get(found.objective, found.unit))
+    took = [run["processor_seconds"] for run in data.runs if run.get("event") == EVENT]
+    return proof_words(found, shown.words, shown.show, took[-1] if took else None)
+
+
+def survey_warnings(data: Dataset, found: Survey) -> tuple[str, ...]:
+    """Return what a reader has to know of a search; a proof of the whole space leaves no doubt of something better."""
+    return (*_unconfirmed(data), *(found.shortcomings if _is_proven(data) else found.warnings))
+
+
+def search_words(data: Dataset, found: Survey) -> str:
+    """Say what the starts met; beside a proof of the whole space an estimate of what is unseen says nothing."""
+    if found.basins == 0 or not _is_proven(data):
+        return found.words
+    return f"{found.basins} basin{'s' if found.basins > 1 else ''} met"
+
+
+def _is_proven(data: Dataset) -> bool:
+    proof = read_proof(store.beside(data.folder) / store.PROOF)
+    return proof is not None and proof.settled and not proof.exceptions
+
+
+def _unconfirmed(data: Dataset) -> tuple[str, ...]:
+    """Return that the search followed other extrema than the true ones, where it did."""
+    best = data.optimum
+    if best is None or best.get("ended") != DIFFERS:
+        return ()
+    apart = f"{100.0 * float(best['gap']):.2g} %"
+    return (f"the search took values that are up to {apart} beside the true ones, which are shown: better may be near",)

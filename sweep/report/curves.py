@@ -1,14 +1,19 @@
-"""The motion over one turn: position, derivatives, deviation and pressure angles, optimum against reference."""
+"""The motion over one turn, optimum against reference: its numbers where no optimiser left them, and its picture."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.evaluation.curves import coordinate
-from sweep.quantities.names import is_largest, reduced, stem
+from sweep.evaluation.curves import coordinate, joint_curves, motion_curves
+from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
+from sweep.families.base import Angles
+from sweep.families.domain import Interval
+from sweep.families.names import is_largest, reduced, stem
 from sweep.report.figures import LIMIT, OPTIMUM, REFERENCE, WIDTH, crank_axis, new_figure
 from sweep.report.quantities import Quantity, quantity
 
@@ -18,7 +23,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sweep.families.base import Array
-    from sweep.study import Limit
+    from sweep.report.dataset import Dataset
+    from sweep.study import Limit, Study
+
 
 FAR_LIMIT = 2.5  # limits farther out than so many times the curves are not drawn: the curves would be flat
 NOT_CURVES = ("role", "phi", "status")
@@ -183,3 +190,42 @@ def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
             both = is_largest(limit.output, magnitude=True) and stem(name) != "pressure_angle"
             found += [value, -value] if both else [value]
     return found
+
+
+POSES = 720
+
+
+def reference_row(study: Study) -> dict[str, float] | None:
+    """Return parameters and outputs of the study's reference design, computed as the sweep computes its designs."""
+    if study.reference is None:
+        return None
+    matrix, _ = design_matrix(study.family, study.reference)
+    outputs = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)
+    parameters = dict(zip(study.family.parameter_names, matrix[0].tolist(), strict=True))
+    return parameters | {name: float(values[0]) for name, values in outputs.items()}
+
+
+def curves(study: Study, rows: Mapping[str, Mapping[str, Any] | None]) -> pd.DataFrame:
+    """Return poses over one turn of the design of every role, as ``_curves.parquet`` holds them."""
+    import pandas as pd
+
+    family = study.family
+    # Over an interval there is no turn to draw.
+    over_turn = not isinstance(family.domain, Interval)
+    known = {role: row for role, row in rows.items() if row is not None and over_turn}
+    names = [*motion_curves(family), *joint_curves(family)]
+    matrix = np.array([[float(row[p]) for p in family.parameter_names] for row in known.values()])
+    phi = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
+    columns = family.poses(
+        matrix.reshape(len(known), len(family.parameters)), Angles.of(phi[None, :]), frozenset(names)
+    )
+    head = {"role": np.repeat(list(known), POSES), "phi": np.tile(phi, len(known))}
+    return pd.DataFrame(head | {name: columns[name].ravel() for name in [*names, "status"]})
+
+
+def motion(data: Dataset) -> Figure | None:
+    """Return the curves over one turn."""
+    if data.curves is None or not len(data.curves):
+        return None
+    study = data.study
+    return motion_figure(data.curves, data.units, study.family.position, study.speed, study.limits, study.window)

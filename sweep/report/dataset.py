@@ -1,25 +1,35 @@
-"""A finished dataset folder as the report sees it."""
+"""A finished dataset folder as the report sees it, and designs out of it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from kernels import status as codes
 from sweep.dataset import store
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
+from sweep.families.base import Family
+from sweep.families.names import is_largest, is_place, stem
 from sweep.optimise import Survey, read_survey
-from sweep.quantities.names import is_largest, is_place, stem
+from sweep.report.curves import curves, reference_row
+from sweep.report.quantities import Quantity, quantity
+from sweep.report.scan import Cells, Scan, scan
+from sweep.study.load import study_from_data
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from sweep.study import Study
 
+
 Row = Mapping[str, Any]
+CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
+DESIGNS_PER_CELL = 3.0
 
 
 @dataclass(frozen=True)
@@ -139,7 +149,8 @@ def read_dataset(folder: Path) -> Dataset:
     InputError
         if the folder is no complete dataset.
     """
-    plan = store.read_plan(folder)
+    folder = store.located(folder)
+    plan = store.trusted_plan(folder)
     if plan is None:
         allowed = f"a dataset folder, with a readable {store.PLAN} (sweep run makes one)"
         raise InputError("folder", str(folder), allowed, "report")
@@ -170,8 +181,6 @@ def read_dataset(folder: Path) -> Dataset:
 
 def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
     """Return the study a dataset answers, from its plan; its title and question stand there under ``about``."""
-    from sweep.study.load import study_from_data
-
     about = plan.get("about", {"name": plan["name"]})
     return study_from_data({**plan["data"], "study": about}, store.beside(folder) / store.PLAN)
 
@@ -190,3 +199,111 @@ def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str
             if b"definition" in about:
                 definitions.setdefault(column.name, about[b"definition"].decode())
     return units, definitions
+
+
+ROLES = ("optimum", "reference", "best")
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A design with the mechanism it is of; ``speed`` is that of the study's scene [rad/s]."""
+
+    family: Family
+    design: dict[str, float]
+    speed: float | None
+
+
+def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
+    """Return a design of a dataset.
+
+    Parameters
+    ----------
+    folder : what `sweep run` left behind
+    design : "optimum", "reference", "best" (of the sweep) or the number of a row as :func:`sweep.load` counts them; if
+        left out the optimum, or where nothing was optimised the best
+
+    Raises
+    ------
+    InputError
+        for a folder that is no complete dataset, or one that has no such design.
+    """
+    path = store.located(folder)
+    if isinstance(design, int) or (isinstance(design, str) and design.lstrip("-").isdigit()):
+        return _row(path, int(design))
+    if design is not None and design not in ROLES:
+        raise InputError("design", design, f"{', '.join(ROLES)}, or the number of a row", str(folder))
+    data = read_dataset(path)
+    if design == "best" or (design == "reference" and data.optima is None) or (design is None and data.optimum is None):
+        data, _, _ = gather(path)  # goes through all rows
+    row = {"optimum": data.optimum, "reference": data.reference, "best": data.best, None: data.result}[design]
+    if row is None:
+        raise InputError(
+            "design", design or "result", f"one this dataset has, of {', '.join(ROLES)}, or a row", str(folder)
+        )
+    return _chosen(data, {name: float(row[name]) for name in data.study.family.parameter_names})
+
+
+def _row(folder: Path, number: int) -> Chosen:
+    data = read_dataset(folder)
+    rows = store.load(folder)
+    if not 0 <= number < len(rows):
+        raise InputError("design", number, f"a row from 0 to {len(rows) - 1}", str(folder))
+    row = rows.iloc[number]
+    return _chosen(data, {name: float(row[name]) for name in data.study.family.parameter_names})
+
+
+def _chosen(data: Dataset, design: dict[str, float]) -> Chosen:
+    return Chosen(data.study.family, design, data.study.speed)
+
+
+def objective_of(study: Study) -> str | None:
+    """Return the output that is to be small, if the study names one."""
+    return None if study.objective is None else study.objective.output
+
+
+def shown_objective(data: Dataset) -> Quantity | None:
+    """Return the objective as it is shown."""
+    name = objective_of(data.study)
+    return None if name is None else quantity(name, data.units.get(name, ""))
+
+
+def marked(data: Dataset) -> dict[str, Any]:
+    """Return the designs that are marked in the pictures of the design space."""
+    return {data.result_name: data.result, "reference": data.reference}
+
+
+def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
+    """Read a dataset, go once through its rows, and compute what an optimiser would have left."""
+    data = read_dataset(folder)
+    cells = divided_axes(data.study, data.counts.get(codes.OK, 0))
+    objective = objective_of(data.study)
+    larger = data.study.pareto is not None and data.study.pareto.at_least
+    found = scan(data.parts, cells, objective, data.against if objective is not None else None, larger)
+    data = replace(data, best=found.best_row or None)
+    if data.optima is None:
+        data = replace(data, computed_reference=reference_row(data.study))
+    if data.curves is None and data.study.output.curves != "none":
+        data = replace(data, curves=curves(data.study, marked(data)))
+    return data, found, cells
+
+
+def divided_axes(study: Study, feasible: int) -> list[Cells]:
+    """Return the swept axes, divided into cells: finely if a single map shows them all, else coarsely.
+
+    Axes of a sample are divided so that a cell holds some of the ``feasible`` designs on average.  Left out are signs,
+    which make no map, and what [locus] or [fit] makes.
+    """
+    signs = {p.name for p in study.family.parameters if p.choices is not None}
+    left_out = signs.union(study.made, study.rescaled)
+    swept = [axis for axis in study.space.axes if axis.varies and axis.name not in left_out]
+    most = CELLS_OF_PAIR if len(swept) <= 2 else CELLS_OF_MANY
+    if study.space.kind == "sobol":
+        # A power of two: a Sobol sequence puts equally many points into such cells.
+        sampled = 2 ** min(5, max(2, math.floor(0.5 * math.log2(max(feasible, 1) / DESIGNS_PER_CELL))))
+        return [
+            Cells.of_range(axis.name, axis.low, axis.high, sampled)
+            if axis.values is None
+            else Cells.of_values(axis.name, axis.values, most)
+            for axis in swept
+        ]
+    return [Cells.of_values(axis.name, axis.values, most) for axis in swept if axis.values is not None]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 TEMPLATES = Path(__file__).resolve().parent.parent / "templates"
 OPTIMUM, REFERENCE, LIMIT, QUIET = "#1f5aa6", "#c8551b", "#b3261e", "#8a8f98"
 WIDTH = 9.6  # inches, the full text width of the page
+NARROW = 4.6  # bars and their names can still be read on a telephone
 
 
 @dataclass(frozen=True)

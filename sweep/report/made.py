@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sweep.chunks.cascade import compared, meets
 from sweep.evaluation.summaries import design_outputs
-from sweep.optimise.tolerance import deviating, touched
-from sweep.quantities.names import is_flag, judged_by
-from sweep.reductions import catalogue
+from sweep.families.names import is_flag, judged_by
+from sweep.optimise.manufacture.tolerance import deviating, touched
+from sweep.quantities import resolve
+from sweep.quantities.limits import compared, meets
 from sweep.report.dataset import Dataset
+from sweep.report.figures import LIMIT, NARROW, OPTIMUM, new_figure
 from sweep.report.quantities import Quantity, number, quantity
 from sweep.study import Limit
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from sweep.families.base import Array
@@ -112,7 +114,7 @@ def histogram(data: Dataset, output: str) -> Histogram | None:
     study, row = data.study, data.optimum
     if study.tolerance is None or study.optimise is None or row is None:
         return None
-    catalogue.output(study.family, output)  # refuses a name that is none
+    resolve.output(study.family, output)  # refuses a name that is none
     design = np.array([float(row[name]) for name in study.family.parameter_names])
     designs = deviating(study.family, design, study.tolerance, study.optimise.seed, SAMPLES)
     values = design_outputs(study.family, designs, [output], study.accuracy, study.window)[output]
@@ -159,7 +161,7 @@ def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
 
 
 def _histogram(data: Dataset, limit: Limit, values: Array) -> Histogram:
-    shown = quantity(limit.output, catalogue.output(data.study.family, limit.output).unit)
+    shown = quantity(limit.output, resolve.output(data.study.family, limit.output).unit)
     known = values[np.isfinite(values)] * shown.factor
     low, high = np.percentile(known, (0.1, 99.9)) if known.size else (0.0, 1.0)
     far = FAR * (high - low) or math.inf
@@ -177,3 +179,20 @@ def _histogram(data: Dataset, limit: Limit, values: Array) -> Histogram:
     counts, _ = np.histogram(np.clip(known, edges[0], edges[-1]), edges)
     shares = counts / max(values.size, 1)
     return Histogram(shown, edges, shares, bounds[0], bounds[1], float(meets(limit, values).mean()))
+
+
+def histogram_figure(found: Histogram, title: str = "") -> Figure:
+    """Return an output over what is made; what misses its limit has another colour, lines are the limit."""
+    figure = new_figure(NARROW, 1.9)
+    axes = figure.subplots()
+    middle = 0.5 * (found.edges[:-1] + found.edges[1:])
+    bounds = [x for x in (found.low, found.high) if x is not None]
+    low, high = (-np.inf if found.low is None else found.low), (np.inf if found.high is None else found.high)
+    colours = np.where((middle >= low) & (middle <= high), OPTIMUM, LIMIT)
+    axes.bar(middle, 100.0 * found.shares, 0.92 * np.diff(found.edges), color=colours, alpha=0.75)
+    for bound in bounds:
+        axes.axvline(bound, color=LIMIT, linewidth=1.2)
+    axes.set_xlabel(found.shown.title)
+    axes.set_ylabel("of what is made [%]")
+    axes.set_title(title)
+    return figure

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweep.quantities.limits import compared
+from sweep.report.dataset import Dataset, marked, shown_objective
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
-from sweep.report.quantities import Quantity
+from sweep.report.front import draw_front
+from sweep.report.quantities import Quantity, quantity
+from sweep.report.scan import Cells, Scan, most_telling
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +23,8 @@ if TYPE_CHECKING:
 
     from sweep.families.base import Array
     from sweep.report.scan import Cells, Grid, Scan
+    from sweep.study import Study
+
 
 MARKS: dict[str, dict[str, Any]] = {
     "optimum": {"marker": "*", "s": 210, "color": "#14181f"},
@@ -200,3 +207,60 @@ def _share_norm(values: Array) -> object:
     from matplotlib.colors import Normalize
 
     return Normalize(0.0, float(np.nanmax(values)) if np.isfinite(values).any() else 100.0)
+
+
+def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, str] | None = None) -> Figure | None:
+    """Show what the best design of each cell attains over two axes, the most telling pair if none is given,
+    or over one.
+    """
+    by_name = {c.name: c for c in cells}
+    marks = {role: row for role, row in marked(data).items() if row is not None}
+    shown = shown_objective(data)
+    pair = most_telling(found) if pair is None else pair
+    if pair is not None:
+        x, y = pair
+        at = {role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()}
+        sides = (by_name[x], axis_quantity(data, x)), (by_name[y], axis_quantity(data, y))
+        return map_figure(found.grids[pair], *sides, data.designs, shown, at, overlays(data.study, x, y))
+    if len(cells) == 1 and found.feasible:
+        name = cells[0].name
+        side = cells[0], axis_quantity(data, name)
+        return line_figure(
+            found.lines[name], side, data.designs, shown, {r: float(row[name]) for r, row in marks.items()}
+        )
+    return None
+
+
+def trade_off(data: Dataset, found: Scan) -> Figure | None:
+    """Draw the objective against a second criterion, with the front where one was searched."""
+    study, shown = data.study, shown_objective(data)
+    against = data.against
+    if shown is None or against is None or not (len(found.scatter) or data.front is not None):
+        return None
+    second = quantity(against, data.units.get(against, ""))
+    first, other = shown.name, second.name
+    marks = {role: row for role, row in marked(data).items() if row is not None}
+    at = {role: (compared(first, float(r[first])), compared(other, float(r[other]))) for role, r in marks.items()}
+    bound = next((limit.maximum for limit in study.limits if limit.output == second.name), None)
+    drawn = None if data.front is None else partial(draw_front, data=data)
+    return trade_off_figure(found, shown, second, at, bound, drawn)
+
+
+def axis_quantity(data: Dataset, name: str) -> Quantity:
+    """Return a swept parameter under its own name, in the unit a designer reads."""
+    shown = quantity(name, data.units.get(name, ""))
+    return replace(shown, symbol=name, words=data.definitions.get(name, name))
+
+
+def overlays(study: Study, x: str, y: str) -> list[Overlay]:
+    """Return known lines, ``[report] curves`` of the study, that lie in the plane of the map;
+    points in the axes' units.
+    """
+    factors = {axis.name: axis.factor for axis in study.space.axes}
+    found = []
+    for curve in study.data.get("report", {}).get("curves", []):
+        if {curve["x"], curve["y"]} == {x, y}:
+            points = np.asarray(curve["points"], dtype=np.float64) * (factors[curve["x"]], factors[curve["y"]])
+            along = points if curve["x"] == x else points[:, ::-1]
+            found.append(Overlay(curve["label"], along[:, 0], along[:, 1]))
+    return found

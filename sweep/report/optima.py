@@ -1,24 +1,162 @@
-"""Cards of the structurally different optima, each with its drawing, sizes and yield."""
+"""Structurally different optima of a search, their cards, and the designs that can be looked at on the page.
+
+Starts that ended alike, or in each other's mirror image, are one.  A designer chooses: the best on paper may be the one
+that nobody wants to build.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.optimise.tolerance import deviating
-from sweep.reductions.dimensions import size
-from sweep.report.dataset import Dataset
+from kernels import status as codes
+from sweep.evaluation.summaries import design_outputs
+from sweep.optimise.manufacture.tolerance import deviating
+from sweep.quantities.dimensions import sizes
+from sweep.quantities.limits import compared, meets
+from sweep.report.dataset import Dataset, Row
 from sweep.report.figures import save
-from sweep.report.groups import Group
-from sweep.report.mechanisms import small_figures
+from sweep.report.mechanisms import parts_over_turn, small_figures
 from sweep.report.quantities import change, number, quantity, with_unit
-from sweep.report.turns import parts_over_turn
 
-MOST = 6  # are shown
+if TYPE_CHECKING:
+    from sweep.families.base import Array
+
+
+ALIKE = 0.1  # of the mechanism's size, or of half a turn: what lies nearer is the same design in other numbers
+SAME = 1e-6  # relative difference of objectives that are one
+
+
+@dataclass(frozen=True)
+class Group:
+    """Starts that ended in the same design or its mirror image: the row that stands for them, and how many they are."""
+
+    row: dict[str, Any]
+    starts: int
+    mirrored: int = 0
+
+    def title(self, k: int) -> str:
+        """Return what the group is called as the ``k``-th of the list."""
+        if self.row["role"] == "nominal":
+            return "best on paper"
+        return "optimum" if self.row["role"] == "optimum" else f"another optimum, {k}"
+
+
+def groups(data: Dataset) -> list[Group]:
+    """Return the different optima, the study's answer first, then by their objective; empty without a search."""
+    objective = data.study.objective
+    if data.optima is None or objective is None:
+        return []
+    kept = data.optima[(data.optima["role"] != "reference") & (data.optima["status"] == codes.OK)]
+    rows = [{str(key): value for key, value in row.items()} for row in kept.to_dict("records")]
+    rows.sort(key=lambda row: (row["role"] != "optimum", float(compared(objective.output, row[objective.output]))))
+    places = _places(data, rows)
+    values = [float(row[objective.output]) for row in rows]
+    leaders: list[int] = []
+    count, mirrored = dict.fromkeys(range(len(rows)), 0), dict.fromkeys(range(len(rows)), 0)
+    for k, row in enumerate(rows):
+        near = next((j for j in leaders if _apart(places, j, k) <= ALIKE), None)
+        twin = next((j for j in leaders if near is None and _mirrored(places, values, j, k)), None)
+        own = near if near is not None else twin
+        if own is None:
+            leaders.append(k)
+        started = row["role"] != "nominal"
+        count[k if own is None else own] += started
+        if twin is not None:
+            mirrored[twin] += started
+    return [Group(rows[k], count[k], mirrored[k]) for k in leaders]
+
+
+def _places(data: Dataset, rows: list[dict[str, Any]]) -> tuple[Array, Array, Array]:
+    """Return lengths and ratios over the largest of them, angles over half a turn, signs; (k, number of each)."""
+    own = [p for p in data.study.bare.parameters if p.name in data.study.family.parameter_names]
+    of = {unit: [p.name for p in own if p.unit == unit and p.choices is None] for unit in ("length", "ratio", "angle")}
+    signs = [p.name for p in own if p.choices is not None]
+
+    def matrix(names: list[str]) -> Array:
+        return np.array([[float(row[name]) for name in names] for row in rows]).reshape(len(rows), len(names))
+
+    sized = [x / np.maximum(np.abs(x).max(axis=1, initial=1e-300, keepdims=True), 1e-300)
+             for x in (matrix(of["length"]), matrix(of["ratio"]))]  # fmt: skip
+    return np.hstack(sized), matrix(of["angle"]), matrix(signs)
+
+
+def _apart(places: tuple[Array, Array, Array], j: int, k: int) -> float:
+    sized, angles, signs = places
+    turned = np.abs(np.mod(angles[j] - angles[k] + np.pi, 2.0 * np.pi) - np.pi) / np.pi
+    parts = (np.abs(sized[j] - sized[k]), turned, np.abs(signs[j] - signs[k]))
+    return float(np.concatenate(parts).max(initial=0.0))
+
+
+def _mirrored(places: tuple[Array, Array, Array], values: list[float], j: int, k: int) -> bool:
+    """Return whether two designs have the same lengths but for signs, and the same objective:
+    one is the other in a mirror.
+    """
+    sized = np.abs(places[0])
+    same = abs(values[j] - values[k]) <= SAME * max(abs(values[j]), 1e-300)
+    return same and float(np.abs(sized[j] - sized[k]).max(initial=0.0)) <= 1e-3 * ALIKE
+
+
+OFFERED = 5  # other optima, and as many designs of the front
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A design under a name; ``role`` is "result", "alternative", "front" or "reference", ``note`` its objective."""
+
+    name: str
+    role: str
+    note: str
+    row: Row
+
+
+def shown_designs(data: Dataset, different: Sequence[Group]) -> list[Shown]:
+    """Return designs in the order in which they are offered; empty where no design was found.
+
+    ``different`` are the optima of :func:`groups`, the study's answer first.
+    """
+    if data.result is None:
+        return []
+    found = [Shown(data.result_name, "result", _objective(data, data.result), data.result)]
+    others = [one for one in different if one.row["role"] != "optimum"][:OFFERED]
+    found += [Shown(one.title(k), "alternative", _objective(data, one.row), one.row) for k, one in enumerate(others, 1)]
+    found += _of_front(data)
+    if data.reference is not None:
+        found.append(Shown("reference", "reference", _objective(data, data.reference), data.reference))
+    return found
+
+
+def _of_front(data: Dataset) -> list[Shown]:
+    """Return designs of the front, spread evenly from the loosest bound to the tightest."""
+    pareto = data.study.pareto
+    if data.front is None or pareto is None:
+        return []
+    side = "at least" if pareto.at_least else "at most"
+    shown = quantity(pareto.output, data.units.get(pareto.output, ""))
+    rows = [_row(row) for row in data.front.to_dict("records") if int(row["status"]) == codes.OK]
+    chosen = sorted({round(k) for k in np.linspace(0, len(rows) - 1, min(OFFERED, len(rows)))})
+    names = [f"{shown.symbol} {side} {shown.show(float(rows[k]['bound']), 3)}" for k in chosen]
+    return [Shown(name, "front", _objective(data, rows[k]), rows[k]) for name, k in zip(names, chosen, strict=True)]
+
+
+def _row(row: Any) -> dict[str, Any]:
+    return {str(key): value for key, value in row.items()}
+
+
+def _objective(data: Dataset, row: Row) -> str:
+    objective = data.study.objective
+    if objective is None or objective.output not in row:
+        return ""
+    shown = quantity(objective.output, data.units.get(objective.output, ""))
+    return f"{shown.symbol} = {shown.show(float(row[objective.output]), 4)}"
+
+
+CARDS = 6  # are shown
 ROUNDING = 1e-9  # of the largest length: what is smaller is 0
 SAMPLES = 2048  # made mechanisms of each: a share good to 1 %
 EXTRAS = ("least_link", "arm_ratio")
@@ -48,7 +186,7 @@ def optima(data: Dataset, found: list[Group], folder: Path) -> list[Optimum]:
     objective = data.study.objective
     if len(found) < 2 or objective is None:
         return []
-    found = found[:MOST]
+    found = found[:CARDS]
     drawn = small_figures(parts_over_turn(data.study, {str(k): group.row for k, group in enumerate(found)}), "mm")
     pictures = {key: save(figure, folder / f"optimum-{int(key) + 1}.svg").uri for key, figure in drawn.items()}
     shown = quantity(objective.output, data.units.get(objective.output, ""))
@@ -91,9 +229,6 @@ def optima_sentence(data: Dataset, found: list[Group]) -> str:
 
 def _made(data: Dataset, row: dict[str, Any]) -> str:
     """Return the share of what is made within the tolerances that keeps all limits."""
-    from sweep.chunks.cascade import meets
-    from sweep.evaluation.summaries import design_outputs
-
     study, known = data.study, float(row.get("yield", math.nan))
     limits = [x for x in study.output_limits if x.minimum is None or x.minimum != x.maximum]
     if study.tolerance is None or study.optimise is None or not limits:
@@ -127,7 +262,7 @@ def _extras(data: Dataset, row: dict[str, Any]) -> tuple[tuple[str, str], ...]:
     design = np.array([[float(row[name]) for name in family.parameter_names]])
     found = []
     for name in EXTRAS:
-        one = size(family, name)
+        one = sizes(family).get(name)
         if one is not None:
             shown = quantity(name, one.output.unit)
             found.append((shown.words, shown.show(float(one.values(family, design)[0]), 4)))

@@ -2,41 +2,65 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kernels import status as codes
+from sweep.dataset.files import beside, is_older, located
 from sweep.errors import StoreError
 from sweep.jobs.progress import Say, unsaid
-from sweep.report import answer, front, limits, pictures, robust, tables
-from sweep.report.curves import motion_caption
-from sweep.report.dataset import Dataset, read_dataset
+from sweep.report import answer, front, maps, mechanisms, robust, tables
+from sweep.report.curves import motion, motion_caption
+from sweep.report.dataset import Dataset, gather
 from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
-from sweep.report.files import copy_tables, write_survivors
-from sweep.report.groups import groups
 from sweep.report.live import live
-from sweep.report.mechanisms import mechanism_caption
-from sweep.report.scan import Cells, Scan, most_telling, scan
-from sweep.report.sections import buildable
-from sweep.report.turns import curves, reference_row
+from sweep.report.made import TELLING, histogram_figure, made, made_sentence
+from sweep.report.optima import CARDS, Group, groups, optima, optima_sentence
+from sweep.report.robust import tolerance_words
+from sweep.report.scan import Cells, Scan, most_telling
 
 if TYPE_CHECKING:
     from sweep.evaluation.joints import Part
     from sweep.study import Study
 
-CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
+
 STEPS = 4  # of a report: rows, figures, optima and yield, page
-DESIGNS_PER_CELL = 3.0
 
 
-def write(folder: Path, out: Path, say: Say = unsaid) -> Path:
-    """Write everything the report consists of into ``out`` and return the path of ``report.html``."""
+def write_report(folder: str | Path, out: str | Path | None = None, say: Say = unsaid) -> Path:
+    """Write the report of a dataset.
+
+    Parameters
+    ----------
+    folder : dataset that ``sweep.run`` left behind, complete
+    out : where to write; default beside the chunks, ``results/<name>`` for ``results/<name>/designs``
+    say : called with how many of the report's steps are done
+
+    Returns
+    -------
+    Path
+        of ``report.html``.  Beside it: ``figures/*.svg``, ``survivors.parquet`` (the designs within all limits) and,
+        if the study optimises, the tables the optimiser left (``optimum.parquet``, ``curves.parquet`` ...).
+
+    Raises
+    ------
+    InputError
+        if the folder is no complete dataset.
+    StoreError
+        if the report cannot be written.
+    """
+    place = located(folder)
+    return _write(place, _default(place) if out is None else Path(out), say)
+
+
+def _write(folder: Path, out: Path, say: Say) -> Path:
+    """Write everything the report consists of into ``out``."""
     say("report", 0, STEPS, "steps")
     data, found, cells = gather(folder)
-    several, parts = groups(data), pictures.drawn_parts(data)
+    several, parts = groups(data), mechanisms.drawn_parts(data)
     try:
         out.mkdir(parents=True, exist_ok=True)
         with house_style():
@@ -57,7 +81,7 @@ def write(folder: Path, out: Path, say: Say = unsaid) -> Path:
                 cells,
                 figures,
                 own,
-                more | live(data, cells, several) | {"mechanism": mechanism_caption(parts)},
+                more | live(data, cells, several) | {"mechanism": mechanisms.mechanism_caption(parts)},
             ),
             encoding="utf-8",
         )
@@ -67,54 +91,17 @@ def write(folder: Path, out: Path, say: Say = unsaid) -> Path:
     return target
 
 
-def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
-    """Read a dataset, go once through its rows, and compute what an optimiser would have left."""
-    data = read_dataset(folder)
-    cells = divided_axes(data.study, data.counts.get(codes.OK, 0))
-    objective = pictures.objective_of(data.study)
-    larger = data.study.pareto is not None and data.study.pareto.at_least
-    found = scan(data.parts, cells, objective, data.against if objective is not None else None, larger)
-    data = replace(data, best=found.best_row or None)
-    if data.optima is None:
-        data = replace(data, computed_reference=reference_row(data.study))
-    if data.curves is None and data.study.output.curves != "none":
-        data = replace(data, curves=curves(data.study, pictures.marked(data)))
-    return data, found, cells
-
-
-def divided_axes(study: Study, feasible: int) -> list[Cells]:
-    """Return the swept axes, divided into cells: finely if a single map shows them all, else coarsely.
-
-    Axes of a sample are divided so that a cell holds some of the ``feasible`` designs on average.  Left out are signs,
-    which make no map, and what [locus] or [fit] makes.
-    """
-    signs = {p.name for p in study.family.parameters if p.choices is not None}
-    left_out = signs.union(study.made, study.rescaled)
-    swept = [axis for axis in study.space.axes if axis.varies and axis.name not in left_out]
-    most = CELLS_OF_PAIR if len(swept) <= 2 else CELLS_OF_MANY
-    if study.space.kind == "sobol":
-        # A power of two: a Sobol sequence puts equally many points into such cells.
-        sampled = 2 ** min(5, max(2, math.floor(0.5 * math.log2(max(feasible, 1) / DESIGNS_PER_CELL))))
-        return [
-            Cells.of_range(axis.name, axis.low, axis.high, sampled)
-            if axis.values is None
-            else Cells.of_values(axis.name, axis.values, most)
-            for axis in swept
-        ]
-    return [Cells.of_values(axis.name, axis.values, most) for axis in swept if axis.values is not None]
-
-
 def draw(
     data: Dataset, found: Scan, cells: list[Cells], parts: dict[str, list[Part]], folder: Path
 ) -> dict[str, Saved]:
     """Return every figure the data allow, saved; keys are the names the template knows."""
     made = {
-        "map": pictures.design_map(data, found, cells),
-        "trade_off": pictures.trade_off(data, found),
-        "motion": pictures.motion(data),
-        "mechanism": pictures.mechanism(parts),
-        "tolerance": pictures.tolerance(data),
-        "sensitivity": pictures.sensitivity(data),
+        "map": maps.design_map(data, found, cells),
+        "trade_off": maps.trade_off(data, found),
+        "motion": motion(data),
+        "mechanism": mechanisms.mechanism(parts),
+        "tolerance": robust.tolerance(data),
+        "sensitivity": robust.sensitivity(data),
     }
     files = {"trade_off": "trade-off"}
     return {
@@ -171,7 +158,7 @@ def render(
         figures=figures,
         own_figures=own,
         sentences=answer.answer(data, found, more["further"]),
-        limits=limits.limit_states(data),
+        limits=tables.limit_states(data),
         outputs=tables.output_rows(data),
         parameters=tables.parameter_rows(data),
         fates=tables.fates(data, found),
@@ -181,7 +168,7 @@ def render(
         front_names=front.front_names(data),
         front_note=front.front_note(data),
         tolerances=robust.tolerance_rows(data),
-        tolerance=robust.tolerance_words(data),
+        tolerance=tolerance_words(data),
         slopes=robust.slope_rows(data),
         motion=""
         if data.curves is None
@@ -192,3 +179,58 @@ def render(
         today=date.today().isoformat(),
         **more,
     )
+
+
+def copy_tables(folder: Path, out: Path) -> None:
+    """Copy the optimum with its curves, sensitivities and tolerances, and the front, where the study has them."""
+    for name in ("optimum.parquet", "curves.parquet", "sensitivity.parquet", "tolerance.parquet", "pareto.parquet"):
+        source, target = beside(folder) / f"_{name}", out / name
+        if source.exists():
+            shutil.copyfile(source, target)
+        else:
+            target.unlink(missing_ok=True)  # of an earlier report on another version of the study
+
+
+def write_survivors(parts: Sequence[Path], target: Path) -> None:
+    """Write the designs within all limits, in the order of the sweep, with the parts' units and definitions."""
+    import pyarrow.compute as pc
+    import pyarrow.parquet as pq
+
+    if not parts:
+        return
+    schema = pq.read_schema(parts[0])
+    partial = target.with_name(f"_tmp-{target.name}")
+    with pq.ParquetWriter(partial, schema, compression="zstd") as writer:
+        for part in parts:
+            with pq.ParquetFile(part) as source:
+                for batch in source.iter_batches():
+                    writer.write_batch(batch.filter(pc.equal(batch["status"], 0)).cast(schema))
+    partial.replace(target)
+
+
+COSTS = 8  # dimensions that are shown
+
+
+def buildable(data: Dataset, several: list[Group], folder: Path) -> dict[str, Any]:
+    """Return names of the template with what they stand for;
+    pictures are saved in ``folder``, in the style in force.
+    """
+    make, within = made(data), tolerance_words(data)
+    costs = (
+        ()
+        if make is None
+        else tuple(cost for cost in make.costs if cost.spread >= TELLING or cost.gain >= TELLING)[:COSTS]
+    )
+    return {
+        "optima": optima(data, several, folder),
+        "optima_left": max(len(several) - CARDS, 0),
+        "made": make,
+        "made_words": made_sentence(make, within),
+        "made_histogram": "" if make is None else save(histogram_figure(make.histogram), folder / "yield.svg").uri,
+        "made_costs": costs,
+        "further": [text for text in (optima_sentence(data, several), made_sentence(make, within)) if text],
+    }
+
+
+def _default(folder: Path) -> Path:
+    return folder / "_report" if is_older(folder) else beside(folder)

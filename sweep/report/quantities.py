@@ -7,8 +7,8 @@ import re
 from dataclasses import dataclass, replace
 
 from sweep.families.domain import Turn
-from sweep.quantities.names import is_error, is_place, parts, without_error, without_minus
-from sweep.quantities.reduction import split
+from sweep.families.names import is_error, is_place, parts, without_error, without_minus
+from sweep.families.reduction import split
 from sweep.study.units import internal_unit
 
 POSITIONS = {
@@ -25,6 +25,7 @@ PRIMES = ("", "′", "″", "‴")
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
 # Units that a designer reads instead of those that are stored, with the factor to them.
 READ_IN = {"t": ("g", 1e6), "t*mm^2": ("kg·mm²", 1e3), "life": ("h", 1.0 / 3600.0)}
+NO_ANGLE = 1e-12  # rad: what is smaller is the rounding of zero
 _POINT = re.compile("([xyz])_([a-z])")
 
 
@@ -64,7 +65,9 @@ class Quantity:
         return f"{self.heading} [{self.unit}]" if self.unit else self.heading
 
     def show(self, stored: float, digits: int = 5) -> str:
-        """Return the value with its unit."""
+        """Value with its unit; an angle that only rounding keeps from 0 is 0, but an error is as small as it is."""
+        if self.unit == "°" and abs(stored) < NO_ANGLE and not is_error(self.name):
+            stored = 0.0
         return with_unit(number(stored * self.factor, digits), self.unit)
 
     def at_speed(self, stored: float, speed: float | None, digits: int = 4) -> str:
@@ -173,7 +176,7 @@ def change(shown: Quantity, new: float, old: float) -> str:
     difference = new - old if signed else abs(new) - abs(old)
     if not math.isfinite(difference):
         return ""
-    if abs(difference) <= 1e-9 * max(abs(new), abs(old)):
+    if abs(difference) <= max(1e-9 * max(abs(new), abs(old)), NO_ANGLE if shown.unit == "°" else 0.0):
         return "the same"
     return f"{shown.show(abs(difference), 3)} {'less' if difference < 0.0 else 'more'}"
 

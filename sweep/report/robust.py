@@ -1,17 +1,25 @@
-"""Two small tables: what manufacturing tolerances do to the result, and which dimension changes the objective most."""
+"""What tolerances do to the result and which dimension changes the objective most: two tables, and pictures."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sweep.dataset import store
-from sweep.quantities.names import is_flag, without_minus
+from sweep.families.names import is_flag, without_minus
+from sweep.report.dataset import shown_objective
+from sweep.report.figures import NARROW, OPTIMUM, QUIET, REFERENCE, new_figure
 from sweep.report.quantities import number, quantity
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from sweep.report.dataset import Dataset
+    from sweep.report.quantities import Quantity
 
 
 STEPS = {"length": (0.1, "0.1\u00a0mm"), "angle": (math.radians(0.1), "0.1°")}
@@ -124,3 +132,64 @@ def optimum_rows(data: Dataset, file: str) -> list[dict[str, Any]]:
         return []
     frame = store.read_table(path)
     return [{str(k): v for k, v in row.items()} for row in frame[frame["role"] == "optimum"].to_dict("records")]
+
+
+def spread_figure(rows: Sequence[tuple[Quantity, float, float, float]], title: str) -> Figure:
+    """Return outputs with low end, mean and high end of what is made, in percent of the nominal value."""
+    figure = new_figure(NARROW, 0.27 * len(rows) + 1.1)
+    axes = figure.subplots()
+    for k, (_, low, mean, high) in enumerate(rows):
+        axes.plot([low, high], [k, k], color=OPTIMUM, linewidth=5.0, solid_capstyle="butt", alpha=0.5)
+        axes.plot(mean, k, "o", color=OPTIMUM, markersize=4.5)
+    axes.axvline(0.0, color=QUIET, linewidth=0.8)
+    axes.set_yticks(range(len(rows)), [shown.symbol for shown, *_ in rows])
+    axes.invert_yaxis()
+    axes.set_xlabel("change from the nominal value [%]")
+    axes.set_title(title)
+    return figure
+
+
+def slopes_figure(ranked: Sequence[Slope], objective: Quantity) -> Figure:
+    """Return two bars for each dimension: made larger, made smaller; the most telling first."""
+    figure = new_figure(NARROW, 0.28 * len(ranked) + 1.1)
+    axes = figure.subplots()
+    for offset, values, colour, label in (
+        (-0.2, [s.growing for s in ranked], OPTIMUM, "larger"),
+        (0.2, [s.shrinking for s in ranked], REFERENCE, "smaller"),
+    ):
+        axes.barh(np.arange(len(ranked)) + offset, values, 0.38, color=colour, label=label)
+    axes.axvline(0.0, color=QUIET, linewidth=0.8)
+    axes.set_yticks(range(len(ranked)), [f"{s.name}, by {s.step}" for s in ranked])
+    axes.invert_yaxis()
+    axes.set_xlabel(f"change of the {objective.words} [%]")
+    axes.legend()
+    return figure
+
+
+def tolerance(data: Dataset) -> Figure | None:
+    """Spread of the optimum's outputs as it is made."""
+    rows = [
+        row
+        for row in optimum_rows(data, store.TOLERANCE)
+        if not math.isnan(row["nominal"]) and row["nominal"] != 0.0 and not is_flag(str(row["output"]))
+    ]
+    if not rows:
+        return None
+    spread = [
+        (
+            quantity(str(row["output"]), data.units.get(str(row["output"]), "")),
+            *(100.0 * (row[key] / row["nominal"] - 1.0) for key in ("low", "mean", "high")),
+        )
+        for row in rows
+    ]
+    return spread_figure(spread, tolerance_words(data))
+
+
+SEEN = 0.005  # of the longest bar: shorter ones are no wider than a line
+
+
+def sensitivity(data: Dataset) -> Figure | None:
+    """Draw by how much each dimension changes the objective; what changes it next to nothing is left out."""
+    ranked, objective = slopes(data), shown_objective(data)
+    ranked = [slope for slope in ranked if slope.largest > SEEN * ranked[0].largest]
+    return slopes_figure(ranked, objective) if ranked and objective is not None else None

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sweep.chunks.cascade import compared
 from sweep.families.base import Array
-from sweep.quantities.names import is_error
+from sweep.families.names import is_error
+from sweep.quantities.limits import compared
 
 ROWS_PER_BATCH = 262_144
 SCATTER_POINTS = 40_000

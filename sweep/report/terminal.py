@@ -12,15 +12,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as codes
-from sweep.chunks.cascade import compared
+from sweep.chunks.plan import spread_designs
 from sweep.dataset import store
 from sweep.evaluation.statuses import meaning
+from sweep.evaluation.summaries import design_outputs
 from sweep.optimise import read_survey
-from sweep.optimise.survey import started
+from sweep.optimise.multistart.survey import started
+from sweep.quantities.limits import compared
+from sweep.report.answer import proof_sentence, search_words, survey_warnings
 from sweep.report.dataset import Dataset, read_dataset
-from sweep.report.limits import bound_words, limit_states, limited
-from sweep.report.proof import proof_sentence, search_warnings
 from sweep.report.quantities import quantity
+from sweep.report.tables import bound_words, limit_states, limited
+from sweep.synthesis.fit import fit_line
 
 if TYPE_CHECKING:
     from sweep.study import Limit, Study
@@ -58,10 +61,10 @@ def ending(folder: Path) -> Ending:
         lines += _nearest(data) if missed else _optimum(data)
         found = read_survey(store.beside(folder) / store.OPTIMUM)
         if found is not None:
-            lines.append(f"search: {started(found.starts)}, {found.words}")
+            lines.append(f"search: {started(found.starts)}, {search_words(data, found)}")
             kinds = [f"{words}: {started(n)}, {b} basin{'' if b == 1 else 's'}" for words, n, b in found.kinds]
             lines += [f"signs: {'; '.join(kinds)}"] if kinds else []
-            lines += [f"warning: {text}" for text in search_warnings(data, found)]
+            lines += [f"warning: {text}" for text in survey_warnings(data, found)]
         lines += [sentence] if (sentence := proof_sentence(data)) else []
     else:
         missed = feasible == 0
@@ -135,10 +138,6 @@ def _nearest_of_space(study: Study, data: Dataset) -> list[str]:
     if not study.limits:
         status, count = max(((s, n) for s, n in data.counts.items() if s != codes.OK), key=lambda item: item[1])
         return [f"no design has all that is wanted; {count} of {data.designs}: {meaning(status)}"]
-    from sweep.chunks.plan import spread_designs
-    from sweep.evaluation.summaries import design_outputs
-    from sweep.synthesis.fit import fit_line
-
     designs = spread_designs(study, LOOKED_AT)
     if study.fit is not None and len(designs):
         designs, made = fit_line(study.family, designs, study.fit, study.window)

@@ -1,33 +1,41 @@
-"""[limits] and the names of design outputs: each must be an output of the family, its bounds in the output's unit."""
+"""[limits]: bounds of design outputs and of parameters, each in its unit."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from pydantic import Field
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Output
-from sweep.families.chain import Chain
-from sweep.quantities.names import is_flag
+from sweep.families.names import is_flag
+from sweep.quantities.limits import Limit
+from sweep.quantities.resolve import output as design_output
 from sweep.study import units
-from sweep.study.faults import Faults, Key, read_section
-from sweep.study.model import LimitEntry
-from sweep.study.study import Limit
+from sweep.study.file import Faults, Key, StudyFile
+from sweep.study.locus import prescribed_limits
+from sweep.study.parameter import Entry
+from sweep.study.section import Number, Section, read_section
 
-if TYPE_CHECKING:
-    from sweep.synthesis.fit import LineFit
+_SIDES = ("<", ">", "=", "\u2264", "\u2265")
+_SIDE = re.compile("([<>=\u2264\u2265]+)\\s*(.*)", re.DOTALL)
+
+
+class LimitEntry(Section):
+    """Entry ``limits.x = { min, max, unit }``."""
+
+    min: Number | None = Field(None, description="a finite number, its unit in the key unit")
+    max: Number | None = Field(None, description="a finite number, its unit in the key unit")
+    unit: str | None = Field(None, description='a unit as a text, as "deg"')
 
 
 def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Output | None:
-    """Return the design output named by the value at ``key``, or by the key itself;
-    or a fault that gives the nearest.
-    """
-    from sweep.evaluation.summaries import output
-
+    """Find the design output named by the value at ``key`` or by the key itself; or report it with the nearest."""
     try:
-        return output(family, name)
+        return design_output(family, name)
     except InputError as error:
         if key[-1] == name:
             faults.unknown_name(key, "design output", error.allowed)
@@ -36,10 +44,13 @@ def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Out
         return None
 
 
-def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple[Limit, ...]:
-    """Return the limits in the order of the file, in internal units."""
-    found = []
+def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]) -> tuple[Limit, ...]:
+    """Read the limits in internal units: those of prescribed outputs, then those of the table in its order."""
+    raw, faults = file.free_table("limits") or {}, file.faults
+    found = list(prescribed_limits(prescribed))
     for name, entry in raw.items():
+        if name in prescribed:
+            faults.value(("limits", name), entry, "nothing here: [locus] prescribes it")
         key: Key = ("limits", name)
         output = _parameter(family, name) or read_output_name(family, name, key, faults)
         if output is None:
@@ -59,16 +70,8 @@ def read_limits(family: Family, raw: Mapping[str, Any], faults: Faults) -> tuple
     return tuple(found)
 
 
-def check_fitted_stroke(fit: LineFit, family: Family, raw: Mapping[str, Any], faults: Faults) -> None:
-    """Report an optimum without a bound on its stroke: [fit] scales the designs of the sweep, not of the search."""
-    names = ("stroke", f"stroke{len(family.stages)}") if isinstance(family, Chain) else ("stroke",)
-    if fit.stroke is not None and not any(name in raw for name in names):
-        words = f'{{ min = {fit.stroke * 0.999:g}, max = {fit.stroke * 1.001:g}, unit = "mm" }}'
-        faults.missing(("limits", "stroke"), f"bounds near fit.stroke that [optimise] must keep, as {words}")
-
-
 def _parameter(family: Family, name: str) -> Output | None:
-    """Return a parameter as something to be bounded: [fit] may set or scale it."""
+    """Take a parameter as something to be bounded: [fit] may set or scale it."""
     found = next((p for p in family.parameters if p.name == name and p.choices is None), None)
     return None if found is None else Output(name, found.unit, found.text)
 
@@ -84,17 +87,15 @@ def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Fault
         if "unit" not in raw:
             faults.missing((*key, "unit"), units.example(internal))
         return []
-    try:
-        factor = units.factor(entry.unit or "1", internal)
-    except units.UnitFault as fault:
-        faults.value((*key, "unit"), entry.unit, str(fault))
+    factor = faults.factor(entry.unit or "1", internal, (*key, "unit"))
+    if factor is None:
         return []
     bounds = [None if bound is None else bound * factor for bound in (entry.min, entry.max)]
     return [Limit(output.name, *bounds)]
 
 
 def _read_band(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
-    """Return a value and how far it may be missed, as "40 +- 0.2 deg"."""
+    """Read a value and how far it may be missed, as "40 +- 0.2 deg"."""
     internal = units.internal_unit(output.unit)
     middle, _, width = (part.strip() for part in text.partition("+-"))
     try:
@@ -114,7 +115,7 @@ def _read_band(output: Output, text: str, key: Key, faults: Faults) -> list[Limi
 
 
 def _read_side(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
-    """Return a bound on one side, as "<= 45 deg"."""
+    """Read a bound on one side, as "<= 45 deg"."""
     internal = units.internal_unit(output.unit)
     sign, rest = _SIDE.fullmatch(text.strip()).groups()  # type: ignore[union-attr]
     if sign not in ("<=", ">=", "\u2264", "\u2265"):
@@ -134,10 +135,6 @@ def _read_side(output: Output, text: str, key: Key, faults: Faults) -> list[Limi
         return []
     upper = sign in ("<=", "\u2264")
     return [Limit(output.name, None if upper else bound, bound if upper else None)]
-
-
-_SIDES = ("<", ">", "=", "\u2264", "\u2265")
-_SIDE = re.compile("([<>=\u2264\u2265]+)\\s*(.*)", re.DOTALL)
 
 
 def _side(internal: str) -> str:

@@ -4,20 +4,45 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from sweep.study.faults import Faults
-from sweep.study.lines import key_lines
-from sweep.study.machine import flattened
-from sweep.study.model import OutputSection
-from sweep.study.reading import Reading
-from sweep.study.study import Study
-from sweep.study.tables import READERS, REQUIRED_TABLES, TABLES
-from sweep.study.tables.accuracy import accuracy_table
-from sweep.study.tables.bodies import Besides
-from sweep.study.toml import read_toml, toml_text
+from sweep.effects.wanted import expanded
+from sweep.errors import StudyError
+from sweep.families.base import Accuracy, Family
+from sweep.families.specification import Specification
+from sweep.quantities.limits import Limit
+from sweep.study.accuracy import accuracy_table, check_proofs, read_accuracy
+from sweep.study.design import Elsewhere, check_varied, read_reference, read_space
+from sweep.study.file import Faults, StudyFile
+from sweep.study.fit import read_fit
+from sweep.study.limits import read_limits
+from sweep.study.loads import Inputs, read_inputs, tables_of_inputs
+from sweep.study.locus import read_locus
+from sweep.study.mechanism import flattened, read_mechanism
+from sweep.study.objective import check_goal, check_objective
+from sweep.study.optimise import check_search, check_steady, read_optimise
+from sweep.study.output import read_budget
+from sweep.study.pareto import read_front_time, read_pareto
+from sweep.study.report import check_report
+from sweep.study.scene import read_window, speeds, with_effects
+from sweep.study.study import (
+    Budget,
+    Objective,
+    OptimiseSettings,
+    OutputSettings,
+    ParetoSettings,
+    Study,
+    Tolerance,
+)
+from sweep.study.tables import Sections, read_sections
+from sweep.study.task import check_task, read_study_task
+from sweep.study.thread import read_threads
+from sweep.study.tolerance import check_tolerance, read_tolerance
+from sweep.study.toml import key_lines, read_toml, toml_text
+from sweep.synthesis.tasks.problem import Problem
 
 
 def load_study(path: str | Path, smoke: bool = False) -> Study:
@@ -55,8 +80,7 @@ def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
 
 
 def with_accuracy(study: Study, target: float | None = None, certify: bool | Sequence[str] | None = None) -> Study:
-    """Return the same study with its extrema refined to another relative error,
-    or with or without the proof of its maxima.
+    """Return the same study with another relative error of its extrema, or with or without the proof of its maxima.
 
     Raises
     ------
@@ -96,23 +120,120 @@ def _build(
     places: Mapping[str, Mapping[str, int]] = MappingProxyType({}),
 ) -> Study:
     members = data.get("machine")
-    data = flattened(data, members)
     faults = Faults({name: flattened(content, members) for name, content in files.items()}, places)
-    for name in data:
-        if name not in TABLES:
-            faults.unknown((name,), [t for t in TABLES if t not in data], "table")
-    for name in REQUIRED_TABLES:
-        if name not in data:
-            faults.missing((name,), f"a table [{name}]")
-    reading = Reading(data, path, faults)
-    for _, read in READERS:
-        read(reading)
-    reading.raise_faults()
-    defaults = {
-        "accuracy": accuracy_table(reading.fields["accuracy"]),
-        "output": reading.get(OutputSection).model_dump(),
-    }
-    loads = reading.get(Besides).inlined
-    if loads:
-        defaults["loads"] = copy.deepcopy(loads)
-    return Study(path=path, data=copy.deepcopy(dict(data)) | defaults, **reading.fields)
+    file = StudyFile(flattened(data, members), path, faults)
+    sections = read_sections(file)
+    alone = _read_alone(file, sections)
+    found = read_mechanism(sections.mechanism, file, read_threads(file))
+    if found is None:  # nothing else can be checked
+        raise StudyError(str(path), faults.lines)
+    return _study(file, sections, alone, *found)
+
+
+@dataclass(frozen=True)
+class _Alone:
+    """What tables say whatever the mechanism is."""
+
+    speed: float | None
+    window: tuple[float, float] | None
+    accuracy: Accuracy
+    optimise: OptimiseSettings | None
+    tolerance: Tolerance | None
+    front_time: float | None
+    task: Problem | None
+    budget: Budget
+
+
+def _read_alone(file: StudyFile, sections: Sections) -> _Alone:
+    alone = _Alone(
+        file.quantity(sections.scene.speed, "rad/s", ("scene", "speed"), signed=True),
+        read_window(sections.scene.window, file.faults),
+        read_accuracy(sections.accuracy, file.faults),
+        read_optimise(sections.optimise, file),
+        read_tolerance(sections.tolerance, file),
+        read_front_time(sections.pareto, file),
+        read_study_task(file),
+        read_budget(sections.budget, file),
+    )
+    check_goal(sections.objective, file)
+    if not (sections.scene.want or file.free_table("limits") or sections.objective.goal):
+        file.faults.missing(("scene", "want"), "design outputs to compute, here or in [limits] or [objective]")
+    return alone
+
+
+def _study(
+    file: StudyFile, sections: Sections, alone: _Alone, mechanism: tuple[str, ...] | Specification, bare: Family
+) -> Study:
+    faults, objective, goal = file.faults, sections.objective, sections.objective.goal
+    inputs = read_inputs(file, bare)
+    named = [*(file.free_table("limits") or ()), *(x for x in (goal, sections.pareto.output) if x)]
+    family = with_effects(file, bare, named, inputs.curves)
+    locus, prescribed = read_locus(file, bare)
+    limits = read_limits(file, family, prescribed)
+    check_search(sections.optimise, file, bare)
+    check_objective(objective, family, faults)
+    check_steady(file, family, objective, limits)
+    if alone.task is not None:
+        check_task(file, mechanism)
+    front = read_pareto(sections.pareto, file, family, objective, sections.optimise, alone.front_time)
+    fit = read_fit(sections.fit, file, family)
+    other = Elsewhere(
+        () if fit is None else fit.parameters(family),
+        speeds(family, alone.speed),
+        () if locus is None else locus.made,
+        prescribed,
+        inputs.raw,
+        tables_of_inputs(file, bare, family, inputs),
+    )
+    space = read_space(file, family, other)
+    if space is not None and fit is None and (locus is None or sections.optimise.variables != "parameters"):
+        check_varied(file, family, space, inputs.raw)
+    check_tolerance(alone.tolerance, family, limits, faults)
+    reference = read_reference(sections.reference, bare, family, faults, other, space)
+    check_report(sections.report, file, family, prescribed)
+    want = _computed(family, [*expanded(bare, sections.scene.want), *prescribed], limits, goal, front)
+    check_proofs(alone.accuracy, family, want, window=alone.window is not None, faults=faults)
+    file.raise_faults()
+    assert space is not None  # without it there are faults
+    return Study(
+        name=sections.study.name or "",
+        title=sections.study.title,
+        question=sections.study.question,
+        path=file.path,
+        mechanism=mechanism,
+        speed=alone.speed,
+        curves=inputs.curves,
+        want=want,
+        space=space,
+        locus=locus,
+        fit=fit,
+        limits=limits,
+        objective=Objective(goal) if goal else None,
+        accuracy=alone.accuracy,
+        window=alone.window,
+        optimise=alone.optimise,
+        pareto=front,
+        tolerance=alone.tolerance,
+        reference=reference,
+        task=alone.task,
+        output=OutputSettings(**sections.output.model_dump()),
+        budget=alone.budget,
+        data=_completed(file, sections, alone.accuracy, inputs),
+    )
+
+
+def _computed(
+    family: Family, names: list[str], limits: tuple[Limit, ...], goal: str | None, front: ParetoSettings | None
+) -> tuple[str, ...]:
+    """Collect all design outputs that are computed: named, limited, to be made small, or set against that."""
+    wanted = [*names, *(limit.output for limit in limits), goal, None if front is None else front.output]
+    own = family.parameter_names
+    return tuple(name for name in dict.fromkeys(wanted) if name and name not in own)
+
+
+def _completed(file: StudyFile, sections: Sections, accuracy: Accuracy, inputs: Inputs) -> dict[str, Any]:
+    """Fill in the content of the file with its defaults, and with the files that [loads] names."""
+    defaults = {"accuracy": accuracy_table(accuracy), "output": sections.output.model_dump()}
+    if inputs.inlined:
+        defaults["loads"] = copy.deepcopy(inputs.inlined)
+    return copy.deepcopy(dict(file.data)) | defaults

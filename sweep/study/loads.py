@@ -1,20 +1,30 @@
-"""One load over the turn as [loads] gives it: a file of two columns, the same two columns in the study, or a series."""
+"""[bodies] and [loads]: what the effects of a scene ask for besides the mechanism, and loads over the turn.
+
+A load over the turn is a file of two columns, the same two columns in the study, or a series.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
-from sweep.errors import nearest
+from sweep.effects import curved_inputs, input_names
+from sweep.effects.base import STUDY_LOADS
+from sweep.errors import closest, nearest
+from sweep.families.base import Family
+from sweep.families.machines import Machine
+from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve, SeriesCurve, table_curve
 from sweep.study import units
-from sweep.study.faults import Faults, Key, read_section
-from sweep.study.model import Number, Section
+from sweep.study.file import Faults, Key, StudyFile
+from sweep.study.section import Number, Section, read_section
 
+OF_SCENE = ("speed", "speed_change")
 MOST_POINTS = 100_000
 FORMS = (
     '{ phi = [0, 90, 180], values = [0, -3, 0], unit = "N" }',
@@ -26,7 +36,7 @@ Names = Annotated[list[str], Field(min_length=2, max_length=2)]
 
 
 class CurveSection(Section):
-    """loads.<name>, where it changes over the turn"""
+    """Table ``loads.<name>`` of a load that changes over the turn."""
 
     file: str | None = Field(None, description='the name of a CSV or Parquet file beside the study, as "load.csv"')
     columns: Names | None = Field(
@@ -44,15 +54,99 @@ class CurveSection(Section):
 TABLE, SERIES = ("phi", "values"), ("mean", "cos", "sin")
 
 
+@dataclass
+class Inputs:
+    """Inputs of effects as they stand in [bodies] and [loads], by name, with the table of each; and the curves.
+
+    ``inlined`` is [loads] with the contents of the files that it names.
+    """
+
+    raw: dict[str, Any] = field(default_factory=dict)
+    tables: dict[str, str] = field(default_factory=dict)
+    curves: dict[str, Curve] = field(default_factory=dict)
+    inlined: dict[str, Any] = field(default_factory=dict)
+
+
+def read_inputs(file: StudyFile, bare: Family) -> Inputs:
+    """Read both tables; names that are no inputs of effects, or stand in the wrong table, are reported."""
+    found = Inputs()
+    given = {table: entries for table in ("bodies", "loads") if (entries := file.free_table(table)) is not None}
+    homes = {name: home(bare, name) for name in (input_names(bare) if given else ())}
+    design = file.free_table("design") or {}
+    for table, entries in given.items():
+        for name, entry in entries.items():
+            key: Key = (table, name)
+            if homes.get(name) != table:
+                _misplaced(bare, key, entry, homes, file.faults)
+            elif name in design:
+                file.faults.value(key, entry, "either here or in [design]")
+            elif table == "loads" and is_curve(entry):
+                _read_load(file, bare, found, name, entry)
+            else:
+                found.raw[name], found.tables[name] = entry, table
+    if given.get("loads"):
+        found.inlined = {**given["loads"], **found.inlined}
+    return found
+
+
+def tables_of_inputs(file: StudyFile, bare: Family, family: Family, inputs: Inputs) -> dict[str, str]:
+    """Name the tables in which inputs of effects stand, or should stand; a name that is left out is [design]'s."""
+    design = file.free_table("design") or {}
+    added = [name for name in family.parameter_names if name not in bare.parameter_names and name not in design]
+    return {name: inputs.tables.get(name, home(bare, name)) for name in added}
+
+
+def home(family: Family, name: str) -> str:
+    """Name the table that an input of an effect belongs to.
+
+    The crank's speed is given in [scene] or swept in [design].
+    """
+    plain = plain_name(family, name)
+    return "loads" if plain in STUDY_LOADS else "design" if plain in OF_SCENE else "bodies"
+
+
+def plain_name(family: Family, name: str) -> str:
+    """Strip the name of an effect's input of member and stage."""
+    if isinstance(family, Machine):
+        member, own = family.split(name) or (None, name)
+        return plain_name(member.family, own) if member is not None else name
+    stages = [str(stage.number) for stage in getattr(family, "stages", ())]
+    return next((plain for number in stages if (plain := at_stage(name, number))), name)
+
+
+def _misplaced(bare: Family, key: Key, entry: object, homes: dict[str, str], faults: Faults) -> None:
+    table, name = str(key[0]), str(key[1])
+    if name in bare.parameter_names:
+        faults.value(key, entry, "nothing here: it is a parameter of the mechanism and stands in [design]")
+    elif name in homes:
+        place = {"design": "[scene] or [design]"}.get(homes[name], f"[{homes[name]}]")
+        faults.value(key, entry, f"nothing here: it stands in {place}")
+    else:
+        names = sorted(name for name, place in homes.items() if place == table)
+        guess = closest(name, names)  # all of a chain's are hundreds
+        names = names if guess is None else [guess]
+        faults.unknown(key, names, f"input of the effects of {bare.name}")
+
+
+def _read_load(file: StudyFile, bare: Family, found: Inputs, name: str, entry: dict[str, Any]) -> None:
+    if name not in curved_inputs(bare):
+        file.faults.value(("loads", name), entry, "one value: it does not change over the turn")
+        return
+    internal = "N*mm" if "torque" in name.rpartition(".")[2] else "N"
+    made = read_curve(entry, internal, file.path.parent, ("loads", name), file.faults)
+    if made is not None:
+        found.curves[name], found.inlined[name] = made
+
+
 def is_curve(entry: object) -> bool:
-    """Return whether an entry of [loads] changes over the turn: it has a key that no constant and no axis has."""
+    """Tell whether an entry of [loads] changes over the turn: it has a key that no constant and no axis has."""
     return isinstance(entry, dict) and not {"file", "phi", *SERIES}.isdisjoint(entry)
 
 
 def read_curve(
     raw: dict[str, Any], internal: str, folder: Path, key: Key, faults: Faults
 ) -> tuple[Curve, dict[str, Any]] | None:
-    """Return the curve in internal units, and the same entry with the content of its file; None with its faults.
+    """Read the curve in internal units, and the same entry with the content of its file; or report its faults.
 
     Parameters
     ----------
@@ -95,17 +189,13 @@ def _factor(section: CurveSection, name: str, internal: str, key: Key, faults: F
     if unit is None:
         faults.missing((*key, name), units.example(internal))
         return 1.0
-    try:
-        return units.factor(unit, internal)
-    except units.UnitFault as fault:
-        faults.value((*key, name), unit, str(fault))
-        return 1.0
+    return faults.factor(unit, internal, (*key, name)) or 1.0
 
 
 def _file(
     section: CurveSection, folder: Path, key: Key, faults: Faults
 ) -> tuple[Sequence[float], Sequence[float]] | None:
-    """Return the two columns of a file beside the study."""
+    """Read the two columns of a file beside the study."""
     import pandas as pd
 
     name = section.file or ""

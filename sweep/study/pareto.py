@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, cast
+from typing import Annotated, Any, cast
+
+from pydantic import Field
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Output, Parameter, Unit
-from sweep.quantities.names import without_minus
-from sweep.study.design import read_entry
-from sweep.study.faults import Faults, Key
+from sweep.families.names import without_minus
+from sweep.quantities.measures import measure
+from sweep.study.file import Faults, Key, StudyFile
 from sweep.study.limits import read_output_name
-from sweep.study.model import ParetoSection
+from sweep.study.objective import ObjectiveSection
+from sweep.study.optimise import OptimiseSection
+from sweep.study.parameter import read_entry
+from sweep.study.section import Section
 from sweep.study.space import Axis
 from sweep.study.study import ParetoSettings
 
@@ -20,23 +24,45 @@ MOST_BOUNDS = 64
 SIDES = ("at_most", "at_least")
 
 
+class ParetoSection(Section):
+    """Table [pareto]; at_most and at_least are read like parameters."""
+
+    required = ("output",)
+    output: str | None = Field(None, description="the name of a design output, not the objective")
+    at_most: Any = None
+    at_least: Any = None
+    points: Annotated[int, Field(ge=2, le=64)] | None = Field(None, description="a whole number, 2 to 64")
+    starts: Annotated[int, Field(ge=0, le=1000)] = Field(2, description="a whole number, 0 to 1000")
+    time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
+
+
+def read_front_time(section: ParetoSection, file: StudyFile) -> float | None:
+    """Read the time for the whole front [s]; a front that has no optimum to begin at is reported."""
+    if "pareto" in file and "optimise" not in file:
+        file.faults.missing(("optimise",), "a table [optimise], as [pareto] begins at the optimum")
+    return file.quantity(section.time_budget, "s", ("pareto", "time_budget"))
+
+
 def read_pareto(
     section: ParetoSection,
-    raw: Mapping[str, Any],
+    file: StudyFile,
     family: Family,
-    objective: str | None,
-    time_budget: float | None,
-    faults: Faults,
+    objective: ObjectiveSection,
+    search: OptimiseSection,
+    seconds: float | None,
 ) -> ParetoSettings | None:
-    """Return the settings of the front, or None if something is faulty (all faults are reported).
+    """Read the settings of the front, or None if something is faulty (all faults are reported).
 
     Parameters
     ----------
-    section, raw : the table as it was read, and as it stands in the file
+    section : [pareto]
     family : with the effects that the second output calls for
-    objective : the output that is minimised
-    time_budget : read from the section [s]
+    objective, search : [objective] and [optimise]
+    seconds : time for the whole front
     """
+    raw, faults = file.data.get("pareto"), file.faults
+    if not isinstance(raw, dict):
+        return None
     given = [side for side in SIDES if side in raw]
     if len(given) == 2:
         faults.value(("pareto", "at_least"), raw["at_least"], "either at_most or at_least, not both")
@@ -48,7 +74,8 @@ def read_pareto(
     output = read_output_name(family, section.output, place, faults)
     if output is None or len(given) != 1:
         return None
-    if output.name in (objective, without_minus(objective or "")):
+    goal = objective.goal or ""
+    if output.name in (goal, without_minus(goal)):
         faults.value(place, output.name, "another output than the objective")
         return None
     key: Key = ("pareto", given[0])
@@ -59,7 +86,9 @@ def read_pareto(
         some = f"more than the {len(set(bounds))} bounds given, of which there must be two or more"
         faults.value(("pareto", "points"), section.points, some)
         return None
-    return ParetoSettings(output.name, bounds, given[0] == "at_least", section.starts, time_budget, section.points)
+    return ParetoSettings(
+        output.name, bounds, given[0] == "at_least", section.starts, seconds, section.points, search.looks
+    )
 
 
 def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[float, ...] | None:
@@ -76,9 +105,7 @@ def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[floa
 
 
 def _searchable(family: Family, output: Output, bounds: tuple[float, ...], side: str, faults: Faults) -> bool:
-    """Return whether the optimiser can hold such bounds."""
-    from sweep.reductions.measures import measure
-
+    """Tell whether the optimiser can hold such bounds."""
     try:
         found = measure(family, output.name)
     except InputError as error:

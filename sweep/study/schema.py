@@ -6,37 +6,36 @@ parameters of every family; what one table asks of another, `sweep check` says.
 
 from __future__ import annotations
 
-import re
-import sys
 from typing import Any, TypeAlias
 
 from sweep.effects import input_names
 from sweep.families import NAMES, family
 from sweep.families.base import Family, Parameter
-from sweep.study.model import FixedEntry, LimitEntry, ListEntry, RangeEntry, SampleTable, Section
+from sweep.study.design import SampleTable
+from sweep.study.limits import LimitEntry
+from sweep.study.parameter import FixedEntry, ListEntry, RangeEntry
+from sweep.study.section import Section
 from sweep.study.tables import REQUIRED_TABLES, TABLES
 from sweep.study.units import example, internal_unit
 
 Schema: TypeAlias = dict[str, Any]
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # the newest that editors for TOML know
-# How the docstring of a model says which table it is: of the whole file, or of each name within one.
-_TABLE, _EACH = re.compile(r"\[(\w+)\](?!\w)"), re.compile(r"(\w+)\.<\w+>")
 ENTRY = {"$ref": "#/definitions/entry"}
 
 
 def study_schema() -> Schema:
     """Return the schema as a plain dict, the same at every call."""
     definitions: Schema = {"entry": _entry()}
-    tables: Schema = {name: _model(model, definitions) for name, model in models(_TABLE).items()}
-    tables |= {name: _each(_model(model, definitions)) for name, model in models(_EACH).items()}
+    tables: Schema = {name: _model(t.model, definitions) for name, t in TABLES.items() if t.model is not None}
+    tables |= {name: _each(_model(t.each, definitions)) for name, t in TABLES.items() if t.each is not None}
     tables["locus"] = _each(ENTRY)
     tables["design"] = _each({"anyOf": [ENTRY, _each(ENTRY)]}) | {
         "properties": {"sample": _model(SampleTable, definitions)}
     }
     tables["bodies"] = _each({"anyOf": [ENTRY, _each(ENTRY)]})
     # a load is a parameter, or changes over the turn; in a machine it stands under its member
-    load = {"anyOf": [ENTRY, *([tables["loads"]["additionalProperties"]] if "loads" in tables else [])]}
+    load = {"anyOf": [ENTRY, tables["loads"]["additionalProperties"]]}
     tables["loads"] = _each({"anyOf": [*load["anyOf"], _each(load)]})
     limit = {"anyOf": [{"const": True}, {"type": "string"}, _model(LimitEntry, definitions)]}
     tables["limits"] = _each({"anyOf": [*limit["anyOf"], _each(limit)]})
@@ -49,7 +48,7 @@ def study_schema() -> Schema:
         "title": "linksweep study",
         "type": "object",
         "properties": {
-            name: {"description": described(name)} | tables.get(name, {"type": "object"}) for name in TABLES
+            name: {"description": table.about} | tables.get(name, {"type": "object"}) for name, table in TABLES.items()
         },
         "additionalProperties": False,
         "required": list(REQUIRED_TABLES),
@@ -57,22 +56,6 @@ def study_schema() -> Schema:
         "allOf": [_of_family(family(name)) for name in NAMES],
         "definitions": definitions,
     }
-
-
-def models(kind: re.Pattern[str] = _TABLE) -> dict[str, type[Section]]:
-    """Return the models of the tables, by name: of whole tables, or of what stands under each name of one."""
-    found = ((kind.match(model.__doc__ or ""), model) for model in Section.__subclasses__())
-    return {match[1]: model for match, model in found if match is not None}
-
-
-def described(table: str) -> str:
-    """Return what a table is about, as the docstring of its reader says it;
-    of several the one that is about least else.
-    """
-    docstrings = [(module.__doc__ or "") for name, module in sys.modules.items() if name.startswith("sweep.study.")]
-    heads = [text.split("\n")[0].partition(": ") for text in docstrings if text.startswith("[")]
-    _, _, words = min((head for head in heads if f"[{table}]" in head[0]), key=lambda head: (len(head[0]), head))
-    return words[0].upper() + words[1:]
 
 
 def _each(schema: Schema) -> Schema:

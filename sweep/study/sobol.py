@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.sobol import BITS, RUN, TABLE_BITS, sobol_points
+from kernels.arithmetic.sobol import BITS, RUN, TABLE_BITS, sobol_points
 from sweep.families.base import Array
 
 INDEX_BITS = 40

@@ -43,15 +43,13 @@ class Axis:
         factor: float = 1.0,
         scale: Scale = "linear",
     ) -> Axis:
-        """Return ``count`` values from ends[0] to ends[1], both included and given in the written unit;
-        count 1 is ends[0].
-        """
+        """Return ``count`` values from ends[0] to ends[1], both included and in the written unit; one is ends[0]."""
         values = _between(ends, np.arange(count, dtype=np.float64), max(count - 1, 1), scale) * factor
         return cls(name, ends[0] * factor, ends[1] * factor, _read_only(values), unit, factor, scale)
 
     @classmethod
     def listed(cls, name: str, values: Sequence[float], unit: str = "1", factor: float = 1.0) -> Axis:
-        """Return the values as listed, in their order."""
+        """Take the values as listed, in their order."""
         array = np.asarray(values, dtype=np.float64) * factor
         return cls(name, float(array.min()), float(array.max()), _read_only(array), unit, factor)
 
@@ -59,7 +57,7 @@ class Axis:
     def sampled(
         cls, name: str, ends: tuple[float, float], unit: str = "1", factor: float = 1.0, scale: Scale = "linear"
     ) -> Axis:
-        """Return any value between the ends, to be drawn by a sample."""
+        """Allow any value between the ends, to be drawn by a sample."""
         return cls(name, ends[0] * factor, ends[1] * factor, None, unit, factor, scale)
 
     @property
@@ -78,9 +76,7 @@ class Axis:
         return self.values is None and self.scale == "linear"
 
     def at(self, fraction: Array) -> Array:
-        """Return the value for numbers in (0, 1):
-        the listed one whose equal share it falls in, or a point between the ends.
-        """
+        """Find the values for numbers in (0, 1): those in whose equal share they fall, or points between the ends."""
         if self.values is not None:
             return self.values[(fraction * len(self.values)).astype(np.int64)]
         return _between((self.low, self.high), fraction, 1, self.scale)

@@ -11,29 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from sweep.effects import extended
-from sweep.families import Specification
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
+from sweep.families.names import without_minus
+from sweep.families.specification import Specification
 from sweep.numerics.curves import Curve
-from sweep.quantities.names import without_minus
+from sweep.quantities.limits import Limit as Limit
 from sweep.study.space import DesignSpace
 
 if TYPE_CHECKING:
     from sweep.synthesis.fit import LineFit
     from sweep.synthesis.prescription import OnLocus
     from sweep.synthesis.tasks.problem import Problem
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Bounds of a design output or of a parameter; equal ones ask for a value, ``rotatable = true`` is a minimum of 1.
-
-    A parameter needs bounds of its own where [fit] sets or scales it.
-    """
-
-    output: str
-    minimum: float | None = None
-    maximum: float | None = None
 
 
 @dataclass(frozen=True)
@@ -69,7 +58,8 @@ class OptimiseSettings:
 
     ``variables`` is "locus" for what [locus] prescribes, "parameters" for the links, None for what suits the study.
     ``unseen`` is the estimated share of unseen basins below which no more starts are made once the best basin was met
-    often enough; ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from a
+    often enough; None asks for 2 % of starts, and of populations for the best basin alone.
+    ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from a
     search over what is not linear, by at most ``populations`` that know nothing of each other.  ``time_budget`` [s] is
     an emergency brake: what it stops says so, and no result that was not stopped depends on it.  ``prove`` asks for a
     proof that nothing in the space is better.
@@ -79,7 +69,7 @@ class OptimiseSettings:
     seed: int = 0
     time_budget: float | None = None
     variables: Literal["parameters", "locus"] | None = None
-    unseen: float = 0.02
+    unseen: float | None = None
     looks: int = 20_000
     globally: Literal["none", "proportions"] = "none"
     populations: int = 40

@@ -10,9 +10,8 @@ from typing import Any
 from sweep.errors import InputError, StudyError, nearest
 from sweep.families import family
 from sweep.study import units
-from sweep.study.faults import Faults, Key
-from sweep.study.lines import key_lines
-from sweep.study.toml import read_toml, toml_text
+from sweep.study.file import Faults, Key, StudyFile
+from sweep.study.toml import key_lines, read_toml, toml_text
 from sweep.synthesis import tasks
 from sweep.synthesis.tasks.positions import Position
 from sweep.synthesis.tasks.problem import Problem
@@ -37,7 +36,7 @@ WORDS = ("objective", "adjusted", "limit", "kappa", "branch")
 
 
 def load_task(path: str | Path) -> Problem:
-    """Return the problem of a file's [task] table.
+    """Read the problem of a file's [task] table.
 
     Parameters
     ----------
@@ -65,10 +64,14 @@ def load_task(path: str | Path) -> Problem:
 
 
 def read_task(raw: object, faults: Faults) -> Problem | None:
-    """Return the problem of a table [task], or None with its faults."""
+    """Read the problem of a table [task], or None with its faults."""
     before = len(faults.lines)
     if not isinstance(raw, dict):
-        faults.missing(("task",), "a table [task] with kind and what is given")
+        needed = "a table [task] with kind and what is given"
+        if raw is None:
+            faults.missing(("task",), needed)
+        else:
+            faults.value(("task",), raw, needed)
         return None
     kind = raw.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
@@ -90,6 +93,29 @@ def read_task(raw: object, faults: Faults) -> Problem | None:
         faults.value(("task", error.name), error.value, error.allowed)
         return None
     return problem
+
+
+def read_study_task(file: StudyFile) -> Problem | None:
+    """Read the task of a study, which asks for the search that begins at the task's mechanisms."""
+    if "task" not in file:
+        return None
+    task = read_task(file.data["task"], file.faults)
+    if "optimise" not in file:
+        needed = "a table [optimise]: the mechanisms that do a [task] are where its search begins"
+        file.faults.missing(("optimise",), needed)
+    return task
+
+
+def check_task(file: StudyFile, mechanism: object) -> None:
+    """Report a task whose mechanisms are not those of the study."""
+    kind = file.data["task"]["kind"]
+    chain = CHAINS.get(kind)
+    if chain is None:
+        file.faults.value(("task", "kind"), kind, f"{', '.join(CHAINS)}; {kind} is answered by `sweep task` alone")
+    elif mechanism != chain:
+        wanted = f'family = "{chain[0]}"' if len(chain) == 1 else f"chain = {list(chain)}"
+        allowed = f"in this study a task of its mechanism; {kind} is about {wanted}"
+        file.faults.value(("task", "kind"), kind, allowed)
 
 
 def _needed(name: str) -> str:
@@ -169,22 +195,15 @@ def _range(raw: object, internal: str, key: Key, faults: Faults) -> tuple[float,
     if set(table) - {"unit"} != {"from", "to"} or not all(_plain(table[end]) for end in ("from", "to")):
         faults.value(key, raw, f'{{ from = ..., to = ..., unit = "{internal}" }} with two numbers')
         return (0.0, 0.0)
-    try:
-        factor = units.factor(str(table.get("unit", "1")), internal)
-    except units.UnitFault as fault:
-        faults.value((*key, "unit"), table.get("unit"), str(fault))
+    factor = faults.factor(str(table.get("unit", "1")), internal, (*key, "unit"))
+    if factor is None:
         return (0.0, 0.0)
     return float(table["from"]) * factor, float(table["to"]) * factor
 
 
 def _number(raw: object, internal: str, key: Key, faults: Faults) -> Any:
-    try:
-        if isinstance(raw, str):
-            number, unit = units.split(raw, internal)
-            return number * units.factor(unit, internal)
-    except units.UnitFault as fault:
-        faults.value(key, raw, str(fault))
-        return 0.0
+    if isinstance(raw, str):
+        return faults.number(raw, internal, key) or 0.0
     if not _plain(raw) or internal != "1":
         faults.value(key, raw, units.example(internal))
         return 0.0
@@ -192,5 +211,5 @@ def _number(raw: object, internal: str, key: Key, faults: Faults) -> Any:
 
 
 def _plain(raw: object) -> bool:
-    """Return whether it is a number that a float holds with room to spare; nan is none."""
+    """Tell whether it is a number that a float holds with room to spare; nan is none."""
     return isinstance(raw, int | float) and not isinstance(raw, bool) and -1e100 <= raw <= 1e100

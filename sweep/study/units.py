@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from sweep.errors import nearest
-from sweep.families.unit_words import spelt_out
+from sweep.families.parameter import spelt_out
 
 if TYPE_CHECKING:
     import pint

@@ -1,8 +1,8 @@
 """The inner fit of a guided four-bar: coupler point, line and scale that a study need not sweep.
 
 For the links of the last stage and the swing of what drives it, the coupler point (xi, eta) and the line (lam, h) with
-the smallest largest deviation over the working part follow from a linear problem (kernels/line_fit.py); scaling the
-whole stage then gives the wanted stroke.  So a sweep over proportions is a sweep over finished needle mechanisms.
+the smallest largest deviation over the working part follow from a linear problem (kernels/linear/line_fit.py); scaling
+the whole stage then gives the wanted stroke.  So a sweep over proportions is a sweep over finished needle mechanisms.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as codes
-from kernels.line_fit import line_fit
+from kernels.linear.line_fit import line_fit
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family

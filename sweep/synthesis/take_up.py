@@ -144,7 +144,8 @@ class _Problem:
 
     def lengths(self, design: Array) -> Array:
         status, length = np.empty(self.cos.shape, np.uint8), np.empty(self.cos.shape)
-        eyelet.poses(design, self.cos, self.sin, status, None, None, None, length, None, None, None, None)
+        wanted = eyelet.Outputs(None, None, None, length, None, None, None, None)
+        eyelet.poses(design, self.cos, self.sin, status, wanted)
         whole: Array = length[0]
         return whole
 

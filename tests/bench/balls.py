@@ -14,8 +14,8 @@ import flint
 import numpy as np
 from flint import arb, arb_series
 
-from kernels.proof.tape import COMBINE, CONSTANT, INVERSE, MULTIPLY, ROOT
-from kernels.proof.taylor import least
+from kernels.boxes.tape import COMBINE, CONSTANT, INVERSE, MULTIPLY, ROOT
+from kernels.boxes.taylor import least
 from tests.bench.boxes import Array, Boxes, Formula
 
 BITS = 53

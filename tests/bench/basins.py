@@ -13,16 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from studies.accuracy.machine import description
-from sweep.optimise.certificate import AGREE
-from sweep.optimise.filling import kinds
-from sweep.optimise.generations import TOGETHER, Population
-from sweep.optimise.globally import searched
-from sweep.optimise.linear import elimination
-from sweep.optimise.posing import problem_of
-from sweep.optimise.starts import drawn
-from sweep.optimise.survey import further, settled
+from sweep.optimise.local.kkt import AGREE
+from sweep.optimise.multistart.survey import enough, settled, wanted
+from sweep.optimise.starts.dataset import drawn, kinds
+from sweep.optimise.starts.global_starts import searched
+from sweep.optimise.starts.linear import elimination
+from sweep.optimise.starts.populations import Population
+from sweep.optimise.starts.posing import problem_of
 from sweep.study import Study
-from tests.needle208_record import FOLDER, record
+from tests.support.needle208_record import FOLDER, record
 
 SEEDS = 5
 LEAST = {"record": None, "record_8mm": 8.0}  # shortest link of stage 2 [mm], by the name of the design in expected.json
@@ -61,21 +60,17 @@ def most(study: Study) -> int:
 
 
 def told(study: Study, rows: Sequence[Row]) -> bool:
-    """Whether the populations of a seed are enough, by the study's own rule, asked where the study asks."""
+    """Whether the populations of a seed are enough, by the study's own rule."""
     assert study.optimise is not None
-    values = [row.value for row in rows]
-    looked, more = 0, TOGETHER
-    while more and looked < min(len(values), most(study)):
-        looked = min(looked + more, most(study))
-        more = further([x for x in values[:looked] if np.isfinite(x)], study.optimise.unseen, TOGETHER)
-    return looked <= len(values) and (not more or looked >= most(study))
+    values = [row.value if np.isfinite(row.value) else np.inf for row in rows]
+    return len(rows) >= most(study) or enough(values, wanted(study.optimise, True)) is not None
 
 
 def fewest(study: Study) -> int:
     """Populations that the rule asks for at least, whatever they end at: those that all end at one value."""
     assert study.optimise is not None
     numbers = range(1, most(study))
-    return next((n for n in numbers if settled([1.0] * n, study.optimise.unseen)), most(study))
+    return next((n for n in numbers if settled([1.0] * n, wanted(study.optimise, True))), most(study))
 
 
 def hit(row: Row) -> bool:

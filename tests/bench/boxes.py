@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels._jit import kernel
+from kernels.boxes.tape import run
+from kernels.boxes.taylor import ROUNDING, least, variable, width
 from kernels.families.rssr import box_by_axes, box_by_rocker
 from kernels.families.rssr import box_turn as bt
-from kernels.proof.tape import run
-from kernels.proof.taylor import ROUNDING, least, variable, width
+from kernels.jit import kernel
 from sweep.proof.question import Question
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ WANTED = {"psi''": bt.PSI2, "Delta - b^2 cos^2": bt.PRESSURE, "F": bt.PASSED}
 
 @dataclass(frozen=True)
 class Formula:
-    """Operations of :mod:`kernels.proof.tape`, and the forms where the results stand that are compared."""
+    """Operations of :mod:`kernels.boxes.tape`, and the forms where the results stand that are compared."""
 
     operations: Numbers
     factors: Array

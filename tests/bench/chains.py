@@ -22,13 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from kernels import series
+from kernels import chains
 from kernels.families import guide, rssp, rssr
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Angles
 from tests.bench.extrema import turning
 from tests.bench.kernels import FLAGS, measure
-from tests.turn_designs import DRIVEN_SLIDER, NEEDLE, driven_sliders, needle_drives
+from tests.support.turn_designs import DRIVEN_SLIDER, NEEDLE, driven_sliders, needle_drives
 
 DESIGNS, MANY, SAMPLES, ROUNDS = 2048, 16384, 360, 15
 WANTED = (
@@ -94,7 +94,7 @@ def dense(designs: Any) -> dict[str, tuple[Callable[[], object], float]]:
     phi, n = np.arange(SAMPLES) * (2.0 * np.pi / SAMPLES), len(designs)
     cos, sin, least = np.cos(phi), np.sin(phi), np.empty((n, 2))
     acceleration, deviation = np.empty(n), np.empty(n)
-    kernel = series.dense_maxima(series.chained((rssr.FORM, guide.FORM)))
+    kernel = chains.dense_maxima(chains.chained((rssr.FORM, guide.FORM)))
 
     def fused() -> Any:
         kernel(designs, cos, sin, least, None, acceleration, None, deviation, None, None)
@@ -124,7 +124,7 @@ def dense_sliders(designs: Any) -> dict[str, tuple[Callable[[], object], float]]
     """The dense loop of driven sliders, fused and staged: largest |d2s| and least discriminants."""
     phi, n = np.arange(SAMPLES) * (2.0 * np.pi / SAMPLES), len(designs)
     angles, least, acceleration = Angles.of(phi[None]), np.empty((n, 2)), np.empty(n)
-    kernel = series.dense_maxima(series.chained((rssr.FORM, rssp.FORM)))
+    kernel = chains.dense_maxima(chains.chained((rssr.FORM, rssp.FORM)))
 
     def fused() -> Any:
         kernel(designs, angles.cos[0], angles.sin[0], least, None, acceleration, None, None, None, None)

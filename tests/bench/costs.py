@@ -23,10 +23,10 @@ from sweep.families import family
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.capabilities import InSeries
 from sweep.families.chain import Chain
-from sweep.families.together import own_code
-from sweep.reductions.size import size_step
+from sweep.families.poses import own_code
+from sweep.quantities.dimensions import size_step
+from sweep.reductions.steps import POSES_EVENT, POSES_PEAK, POSES_SEARCH
 from sweep.reductions.travel import certified_travel
-from sweep.reductions.work import POSES_EVENT, POSES_PEAK, POSES_SEARCH
 from sweep.study import Study, load_study
 from sweep.study.space import Axis, DesignSpace
 from sweep.synthesis.fit import fit_line

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.optimise import Problem, minimise
-from sweep.optimise.certificate import Result
+from sweep.optimise.local.kkt import Result
 from sweep.study import OptimiseSettings
 
 POPULATIONS, MEMBERS, GENERATIONS = 12, 60, 400

@@ -1,6 +1,6 @@
 """Which arithmetic encloses a formula of the proofs best in the least time: ``make bench-enclosures``, docs/proof.md.
 
-Taylor models (kernels/proof/taylor.py), intervals with slopes, and balls of python-flint go over the same boxes at the
+Taylor models (kernels/boxes/taylor.py), intervals with slopes, and balls of python-flint go over the same boxes at the
 same crank angles, by the same operations.  Printed for each: time of a box; width of its enclosures over the spread of
 the function; parts into which a box has to be halved until the least psi'' on it is known closely, and their time.
 """

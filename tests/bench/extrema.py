@@ -1,8 +1,8 @@
 """The search for true extrema from poses alone: its errors, its estimates of them, its time: ``make bench-extrema``.
 
 The two tables of docs/extrema.md.  Errors against poses in twice the working precision about the peaks that eight times
-the samples find, which tests/test_extrema_reference.py compares with brute force.  Families without their own steps.
-Then the crank-rocker's own search against the proof of its maxima, and limit positions against 50 digits.
+the samples find, which tests/reductions/test_extrema_reference.py compares with brute force.  Families without their
+own steps.  Then the crank-rocker's own search against the proof of its maxima, and limit positions against 50 digits.
 """
 
 from __future__ import annotations
@@ -19,12 +19,21 @@ from studies.accuracy.regions import regions, rotatable
 from studies.accuracy.timing import seconds
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
-from sweep.quantities.reduction import Mode
-from sweep.reductions import extrema, search
-from sweep.reductions.extrema import Request
+from sweep.families.reduction import Mode
+from sweep.quantities.kinds import Request
+from sweep.reductions import extrema, peak_search
 from tests.bench.limits import limits
-from tests.climbing import climbed
-from tests.turn_designs import GUIDE, NEEDLE, RSSP, RSSR, crank_rockers, guided_four_bars, needle_drives, slider_cranks
+from tests.support.climbing import climbed
+from tests.support.turn_designs import (
+    GUIDE,
+    NEEDLE,
+    RSSP,
+    RSSR,
+    crank_rockers,
+    guided_four_bars,
+    needle_drives,
+    slider_cranks,
+)
 
 MARGIN, WRONG_PEAK = 1e-5, 1e-4
 PROVEN, PROVEN_SEEDS = 300_000, (1, 2, 3)
@@ -66,7 +75,7 @@ def turning(family: Any, make: Any, n: int) -> Any:
 
 def exact(family: Any, designs: Any, name: str, window: tuple[float, float] | None) -> tuple[Any, Any]:
     """Values and bounds of their errors: climbed in twice the working precision, windowed ones searched again."""
-    with patch.object(search, "START", 8 * search.START):
+    with patch.object(peak_search, "START", 8 * peak_search.START):
         if window is not None:
             found = design_outputs(family, designs, [name], Accuracy(target=1e-13), window)
             return found[name], found[f"err_{name}"]

@@ -16,8 +16,8 @@ import numpy as np
 from sweep.families import NAMES, family
 from sweep.families.base import Accuracy, Angles, Array, Family
 from sweep.families.domain import March
-from sweep.reductions.closing import on_closed_turn
 from sweep.reductions.margins import margin_suffixes, own_step
+from sweep.reductions.sampling import on_closed_turn
 from sweep.reductions.turn import margin_group
 
 SAMPLES, ROUNDS, MOST = 360, 7, 4096

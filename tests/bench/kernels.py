@@ -27,7 +27,7 @@ from kernels.families import geared_dwell, rssr
 from sweep.families.geared_dwell import half_turn
 from tests.bench.position import range_of_sine
 from tests.bench.rivals import C_SOURCE, LEVELS, geared_in_numpy, in_numpy
-from tests.rssr_designs import random_designs
+from tests.support.rssr_designs import random_designs
 
 DESIGNS, SAMPLES, ROUNDS = 4096, 360, 25
 TILES = 256  # how many times the designs the race of threads takes: a call of joblib alone costs 10 ms

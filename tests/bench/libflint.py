@@ -15,7 +15,7 @@ import flint
 import numba
 import numpy as np
 
-from kernels.proof.tape import COMBINE, CONSTANT, INVERSE, MULTIPLY, ROOT
+from kernels.boxes.tape import COMBINE, CONSTANT, INVERSE, MULTIPLY, ROOT
 from tests.bench.boxes import Array, Boxes, Formula, arguments
 from tests.bench.slopes import down, up
 

@@ -8,12 +8,12 @@ import numpy as np
 from mpmath import mp, mpf
 
 from kernels import status as st
-from studies.accuracy.reference import turning_point
 from studies.accuracy.regions import regions
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
 from tests.reference import rssp as slider
-from tests.turn_designs import RSSP, RSSR, slider_cranks
+from tests.support.sixty_digits import turning_point
+from tests.support.turn_designs import RSSP, RSSR, slider_cranks
 
 EACH = 100
 ANGLES = ("phi_ext", "phi_fold", "phi0", "stroke_ratio")

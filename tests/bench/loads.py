@@ -1,8 +1,8 @@
 """Joint loads next to MuJoCo: difference and time per pose of every family with joints, for the accuracy pages.
 
 MuJoCo gets the exported model; Newton's method closes its loop, and its own inverse dynamics gives the loads, called
-from Python pose by pose, as tests/test_mujoco_loads.py does.  ``make bench-peers`` writes the table; another program
-is further rows with the same columns.
+from Python pose by pose, as tests/effects/test_mujoco_loads.py does.  ``make bench-peers`` writes the table; another
+program is further rows with the same columns.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from studies.accuracy.timing import spread
 from sweep.effects import extended
 from sweep.families import family
 from sweep.families.base import Angles
-from tests.test_export import LINKED, scaled
-from tests.test_mujoco_loads import CHANGE, SPEED, Loop, apart, bodies, model_of
+from tests.effects.test_mujoco_loads import CHANGE, SPEED, Loop, apart, bodies, model_of
+from tests.exchange.test_export import LINKED, scaled
 
 POSES, MANY = 25, 3600
 WANTED = (*(f"force_{joint}_{axis}" for joint in "abcd" for axis in "xyz"), "drive_torque")

@@ -17,7 +17,7 @@ import pyarrow.fs as fs
 import sweep
 import sweep.chunks.plan
 from sweep.engine.parts import merge, split
-from tests.engine_study import SMALL_CHUNKS, chunk_bytes, write_study
+from tests.support.engine_study import SMALL_CHUNKS, chunk_bytes, write_study
 
 LOCAL = fs.LocalFileSystem()
 

@@ -20,9 +20,9 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem, on_locus, optimum
-from sweep.optimise.candidates import BLOCK, ranking
-from sweep.optimise.certificate import AGREE, Result
-from sweep.optimise.descent import KKT
+from sweep.optimise.local.descent import KKT
+from sweep.optimise.local.kkt import AGREE, Result
+from sweep.optimise.starts.candidates import BLOCK, ranking
 from sweep.study import Limit, OptimiseSettings
 from tests.bench.differential import differential
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from kernels._jit import kernel_fused
+from kernels.arithmetic.max_min import largest, smallest
 from kernels.families.rssr.closure import Array, reduce_design
-from kernels.reduce import largest, smallest
+from kernels.jit import kernel_fused
 
 
 @kernel_fused

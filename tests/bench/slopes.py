@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels._jit import inline, kernel
-from kernels.proof.tape import COMBINE, CONSTANT, INVERSE, MULTIPLY, ROOT
-from kernels.sincos import sincos
+from kernels.arithmetic.sincos import sincos
+from kernels.boxes.tape import COMBINE, CONSTANT, INVERSE, MULTIPLY, ROOT
+from kernels.jit import inline, kernel
 from tests.bench.boxes import Boxes, Formula, arguments
 
 Array = NDArray[np.float64]

@@ -14,12 +14,13 @@ from typing import Any
 
 import sweep.chunks.plan
 import sweep.engine.run
+import sweep.engine.searches
 import sweep.engine.worker
-import sweep.optimise.solve
+import sweep.optimise.multistart.multistart
 import sweep.optimise.study
 import sweep.report
 from sweep.__main__ import main
-from tests.engine_study import SMALL_CHUNKS
+from tests.support.engine_study import SMALL_CHUNKS
 
 
 def marked(module: Any, name: str, stage: str, marks: Path) -> None:
@@ -71,12 +72,12 @@ FAULTS: dict[str, Callable[[], None]] = {
 if __name__ == "__main__":
     place = Path(sys.argv[1])
     marked(sweep.engine.run, "_compute", "sweep", place)
-    marked(sweep.engine.run, "_optimise", "optimiser", place)
-    marked(sweep.engine.run, "_front", "front", place)
+    marked(sweep.engine.searches, "_optimise", "optimiser", place)
+    marked(sweep.engine.searches, "_front", "front", place)
     marked(sweep.optimise.study, "robust", "tolerance", place)
     marked(sweep.report, "write_report", "report", place)
     vars(sweep.chunks.plan).update(SMALL_CHUNKS)
-    sweep.optimise.solve.SERIAL_LOOKS = 0  # every start goes to a process
+    sweep.optimise.multistart.multistart.SERIAL_LOOKS = 0  # every start goes to a process
     FAULTS[sys.argv[2]]()
     del sys.argv[1:3]
     main()

@@ -12,9 +12,9 @@ from functools import partial
 from pathlib import Path
 
 from sweep.dataset.store import beside
-from tests.engine_study import ROOT
 from tests.faults.ground import SECONDS, Ground, Kind, Outcome, files, last_line
 from tests.faults.kills import reached
+from tests.support.engine_study import ROOT
 
 KEPT = "run again"
 

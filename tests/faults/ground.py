@@ -20,9 +20,9 @@ import sweep.chunks.plan
 from sweep.dataset.store import CURVES, OPTIMUM, PARETO, SENSITIVITY, TOLERANCE, beside
 from sweep.engine.run import run
 from sweep.errors import LinksweepError
-from tests.engine_study import ROOT, SMALL_CHUNKS, write_study
-from tests.test_optimise_front import TABLE
-from tests.test_optimise_study import STUDY
+from tests.optimise.test_front import TABLE
+from tests.optimise.test_study import STUDY
+from tests.support.engine_study import ROOT, SMALL_CHUNKS, write_study
 
 TABLES = (OPTIMUM, CURVES, SENSITIVITY, TOLERANCE, PARETO)
 ROBUST = '\n[tolerance]\nlengths = "0.3 mm"\nangles = "0.2 deg"\nrobust = "95 %"\n'

@@ -8,7 +8,7 @@ import time
 from functools import partial
 from pathlib import Path
 
-from kernels._cache import CACHE_DIR
+from kernels.cache_folder import CACHE_DIR
 from tests.faults.damage import Damage, cut, delete, empty, flip
 from tests.faults.ground import SECONDS, Ground, Kind, Outcome, files, last_line
 from tests.faults.kills import reached

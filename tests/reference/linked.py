@@ -1,6 +1,6 @@
 """Bodies and joints of the loopers from their public poses alone: what the momentum of each body is made of.
 
-Nothing here comes from kernels.links: axes of bodies are built from joint coordinates and angles, rates by
+Nothing here comes from kernels.linkage.bodies: axes of bodies are built from joint coordinates and angles, rates by
 differentiating over the turn (tests/reference/momentum.py).
 """
 

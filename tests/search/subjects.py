@@ -15,8 +15,8 @@ from sweep.effects.costs import designs as ordinary
 from sweep.families import NAMES, family
 from sweep.families.base import Angles, Array, Columns, Family
 from sweep.families.domain import March
-from sweep.reductions.closing import on_closed_turn
-from tests.turn_designs import guided_four_bars
+from sweep.reductions.sampling import on_closed_turn
+from tests.support.turn_designs import guided_four_bars
 
 CHAINS = ("rssr+guide", "rssr+rssp", "rssr+rssr", "four_bar+slider_crank")
 # Several members on one shaft, with a distance between two of them and whatever else is asked of them.

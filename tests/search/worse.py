@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from kernels import status as st
-from studies.accuracy.reference import ORDERS, angle_error, condition, transfer_functions
 from sweep.families import family
 from sweep.families.base import Angles
+from tests.support.sixty_digits import ORDERS, angle_error, condition, transfer_functions
 
 TABLE = Path(__file__).resolve().parents[1] / "oracle" / "worst_found.json"
 NAMES = ("a", "b", "c", "e", "f", "g", "alpha", "branch")

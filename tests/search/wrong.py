@@ -22,10 +22,10 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.chain import Chain
 from sweep.families.domain import Interval
-from sweep.quantities.names import error_of
-from sweep.quantities.reduction import prefixes
-from sweep.reductions.catalogue import output_names
-from sweep.reductions.closing import on_closed_turn
+from sweep.families.names import error_of
+from sweep.families.reduction import prefixes
+from sweep.quantities.resolve import output_names
+from sweep.reductions.sampling import on_closed_turn
 from tests.search.brute import TWO_PI, Best, climbed, dense, poses
 from tests.search.subjects import KINDS, Subject, all_at_once, random_designs, subjects
 

@@ -8,17 +8,13 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kernels._jit import inline
-from kernels.complex_step import arctan2, divisor, hypotenuse
-
-Array: TypeAlias = NDArray[np.float64]
-Status: TypeAlias = NDArray[np.uint8]
-EPS = 2.0**-53
+from kernels.arithmetic.complex_step import arctan2, divisor, hypotenuse
+from kernels.jit import inline
+from kernels.types import Array
 
 
 class Mode(IntEnum):

@@ -9,13 +9,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kernels._jit import inline
+from kernels.jit import inline
+from kernels.types import TWO_PI, Numbers
 
-Numbers = NDArray[Any]  # float64, or complex128 for exact gradients by the complex step
-Status = NDArray[np.uint8]
-TWO_PI = 2.0 * math.pi
 POLYNOMIAL_345, MODIFIED_SINE, CYCLOIDAL, FOURIER = 1, 2, 3, 4
 HARMONICS = 6
 COEFFICIENTS = 2 * HARMONICS

@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import kernel
-from kernels.complex_step import arctan2, magnitude
-from kernels.families.cam.law import LAW, LIFT, Numbers, Status, law_is_valid, motion
+from kernels.arithmetic.complex_step import arctan2, magnitude
+from kernels.families.cam.law import LAW, LIFT, law_is_valid, motion
+from kernels.jit import kernel
+from kernels.linkage.outputs import write
+from kernels.types import Numbers, Status
 
 R0, C, E, BRANCH, TABLE = LAW + 1, LAW + 2, LAW + 3, LAW + 4, LAW + 5
+
+
+class Outputs(NamedTuple):
+    """Pose outputs, each (n, m), or None: what is None is not computed."""
+
+    psi: Numbers | None
+    dpsi: Numbers | None
+    d2psi: Numbers | None
+    d3psi: Numbers | None
+    pressure_angle: Numbers | None
+    x_p: Numbers | None
+    y_p: Numbers | None
 
 
 @kernel
@@ -19,13 +34,7 @@ def poses(
     designs: Numbers,
     phi: Numbers,
     status: Status,
-    psi: Numbers | None,
-    dpsi: Numbers | None,
-    d2psi: Numbers | None,
-    d3psi: Numbers | None,
-    pressure_angle: Numbers | None,
-    x_p: Numbers | None,
-    y_p: Numbers | None,
+    out: Outputs,
 ) -> None:
     """Compute the lever angle, derivatives, pressure angle and pitch curve of every design at its cam angles.
 
@@ -62,20 +71,14 @@ def poses(
                 y, d1, d2, d3 = motion(designs, i, TABLE, angle)
             # lifting brings the lever nearer to the direction away from the cam
             value, slope = branch * (rest - lift * y), -branch * lift * d1
-            if psi is not None:
-                psi[i, j] = value
-            if dpsi is not None:
-                dpsi[i, j] = slope
-            if d2psi is not None:
-                d2psi[i, j] = -branch * lift * d2
-            if d3psi is not None:
-                d3psi[i, j] = -branch * lift * d3
-            if pressure_angle is not None:
+            write(out.psi, i, j, value)
+            write(out.dpsi, i, j, slope)
+            write(out.d2psi, i, j, -branch * lift * d2)
+            write(out.d3psi, i, j, -branch * lift * d3)
+            if out.pressure_angle is not None:
                 radial, across = e * np.cos(value) + c * (1.0 - slope), e * np.sin(value)
-                pressure_angle[i, j] = arctan2(magnitude(radial), magnitude(across))
-            if x_p is not None or y_p is not None:
+                write(out.pressure_angle, i, j, arctan2(magnitude(radial), magnitude(across)))
+            if out.x_p is not None or out.y_p is not None:
                 x, z = e + c * np.cos(value), c * np.sin(value)
-                if x_p is not None:
-                    x_p[i, j] = (x * np.cos(angle) + z * np.sin(angle)) * unit
-                if y_p is not None:
-                    y_p[i, j] = (z * np.cos(angle) - x * np.sin(angle)) * unit
+                write(out.x_p, i, j, (x * np.cos(angle) + z * np.sin(angle)) * unit)
+                write(out.y_p, i, j, (z * np.cos(angle) - x * np.sin(angle)) * unit)

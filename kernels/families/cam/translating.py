@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import kernel
-from kernels.complex_step import arctan2, magnitude
-from kernels.families.cam.law import LAW, LIFT, Numbers, Status, law_is_valid, motion
+from kernels.arithmetic.complex_step import arctan2, magnitude
+from kernels.families.cam.law import LAW, LIFT, law_is_valid, motion
+from kernels.jit import kernel
+from kernels.linkage.outputs import write
+from kernels.types import Numbers, Status
 
 R0, E, TABLE = LAW + 1, LAW + 2, LAW + 3
+
+
+class Outputs(NamedTuple):
+    """Pose outputs, each (n, m), or None: what is None is not computed."""
+
+    s: Numbers | None
+    ds: Numbers | None
+    d2s: Numbers | None
+    d3s: Numbers | None
+    pressure_angle: Numbers | None
+    x_p: Numbers | None
+    y_p: Numbers | None
 
 
 @kernel
@@ -19,13 +34,7 @@ def poses(
     designs: Numbers,
     phi: Numbers,
     status: Status,
-    s: Numbers | None,
-    ds: Numbers | None,
-    d2s: Numbers | None,
-    d3s: Numbers | None,
-    pressure_angle: Numbers | None,
-    x_p: Numbers | None,
-    y_p: Numbers | None,
+    out: Outputs,
 ) -> None:
     """Compute the follower displacement, derivatives,
     pressure angle and pitch curve of every design at its cam angles.
@@ -56,19 +65,15 @@ def poses(
             reach = base + lift * y
             if known and not reach.real > 0.0:
                 status[i, j] = st.SINGULAR
-            if s is not None:
-                s[i, j] = lift * y * unit
-            if ds is not None:
-                ds[i, j] = lift * d1 * unit
-            if d2s is not None:
-                d2s[i, j] = lift * d2 * unit
-            if d3s is not None:
-                d3s[i, j] = lift * d3 * unit
-            if pressure_angle is not None:
-                pressure_angle[i, j] = (
-                    arctan2(magnitude(lift * d1 - e), reach) if reach.real > 0.0 else math.nan * reach
-                )
-            if x_p is not None:
-                x_p[i, j] = (reach * np.cos(angle) - e * np.sin(angle)) * unit
-            if y_p is not None:
-                y_p[i, j] = -(reach * np.sin(angle) + e * np.cos(angle)) * unit
+            write(out.s, i, j, lift * y * unit)
+            write(out.ds, i, j, lift * d1 * unit)
+            write(out.d2s, i, j, lift * d2 * unit)
+            write(out.d3s, i, j, lift * d3 * unit)
+            write(
+                out.pressure_angle,
+                i,
+                j,
+                (arctan2(magnitude(lift * d1 - e), reach) if reach.real > 0.0 else math.nan * reach),
+            )
+            write(out.x_p, i, j, (reach * np.cos(angle) - e * np.sin(angle)) * unit)
+            write(out.y_p, i, j, -(reach * np.sin(angle) + e * np.cos(angle)) * unit)

@@ -1,6 +1,6 @@
 """The looper on a cylinder whose second ball stands off the shaft's axis: both loops ask for angle and place at once.
 
-The angles at which both loops close are those of :mod:`kernels.families.cylindrical_looper.shaft_roots`.  Equation
+The angles at which both loops close are those of :mod:`kernels.families.cylindrical_looper.closure`.  Equation
 numbers are of docs/cylindrical_looper.md.
 """
 
@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.complex_step import magnitude
-from kernels.driven_ball import EPS, Path, Swung
-from kernels.families.cylindrical_looper.closure import Numbers, Reduced, Status, reduce_design
-from kernels.families.cylindrical_looper.motion import Slide, carried, put_slide
-from kernels.families.cylindrical_looper.shaft_roots import MOST, Loops, chosen, place
-from kernels.looper_outputs import put_angle, put_loop, put_point
-from kernels.vectors import Vector, dot
+from kernels.arithmetic.complex_step import magnitude
+from kernels.arithmetic.vectors import Vector, dot
+from kernels.families.cylindrical_looper.closure import MOST, Loops, Reduced, chosen, place, reduce_design
+from kernels.families.cylindrical_looper.motion import Outputs, Slide, carried
+from kernels.jit import inline, kernel
+from kernels.linkage.driven_ball import Path, Swung
+from kernels.linkage.outputs import put_angle, put_block, put_loop, put_point
+from kernels.types import EPS, Numbers, Status
 
 
 class Offset(NamedTuple):
@@ -221,15 +221,7 @@ def coupled_poses(
     cos_phi: Numbers,
     sin_phi: Numbers,
     status: Status,
-    shaft: Numbers | None,
-    shaft_loop: Numbers | None,
-    slide: Numbers | None,
-    slide_loop: Numbers | None,
-    point: Numbers | None,
-    velocity: Numbers | None,
-    acceleration: Numbers | None,
-    jerk: Numbers | None,
-    magnitudes: Numbers | None,
+    out: Outputs,
     joints: Numbers | None,
 ) -> None:
     """Compute what :func:`kernels.families.cylindrical_looper.motion.poses` does,
@@ -255,15 +247,13 @@ def coupled_poses(
             one, two = _solved(r, o, first, second, at)
             status[i, j] = one.status
             scale = r.unit + undefined
-            put_angle(shaft, i, j, one, undefined)
-            if shaft_loop is not None:
-                put_loop(shaft_loop, i, j, one.delta, one.root, one.across, r.unit, undefined)
-            put_slide(slide, i, j, two, scale)
-            if slide_loop is not None:
-                put_loop(slide_loop, i, j, two.delta, two.root, two.across, r.unit, undefined)
+            put_angle(out.shaft, i, j, one, undefined)
+            put_loop(out.shaft_loop, i, j, one.delta, one.root, one.across, r.unit, undefined)
+            put_block(out.slide, i, j, (two.s, two.first, two.second, two.third), scale)
+            put_loop(out.slide_loop, i, j, two.delta, two.root, two.across, r.unit, undefined)
             foot = (r.swings.e, 0.0 * r.swings.e, r.swings.g)
             path = carried(r, one, two)
-            put_point(point, velocity, acceleration, jerk, magnitudes, i, j, foot, path, scale)
+            put_point(out, i, j, foot, path, scale)
             if joints is not None:
                 ball = (r.swings.c * one.cos, r.swings.c * one.sin, r.slides * two.s)
                 for n in range(3):

@@ -1,4 +1,7 @@
-"""Motion of the cylindrical looper at given crank angles: shaft, working point, their derivatives."""
+"""Motion of the cylindrical looper at given crank angles, and its bodies for their loads.
+
+The bodies are two cranks and couplers, shaft and rocker.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.complex_step import magnitude
-from kernels.driven_ball import Path, Swung, rotated, swing
-from kernels.families.cylindrical_looper.closure import Numbers, Reduced, Status, reduce_design
-from kernels.looper_drive import pin_path
-from kernels.looper_outputs import put_angle, put_loop, put_point
-from kernels.slider_closure import Reduced as Slider
-from kernels.slider_closure import derivatives, place, tolerance
-from kernels.verdict import pose_status
+from kernels.arithmetic.complex_step import magnitude
+from kernels.arithmetic.vectors import add, cross, mix, scale
+from kernels.families.cylindrical_looper.closure import Reduced, reduce_design
+from kernels.jit import inline, kernel
+from kernels.linkage.bodies import FRAME, Links, Moving, put, put_ball, put_body, put_crank, put_line, put_rod, shaft
+from kernels.linkage.driven_ball import Path, Swung, rotated, swing
+from kernels.linkage.looper_drive import pin_path
+from kernels.linkage.outputs import has_point, put_angle, put_block, put_loop, put_point
+from kernels.linkage.slider_closure import Reduced as Slider
+from kernels.linkage.slider_closure import derivatives, place, tolerance
+from kernels.linkage.verdict import pose_status
+from kernels.types import Array, Numbers, Status
 
 
 class Slide(NamedTuple):
@@ -57,21 +63,27 @@ def _first_crank(r: Reduced, slide: Slide, u: float, v: float) -> Path:
     return m, m1, m2, m3
 
 
+class Outputs(NamedTuple):
+    """Blocks (k, n, m) of outputs, or None: what is None is not computed."""
+
+    shaft: Numbers | None
+    shaft_loop: Numbers | None
+    slide: Numbers | None
+    slide_loop: Numbers | None
+    point: Numbers | None
+    velocity: Numbers | None
+    acceleration: Numbers | None
+    jerk: Numbers | None
+    magnitudes: Numbers | None
+
+
 @kernel
 def poses(
     designs: Numbers,
     cos_phi: Numbers,
     sin_phi: Numbers,
     status: Status,
-    shaft: Numbers | None,
-    shaft_loop: Numbers | None,
-    slide: Numbers | None,
-    slide_loop: Numbers | None,
-    point: Numbers | None,
-    velocity: Numbers | None,
-    acceleration: Numbers | None,
-    jerk: Numbers | None,
-    magnitudes: Numbers | None,
+    out: Outputs,
     joints: Numbers | None,
 ) -> None:
     """Compute the angle and place of the looper's shaft and the working point, with derivatives,
@@ -107,27 +119,22 @@ def poses(
             drive = r.swings
             one = swing(first, r.size1, drive.b, drive.c, drive.branch)
             slide_counts, shaft_counts = r.slides == 1.0, False
-            if slide is not None or slide_loop is not None:
+            if out.slide is not None or out.slide_loop is not None:
                 slide_counts = True
-            if shaft is not None or shaft_loop is not None:
+            if out.shaft is not None or out.shaft_loop is not None:
                 shaft_counts = True
-            if (
-                point is not None or velocity is not None or acceleration is not None or jerk is not None
-                or magnitudes is not None or joints is not None
-            ):  # fmt: skip
+            if has_point(out) or joints is not None:
                 slide_counts, shaft_counts = True, True
             status[i, j] = _code(r.valid, slide_counts, two.status, shaft_counts, one.status)
             undefined = 0.0 if r.valid else math.nan
             scale = r.unit + undefined
-            put_angle(shaft, i, j, one, undefined)
-            put_slide(slide, i, j, two, scale)
-            if shaft_loop is not None:
-                put_loop(shaft_loop, i, j, one.delta, magnitude(one.root), one.across, r.unit, undefined)
-            if slide_loop is not None:
-                put_loop(slide_loop, i, j, two.delta, two.root, two.across, r.unit, undefined)
+            put_angle(out.shaft, i, j, one, undefined)
+            put_block(out.slide, i, j, (two.s, two.first, two.second, two.third), scale)
+            put_loop(out.shaft_loop, i, j, one.delta, magnitude(one.root), one.across, r.unit, undefined)
+            put_loop(out.slide_loop, i, j, two.delta, two.root, two.across, r.unit, undefined)
             foot = (drive.e, 0.0 * drive.e, drive.g)
             path = carried(r, one, two)
-            put_point(point, velocity, acceleration, jerk, magnitudes, i, j, foot, path, scale)
+            put_point(out, i, j, foot, path, scale)
             if joints is not None:
                 _put_joints(joints, i, j, r, first, one, two, v, scale)
 
@@ -141,16 +148,6 @@ def _code(valid: bool, slide_counts: bool, of_slide: int, shaft_counts: bool, of
     if slide_counts and of_slide != st.OK:
         return of_slide
     return of_shaft if shaft_counts else st.OK
-
-
-@inline
-def put_slide(slide: Numbers | None, i: int, j: int, two: Slide, scale: Any) -> None:
-    """Write place of the shaft along its axis and its three derivatives [length]."""
-    if slide is not None:
-        slide[0, i, j] = two.s * scale
-        slide[1, i, j] = two.first * scale
-        slide[2, i, j] = two.second * scale
-        slide[3, i, j] = two.third * scale
 
 
 @inline
@@ -180,3 +177,75 @@ def _put_joints(
     for k in range(3):
         joints[k, i, j] = pin[k] * scale
         joints[3 + k, i, j] = ball[k] * scale
+
+
+SHAFT = 2  # its number among the bodies
+
+
+@kernel
+def links(
+    designs: Array,
+    cos_phi: Array,
+    sin_phi: Array,
+    psi: Array,
+    dpsi: Array,
+    d2psi: Array,
+    s: Array,
+    ds: Array,
+    d2s: Array,
+    out: Links,
+) -> None:
+    """Fill the bodies, freedoms and closing lines of every pose; symbols are those of docs/cylindrical_looper.md.
+
+    The rocker sits on the shaft, which guides it across and takes its torque by a key.  Along the shaft it is held by
+    the shaft where it slides with it, and by the frame where it stays at its height.
+
+    Parameters
+    ----------
+    designs : (n, 23);  cos_phi, sin_phi : (n, m) or (1, m)
+    psi, dpsi, d2psi, s, ds, d2s : (n, m), outputs of ``poses``
+    out : crank 1, crank 2, shaft, rocker, coupler 1, coupler 2; shaft and rocker from the axis at the height of the
+        rocker's ball at s = 0, the shaft moved by s, the rocker where it slides.  Nine freedoms; seven lines, of both
+        balls, whose forces act on rocker and shaft, and along the shaft on the rocker
+    """
+    for i in range(designs.shape[0]):
+        d = designs[i]
+        u1, e2 = shaft(d[6])
+        first, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+        centre1, foot = scale(d[4], u1), (d[3], 0.0, d[5])
+        # Frame of crank 2: x2 across the shaft, y2 = k along it, z2 = x2 x k; its slide is the shaft's axis.
+        x2 = (math.cos(d[21]), math.sin(d[21]), 0.0)
+        z2 = cross(x2, k)
+        sa, ca = math.sin(d[12]), math.cos(d[12])
+        u2, g2 = mix(sa, k, ca, z2), mix(ca, k, -sa, z2)
+        centre2 = add(mix(1.0, foot, -d[10], x2), scale(d[11], u2))
+        co, so = math.cos(d[13]), math.sin(d[13])
+        row = i if cos_phi.shape[0] > 1 else 0
+        for j in range(psi.shape[1]):
+            bodies, axes, lines = out.bodies[i, j], out.axes[i, j], out.lines[i, j]
+            u, v = cos_phi[row, j], sin_phi[row, j]
+            w, x = u * co - v * so, v * co + u * so
+            crank1 = put_crank(bodies[0], axes[0], centre1, u1, first, e2, u, v)
+            crank2 = put_crank(bodies[1], axes[1], centre2, u2, x2, g2, w, x)
+            pin1 = add(centre1, scale(d[0], mix(u, first, v, e2)))
+            pin2 = add(centre2, scale(d[8], mix(w, x2, x, g2)))
+            rho = (math.cos(psi[i, j]), math.sin(psi[i, j]), 0.0)
+            omega, eps = scale(dpsi[i, j], k), scale(d2psi[i, j], k)
+            place = mix(1.0, foot, s[i, j], k)
+            looper = Moving(place, scale(ds[i, j], k), scale(d2s[i, j], k), omega, eps)
+            put_body(bodies[2], looper, rho, cross(k, rho), k, foot)
+            held = mix(1.0, foot, d[15] * s[i, j], k)
+            rocker = Moving(held, scale(d[15] * ds[i, j], k), scale(d[15] * d2s[i, j], k), omega, eps)
+            put_body(bodies[3], rocker, rho, cross(k, rho), k, held)
+            put(axes[2], k)
+            put(axes[3], k)
+            put(axes[4], k)
+            ball1 = add(held, scale(d[2], rho))
+            beta = psi[i, j] + d[20]
+            ball2 = add(place, scale(d[19], (math.cos(beta), math.sin(beta), 0.0)))
+            put_rod(bodies[4], axes[5:], crank1, pin1, rocker, ball1)
+            put_rod(bodies[5], axes[7:], crank2, pin2, looper, ball2)
+            put_ball(lines, ball1)
+            put_ball(lines[3:], ball2)
+            put_line(lines[6], held, k)
+            out.ends[i, 6, 1] = SHAFT if d[15] == 1.0 else FRAME

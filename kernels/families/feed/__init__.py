@@ -5,8 +5,8 @@ and leaving, ``triad`` is the rack on three leads.
 """
 
 from kernels.families.feed.closure import Design as Design
-from kernels.families.feed.events import feeding as feeding
 from kernels.families.feed.motion import differences as differences
+from kernels.families.feed.motion import feeding as feeding
 from kernels.families.feed.motion import lift_rows as lift_rows
 from kernels.families.feed.motion import poses as poses
 from kernels.families.feed.triad import TriadDesign as TriadDesign

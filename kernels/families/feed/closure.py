@@ -7,19 +7,15 @@ drawing costs a bit.  Designs may be complex128 (exact gradients by the complex 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline
-from kernels.complex_step import arctan2, hypotenuse
-from kernels.verdict import follower_status, pose_status
-
-Array: TypeAlias = NDArray[np.float64]
-Status: TypeAlias = NDArray[np.uint8]
-EPS = 2.0**-53
+from kernels.arithmetic.complex_step import arctan2, hypotenuse
+from kernels.jit import inline
+from kernels.linkage.verdict import follower_status, pose_status
+from kernels.types import EPS, Array
 
 
 class Design(NamedTuple):

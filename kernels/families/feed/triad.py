@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.families.feed.closure import EPS, Array, Driven, Rocker, Status, eccentric, rocker_angle
+from kernels.families.feed.closure import Driven, Rocker, eccentric, rocker_angle
+from kernels.jit import inline, kernel
+from kernels.types import EPS, TWO_PI, Array, Status
 
 NODES = 180
-TWO_PI = 2.0 * math.pi
 _MOST_STEPS = 40
 _SMALL = 1e-9  # steps of Newton's method from here on are quadratically short, or rounding
 # From the guess to the links' own lengths: steps of Newton's method in all and at one stage, which ends when a step is

@@ -1,19 +1,28 @@
-"""One design of the five-link brought to its constants, and its closure as a function of the rocker angle.
+"""One design of the five-link brought to its constants, its closure, and designs with the limits of a crank-rocker.
+
+The equation numbers are of docs/five_link.md.
 
 Polukhin 1971, section 5.5, in the forms of docs/five_link.md; the equation numbers are of that page.  Lengths are in
-units of the crank and mirrored to the assembly mode +1, as in :mod:`kernels.crank_closure`, whose numbers it shares.
+units of the crank and mirrored to the assembly mode +1, as in :mod:`kernels.linkage.crank_closure`, whose numbers it
+shares.
+
+In its limit positions the five-link lies in the plane of crank axis and crank, as the crank-rocker does, so that the
+same rocker and the same axes serve: only crank and coupler change with h.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from kernels._jit import inline
-from kernels.complex_step import divisor
-from kernels.crank_closure import EPS, Numbers, Reduced, axial_terms, reduce_scaled, unit_scale
-from kernels.sincos import sincos
+from kernels import status as st
+from kernels.arithmetic.complex_step import divisor
+from kernels.arithmetic.sincos import sincos
+from kernels.jit import inline, kernel
+from kernels.linkage.crank_closure import Reduced, axial_terms, reduce_scaled, unit_scale
+from kernels.types import EPS, Array, Numbers, Status
 
 
 class Design(NamedTuple):
@@ -117,3 +126,44 @@ def residual_size(r: Reduced, joint: Joint, x: Any, y: Any) -> float:
     """Return the rounding error of G5: what its terms are made of, times 8 x 2^-53."""
     terms = abs(x.real) + abs(y.real) + abs(r.e.real) + 2.0 + abs(r.y0.real) + r.w_size + joint.size
     return float(8.0 * EPS * terms)
+
+
+@kernel
+def with_limits_of(
+    designs: Array, psi_ext: Array, psi_fold: Array, h: Array, status: Status, a: Array, b: Array
+) -> None:
+    """Compute the crank and coupler of the five-links with s2 = 0
+    that have the limit positions of given crank-rockers.
+
+    Parameters
+    ----------
+    designs : (n, 8) crank-rockers: a, b, c, e, f, g, alpha, branch
+    psi_ext, psi_fold : (n,) their rocker angles in the extended and the folded limit position [rad]
+    h : (n,) common perpendicular of the two revolutes
+    status : (n,) out; OK, INVALID_INPUT, or NOT_ADMISSIBLE where no crank of positive length, or no coupler that
+        reaches beyond the second revolute, has these limit positions
+    a, b : (n,) out [length]; nan where the status is not OK
+    """
+    for i in range(designs.shape[0]):
+        crank, c, e, f, g, alpha = (
+            designs[i, 0],
+            designs[i, 2],
+            designs[i, 3],
+            designs[i, 4],
+            designs[i, 5],
+            designs[i, 6],
+        )
+        sa, ca = math.sin(alpha), math.cos(alpha)
+        # distance of the ball from the crank axis in both positions, and its height over the crank plane in the first
+        y1, y2 = c * math.sin(psi_ext[i]), c * math.sin(psi_fold[i])
+        rho1 = math.hypot(c * math.cos(psi_ext[i]) + e, y1 * ca - g * sa)
+        rho2 = math.hypot(c * math.cos(psi_fold[i]) + e, y2 * ca - g * sa)
+        between = rho1 + rho2 - 2.0 * h[i]
+        found = (crank * (rho1 + rho2) - h[i] * (rho1 - rho2)) / between
+        across = rho1 - found - h[i]
+        admissible = found > 0.0 and across > 0.0 and rho2 + found > h[i]
+        status[i] = st.OK if admissible else st.NOT_ADMISSIBLE
+        if found - found != 0.0:  # infinite or no number
+            status[i] = st.INVALID_INPUT
+        a[i] = found if status[i] == st.OK else math.nan
+        b[i] = np.hypot(across, y1 * sa + g * ca - f) if status[i] == st.OK else math.nan

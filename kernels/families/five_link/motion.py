@@ -1,4 +1,7 @@
-"""Motion of the five-link at given crank angles: position, transfer functions, joints, pressure angle."""
+"""Motion of the five-link at given crank angles, and its bodies for their loads.
+
+The bodies are crank, cross-piece, coupler and rocker (:mod:`kernels.linkage.bodies`).
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.complex_step import arctan2, divisor, hypotenuse
-from kernels.crank_closure import Numbers, Reduced, Status
+from kernels.arithmetic.complex_step import arctan2, divisor, hypotenuse
+from kernels.arithmetic.vectors import add, cross, dot, mix, scale, spun, sub
 from kernels.families.five_link.closure import Joint, axial_reach, reduce_design, slope
 from kernels.families.five_link.roots import MOST, extremes
 from kernels.families.five_link.solve import pose_terms, reaches, real_joint, solve
+from kernels.jit import inline, kernel
+from kernels.linkage.bodies import (
+    Links,
+    Moving,
+    acceleration_at,
+    put,
+    put_ball,
+    put_body,
+    put_crank,
+    put_turning,
+    shaft,
+    velocity_at,
+)
+from kernels.linkage.crank_closure import Reduced
+from kernels.linkage.outputs import write
+from kernels.types import Array, Numbers, Status
 
 
 class Bends(NamedTuple):
@@ -120,20 +138,26 @@ def discriminant_of(r: Reduced, joint: Joint, code: int, u: Any, v: Any, w: Any,
     return _shortfall(r, joint, u, v)
 
 
+class Outputs(NamedTuple):
+    """Pose outputs, each (n, m), or None: what is None is not computed."""
+
+    psi: Numbers | None
+    dpsi: Numbers | None
+    d2psi: Numbers | None
+    d3psi: Numbers | None
+    sin_psi: Numbers | None
+    cos_psi: Numbers | None
+    discriminant: Numbers | None
+    pressure_angle: Numbers | None
+
+
 @kernel
 def poses(
     designs: Numbers,
     cos_phi: Numbers,
     sin_phi: Numbers,
     status: Status,
-    psi: Numbers | None,
-    dpsi: Numbers | None,
-    d2psi: Numbers | None,
-    d3psi: Numbers | None,
-    sin_psi: Numbers | None,
-    cos_psi: Numbers | None,
-    discriminant: Numbers | None,
-    pressure_angle: Numbers | None,
+    out: Outputs,
     places: Numbers | None,
 ) -> None:
     """Compute the position, transfer functions, discriminant,
@@ -165,30 +189,24 @@ def poses(
             u, v = cos_phi[row, j], sin_phi[row, j]
             code, c, s, t, w = solve(r, joint, u, v, room)
             status[i, j] = code
-            if discriminant is not None:
-                discriminant[i, j] = math.nan
+            if out.discriminant is not None:
+                write(out.discriminant, i, j, math.nan)
                 if code != st.INVALID_INPUT:
-                    discriminant[i, j] = (discriminant_of(r, joint, code, u, v, w, c, s, t) * two_ac) * two_ac
-            if cos_psi is not None:
-                cos_psi[i, j] = -c
+                    write(out.discriminant, i, j, (discriminant_of(r, joint, code, u, v, w, c, s, t) * two_ac) * two_ac)
+            write(out.cos_psi, i, j, -c)
             sine = 0.0 - r.branch * s  # never -0.0, which would turn the angle pi into -pi
-            if sin_psi is not None:
-                sin_psi[i, j] = sine
-            if psi is not None:
-                psi[i, j] = arctan2(sine, -c)
-            if pressure_angle is not None:
+            write(out.sin_psi, i, j, sine)
+            write(out.psi, i, j, arctan2(sine, -c))
+            if out.pressure_angle is not None:
                 along, rise = across(r, joint, v, w, c, s)
-                pressure_angle[i, j] = arctan2(hypotenuse(along, rise), t)
-            if dpsi is not None or d2psi is not None or d3psi is not None:
+                write(out.pressure_angle, i, j, arctan2(hypotenuse(along, rise), t))
+            if out.dpsi is not None or out.d2psi is not None or out.d3psi is not None:
                 p, q, jerk = (
                     transfer(r, joint, u, v, c, s, t) if code == st.OK else (math.nan * t, math.nan * t, math.nan * t)
                 )
-                if dpsi is not None:
-                    dpsi[i, j] = r.branch * p
-                if d2psi is not None:
-                    d2psi[i, j] = r.branch * q
-                if d3psi is not None:
-                    d3psi[i, j] = r.branch * jerk
+                write(out.dpsi, i, j, r.branch * p)
+                write(out.d2psi, i, j, r.branch * q)
+                write(out.d3psi, i, j, r.branch * jerk)
             if places is not None:
                 _put_places(places, designs, i, j, r, joint, u, v, c, s)
 
@@ -218,3 +236,67 @@ def _put_places(
     places[8, i, j] = designs[i, 3] - designs[i, 2] * c
     places[9, i, j] = -r.branch * designs[i, 2] * s
     places[10, i, j] = designs[i, 5] + 0.0 * c  # nan where there is no angle
+
+
+@kernel
+def links(
+    designs: Array,
+    cos_phi: Array,
+    sin_phi: Array,
+    psi: Array,
+    dpsi: Array,
+    d2psi: Array,
+    theta: Array,
+    beta: Array,
+    out: Links,
+) -> None:
+    """Fill the bodies, freedoms and closing lines of every pose.
+
+    The coupler turns about axis 1 by theta and about axis 2, t, by -beta; the rates of both follow from the motion of
+    the ball C seen from the crank pin B.  Vectors m, t, u and the points are those of docs/five_link.md.
+
+    Parameters
+    ----------
+    designs : (n, 11);  cos_phi, sin_phi : (n, m) or (1, m)
+    psi, dpsi, d2psi, theta, beta : (n, m), outputs of ``poses``
+    out : four bodies, four freedoms, three lines: the ball C, whose forces act on the rocker
+    """
+    for i in range(designs.shape[0]):
+        d = designs[i]
+        u, e2 = shaft(d[6])
+        e1, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+        centre, foot = scale(d[4], u), (d[3], 0.0, d[5])
+        row = i if cos_phi.shape[0] > 1 else 0
+        for j in range(psi.shape[1]):
+            bodies, axes = out.bodies[i, j], out.axes[i, j]
+            crank = put_crank(bodies[0], axes[0], centre, u, e1, e2, cos_phi[row, j], sin_phi[row, j])
+            pin = add(centre, scale(d[0], mix(cos_phi[row, j], e1, sin_phi[row, j], e2)))
+            rho = (math.cos(psi[i, j]), math.sin(psi[i, j]), 0.0)
+            rocker = put_turning(bodies[3], foot, k, rho, dpsi[i, j], d2psi[i, j])
+            ball = add(foot, scale(d[2], rho))
+            m = mix(math.cos(theta[i, j]), e1, math.sin(theta[i, j]), e2)
+            t = cross(u, m)
+            cb, sb = math.cos(beta[i, j]), math.sin(beta[i, j])
+            hinge = add(pin, mix(d[7], m, d[8], t))
+            arm, swept = mix(cb, m, sb, u), mix(-sb, m, cb, u)
+            seen = sub(velocity_at(rocker, ball), velocity_at(crank, pin))
+            reach = d[7] + d[1] * cb
+            rate = dot(seen, u) / (d[1] * cb)
+            spin = (dot(seen, t)) / reach
+            omega1 = scale(spin, u)
+            seen2 = sub(acceleration_at(rocker, ball), acceleration_at(crank, pin))
+            # What the ball does at constant rates: about axis 1, of Coriolis, about axis 2.
+            known = add(spun(omega1, (0.0, 0.0, 0.0), sub(ball, pin)), scale(2.0 * rate * d[1], cross(omega1, swept)))
+            left = sub(seen2, sub(known, scale(rate * rate * d[1], arm)))
+            rate2, spin2 = dot(left, u) / (d[1] * cb), dot(left, t) / reach
+            eps1 = scale(spin2, u)
+            piece = Moving(pin, velocity_at(crank, pin), acceleration_at(crank, pin), omega1, eps1)
+            put_body(bodies[1], piece, m, t, u, pin)
+            omega2 = mix(1.0, omega1, -rate, t)
+            eps2 = add(mix(1.0, eps1, -rate2, t), scale(-rate, cross(omega1, t)))
+            coupler = Moving(hinge, velocity_at(piece, hinge), acceleration_at(piece, hinge), omega2, eps2)
+            put_body(bodies[2], coupler, arm, t, cross(arm, t), hinge)
+            put(axes[1], u)
+            put(axes[2], t)
+            put(axes[3], k)
+            put_ball(out.lines[i, j], ball)

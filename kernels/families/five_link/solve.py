@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.complex_step import divisor
-from kernels.crank_closure import EPS, Array, Reduced, discriminant_tolerance
+from kernels.arithmetic.complex_step import divisor
+from kernels.curves.trigonometric_polynomials import rotate
 from kernels.families.five_link.closure import Joint, axial_reach, residual_size, slope
-from kernels.families.five_link.proof import NONE, ONE, solutions
-from kernels.families.five_link.roots import MOST, all_roots
-from kernels.trigpoly import rotate
-from kernels.verdict import pose_status
+from kernels.families.five_link.roots import MOST, NONE, ONE, all_roots, solutions
+from kernels.jit import inline, kernel
+from kernels.linkage.crank_closure import Reduced, discriminant_tolerance
+from kernels.linkage.verdict import pose_status
+from kernels.types import EPS, Array
 
 ROUNDS = 10  # of Newton's method; 3 to 5 are usual, and what needs more is left to the scan
 NEAR = 1e-5  # a step below this leaves 1e-10, and the two rounds that follow leave rounding only

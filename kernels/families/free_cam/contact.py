@@ -1,4 +1,4 @@
-"""Where the thread lies on the bare edge without friction: the shortest of all ways over it.
+"""The thread over the edge x = a y^2 of the cam: its length over one point, the shortest of all ways.
 
 The thread is shortest where L'(y) = 0 rises.  The search walks along the edge in steps that no zero of L' can be
 skipped by, |L'| / max|L''|, so that every minimum is found but for pairs nearer than a share FINEST of the way.
@@ -9,8 +9,131 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from kernels._jit import inline
-from kernels.families.free_cam.edge import FINEST, HALVINGS, Cam, along_edge, reach, steepest_slope
+import numpy as np
+
+from kernels import status as st
+from kernels.jit import inline
+from kernels.types import Array
+
+# Two extrema nearer to each other than this share of the way searched may be missed: the dip between them is no deeper
+# than its third power.
+FINEST = 2.0**-16
+HALVINGS = 60
+
+
+class Cam(NamedTuple):
+    """Edge and guides in the axes of the cam, lengths in units of ``unit``."""
+
+    a: float
+    x1: float
+    y1: float
+    z1: float
+    x2: float
+    y2: float
+    z2: float
+    unit: float
+    code: int
+
+
+class Line(NamedTuple):
+    """Where the straight line between the guides passes the plane of the cam."""
+
+    x: float
+    y: float
+    length: float
+    inside: bool  # whether it passes through the material, so that the edge pushes the thread away
+
+
+@inline
+def turned_cam(designs: Array, i: int, u: float, v: float) -> Cam:
+    """Turn design i, (n, 8) with columns a, X1, Y1, Z1, X2, Y2, Z2, P_h, to u = cos(phi), v = sin(phi)."""
+    size = 0.0
+    for k in range(1, 8):
+        size += abs(designs[i, k].real)
+    a = designs[i, 0]
+    bent = a.real * size
+    valid = 1e-140 < size < 1e140 and a.real >= 0.0 and bent < 1e6 and math.isfinite(u.real + v.real)
+    # On one side of the plane, or in it, the thread need not pass the edge at all.
+    valid = valid and designs[i, 3].real * designs[i, 6].real < 0.0
+    _, exponent = math.frexp(size if valid else 1.0)
+    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    x1, y1, x2, y2 = designs[i, 1], designs[i, 2], designs[i, 4], designs[i, 5]
+    return Cam(
+        a * unit,
+        (x1 * u + y1 * v) * per_unit, (y1 * u - x1 * v) * per_unit, designs[i, 3] * per_unit,
+        (x2 * u + y2 * v) * per_unit, (y2 * u - x2 * v) * per_unit, designs[i, 6] * per_unit,
+        unit, st.OK if valid else st.INVALID_INPUT,
+    )  # fmt: skip
+
+
+@inline
+def straight(cam: Cam) -> Line:
+    """Return the line between the guides at the plane of the cam."""
+    share = cam.z1 / (cam.z1 - cam.z2)
+    x, y = cam.x1 + share * (cam.x2 - cam.x1), cam.y1 + share * (cam.y2 - cam.y1)
+    dx, dy, dz = cam.x2 - cam.x1, cam.y2 - cam.y1, cam.z2 - cam.z1
+    return Line(x, y, np.sqrt(dx * dx + dy * dy + dz * dz), (x - cam.a * y * y).real > 0.0)
+
+
+@inline
+def part(a: float, x: float, y: float, z: float, at: float) -> tuple[float, float, float]:
+    """Return the distance of the edge's point ``at`` from a guide and its first two derivatives along y; (19), (20)."""
+    dx, dy, tx = a * at * at - x, at - y, 2.0 * a * at
+    square = dx * dx + dy * dy + z * z
+    distance = np.sqrt(square)
+    across = tx * dy - dx
+    turning = (z * z * (1.0 + tx * tx) + across * across) / square
+    return distance, (dx * tx + dy) / distance, (turning + 2.0 * a * dx) / distance
+
+
+@inline
+def along_edge(cam: Cam, at: float) -> tuple[float, float, float]:
+    """Return the length of the thread over the point ``at`` and its first two derivatives along y; (19), (20)."""
+    first = part(cam.a, cam.x1, cam.y1, cam.z1, at)
+    second = part(cam.a, cam.x2, cam.y2, cam.z2, at)
+    return first[0] + second[0], first[1] + second[1], first[2] + second[2]
+
+
+@inline
+def reach(cam: Cam) -> float:
+    """Return a |y| beyond which the thread only grows longer; no extremum lies outside."""
+    return max(_reach(cam.a.real, cam.x1.real, cam.y1.real), _reach(cam.a.real, cam.x2.real, cam.y2.real))
+
+
+@inline
+def _reach(a: float, x: float, y: float) -> float:
+    # The slope is that of y (2 a^2 y^2 + 1 - 2 a x) - y_i for a guide at (x, y_i).
+    return 2.0 * abs(y) if a * x <= 0.25 else math.sqrt(x / a) + abs(y)
+
+
+@inline
+def _nearest(low: float, high: float, centre: float) -> float:
+    """Return the least distance of an interval from a point."""
+    return max(max(low - centre, centre - high), 0.0)
+
+
+@inline
+def least_distances(cam: Cam, low: float, high: float) -> tuple[float, float]:
+    """Return lower bounds of the distances of the guides from the edge between two of its points."""
+    a, far, near = cam.a.real, max(low * low, high * high), _nearest(low, high, 0.0)
+    bottom, top = a * near * near, a * far
+    dx, dy = _nearest(bottom, top, cam.x1.real), _nearest(low, high, cam.y1.real)
+    first = math.sqrt(dx * dx + dy * dy + cam.z1.real * cam.z1.real)
+    dx, dy = _nearest(bottom, top, cam.x2.real), _nearest(low, high, cam.y2.real)
+    return first, math.sqrt(dx * dx + dy * dy + cam.z2.real * cam.z2.real)
+
+
+@inline
+def steepest_slope(cam: Cam, low: float, high: float) -> float:
+    """Return an upper bound of |L''| between two points of the edge,
+    from |turning| <= |tangent|^2 and the largest offsets.
+    """
+    a, far = cam.a.real, max(low * low, high * high)
+    tangent = 1.0 + 4.0 * a * a * far
+    first, second = least_distances(cam, low, high)
+    off1 = max(abs(cam.x1.real), abs(a * far - cam.x1.real))
+    off2 = max(abs(cam.x2.real), abs(a * far - cam.x2.real))
+    return (tangent + 2.0 * a * off1) / first + (tangent + 2.0 * a * off2) / second
 
 
 class Contact(NamedTuple):

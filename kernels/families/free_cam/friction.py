@@ -10,17 +10,21 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.families.free_cam.contact import shortest
-from kernels.families.free_cam.edge import FINEST, HALVINGS, Cam, least_distances, reach, straight, turned_cam
-from kernels.thread_path import wrap_angle
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.families.free_cam.contact import (
+    FINEST,
+    HALVINGS,
+    Cam,
+    least_distances,
+    reach,
+    shortest,
+    straight,
+    turned_cam,
+)
+from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write
+from kernels.linkage.thread_path import wrap_angle
+from kernels.types import Array, Status
 
 # How far beyond the last extremum of the length limit points are looked for, in units of that reach.
 FAR = 64.0
@@ -207,10 +211,20 @@ def landed(designs: Array, i: int, u0: float, v0: float, u1: float, v1: float) -
     return y
 
 
+class MarchOutputs(NamedTuple):
+    """Pose outputs, each (n, m), or None: what is None is not computed."""
+
+    L: Array | None
+    wrap: Array | None
+    y_contact: Array | None
+    contact: Array | None
+    sticking: Array | None
+
+
 @kernel
 def march(
     designs: Array, friction: Array, cos_phi: Array, sin_phi: Array, turns: int, status: Status,
-    L: Array | None, wrap: Array | None, y_contact: Array | None, contact: Array | None, sticking: Array | None,
+    out: MarchOutputs,
 ) -> None:  # fmt: skip
     """Compute the way of the thread over an edge with friction, in the order of the given angles;
     docs/takeup.md, section 5.
@@ -261,15 +275,11 @@ def march(
             good = 1.0 if code == st.OK else math.nan
             x = cam.a * at * at if touching else line.x
             n1, n2 = (cam.x1, cam.y1, cam.z1), (cam.x2, cam.y2, cam.z2)
-            if L is not None:
+            if out.L is not None:
                 dx, dy, ex, ey = x - cam.x1, at - cam.y1, x - cam.x2, at - cam.y2
                 over = math.sqrt(dx * dx + dy * dy + cam.z1 * cam.z1) + math.sqrt(ex * ex + ey * ey + cam.z2 * cam.z2)
-                L[i, j] = good * (over if touching else line.length) * cam.unit
-            if wrap is not None:
-                wrap[i, j] = good * (wrap_angle((x, at, 0.0), n1, n2) if touching else 0.0)
-            if y_contact is not None:
-                y_contact[i, j] = good * at * cam.unit
-            if contact is not None:
-                contact[i, j] = good * (1.0 if touching else 0.0)
-            if sticking is not None:
-                sticking[i, j] = good * (1.0 if stuck else 0.0)
+                write(out.L, i, j, good * (over if touching else line.length) * cam.unit)
+            write(out.wrap, i, j, good * (wrap_angle((x, at, 0.0), n1, n2) if touching else 0.0))
+            write(out.y_contact, i, j, good * at * cam.unit)
+            write(out.contact, i, j, good * (1.0 if touching else 0.0))
+            write(out.sticking, i, j, good * (1.0 if stuck else 0.0))

@@ -6,16 +6,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.families.free_cam.contact import shortest
-from kernels.families.free_cam.edge import Cam, along_edge, straight, turned_cam
-from kernels.thread_path import wrap_angle
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.families.free_cam.contact import Cam, along_edge, shortest, straight, turned_cam
+from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write
+from kernels.linkage.thread_path import wrap_angle
+from kernels.types import Array, Status
 
 
 class Design(NamedTuple):
@@ -55,22 +52,28 @@ def over_edge(cam: Cam, at: float) -> tuple[float, float]:
     return one[0] + two[0], one[1] + two[1] - mixed * mixed / along_edge(cam, at)[2]
 
 
+class Outputs(NamedTuple):
+    """Pose outputs, each (n, m), or None: what is None is not computed."""
+
+    P: Array | None
+    dP: Array | None
+    d2P: Array | None
+    L: Array | None
+    wrap: Array | None
+    y_contact: Array | None
+    X: Array | None
+    Y: Array | None
+    contact: Array | None
+    minima: Array | None
+
+
 @kernel
 def poses(
     designs: Array,
     cos_phi: Array,
     sin_phi: Array,
     status: Status,
-    P: Array | None,
-    dP: Array | None,
-    d2P: Array | None,
-    L: Array | None,
-    wrap: Array | None,
-    y_contact: Array | None,
-    X: Array | None,
-    Y: Array | None,
-    contact: Array | None,
-    minima: Array | None,
+    out: Outputs,
 ) -> None:
     """Compute the shortest thread over the edge of the cam, its derivatives, place and wrap;
     (18) to (23) of docs/takeup.md.
@@ -103,39 +106,30 @@ def poses(
             touching = line.inside and cam.code == st.OK
             at, count = line.y, 0
             # the search along the edge is the dear part: not without contact, unless its count is wanted
-            if cam.code == st.OK and (touching or minima is not None):
+            if cam.code == st.OK and (touching or out.minima is not None):
                 found = shortest(cam)
                 count = found.minima
                 if touching:
                     # the search decides on real parts; the zero gives the place the type of the design
                     at = follow_minimum(cam, found.y) + 0.0 * line.y
             x = cam.a * at * at if touching else line.x
-            if L is not None or P is not None:
+            if out.L is not None or out.P is not None:
                 length = along_edge(cam, at)[0] if touching else line.length
-                if L is not None:
-                    L[i, j] = good * length * cam.unit
-                if P is not None:
-                    P[i, j] = good * (length - designs[i, 7] / cam.unit) * cam.unit
-            if dP is not None or d2P is not None:
+                write(out.L, i, j, good * length * cam.unit)
+                write(out.P, i, j, good * (length - designs[i, 7] / cam.unit) * cam.unit)
+            if out.dP is not None or out.d2P is not None:
                 first, second = over_edge(cam, at)
-                if dP is not None:
-                    dP[i, j] = good * (first if touching else 0.0 * first) * cam.unit
-                if d2P is not None:
-                    d2P[i, j] = good * (second if touching else 0.0 * first) * cam.unit
-            if wrap is not None:
+                write(out.dP, i, j, good * (first if touching else 0.0 * first) * cam.unit)
+                write(out.d2P, i, j, good * (second if touching else 0.0 * first) * cam.unit)
+            if out.wrap is not None:
                 zero = 0.0 * at
                 turn = wrap_angle((x, at, zero), (cam.x1, cam.y1, cam.z1), (cam.x2, cam.y2, cam.z2))
-                wrap[i, j] = good * (turn if touching else zero)
-            if y_contact is not None:
-                y_contact[i, j] = good * at * cam.unit
-            if X is not None:
-                X[i, j] = good * (x * u - at * v) * cam.unit
-            if Y is not None:
-                Y[i, j] = good * (x * v + at * u) * cam.unit
-            if contact is not None:
-                contact[i, j] = good * (1.0 if touching else 0.0)
-            if minima is not None:
-                minima[i, j] = good * count
+                write(out.wrap, i, j, good * (turn if touching else zero))
+            write(out.y_contact, i, j, good * at * cam.unit)
+            write(out.X, i, j, good * (x * u - at * v) * cam.unit)
+            write(out.Y, i, j, good * (x * v + at * u) * cam.unit)
+            write(out.contact, i, j, good * (1.0 if touching else 0.0))
+            write(out.minima, i, j, good * count)
 
 
 @inline

@@ -13,7 +13,8 @@ phi = 0, a -> k + 2 at phi = pi) nor at k -> 1.
 """
 
 from kernels.families.geared_dwell.closure import Design as Design
-from kernels.families.geared_dwell.dense import dense_maxima as dense_maxima
-from kernels.families.geared_dwell.dwell import dwell_measures as dwell_measures
+from kernels.families.geared_dwell.maxima import dwell_measures as dwell_measures
 from kernels.families.geared_dwell.maxima import turn_maxima as turn_maxima
+from kernels.families.geared_dwell.motion import Outputs as Outputs
+from kernels.families.geared_dwell.motion import dense_maxima as dense_maxima
 from kernels.families.geared_dwell.motion import poses as poses

@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from kernels.arithmetic.complex_step import magnitude
+from kernels.jit import inline
+from kernels.types import EPS, Numbers
 
-from kernels._jit import inline
-from kernels.complex_step import magnitude
-
-Array: TypeAlias = NDArray[np.float64]
-Numbers: TypeAlias = NDArray[Any]  # float64, or complex128 for exact gradients by the complex step
-Status: TypeAlias = NDArray[np.uint8]
-EPS = 2.0**-53
 TOO_NEAR = 1e-50  # a pin that passes the axis nearer than this has derivatives outside float64
 
 

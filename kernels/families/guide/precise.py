@@ -10,11 +10,14 @@ import math
 from typing import NamedTuple
 
 from kernels import status as st
-from kernels import twofold as two
-from kernels._jit import inline, kernel
-from kernels.families.guide.closure import EPS, Array, Status, reduce_design
-from kernels.twofold import Twofold
-from kernels.verdict import pose_status
+from kernels.arithmetic import double_double as two
+from kernels.arithmetic.double_double import Twofold
+from kernels.families.guide.closure import reduce_design
+from kernels.families.guide.motion import Outputs
+from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write
+from kernels.linkage.verdict import pose_status
+from kernels.types import EPS, Array, Status
 
 BAND = 4.0 * EPS  # what rounding the given numbers does to Delta: a dead point made in float64 is still one
 
@@ -71,15 +74,7 @@ def precise_poses(
     cos_phi: Array,
     sin_phi: Array,
     status: Status,
-    s: Array | None,
-    ds: Array | None,
-    d2s: Array | None,
-    d3s: Array | None,
-    dev: Array | None,
-    ddev: Array | None,
-    d2dev: Array | None,
-    discriminant: Array | None,
-    pressure_angle: Array | None,
+    out: Outputs,
     joints: Array | None,
 ) -> None:
     """Compute what :func:`kernels.families.guide.motion.poses` does, correct to a few roundings,
@@ -117,8 +112,7 @@ def precise_poses(
             tolerance += BAND * BAND * (r.x_size * r.x_size + a * a + r.w_size * r.w_size)
             code = pose_status(r.valid, delta[0], tolerance, rr[0])
             status[i, j] = code
-            if discriminant is not None:
-                discriminant[i, j] = (delta[0] * two_c) * two_c if r.valid else math.nan
+            write(out.discriminant, i, j, (delta[0] * two_c) * two_c if r.valid else math.nan)
             assembled = code == st.OK or code == st.DEAD_POINT
             root = two.root(delta) if code == st.OK else (0.0, 0.0)
             t = two.scale(root, r.branch)
@@ -127,28 +121,32 @@ def precise_poses(
             sin_psi = two.divide(two.subtract(two.multiply(by, w), two.multiply(x, t)), rr, per_rr)
             cx, cy = two.scale(cos_psi, c), two.scale(sin_psi, c)  # the rocker; its pin is at (e, 0) + this
             dx, dy = two.add(x, cx), two.subtract(cy, by)
-            if pressure_angle is not None:
+            if out.pressure_angle is not None:
                 across_c = abs(two.subtract((c, 0.0), w)[0])
-                pressure_angle[i, j] = math.atan2(across_c, root[0]) if assembled else math.nan
+                write(out.pressure_angle, i, j, math.atan2(across_c, root[0]) if assembled else math.nan)
             if joints is not None:
                 joints[0, i, j], joints[1, i, j] = bx[0] * unit, by[0] * unit
                 joints[2, i, j], joints[3, i, j] = (e + cx[0]) * unit, cy[0] * unit
                 mx, my = _times(dx, dy, lx, ly)
                 joints[4, i, j], joints[5, i, j] = two.add(bx, mx)[0] * unit, two.add(by, my)[0] * unit
-            if s is not None or dev is not None:
+            if out.s is not None or out.dev is not None:
                 along, across = _carried(bx, by, dx, dy, line)
-                if s is not None:
-                    s[i, j] = along[0] * unit
-                if dev is not None:
-                    dev[i, j] = two.add(across, (-h, 0.0))[0] * unit
-            if ds is not None or d2s is not None or d3s is not None or ddev is not None or d2dev is not None:
+                write(out.s, i, j, along[0] * unit)
+                write(out.dev, i, j, two.add(across, (-h, 0.0))[0] * unit)
+            if (
+                out.ds is not None
+                or out.d2s is not None
+                or out.d3s is not None
+                or out.ddev is not None
+                or out.d2dev is not None
+            ):
                 at = Pose(bx, by, dx, dy, cx, cy, two.scale(t, c), two.scale(two.subtract((c, 0.0), w), c))
-                _put_derivatives(ds, d2s, d3s, ddev, d2dev, i, j, at, line, code == st.OK)
+                _put_derivatives(out, i, j, at, line, code == st.OK)
 
 
 @inline
 def _put_derivatives(
-    ds: Array | None, d2s: Array | None, d3s: Array | None, ddev: Array | None, d2dev: Array | None, i: int, j: int,
+    out: Outputs, i: int, j: int,
     at: Pose, line: Line, regular: bool,
 ) -> None:  # fmt: skip
     """Write the wanted derivatives up to the highest of them; p, q are psi', psi''."""
@@ -158,26 +156,22 @@ def _put_derivatives(
     p = two.divide(_dot(dx, dy, b1x, b1y), rise, per_rise)
     d1x = two.subtract(two.multiply(p, (-cy[0], -cy[1])), b1x)
     d1y = two.subtract(two.multiply(p, cx), b1y)
-    if ds is not None or ddev is not None:
+    if out.ds is not None or out.ddev is not None:
         along, across = _carried(b1x, b1y, d1x, d1y, line)
-        if ds is not None:
-            ds[i, j] = along[0] * line.unit
-        if ddev is not None:
-            ddev[i, j] = across[0] * line.unit
-    if d2s is not None or d3s is not None or d2dev is not None:
+        write(out.ds, i, j, along[0] * line.unit)
+        write(out.ddev, i, j, across[0] * line.unit)
+    if out.d2s is not None or out.d3s is not None or out.d2dev is not None:
         pp = two.multiply(p, p)
         rest = two.subtract(_dot(dx, dy, bx, by), two.multiply(pp, inward))
         q = two.divide(two.add(_dot(d1x, d1y, d1x, d1y), rest), rise, per_rise)
         q = (-q[0], -q[1])
         d2x = two.subtract(two.subtract(bx, two.multiply(q, cy)), two.multiply(pp, cx))
         d2y = two.add(two.subtract(by, two.multiply(pp, cy)), two.multiply(q, cx))
-        if d2s is not None or d2dev is not None:
+        if out.d2s is not None or out.d2dev is not None:
             along, across = _carried((-bx[0], -bx[1]), (-by[0], -by[1]), d2x, d2y, line)
-            if d2s is not None:
-                d2s[i, j] = along[0] * line.unit
-            if d2dev is not None:
-                d2dev[i, j] = across[0] * line.unit
-        if d3s is not None:
+            write(out.d2s, i, j, along[0] * line.unit)
+            write(out.d2dev, i, j, across[0] * line.unit)
+        if out.d3s is not None:
             pq = two.scale(two.multiply(p, q), 3.0)
             both = two.subtract(two.scale(_dot(d1x, d1y, d2x, d2y), 3.0), two.multiply(pq, inward))
             both = two.divide(both, rise, per_rise)
@@ -186,4 +180,4 @@ def _put_derivatives(
             d3x = two.subtract(two.subtract(b1x, two.multiply(turn, cy)), two.multiply(pq, cx))
             d3y = two.add(two.subtract(b1y, two.multiply(pq, cy)), two.multiply(turn, cx))
             along, _ = _carried((-b1x[0], -b1x[1]), (-b1y[0], -b1y[1]), d3x, d3y, line)
-            d3s[i, j] = along[0] * line.unit
+            write(out.d3s, i, j, along[0] * line.unit)

@@ -1,15 +1,15 @@
-"""The guided four-bar as the last stage of a fused chain (:mod:`kernels.series`)."""
+"""The guided four-bar as the last stage of a fused chain (:mod:`kernels.chains`)."""
 
 from __future__ import annotations
 
 import math
 from typing import Any, NamedTuple
 
-from kernels._jit import inline
-from kernels.families.guide.closure import EPS, Array, Design, place, reduce_along
-from kernels.families.guide.derivatives import acceleration, jerk, snap, velocity
-from kernels.reduce import largest
-from kernels.series.form import STRIDE, Form, Travel
+from kernels.arithmetic.max_min import largest
+from kernels.chains.form import STRIDE, Form, Travel
+from kernels.families.guide.closure import Design, acceleration, jerk, place, reduce_along, snap, velocity
+from kernels.jit import inline
+from kernels.types import EPS, Array
 
 
 class Constants(NamedTuple):

@@ -7,5 +7,6 @@ from kernels.families.guided_cam.follower import follower as follower
 from kernels.families.guided_cam.follower import jam_angle as jam_angle
 from kernels.families.guided_cam.follower import jam_angles as jam_angles
 from kernels.families.guided_cam.motion import HARMONICS as HARMONICS
+from kernels.families.guided_cam.motion import Outputs as Outputs
+from kernels.families.guided_cam.motion import least_radius as least_radius
 from kernels.families.guided_cam.motion import poses as poses
-from kernels.families.guided_cam.size import least_radius as least_radius

@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.complex_step import arctan2
-from kernels.verdict import pose_status
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
-EPS = 2.0**-53
+from kernels.arithmetic.complex_step import arctan2
+from kernels.jit import inline, kernel
+from kernels.linkage.verdict import pose_status
+from kernels.types import EPS, Array, Status
 
 
 @inline

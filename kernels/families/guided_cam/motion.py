@@ -1,4 +1,4 @@
-"""Thread law, follower and cam profile at given cam angles.
+"""Thread law, follower and cam profile at given cam angles, and the least radius at which nothing jams.
 
 The cam is made for the thread: P(phi) is given as a Fourier series, the follower's displacement follows from it.
 """
@@ -9,15 +9,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.complex_step import arctan2, magnitude
-from kernels.families.guided_cam.follower import displacement, follow, reaches
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.arithmetic.complex_step import arctan2, magnitude
+from kernels.families.guided_cam.follower import displacement, follow, jam_angle, reaches
+from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write
+from kernels.types import Array, Status
 
 # Harmonics of P(phi); columns of the design matrix: P_h, X1, Z1, e, R0, mu1, mu2, A1 ... A6, B1 ... B6.
 HARMONICS = 6
@@ -97,21 +95,27 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     )  # fmt: skip
 
 
+class Outputs(NamedTuple):
+    """Pose outputs, each (n, m), or None: what is None is not computed."""
+
+    P: Array | None
+    dP: Array | None
+    d2P: Array | None
+    L: Array | None
+    S: Array | None
+    dS: Array | None
+    d2S: Array | None
+    pressure_angle: Array | None
+    curvature: Array | None
+
+
 @kernel
 def poses(
     designs: Array,
     cos_phi: Array,
     sin_phi: Array,
     status: Status,
-    P: Array | None,
-    dP: Array | None,
-    d2P: Array | None,
-    L: Array | None,
-    S: Array | None,
-    dS: Array | None,
-    d2S: Array | None,
-    pressure_angle: Array | None,
-    curvature: Array | None,
+    out: Outputs,
     profile: Array | None,
 ) -> None:
     """Compute the thread law, follower and profile of the cam; (9) to (17) of docs/takeup.md.
@@ -133,7 +137,7 @@ def poses(
         r = reduce_design(designs, i)
         row = i if cos_phi.shape[0] > 1 else 0
         # the radius is counted from the least displacement, so these need the thread to reach all over the turn
-        whole = pressure_angle is not None or curvature is not None or profile is not None
+        whole = out.pressure_angle is not None or out.curvature is not None or profile is not None
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
             value, first, second = law(designs, i, u, v)
@@ -146,29 +150,92 @@ def poses(
             status[i, j] = code
             good = 1.0 if code == st.OK else math.nan
             given = math.nan if code == st.INVALID_INPUT else 1.0
-            if P is not None:
-                P[i, j] = given * value * r.unit
-            if dP is not None:
-                dP[i, j] = given * first * r.unit
-            if d2P is not None:
-                d2P[i, j] = given * second * r.unit
-            if L is not None:
-                L[i, j] = given * thread * r.unit
+            write(out.P, i, j, given * value * r.unit)
+            write(out.dP, i, j, given * first * r.unit)
+            write(out.d2P, i, j, given * second * r.unit)
+            write(out.L, i, j, given * thread * r.unit)
             s = np.sqrt(square) if code == st.OK else (0.0 if code == st.DEAD_POINT else math.nan) * square
             ds, d2s = follow(good * s, thread, first, second)
-            if S is not None:
-                S[i, j] = s * r.unit
-            if dS is not None:
-                dS[i, j] = ds * r.unit
-            if d2S is not None:
-                d2S[i, j] = d2s * r.unit
+            write(out.S, i, j, s * r.unit)
+            write(out.dS, i, j, ds * r.unit)
+            write(out.d2S, i, j, d2s * r.unit)
             if whole:
-                out = r.radius + (s - r.least)
-                if pressure_angle is not None:
-                    pressure_angle[i, j] = arctan2(magnitude(ds), out)
+                reach = r.radius + (s - r.least)
+                write(out.pressure_angle, i, j, arctan2(magnitude(ds), reach))
                 if profile is not None:
                     # The cam turns by phi against the follower: its profile is passed backwards.
-                    profile[0, i, j], profile[1, i, j] = out * u * r.unit, -out * v * r.unit
-                if curvature is not None:
-                    way = out * out + ds * ds
-                    curvature[i, j] = (way + ds * ds - out * d2s) / (way * np.sqrt(way)) / r.unit
+                    profile[0, i, j], profile[1, i, j] = reach * u * r.unit, -reach * v * r.unit
+                if out.curvature is not None:
+                    way = reach * reach + ds * ds
+                    write(out.curvature, i, j, (way + ds * ds - reach * d2s) / (way * np.sqrt(way)) / r.unit)
+
+
+ROOT_LOOKS = 512  # over the turn; where S is small its root has far shorter waves than the series P
+ROOT_STEPS = 60  # halvings of two looks' distance, which is 2^-5: the place is then as exact as float64 has it
+
+
+@kernel
+def least_radius(designs: Array, status: Status, radius: Array, place: Array, angle: Array, displaced: Array) -> None:
+    """Compute the least R0 for which the pressure angle nowhere exceeds the jamming angle; (16) of docs/takeup.md.
+
+    Parameters
+    ----------
+    designs : (n, 19), see :data:`kernels.families.guided_cam.motion.COLUMNS`; R0 is not used
+    status : (n,) out; NOT_ASSEMBLED where the thread does not reach all through the turn, JAMMED where the follower
+        jams at every pressure angle (mu1 mu2 >= 1), INVALID_INPUT
+    radius : (n,) out [length]; cam radius at the least displacement, not below 0
+    place : (n,) out [rad]; cam angle that asks for it, -pi to pi
+    angle : (n,) out [rad]; jamming angle;  displaced : (n,) out [length]; least displacement S over the turn
+    """
+    for i in range(designs.shape[0]):
+        r = reduce_design(designs, i)
+        limit = jam_angle(designs[i, 5], designs[i, 6])
+        code = st.OK if r.least > 0.0 else st.NOT_ASSEMBLED
+        # "not >" also catches a limit that is no number
+        if code == st.OK and not limit > 0.0:
+            code = st.JAMMED
+        if not r.valid:
+            code = st.INVALID_INPUT
+        status[i], angle[i], displaced[i] = code, limit, r.least * r.unit
+        radius[i], place[i] = math.nan, math.nan
+        if code == st.OK:
+            cotangent = 1.0 / math.tan(limit)
+            best, where = -math.inf, 0.0
+            # rise and return: the guide jams alike whichever way the follower is pressed aside
+            for sign in (1.0, -1.0):
+                value, at = _largest(designs, i, r, sign * cotangent)
+                if value > best:
+                    best, where = value, at
+            radius[i] = max(best + r.least, 0.0) * r.unit
+            # the bisection may have left the turn at its seam
+            place[i] = where - 2.0 * math.pi * np.rint(where / (2.0 * math.pi))
+
+
+@inline
+def _need(designs: Array, i: int, r: Reduced, cotangent: float, phi: float) -> tuple[float, float]:
+    """Evaluate S' cot - S, which is the radius needed at a cam angle but for a constant, and its derivative."""
+    value, first, second = law(designs, i, math.cos(phi), math.sin(phi))
+    thread = r.store + value / r.unit
+    s = math.sqrt(displacement(thread, r.across_z, r.across_x))
+    ds, d2s = follow(s, thread, first / r.unit, second / r.unit)
+    return ds * cotangent - s, d2s * cotangent - ds
+
+
+@inline
+def _largest(designs: Array, i: int, r: Reduced, cotangent: float) -> tuple[float, float]:
+    """Find the largest radius needed over the turn and its place: the best sample, then its slope's zero."""
+    best, where, step = -math.inf, 0.0, 2.0 * math.pi / ROOT_LOOKS
+    for j in range(ROOT_LOOKS):
+        value = _need(designs, i, r, cotangent, step * j)[0]
+        if value > best:
+            best, where = value, step * j
+    low, high = where - step, where + step
+    for _ in range(ROOT_STEPS):
+        middle = 0.5 * (low + high)
+        if _need(designs, i, r, cotangent, middle)[1] > 0.0:
+            low = middle
+        else:
+            high = middle
+    middle = 0.5 * (low + high)
+    # the larger of both: where two maxima share the bracket the bisection may have come to the lower one
+    return max(_need(designs, i, r, cotangent, middle)[0], best), middle

@@ -6,11 +6,12 @@ precision, ``margin`` decides rotatability and the largest pressure angle, ``lim
 """
 
 from kernels.families.rssp.closure import Design as Design
-from kernels.families.rssp.ellipse import pressure_ellipse as pressure_ellipse
-from kernels.families.rssp.joints import joints as joints
-from kernels.families.rssp.limits import limits as limits
+from kernels.families.rssp.margin import limits as limits
 from kernels.families.rssp.margin import margin as margin
+from kernels.families.rssp.motion import Outputs as Outputs
+from kernels.families.rssp.motion import joints as joints
 from kernels.families.rssp.motion import poses as poses
+from kernels.families.rssp.motion import pressure_ellipse as pressure_ellipse
 from kernels.families.rssp.precise import precise_poses as precise_poses
 from kernels.families.rssp.stage import FORM as FORM
 from kernels.families.rssp.stage import PLANAR_FORM as PLANAR_FORM

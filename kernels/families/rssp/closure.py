@@ -1,4 +1,4 @@
-"""One design of the spatial slider-crank brought to the constants of :mod:`kernels.slider_closure`.
+"""One design of the spatial slider-crank brought to the constants of :mod:`kernels.linkage.slider_closure`.
 
 Everything is computed in lengths divided by a power of two near the coupler length, so no scale of the drawing costs a
 bit.  Designs may be complex128 (exact gradients by the complex step); decisions look at the real part.
@@ -9,20 +9,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from kernels._jit import inline
-from kernels.slider_closure import EPS as EPS
-from kernels.slider_closure import Place as Place
-from kernels.slider_closure import Reduced as Reduced
-from kernels.slider_closure import derivatives as derivatives
-from kernels.slider_closure import place as place
-from kernels.slider_closure import reduce_scaled
-from kernels.slider_closure import tolerance as tolerance
-
-Array = NDArray[np.float64]
-Status = NDArray[np.uint8]
+from kernels.jit import inline
+from kernels.linkage.slider_closure import Place as Place
+from kernels.linkage.slider_closure import Reduced as Reduced
+from kernels.linkage.slider_closure import derivatives as derivatives
+from kernels.linkage.slider_closure import place as place
+from kernels.linkage.slider_closure import reduce_scaled
+from kernels.linkage.slider_closure import tolerance as tolerance
+from kernels.types import EPS as EPS
+from kernels.types import Array
 
 
 class Design(NamedTuple):

@@ -9,10 +9,13 @@ from __future__ import annotations
 import math
 
 from kernels import status as st
-from kernels import twofold as two
-from kernels._jit import kernel
-from kernels.families.rssp.closure import EPS, Array, Status, reduce_design
-from kernels.verdict import pose_status
+from kernels.arithmetic import double_double as two
+from kernels.families.rssp.closure import EPS, reduce_design
+from kernels.families.rssp.motion import Outputs
+from kernels.jit import kernel
+from kernels.linkage.outputs import write
+from kernels.linkage.verdict import pose_status
+from kernels.types import Array, Status
 
 BAND = 4.0 * EPS  # what rounding the given numbers does to Q: a dead point made in float64 is still one
 
@@ -23,12 +26,7 @@ def precise_poses(
     cos_phi: Array,
     sin_phi: Array,
     status: Status,
-    s: Array | None,
-    ds: Array | None,
-    d2s: Array | None,
-    d3s: Array | None,
-    discriminant: Array | None,
-    pressure_angle: Array | None,
+    out: Outputs,
     joints: Array | None,
 ) -> None:
     """Compute what :func:`kernels.families.rssp.motion.poses` does, correct to a few roundings,
@@ -57,32 +55,27 @@ def precise_poses(
             code = pose_status(r.valid, q[0], tolerance, None)
             status[i, j] = code
 
-            if discriminant is not None:
-                discriminant[i, j] = (q[0] * unit) * unit if r.valid else math.nan
+            write(out.discriminant, i, j, (q[0] * unit) * unit if r.valid else math.nan)
             root = two.root(q) if code == st.OK else (0.0, 0.0)
             assembled = code == st.OK or code == st.DEAD_POINT
             w = two.scale(root, r.branch)
             place = two.add(y, w)[0] * unit if assembled else math.nan
-            if s is not None:
-                s[i, j] = place
-            if pressure_angle is not None:
-                pressure_angle[i, j] = math.atan2(math.hypot(m[0], n[0]), root[0]) if assembled else math.nan
+            write(out.s, i, j, place)
+            write(out.pressure_angle, i, j, math.atan2(math.hypot(m[0], n[0]), root[0]) if assembled else math.nan)
             if joints is not None:
                 joints[0, i, j], joints[1, i, j], joints[2, i, j] = r.a * u[0] * unit, y[0] * unit, n[0] * unit
                 joints[3, i, j], joints[5, i, j] = (r.e * unit, 0.0) if assembled else (math.nan, math.nan)
                 joints[4, i, j] = place
-            if ds is not None or d2s is not None or d3s is not None:
+            if out.ds is not None or out.d2s is not None or out.d3s is not None:
                 per_w = 1.0 / w[0] if code == st.OK else math.nan
                 q1 = two.subtract(two.multiply(hu, y), two.multiply(ae, v))
                 w1 = two.divide(q1, w, per_w)
-                if ds is not None:
-                    ds[i, j] = two.add(hu, w1)[0] * unit
-                if d2s is not None or d3s is not None:
+                write(out.ds, i, j, two.add(hu, w1)[0] * unit)
+                if out.d2s is not None or out.d3s is not None:
                     q2 = two.subtract(two.multiply(hu, hu), two.add(two.multiply(hv, y), two.multiply(ae, u)))
                     w2 = two.divide(two.subtract(q2, two.multiply(w1, w1)), w, per_w)
-                    if d2s is not None:
-                        d2s[i, j] = two.subtract(w2, hv)[0] * unit
-                    if d3s is not None:
+                    write(out.d2s, i, j, two.subtract(w2, hv)[0] * unit)
+                    if out.d3s is not None:
                         q3 = two.add(two.multiply(hu, hv), two.multiply(w1, w2))
                         w3 = two.divide(two.add(q1, two.scale(q3, 3.0)), w, per_w)  # negative
-                        d3s[i, j] = -two.add(w3, hu)[0] * unit
+                        write(out.d3s, i, j, -two.add(w3, hu)[0] * unit)

@@ -1,4 +1,4 @@
-"""The spatial slider-crank as the last stage of a fused chain or by itself (:mod:`kernels.series`); the planar one too.
+"""The spatial slider-crank as the last stage of a fused chain or by itself (:mod:`kernels.chains`); the planar one too.
 
 The planar slider-crank is the spatial one with alpha = 0 and f = 0 whose crank angle is a quarter turn less.
 """
@@ -8,19 +8,20 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from kernels._jit import inline, kernel
-from kernels.bits import power_below
-from kernels.families.rssp.closure import EPS, Array, Status, place, reduce_design
+from kernels.arithmetic.bits import power_below
+from kernels.arithmetic.max_min import largest, smallest
+from kernels.chains.form import STRIDE, Form, Travel
+from kernels.curves.trigonometric_polynomials import far_minimum, point
+from kernels.families.rssp.closure import EPS, place, reduce_design
 from kernels.families.rssp.margin import least_q
-from kernels.reduce import largest, smallest
-from kernels.series.form import STRIDE, Form, Travel
-from kernels.slider_closure import Reduced, reduce_along, root_derivatives
-from kernels.trigpoly import far_minimum, point
-from kernels.verdict import turning_status
+from kernels.jit import inline, kernel
+from kernels.linkage.slider_closure import Reduced, reduce_along, root_derivatives
+from kernels.linkage.verdict import turning_status
+from kernels.types import Array, Status
 
 
 class Constants(NamedTuple):
-    """The numbers of :class:`kernels.slider_closure.Reduced`."""
+    """The numbers of :class:`kernels.linkage.slider_closure.Reduced`."""
 
     a: Any
     b: Any
@@ -40,7 +41,7 @@ class Constants(NamedTuple):
 @inline
 def _of(r: Reduced) -> Constants:
     unit = 8.0 * EPS
-    # kernels.slider_closure.tolerance where m and n have their full size
+    # kernels.linkage.slider_closure.tolerance where m and n have their full size
     doubt = (unit + unit * unit) * (r.m_size * r.m_size + r.n_size * r.n_size) if r.valid else math.nan
     return Constants(
         r.a, r.b, r.e, r.k0, r.ka, r.n0, r.na, r.m_size, r.n_size, r.branch, r.unit, 1.0 / (r.b * r.b), doubt
@@ -123,7 +124,7 @@ def _travel_blur(c: Constants, u: Any, v: Any, x1: Any, x2: Any, x3: Any) -> tup
     per_w = 1.0 / root
     w1, w2, w3 = root_derivatives(c, u, v, c.k0 + c.ka * v, c.branch * per_w)
     w1, w2, w3, lift = abs(w1), abs(w2), abs(w3), abs(c.ka)
-    # As kernels.slider_closure.tolerance: where f is long and Q small, Q has most of that.
+    # As kernels.linkage.slider_closure.tolerance: where f is long and Q small, Q has most of that.
     tolerance = 8.0 * EPS * (abs(m) * c.m_size + abs(n) * c.n_size) + 4.0 * EPS * abs(q)
     share = 0.5 * tolerance * per_w * per_w + 4.0 * EPS  # relative error of w, and of a sum times 1/w
     terms = 8.0 * EPS * (lift * (abs(c.k0) + 4.0 * lift) + c.a * abs(c.e))

@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from kernels._jit import inline
+from kernels.arithmetic.max_min import largest, smallest
+from kernels.curves.trigonometric_polynomials import approach, far_minimum, lowest_of_16, minimum, point, shortfall
 from kernels.families.rssr.closure import EPS, Array, closure_terms, reduce_scaled, unit_scale, within_unit_range
-from kernels.reduce import largest, smallest
-from kernels.trigpoly import approach, far_minimum, lowest_of_16, minimum, point, shortfall
+from kernels.jit import inline
 
 BLOCK = 64
 # From nearer than _NEAR one step of Newton's method reaches the minimum as well as float64 shows.  Farther are flat

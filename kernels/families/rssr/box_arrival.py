@@ -1,6 +1,6 @@
 """Rows that hold for designs whose acceleration reaches the target: the rocker is where it can be in time.
 
-Between its limits the rocker goes from rest to rest, so its angle stays in a tube (:mod:`kernels.proof.tube`).  Whether
+Between its limits the rocker goes from rest to rest, so its angle stays in a tube (:mod:`kernels.boxes.tube`).  Whether
 it does is told by the sign of F(phi, psi) on the tube's sides, without solving for psi: a polynomial, where psi'' is a
 quotient of roots.  So these rows decide boxes far larger than rows of psi'' do.
 
@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 
-from kernels._jit import inline, kernel
+from kernels.boxes.tape import run
+from kernels.boxes.tube import COSINES, HIGH, LOW, THETA
 from kernels.families.rssr import box_turn as bt
 from kernels.families.rssr.box_problem import (
     AHEAD,
@@ -26,9 +27,8 @@ from kernels.families.rssr.box_problem import (
     take,
 )
 from kernels.families.rssr.box_turn import Formulas
-from kernels.proof.tape import run
-from kernels.proof.taylor import Array
-from kernels.proof.tube import COSINES, HIGH, LOW, THETA
+from kernels.jit import inline, kernel
+from kernels.types import Array
 
 
 @kernel

@@ -6,8 +6,8 @@ place can still be told to hold no mechanism: rho1 = n1/det, X1 = nx/det, Y1 = n
 
 from __future__ import annotations
 
+from kernels.boxes.tape import Number, Tape
 from kernels.families.rssr import box_turn as bt
-from kernels.proof.tape import Number, Tape
 
 SWING, PHI0, PHI1, E, F, G, ALPHA = range(7)
 

@@ -17,8 +17,8 @@ No place of this locus is singular but phi0 = 180 degrees.
 
 from __future__ import annotations
 
+from kernels.boxes.tape import Tape
 from kernels.families.rssr import box_turn as bt
-from kernels.proof.tape import Tape
 
 SWING, PHI0, PHI1, PSI_EXT, C, F, ALPHA = range(7)
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from kernels._jit import inline, kernel
+from kernels.arithmetic.sincos import sincos
+from kernels.boxes.branching import Flags
+from kernels.boxes.tape import run
 from kernels.families.rssr import box_turn as bt
 from kernels.families.rssr.box_problem import ABOVE, BELOW, PRESSURE, Problem, Room, angle_inputs, middle, take
 from kernels.families.rssr.box_turn import Formulas
-from kernels.proof.branching import Flags
-from kernels.proof.tape import run
-from kernels.proof.taylor import Array
-from kernels.sincos import sincos
+from kernels.jit import inline, kernel
+from kernels.types import Array
 
 POSES = 48  # of the centre design, to find the peaks
 PEAKS, NECKS = 6, 3  # most rows of the objective and of the pressure angle

@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels._jit import inline, kernel
+from kernels.arithmetic.sincos import sincos
+from kernels.boxes.branching import MOST_ROWS, Flags, Indices
+from kernels.boxes.taylor import VALUE, constant, variable, width
 from kernels.families.rssr import box_turn as bt
 from kernels.families.rssr.box_turn import Formulas
-from kernels.proof.branching import MOST_ROWS, Flags, Indices
-from kernels.proof.taylor import VALUE, Array, constant, variable, width
-from kernels.sincos import sincos
+from kernels.jit import inline, kernel
+from kernels.types import Array
 
 # Kinds of rows: the acceptance tests, two per limited length, those of the turn, and those of a design that reaches the
 # target: psi is in the tube.  The last four hold for any crank length between its limits that is one of the locus.
@@ -30,7 +31,7 @@ class Problem(NamedTuple):
     cos2: float  # least cos^2 of the pressure angle; 0 without a limit: then only the links must reach
     limits: Array  # (2 k,) least and most of every limited length, the crank first; infinite without a limit
     target: float
-    tube: Array  # (2 m, 9) of kernels.proof.tube, for the target; may be empty
+    tube: Array  # (2 m, 9) of kernels.boxes.tube, for the target; may be empty
 
 
 class Room(NamedTuple):

@@ -10,15 +10,16 @@ from __future__ import annotations
 
 import math
 
-from kernels._jit import inline, kernel
+from kernels.boxes.branching import BOUND, EMPTY, OPEN, Flags, best_bound, halves, looseness, surely_negative
+from kernels.boxes.tape import run
+from kernels.boxes.taylor import VALUE, constant, least, sizes, up, variable
 from kernels.families.rssr import box_turn as bt
 from kernels.families.rssr.box_arrival import arrival_rows, free_crank_rows
 from kernels.families.rssr.box_peaks import peak_rows
 from kernels.families.rssr.box_problem import AHEAD, Problem, Room, acceptance_rows, inputs, limit_rows
 from kernels.families.rssr.box_turn import Formulas
-from kernels.proof.branching import BOUND, EMPTY, OPEN, Flags, best_bound, halves, looseness, surely_negative
-from kernels.proof.tape import run
-from kernels.proof.taylor import VALUE, Array, constant, least, sizes, up, variable
+from kernels.jit import inline, kernel
+from kernels.types import Array
 
 
 @inline

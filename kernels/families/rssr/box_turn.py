@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.proof.tape import Number, Operations, Tape
-from kernels.proof.taylor import Array
+from kernels.boxes.tape import Number, Operations, Tape
+from kernels.types import Array
 
 # Inputs after the seven coordinates: cosine and sine of the crank angle after the extended position, branch, least
 # cos^2 of the pressure angle, cosine and sine of a rocker angle after the extended position, a crank length that is a

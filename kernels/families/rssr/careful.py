@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 
-from kernels._jit import inline, kernel
+from kernels.arithmetic.max_min import largest
 from kernels.families.rssr.closure import EPS, closure_terms
 from kernels.families.rssr.derivatives import follower, order_pair
-from kernels.reduce import largest
+from kernels.jit import inline, kernel
+from kernels.types import TWO_PI
 
-_TURN = 2.0 * math.pi
-_WIDEST = _TURN / 24.0
+_WIDEST = TWO_PI / 24.0
 _ATTEMPTS = 8
 
 
@@ -61,8 +61,8 @@ def rounding(
 @inline
 def _gap(phi: float, centre: float) -> float:
     """Return the distance of two angles around the circle."""
-    d = abs(phi - centre) % _TURN
-    return min(d, _TURN - d)
+    d = abs(phi - centre) % TWO_PI
+    return min(d, TWO_PI - d)
 
 
 @kernel
@@ -96,7 +96,7 @@ def careful_maximum(
     fineness = 0.5
     for _ in range(_ATTEMPTS):
         best, place, error, reach, missed = 0.0, 0.0, 0.0, 0.0, False
-        phi, end = phi1, phi1 + _TURN
+        phi, end = phi1, phi1 + TWO_PI
         y, dy = _evaluate(order, e, y0, ca, k0, k1, k2, phi)
         while phi < end:
             # Distance of the nearer complex zero of Delta; its imaginary part keeps the step from vanishing.

@@ -8,17 +8,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels import cells as cells_of
-from kernels import covering
 from kernels import status as st
-from kernels._jit import kernel
-from kernels.abreast import LANES
-from kernels.certificate import CENTRE, DONE, MODE, REACH, STATE, begin, conclude, judge
-from kernels.enclosure import ORDER
+from kernels.arithmetic.sincos import sincos
+from kernels.certified import cells as cells_of
+from kernels.certified import covering
+from kernels.certified.certificate import CENTRE, DONE, MODE, REACH, STATE, begin, conclude, judge
+from kernels.certified.enclosure import ORDER
+from kernels.certified.lanes import LANES
 from kernels.families.rssr.closure import Array, Status, reduce_design
 from kernels.families.rssr.driven import ACROSS, ALONG, JETS, SHARES, STAGE, Stages, enclose_point, load
 from kernels.families.rssr.enclosure import SIZE, VELOCITY, enclose
-from kernels.sincos import sincos
+from kernels.jit import kernel
 
 
 @kernel

@@ -1,20 +1,20 @@
-"""One design of the spatial crank-rocker brought to the numbers of :mod:`kernels.crank_closure`."""
+"""One design of the spatial crank-rocker brought to the numbers of :mod:`kernels.linkage.crank_closure`."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from kernels._jit import inline
-from kernels.crank_closure import EPS as EPS
-from kernels.crank_closure import Array as Array
-from kernels.crank_closure import Numbers as Numbers
-from kernels.crank_closure import Reduced as Reduced
-from kernels.crank_closure import Status as Status
-from kernels.crank_closure import axial_terms as axial_terms
-from kernels.crank_closure import discriminant_tolerance as discriminant_tolerance
-from kernels.crank_closure import reduce_scaled as reduce_scaled
-from kernels.crank_closure import unit_scale as unit_scale
-from kernels.crank_closure import within_unit_range as within_unit_range
+from kernels.jit import inline
+from kernels.linkage.crank_closure import Reduced as Reduced
+from kernels.linkage.crank_closure import axial_terms as axial_terms
+from kernels.linkage.crank_closure import discriminant_tolerance as discriminant_tolerance
+from kernels.linkage.crank_closure import reduce_scaled as reduce_scaled
+from kernels.linkage.crank_closure import unit_scale as unit_scale
+from kernels.linkage.crank_closure import within_unit_range as within_unit_range
+from kernels.types import EPS as EPS
+from kernels.types import Array as Array
+from kernels.types import Numbers as Numbers
+from kernels.types import Status as Status
 
 
 class Design(NamedTuple):

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels._jit import kernel_fused
+from kernels.arithmetic.max_min import largest, smallest
 from kernels.families.rssr.closure import Array, reduce_design
 from kernels.families.rssr.derivatives import (
     acceleration_fused,
@@ -17,7 +17,7 @@ from kernels.families.rssr.derivatives import (
     rocker_fused,
     velocity_fused,
 )
-from kernels.reduce import largest, smallest
+from kernels.jit import kernel_fused
 
 Indices: TypeAlias = NDArray[np.int64]
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from kernels._jit import inline, inline_fused
+from kernels.arithmetic.max_min import largest
 from kernels.families.rssr.closure import Place, place
-from kernels.reduce import largest
+from kernels.jit import inline, inline_fused
 
 
 class Rocker(NamedTuple):

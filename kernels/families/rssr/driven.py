@@ -13,13 +13,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels._jit import inline_uncounted, kernel_uncounted
-from kernels.abreast import LANES, circle, inverse, root
-from kernels.cells import CENTRE, REACH
+from kernels.arithmetic.sincos import sincos
+from kernels.certified.cells import CENTRE, REACH
+from kernels.certified.jets import WIDTH, combined, double_harmonic, get, harmonic, product, put, size_of, sum_of
+from kernels.certified.lanes import LANES, circle, inverse, root
 from kernels.families.rssr.closure import Array, reduce_design
 from kernels.families.rssr.enclosure import spread
-from kernels.jets import EPS, WIDTH, combined, double_harmonic, get, harmonic, product, put, size_of, sum_of
-from kernels.sincos import sincos
+from kernels.jit import inline, kernel
+from kernels.types import EPS
 
 Stages = NDArray[np.float64]
 # Rows of the numbers of a design: of each stage those of its closure; then a, b and a', b' of what it hands on,
@@ -36,7 +37,7 @@ COS, SIN, X, Y, W, R, T, PER, ALONG, ACROSS = (k * WIDTH * LANES for k in range(
 JETS = 10 * WIDTH * LANES
 
 
-@inline_uncounted
+@inline
 def load(lane: int, numbers: Array, stages: Stages, couplings: Array, shares: Array, i: int) -> None:
     """Write the numbers of design i into its lane."""
     count = stages.shape[0]
@@ -58,7 +59,7 @@ def load(lane: int, numbers: Array, stages: Stages, couplings: Array, shares: Ar
     numbers[row + CONSTANT], numbers[row + CONSTANT_OFF] = shares[i, 6], shares[i, 7]
 
 
-@kernel_uncounted
+@kernel
 def _first(lanes: int, r: Array, walk: Array, jets: Array) -> None:
     """Enclose X, Y, W, R = X^2 + Y^2 and, in PER, the discriminant R - W^2 of the first stage."""
     for i in range(lanes):
@@ -72,7 +73,7 @@ def _first(lanes: int, r: Array, walk: Array, jets: Array) -> None:
         put(jets, PER + i, LANES, double_harmonic(z.d0, z.d1, z.d2, z.d3, z.d4, reach, z.e_delta))
 
 
-@kernel_uncounted
+@kernel
 def _driven(lanes: int, r: Array, jets: Array) -> None:
     """Enclose the same of a later stage from cosine and sine of its crank; the errors of the constants are of 4.2."""
     for i in range(lanes):
@@ -89,7 +90,7 @@ def _driven(lanes: int, r: Array, jets: Array) -> None:
         put(jets, PER + i, LANES, combined(0.0, 1.0, rr, -1.0, product(c, c), 0.0))
 
 
-@inline_uncounted
+@inline
 def _mixed(lanes: int, r: Array, a: int, b: int, jets: Array, out: int) -> None:
     """Enclose a cos psi + b sin psi of the rocker, (2*): (-a X + b Y) W/R + (-a Y - b X) T/R."""
     for i in range(lanes):
@@ -100,14 +101,14 @@ def _mixed(lanes: int, r: Array, a: int, b: int, jets: Array, out: int) -> None:
         put(jets, out + i, LANES, product(total, get(jets, PER + i, LANES)))
 
 
-@kernel_uncounted
+@kernel
 def _hand_on(lanes: int, r: Array, jets: Array) -> None:
     """Enclose cosine and sine of the next stage's crank."""
     _mixed(lanes, r, A1, B1, jets, COS)
     _mixed(lanes, r, A2, B2, jets, SIN)
 
 
-@kernel_uncounted
+@kernel
 def _point_along(lanes: int, r: Array, ends: Array, jets: Array) -> None:
     """Enclose the travel, without its constant: the rocker's part and the crank's p1 cos - p2 sin."""
     _mixed(lanes, r, A1, B1, jets, ALONG)
@@ -117,7 +118,7 @@ def _point_along(lanes: int, r: Array, ends: Array, jets: Array) -> None:
         put(jets, ALONG + i, LANES, sum_of(crank, get(jets, ALONG + i, LANES)))
 
 
-@kernel_uncounted
+@kernel
 def _point_across(lanes: int, r: Array, ends: Array, jets: Array) -> None:
     """Enclose the deviation: the rocker's part, the crank's p2 cos + p1 sin, and the constant."""
     _mixed(lanes, r, A2, B2, jets, ACROSS)
@@ -128,7 +129,7 @@ def _point_across(lanes: int, r: Array, ends: Array, jets: Array) -> None:
         put(jets, ACROSS + i, LANES, sum_of(crank, get(jets, ACROSS + i, LANES)))
 
 
-@kernel_uncounted
+@kernel
 def enclose_point(
     lanes: int, count: int, numbers: Array, jets: Array, walk: Array, along: bool, across: bool, good: Array
 ) -> None:
@@ -139,7 +140,7 @@ def enclose_point(
     lanes, count : lanes in use, number of stages, the last one planar
     numbers : of :func:`load`
     jets : (JETS,) out; ALONG is the travel along the line, without its constant, ACROSS the deviation from it
-    walk : (WALK,) of :mod:`kernels.cells`, with the CENTRE [rad] and REACH of each cell
+    walk : (WALK,) of :mod:`kernels.certified.cells`, with the CENTRE [rad] and REACH of each cell
     along, across : whether that jet is wanted
     good : (LANES,) out, 0 where the motion cannot be enclosed
     """

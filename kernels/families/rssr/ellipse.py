@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from kernels._jit import kernel
+from kernels.arithmetic.sincos import sincos
 from kernels.families.rssr.closure import Array, axial_terms
-from kernels.sincos import sincos
+from kernels.jit import kernel
 
 
 @kernel

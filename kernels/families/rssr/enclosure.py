@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from kernels._jit import inline, kernel
-from kernels.enclosure import EPS, GUARD, WIDTH, add, inverse, multiply, root, trigonometric
+from kernels.certified.enclosure import EPS, GUARD, WIDTH, add, inverse, multiply, root, trigonometric
 from kernels.families.rssr.closure import Array, Reduced, closure_terms
+from kernels.jit import inline, kernel
 
 VELOCITY, R, DELTA, B, T, PER_T, _PRODUCT = (k * WIDTH for k in range(7))
 PER_R = T  # which is needed for 1/T only

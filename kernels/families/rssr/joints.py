@@ -1,4 +1,4 @@
-"""Joint records of the spatial crank-rocker for the effects (:mod:`kernels.joints`)."""
+"""Joint records of the spatial crank-rocker for the effects (:mod:`kernels.linkage.joints`)."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from kernels._jit import kernel
 from kernels.families.rssr.closure import Array
+from kernels.jit import kernel
 
 
 @kernel
@@ -23,7 +23,7 @@ def joints(
     per_pose: Array,
     per_design: Array,
 ) -> None:
-    """Fill the records of :mod:`kernels.joints` from the motion.
+    """Fill the records of :mod:`kernels.linkage.joints` from the motion.
 
     Parameters
     ----------

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.bits import lowest_bit
+from kernels.arithmetic.bits import lowest_bit
+from kernels.curves.trigonometric_polynomials import minimum
 from kernels.families.rssr.block import (
     BLOCK,
     BRANCH,
@@ -37,11 +37,11 @@ from kernels.families.rssr.block import (
 )
 from kernels.families.rssr.closure import EPS, Array, Status, closure_terms
 from kernels.families.rssr.derivatives import follower
-from kernels.trigpoly import minimum
-from kernels.verdict import turning_status
+from kernels.jit import inline, kernel
+from kernels.linkage.verdict import turning_status
+from kernels.types import TWO_PI
 
 LIMIT_NAMES = ("psi_ext", "psi_fold", "phi_ext", "phi_fold", "swing", "phi0", "stroke_ratio")
-TURN = 2.0 * math.pi
 FEWEST, MOST = 32, 8192  # samples of the sign of eta
 Counts = NDArray[np.int64]
 # Of a root: its bracket, where it is so far, the length of the last step, the sign of eta's slope.
@@ -113,7 +113,7 @@ def _turning_points(at: Array, k: int, n: int, begin: Array) -> int:
     """Sample numbers after which psi' changes sign, into ``begin``; returns how many there are (at most 3 are told)."""
     found, first, before = 0, False, False
     for i in range(n + 1):
-        phi = (i % n) * (TURN / n)
+        phi = (i % n) * (TWO_PI / n)
         p, _, _, _ = follower(
             at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], math.cos(phi), math.sin(phi)
         )
@@ -157,8 +157,8 @@ def _unmark(marks: float, begin: Array) -> int:
 @inline
 def _wrapped(angle: float) -> float:
     """Return the angle of an arctangent in [0, 2 pi)."""
-    turned = angle + TURN if angle < 0.0 else 0.0 + angle
-    return turned if turned < TURN else 0.0
+    turned = angle + TWO_PI if angle < 0.0 else 0.0 + angle
+    return turned if turned < TWO_PI else 0.0
 
 
 @inline
@@ -173,14 +173,14 @@ def _swing(at: Array, k: int, s1: float, c1: float, s2: float, c2: float, rho: f
     """
     difference = math.atan2(s2 * c1 - c2 * s1, c1 * c2 + s1 * s2)
     if abs(difference) > _TINY_SWING:
-        return (difference if difference < 0.0 else difference - TURN), 1.0, 0.0
+        return (difference if difference < 0.0 else difference - TWO_PI), 1.0, 0.0
     e, y0, rocker = at[k + E], at[k + Y0], at[k + ROCKER]
     sm, cm = s1 + s2, c1 + c2
     length = math.hypot(sm, cm)
     sm, cm = sm / length, cm / length
     lever = e * sm + y0 * cm
     half = math.asin(max(min(rho / (2.0 * rocker * lever), 0.5), -0.5))
-    swing = 2.0 * half if half < 0.0 else 2.0 * half - TURN
+    swing = 2.0 * half if half < 0.0 else 2.0 * half - TWO_PI
     turned = abs((e * cm - y0 * sm) / lever) + rocker / rho
     terms = (abs(e * sm) + abs(y0 * cm)) / abs(lever) + (abs(e) + rocker * (1.0 + abs(at[k + K1]))) / rho
     return swing, abs(2.0 * half) * turned, abs(swing) * 16.0 * EPS * (1.0 + terms)
@@ -207,7 +207,7 @@ def limits(designs: Array, status: Status, out: Array, error: Array | None) -> N
     who, active, roots = np.empty(BLOCK, np.int64), np.empty(2 * BLOCK, np.int64), np.empty(_ROOT_ROWS * 2 * BLOCK)
     cos, sin = np.empty(FEWEST), np.empty(FEWEST)
     for i in range(FEWEST):
-        cos[i], sin[i] = math.cos(i * (TURN / FEWEST)), math.sin(i * (TURN / FEWEST))
+        cos[i], sin[i] = math.cos(i * (TWO_PI / FEWEST)), math.sin(i * (TWO_PI / FEWEST))
     for start in range(0, designs.shape[0], BLOCK):
         count = min(BLOCK, designs.shape[0] - start)
         load_block(designs, start, count, at)
@@ -233,8 +233,8 @@ def limits(designs: Array, status: Status, out: Array, error: Array | None) -> N
             if found != 2:
                 status[i] = st.NOT_CONVERGED
                 continue
-            _list_root(begin[0], TURN / n, roots, 2 * k)
-            _list_root(begin[1], TURN / n, roots, 2 * k + 1)
+            _list_root(begin[0], TWO_PI / n, roots, 2 * k)
+            _list_root(begin[1], TWO_PI / n, roots, 2 * k + 1)
             who[listed] = k
             listed += 1
         for j in range(listed):
@@ -279,5 +279,5 @@ def _fill(at: Array, k: int, phi1: float, phi2: float, out: Array, error: Array 
         both = error[0] + error[1]
         error[4] = min(both, both * growth + own)
         error[5] = error[2] + error[3]
-        error[6] = error[5] * TURN / ((math.pi - beyond) * (math.pi - beyond))
+        error[6] = error[5] * TWO_PI / ((math.pi - beyond) * (math.pi - beyond))
     return True

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from kernels import status as st
-from kernels._jit import inline, kernel
+from kernels.arithmetic.max_min import largest, smallest
 from kernels.families.rssr.block import (
     BLOCK,
     COS,
@@ -29,8 +29,8 @@ from kernels.families.rssr.block import (
     new_block,
 )
 from kernels.families.rssr.closure import EPS, Array, Status
-from kernels.reduce import largest, smallest
-from kernels.verdict import turning_status
+from kernels.jit import inline, kernel
+from kernels.linkage.verdict import turning_status
 
 
 @inline

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels._jit import inline, kernel
+from kernels.curves.trigonometric_polynomials import far_minimum, point
 from kernels.families.rssr.block import (
     ACROSS,
     BLOCK,
@@ -50,7 +50,6 @@ from kernels.families.rssr.peaks import (
     REACH,
     ROUNDING,
     START,
-    TURN,
     begin_at_vertex,
     finish,
     new_list,
@@ -68,8 +67,9 @@ from kernels.families.rssr.sampling import (
     sample,
     sample_block,
 )
-from kernels.trigpoly import far_minimum, point
-from kernels.verdict import turning_status
+from kernels.jit import inline, kernel
+from kernels.linkage.verdict import turning_status
+from kernels.types import TWO_PI as TURN
 
 Counts = NDArray[np.int64]
 _NONE = (math.nan, math.nan, math.nan, math.nan)

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.complex_step import arctan2, hypotenuse
+from kernels.arithmetic.complex_step import arctan2, hypotenuse
 from kernels.families.rssr.closure import Numbers, Place, Reduced, Status, discriminant_tolerance, place, reduce_design
 from kernels.families.rssr.derivatives import Rocker, acceleration, jerk, velocity
-from kernels.verdict import pose_status
+from kernels.jit import inline, kernel
+from kernels.linkage.verdict import pose_status
 
 
 class Joints(NamedTuple):

@@ -9,15 +9,15 @@ import math
 
 import numpy as np
 
-from kernels._jit import inline, kernel
+from kernels.arithmetic.max_min import largest
+from kernels.curves.trigonometric_polynomials import rotate
 from kernels.families.rssr.block import BLOCK, CA, K0, K1, K2, W_SIZE, Y0, E
 from kernels.families.rssr.careful import rounding
 from kernels.families.rssr.closure import Array
 from kernels.families.rssr.derivatives import follower
-from kernels.reduce import largest
-from kernels.trigpoly import rotate
+from kernels.jit import inline, kernel
+from kernels.types import TWO_PI
 
-TURN = 2.0 * math.pi
 MOST_PEAKS = 8  # 16 samples cannot have more; a design with more goes to the careful search
 # Rows 960 bytes apart modulo 4096, so that they do not evict each other from the cache.
 CAPACITY = BLOCK * MOST_PEAKS + 120
@@ -45,7 +45,7 @@ def append(
     at: Array, k: int, u: float, v: float, left: float, peak: float, right: float, n: int, sample: int, m: Array, i: int
 ) -> None:
     """Put a local maximum of design k of a block at place i: sample number ``sample`` of n and the two beside it."""
-    width = TURN / n
+    width = TWO_PI / n
     m[i + _U], m[i + _V], m[i + START], m[i + _WIDTH] = u, v, sample * width, width
     m[i + _LEFT], m[i + _PEAK], m[i + _RIGHT] = left, peak, right
     m[i + _E], m[i + _Y0], m[i + _CA] = at[k + E], at[k + Y0], at[k + CA]

@@ -2,7 +2,7 @@
 
 In plain arithmetic (:mod:`kernels.families.rssr.motion`) the discriminant of a short coupler, and the constant of a
 long one, are small differences of large numbers: their rounding exceeds what rounding the inputs once would do.  Here
-everything between the given numbers and the results is a pair of numbers (:mod:`kernels.twofold`).
+everything between the given numbers and the results is a pair of numbers (:mod:`kernels.arithmetic.double_double`).
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels import twofold as two
-from kernels._jit import inline, inline_once, kernel
+from kernels.arithmetic import double_double as two
+from kernels.arithmetic.double_double import Twofold
 from kernels.families.rssr.closure import EPS, Array, Status, reduce_scaled, unit_scale
 from kernels.families.rssr.motion import Joints, put
-from kernels.twofold import Twofold
-from kernels.verdict import pose_status
+from kernels.jit import inline, kernel
+from kernels.linkage.verdict import pose_status
 
 # Columns of the constants: high and low parts in units of the crank, mirrored to branch +1; then plain numbers.
 E, Y0, CA, K0, K1, K2, RHO, Z0, SA = range(0, 18, 2)
@@ -28,7 +28,7 @@ BAND = 4.0 * EPS  # what rounding the given numbers does to Delta: a dead point 
 _ROW = 64  # designs side by side; the constant stride lets the loop over them become vector code
 
 
-@inline_once
+@inline
 def _put(at: Array, column: int, k: int, x: Twofold) -> None:
     at[column * _ROW + k], at[(column + 1) * _ROW + k] = x
 
@@ -87,7 +87,7 @@ def precise_constants(designs: Array, out: Array) -> None:
                 out[start + k, column] = at[column * _ROW + k]
 
 
-@inline_once
+@inline
 def _get(constants: Array, row: int, i: int) -> Twofold:
     return constants[i, row], constants[i, row + 1]
 

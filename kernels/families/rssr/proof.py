@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels._jit import inline, kernel
+from kernels.boxes.branching import COMBINED, OPEN, TOO_SMALL, Flags, Indices, pop, push
 from kernels.families.rssr import box_turn as bt
 from kernels.families.rssr.box_peaks import POSES
 from kernels.families.rssr.box_problem import Problem, Room, room
 from kernels.families.rssr.box_rows import crank_known, judge, judge_any_crank
 from kernels.families.rssr.box_turn import Formulas
-from kernels.proof.branching import COMBINED, OPEN, TOO_SMALL, Flags, Indices, pop, push
-from kernels.proof.taylor import Array
+from kernels.jit import inline, kernel
+from kernels.types import Array
 
 NARROWEST = 1.0 / 64.0  # of the widest side
 

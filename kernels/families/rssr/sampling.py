@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels._jit import inline
-from kernels.bits import lowest_bit
+from kernels.arithmetic.bits import lowest_bit
+from kernels.arithmetic.max_min import largest
 from kernels.families.rssr.block import BLOCK, CA, K0, K1, K2, Y0, E
 from kernels.families.rssr.closure import Array
 from kernels.families.rssr.derivatives import follower
 from kernels.families.rssr.peaks import MOST_PEAKS, append
-from kernels.reduce import largest
+from kernels.jit import inline
 
 FEWEST, MOST = 16, 1024
 _FLOOR, MARKS = FEWEST + 2, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block

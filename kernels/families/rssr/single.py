@@ -12,10 +12,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels._jit import kernel_fused
+from kernels.arithmetic.max_min import largest
 from kernels.families.rssr.closure import Array, reduce_design
 from kernels.families.rssr.derivatives import acceleration_fused, place_fused, rocker_fused, velocity_fused
-from kernels.reduce import largest
+from kernels.jit import kernel_fused
 
 Singles: TypeAlias = NDArray[np.float32]
 

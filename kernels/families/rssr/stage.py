@@ -1,11 +1,12 @@
-"""The spatial crank-rocker as a stage of a fused chain, and the beginning of a chain (:mod:`kernels.series`)."""
+"""The spatial crank-rocker as a stage of a fused chain, and the beginning of a chain (:mod:`kernels.chains`)."""
 
 from __future__ import annotations
 
 import math
 from typing import Any, NamedTuple
 
-from kernels._jit import inline, kernel
+from kernels.arithmetic.max_min import largest
+from kernels.chains.form import STRIDE, Form, Travel, Turned
 from kernels.families.rssr.block import (
     ACROSS,
     BLOCK,
@@ -19,13 +20,12 @@ from kernels.families.rssr.block import (
 )
 from kernels.families.rssr.closure import EPS, Array, Design, Status, closure_terms, place, reduce_one
 from kernels.families.rssr.derivatives import acceleration, jerk, rocker, snap, velocity
-from kernels.reduce import largest
-from kernels.series.form import STRIDE, Form, Travel, Turned
-from kernels.verdict import turning_status
+from kernels.jit import inline, kernel
+from kernels.linkage.verdict import turning_status
 
 
 class Constants(NamedTuple):
-    """The numbers of the closure in units of the crank, see :class:`kernels.crank_closure.Reduced`."""
+    """The numbers of the closure in units of the crank, see :class:`kernels.linkage.crank_closure.Reduced`."""
 
     e: Any
     y0: Any

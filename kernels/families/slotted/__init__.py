@@ -5,6 +5,6 @@ crank angle between the limit positions.
 """
 
 from kernels.families.slotted.closure import Design as Design
-from kernels.families.slotted.motion import Slide as Slide
+from kernels.families.slotted.closure import crank_of_phi0 as crank_of_phi0
+from kernels.families.slotted.motion import Outputs as Outputs
 from kernels.families.slotted.motion import poses as poses
-from kernels.families.slotted.synthesis import crank_of_phi0 as crank_of_phi0

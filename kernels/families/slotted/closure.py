@@ -1,4 +1,6 @@
-"""One design of the slotted link brought to its smallest set of numbers; equation numbers are of docs/slotted.md.
+"""One design of the slotted link brought to its smallest set of numbers, and the crank for a wanted phi0.
+
+The equation numbers are of docs/slotted.md.
 
 Everything is computed in lengths divided by a power of two near the crank length, so no scale of the drawing costs a
 bit.  Designs may be complex128 (exact gradients by the complex step); decisions look at the real part.
@@ -7,16 +9,13 @@ bit.  Designs may be complex128 (exact gradients by the complex step); decisions
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kernels._jit import inline
-
-Numbers: TypeAlias = NDArray[Any]  # float64, or complex128 for exact gradients by the complex step
-Status: TypeAlias = NDArray[np.uint8]
-EPS = 2.0**-53
+from kernels import status as st
+from kernels.jit import inline, kernel
+from kernels.types import Numbers, Status
 
 
 class Design(NamedTuple):
@@ -70,3 +69,23 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     valid = valid and 0.0 <= k.real < 1e140 and abs(s.real) < 1e140 and abs(alpha.real) < 1e5
     valid = valid and tau * tau == 1.0 and branch * branch == 1.0 and unit < math.inf
     return Reduced(a, e, y0, ka, lift, z0, na, s, k, tau, branch, x_size, y_size, z_size, unit, valid)
+
+
+@kernel
+def crank_of_phi0(phi0: Numbers, e: Numbers, f: Numbers, alpha: Numbers, status: Status, a: Numbers) -> None:
+    """Compute the crank length a = cos(phi0/2) hypot(e, f tan(alpha)) of the fork slot with s = 0.
+
+    Parameters
+    ----------
+    phi0 : (n,) crank angle of the shorter stroke between the limit positions [rad], 0 < phi0 < pi
+    e, f : (n,) common perpendicular and offset of the crank plane [length];  alpha : (n,) [rad]
+    status : (n,) out; OK, or NOT_ADMISSIBLE where phi0 is outside (0, pi), the driven axis meets the crank's, or
+        cos(alpha) = 0 within rounding, where the projected crank circle is a segment
+    a : (n,) out [length]; nan where the status is not OK
+    """
+    for i in range(phi0.shape[0]):
+        tangent = math.tan(alpha[i])
+        reach = math.hypot(e[i], f[i] * tangent)
+        fine = 0.0 < phi0[i] < math.pi and 0.0 < reach < math.inf and abs(tangent) < 1e15
+        status[i] = st.OK if fine else st.NOT_ADMISSIBLE
+        a[i] = math.cos(0.5 * phi0[i]) * reach if fine else math.nan

@@ -1,4 +1,7 @@
-"""Motion of the slotted link at given crank angles: driven angle, ball along the slot, derivatives, pressure angle."""
+"""Motion of the slotted link at given crank angles, and its bodies for their loads.
+
+The bodies are crank, driven link, between them an arm or a block.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +11,26 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels._jit import inline, kernel
-from kernels.complex_step import arctan2, hypotenuse, magnitude
-from kernels.families.slotted.closure import EPS, Numbers, Reduced, Status, reduce_design
-from kernels.verdict import pose_status
-
-
-class Slide(NamedTuple):
-    """Place of the ball along the slot and its derivatives [length], each (n, m) out, or None: not computed."""
-
-    rho: Numbers | None
-    drho: Numbers | None
-    d2rho: Numbers | None
-    d3rho: Numbers | None
+from kernels.arithmetic.complex_step import arctan2, hypotenuse, magnitude
+from kernels.arithmetic.vectors import add, cross, dot, mix, scale, spun, sub
+from kernels.families.slotted.closure import Reduced, reduce_design
+from kernels.jit import inline, kernel
+from kernels.linkage.bodies import (
+    SLIDE,
+    Links,
+    Moving,
+    acceleration_at,
+    put,
+    put_ball,
+    put_body,
+    put_crank,
+    put_turning,
+    shaft,
+    velocity_at,
+)
+from kernels.linkage.outputs import write
+from kernels.linkage.verdict import pose_status
+from kernels.types import EPS, Array, Numbers, Status
 
 
 class Ball(NamedTuple):
@@ -65,21 +75,30 @@ def _closure(r: Reduced, u: Any, v: Any, is_bar: bool) -> Ball:
     return Ball(code, x, y, z, arm, q, rr, delta)
 
 
+class Outputs(NamedTuple):
+    """Pose outputs, each (n, m), or None: what is None is not computed."""
+
+    psi: Numbers | None
+    dpsi: Numbers | None
+    d2psi: Numbers | None
+    d3psi: Numbers | None
+    sin_psi: Numbers | None
+    cos_psi: Numbers | None
+    rho: Numbers | None
+    drho: Numbers | None
+    d2rho: Numbers | None
+    d3rho: Numbers | None
+    discriminant: Numbers | None
+    pressure_angle: Numbers | None
+
+
 @kernel
 def poses(
     designs: Numbers,
     cos_phi: Numbers,
     sin_phi: Numbers,
     status: Status,
-    psi: Numbers | None,
-    dpsi: Numbers | None,
-    d2psi: Numbers | None,
-    d3psi: Numbers | None,
-    sin_psi: Numbers | None,
-    cos_psi: Numbers | None,
-    slide: Slide,
-    discriminant: Numbers | None,
-    pressure_angle: Numbers | None,
+    out: Outputs,
     joints: Numbers | None,
 ) -> None:
     """Compute the angle of the driven link, place of the ball along the slot, and derivatives,
@@ -112,46 +131,31 @@ def poses(
             ball = _closure(r, u, v, is_bar)
             code = ball.code
             status[i, j] = code
-            if discriminant is not None:
-                discriminant[i, j] = _both_parts(r, ball, is_bar) if r.valid else math.nan
+            write(out.discriminant, i, j, _both_parts(r, ball, is_bar) if r.valid else math.nan)
             has_angle = code == st.OK or code == st.DEAD_POINT
             p = r.branch * np.sqrt(ball.delta) if code == st.OK else 0.0 * ball.delta
             per_rr = 1.0 / ball.rr if has_angle else math.nan
             c = (ball.x * p + ball.y * ball.q) * per_rr
             s = (ball.y * p - ball.x * ball.q) * per_rr + 0.0  # never -0.0, which would turn pi into -pi
-            if cos_psi is not None:
-                cos_psi[i, j] = c
-            if sin_psi is not None:
-                sin_psi[i, j] = s
-            if psi is not None:
-                psi[i, j] = arctan2(s, c)
-            if slide.rho is not None:
-                _put(slide.rho, i, j, p * r.unit if has_angle else math.nan)
-            if pressure_angle is not None:
-                pressure_angle[i, j] = _pressure_angle(r, ball, p, is_bar) if has_angle else math.nan
+            write(out.cos_psi, i, j, c)
+            write(out.sin_psi, i, j, s)
+            write(out.psi, i, j, arctan2(s, c))
+            write(out.rho, i, j, p * r.unit if has_angle else math.nan)
+            if out.pressure_angle is not None:  # LLVM does not drop a hypotenuse that nobody wants
+                write(out.pressure_angle, i, j, _pressure_angle(r, ball, p, is_bar) if has_angle else math.nan)
             if joints is not None:
                 _put_joints(joints, designs, i, j, r, ball, v, p, c, s, has_angle)
             if (
-                dpsi is not None or d2psi is not None or d3psi is not None
-                or slide.drho is not None or slide.d2rho is not None or slide.d3rho is not None
+                out.dpsi is not None or out.d2psi is not None or out.d3psi is not None
+                or out.drho is not None or out.d2rho is not None or out.d3rho is not None
             ):  # fmt: skip
                 w, w1, w2, p1, p2, p3 = _derivatives(r, ball, u, v, c, s, p, is_bar)
-                if dpsi is not None:
-                    dpsi[i, j] = w
-                if d2psi is not None:
-                    d2psi[i, j] = w1
-                if d3psi is not None:
-                    d3psi[i, j] = w2
-                _put(slide.drho, i, j, p1 * r.unit)
-                _put(slide.d2rho, i, j, p2 * r.unit)
-                _put(slide.d3rho, i, j, p3 * r.unit)
-
-
-@inline
-def _put(out: Numbers | None, i: int, j: int, value: Any) -> None:
-    """Write a value where it is wanted; through a function, since a field that is None cannot be written to."""
-    if out is not None:
-        out[i, j] = value
+                write(out.dpsi, i, j, w)
+                write(out.d2psi, i, j, w1)
+                write(out.d3psi, i, j, w2)
+                write(out.drho, i, j, p1 * r.unit)
+                write(out.d2rho, i, j, p2 * r.unit)
+                write(out.d3rho, i, j, p3 * r.unit)
 
 
 @inline
@@ -219,3 +223,70 @@ def _derivatives(
     w2 = -bend * per_p
     turning = 2.0 * w * across2 + w1 * across1 + w2 * q + 2.0 * w1 * q1 + w * q2
     return w, w1, w2, p1, p2, turning - along1 * (1.0 + w * w)
+
+
+@kernel
+def links(
+    designs: Array,
+    cos_phi: Array,
+    sin_phi: Array,
+    psi: Array,
+    dpsi: Array,
+    d2psi: Array,
+    rho: Array,
+    drho: Array,
+    d2rho: Array,
+    out: Links,
+) -> None:
+    """Fill the bodies, freedoms and closing lines of every pose; t, n and rho are those of docs/slotted.md.
+
+    The arm slides along the bar by rho and tilts about it.  In the fork slot (k = 0) a block takes its place, which
+    moves with the ball and slides along t and along the driven axis.  The loop is closed at the ball.
+
+    Parameters
+    ----------
+    designs : (n, 9);  cos_phi, sin_phi : (n, m) or (1, m)
+    psi, dpsi, d2psi, rho, drho, d2rho : (n, m), outputs of ``poses``
+    out : crank, driven link, arm or block; four freedoms, three lines: the ball, whose forces act on the arm
+    """
+    for i in range(designs.shape[0]):
+        d = designs[i]
+        u, e2 = shaft(d[4])
+        first, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+        centre, pivot = scale(d[2], u), (d[1], 0.0, d[3])
+        row = i if cos_phi.shape[0] > 1 else 0
+        for j in range(psi.shape[1]):
+            bodies, axes = out.bodies[i, j], out.axes[i, j]
+            crank = put_crank(bodies[0], axes[0], centre, u, first, e2, cos_phi[row, j], sin_phi[row, j])
+            ball = add(centre, scale(d[0], mix(cos_phi[row, j], first, sin_phi[row, j], e2)))
+            t = (math.cos(psi[i, j]), math.sin(psi[i, j]), 0.0)
+            n = cross(k, t)
+            driven = put_turning(bodies[1], pivot, k, t, dpsi[i, j], d2psi[i, j])
+            put(axes[1], k)
+            put(axes[2], t)
+            put_ball(out.lines[i, j], ball)
+            if d[6] == 0.0:
+                block = Moving(
+                    ball, velocity_at(crank, ball), acceleration_at(crank, ball), driven.omega, driven.eps
+                )  # fmt: skip
+                put_body(bodies[2], block, n, t, cross(n, t), ball)
+                put(axes[3], k)
+                out.freedoms[i, 3, 1] = SLIDE
+            else:
+                foot = add(pivot, mix(rho[i, j], t, d[5], n))
+                arm = sub(ball, foot)
+                # Seen from the driven link the foot slides and the arm tilts about the bar, t x arm per radian.
+                slid, swept = scale(drho[i, j], t), cross(t, arm)
+                v = add(velocity_at(driven, foot), slid)
+                a = add(acceleration_at(driven, foot), scale(d2rho[i, j], t))
+                a = add(a, scale(2.0, cross(driven.omega, slid)))
+                per = 1.0 / dot(swept, swept)
+                tilt = per * dot(swept, sub(sub(velocity_at(crank, ball), v), cross(driven.omega, arm)))
+                omega = mix(1.0, driven.omega, tilt, t)
+                # eps = psi'' k + tilt'' t + tilt' psi' k x t; tilt'' from the ball's acceleration
+                known = mix(1.0, driven.eps, tilt, cross(driven.omega, t))
+                left = sub(sub(acceleration_at(crank, ball), a), spun(omega, known, arm))
+                eps = mix(1.0, known, per * dot(swept, left), t)
+                x = scale(1.0 / d[6], arm)
+                put_body(bodies[2], Moving(foot, v, a, omega, eps), x, t, cross(x, t), foot)
+                put(axes[3], t)

@@ -169,7 +169,7 @@ def eyelet(table: Table) -> pd.DataFrame:
     status, judged = np.empty((n, 1), np.uint8), np.empty((n, 1), np.uint8)
     names = ("dL_dphi", "d2L_dphi2", "L", "wrap", *POINT)
     columns: dict[str, Array] = {name: np.empty((n, 1)) for name in names}
-    eyelet_kernels.poses(designs, cos, sin, status, None, *columns.values())
+    eyelet_kernels.poses(designs, cos, sin, status, eyelet_kernels.Outputs(None, *columns.values()))
     difference, weight = np.empty((n, 1)), np.empty((n, 1))
     eyelet_kernels.weighted_difference(designs, cos, sin, given["P"][:, None], difference, weight, judged)
     columns |= {"length_error": (given["P_h"] + given["P"])[:, None] - columns["L"], "dq": difference, "weight": weight}
@@ -244,7 +244,7 @@ def free_cam(table: Table) -> pd.DataFrame:
     status, judged = np.empty((n, 1), np.uint8), np.empty((n, 1), np.uint8)
     names = ("L", "wrap", "y_contact", "X", "Y", "contact", "n_minima")
     columns: dict[str, Array] = {name: np.empty((n, 1)) for name in names}
-    free_cam_kernels.poses(designs, cos, sin, status, None, None, None, *columns.values())
+    free_cam_kernels.poses(designs, cos, sin, status, free_cam_kernels.Outputs(None, None, None, *columns.values()))
     friction = side_by_side(given, ("tension_ratio", "mu_thread", "mu"))
     limits: dict[str, Array] = {name: np.empty((n, 1)) for name in ("y_limit_plus", "y_limit_minus")}
     free_cam_kernels.limit_points(designs, friction, cos, sin, judged, *limits.values())

@@ -13,7 +13,7 @@ from sweep.errors import MeasuredRangeWarning
 from sweep.evaluation.angles import in_radians
 from sweep.evaluation.tables import Parametrised, design_matrix
 from sweep.families.base import Array, Parameter
-from sweep.families.thread_inputs import Range
+from sweep.families.thread_balance import Range
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -6,16 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kernels.effects.capstan import capstan as capstan_kernel
-from kernels.effects.thread_contour import COLUMNS, contour_of_least_tension, thread_contour
-from kernels.effects.thread_speed import COLUMNS as SPEED_COLUMNS
-from kernels.effects.thread_speed import thread_speed
+from kernels.effects.thread import (
+    CONTOUR_COLUMNS,
+    SPEED_COLUMNS,
+    contour_of_least_tension,
+    thread_contour,
+    thread_speed,
+)
+from kernels.effects.thread import capstan as capstan_kernel
 from kernels.status import SINGULAR
 from sweep.errors import InputError
 from sweep.evaluation.tables import numbers
 from sweep.evaluation.thread.rows import Sheet, columns_of, frame, side_by_side, warn_outside
 from sweep.families.base import Parameter
-from sweep.families.thread_inputs import (
+from sweep.families.thread_balance import (
     ALPHA,
     BENDING,
     BETA,
@@ -85,7 +89,7 @@ def contour(table: Table) -> pd.DataFrame:
     warn_outside(given["R"], MEASURED_RADIUS, FITTED, table)
     n = len(given["R"])
     status, out = np.zeros((n, 1), np.uint8), [np.empty((n, 1)) for _ in range(5)]
-    data = side_by_side(given, COLUMNS)
+    data = side_by_side(given, CONTOUR_COLUMNS)
     thread_contour(given["T1"][:, None], given["theta_deg"][:, None], data, status, *out)
     names = ("T2", "capstan", "bending", "adhesion", "r_thread")
     units = {"gf": "T2 capstan bending adhesion", "mm": "r_thread"}
@@ -138,7 +142,7 @@ def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> 
     poses = max(start.size, angles.shape[1])
     tension = np.ascontiguousarray(np.broadcast_to(start, poses))[None]
     status = np.zeros((1, poses), np.uint8)
-    data = side_by_side(given, COLUMNS)
+    data = side_by_side(given, CONTOUR_COLUMNS)
     columns = {"T1": tension[0]}
     for k in range(count):
         behind, angle = np.empty((1, poses)), np.ascontiguousarray(np.broadcast_to(angles[k], (1, poses)))
@@ -173,7 +177,7 @@ def least_tension_radius(table: Table) -> pd.DataFrame:
     given = columns_of(_CONSTANTS, table)
     n = len(given["alpha"])
     given["R"], zero = np.zeros(n), np.zeros((n, 1))
-    data, radius = side_by_side(given, COLUMNS), np.empty(n)
+    data, radius = side_by_side(given, CONTOUR_COLUMNS), np.empty(n)
     contour_of_least_tension(data, radius)
     thread, status = np.empty((n, 1)), np.zeros((n, 1), np.uint8)
     thread_contour(zero, zero, data, status, None, None, None, None, thread)

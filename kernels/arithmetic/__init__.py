@@ -1,0 +1,1 @@
+"""Arithmetic that numba and its libraries do not have, or not as vector code."""

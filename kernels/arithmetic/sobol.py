@@ -1,0 +1,69 @@
+"""Points of a Sobol sequence by number, from tables of exclusive ors; the tables are made by `sweep.study.sobol`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.arithmetic.max_min import largest, smallest
+from kernels.jit import kernel
+from kernels.types import Array
+
+Integers = NDArray[np.int64]
+
+BITS = 52  # of a point; its integer is exact in float64
+TABLE_BITS = 10  # binary digits of the number of a point that one table stands for
+RUN = 2**TABLE_BITS
+
+
+@kernel
+def sobol_points(
+    start: int,
+    stop: int,
+    first_runs: Integers,
+    tables: Integers,
+    shift: Integers,
+    centre: float,
+    which: Integers,
+    low: Array,
+    high: Array,
+    columns: Integers,
+    out: Array,
+) -> None:
+    """Compute the points start, ..., stop - 1 in some dimensions, stretched from (0, 1) to between two ends.
+
+    Numbers that differ in the lowest digits alone make a run.  Their Gray codes are those of the first run, or of the
+    second, with other high digits; so one exclusive or per point is left.
+
+    Parameters
+    ----------
+    start, stop : numbers of the first point and of the one after the last
+    first_runs : (dimensions, 2, RUN) what the lowest digits of the Gray code make in an even and in an odd run
+    tables : (dimensions, parts, RUN) the same of each group of TABLE_BITS digits; that of the lowest is not used
+    shift : (dimensions,) digital shift
+    centre : added to the integer of a point before it is scaled to (0, 1)
+    which : (k,) dimensions wanted
+    low, high : (k,) ends of each, low <= high; a point at the share x of the way is low (1 - x) + high x, clipped
+    columns : (k,) where each stands in ``out``
+    out : (stop - start, P) out, these columns of it
+    """
+    scale = 2.0**-BITS
+    values = np.empty((which.size, RUN))
+    for run in range(start // RUN, (stop - 1) // RUN + 1):
+        first = run * RUN
+        begin, end = max(start - first, 0), min(stop - first, RUN)
+        for k in range(which.size):
+            dimension, a, b = which[k], low[k], high[k]
+            digits, upper = run ^ (run >> 1), shift[which[k]]
+            for part in range(1, tables.shape[1]):
+                upper ^= tables[dimension, part, digits & (RUN - 1)]
+                digits >>= TABLE_BITS
+            # Whole rows and whole runs: so the compiler sees that no index counts from the end, and makes vector code.
+            these, to = first_runs[dimension, run & 1], values[k]
+            for j in range(RUN):
+                share = (np.float64(these[j] ^ upper) + centre) * scale
+                to[j] = smallest(largest(a * (1.0 - share) + b * share, a), b)
+        for k in range(which.size):
+            column = columns[k]
+            for j in range(begin, end):
+                out[first + j - start, column] = values[k, j]

@@ -1,0 +1,195 @@
+"""Branch and bound over boxes of designs: what the rows of a box prove together, and which box is next.
+
+A row is a function of the design, enclosed over a box as a form (:mod:`kernels.boxes.taylor`).  Rows of the objective
+are at most the value t of a design; rows of limits are at least 0 in a feasible one.  With multipliers that are not
+negative, l_j for the first and m_i for the others,
+
+    t >= t sum l_j >= sum l_j a_j(x) - sum m_i b_i(x),   sum l_j <= 1                                                (1)
+
+for every feasible design of the box.  Without rows of the objective the right side can only be positive where there is
+no feasible design.  A family writes the loop around its own rows; the pieces are here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.boxes.program import IMPOSSIBLE, multipliers
+from kernels.boxes.taylor import LINEAR, ROUNDING, TINY, VALUE, least, up
+from kernels.jit import inline, kernel
+from kernels.types import Array
+
+Indices = NDArray[np.int64]
+Flags = NDArray[np.uint8]
+
+MOST_ROWS = 40
+COMBINED = 7  # rows that a proof combines at most: two more than the linear program may have variables
+# What became of a box: not decided, not decided and too small to be halved, no design below the target, none feasible.
+OPEN, TOO_SMALL, BOUND, EMPTY = range(4)
+
+
+@inline
+def halves(low: Array, high: Array, centre: Array, half: Array) -> None:
+    """Compute the centre of a box, rounded, and half widths that reach both ends from it."""
+    for k in range(centre.shape[0]):
+        centre[k] = 0.5 * (low[k] + high[k])
+        half[k] = max(up(high[k] - centre[k]), up(centre[k] - low[k]))
+
+
+@kernel
+def combined(rows: Array, factors: Array, count: int, n: int, total: Array) -> float:
+    """Return a number below sum factors_j row_j over the whole box, rounding included.
+
+    The sum is left in ``total``, one form.
+    """
+    last, size = total.shape[0] - 1, 0.0
+    total[:] = 0.0
+    for j in range(count):
+        factor = factors[j]
+        if factor != 0.0:
+            for k in range(last):
+                term = factor * rows[j, k]
+                total[k] += term
+                size += abs(term)
+            total[last] += abs(factor) * rows[j, last]
+    # the sum of at most MOST_ROWS terms errs by less than MOST_ROWS units of 2^-53 of their magnitudes
+    total[last] = total[last] * (1.0 + ROUNDING) + (size * ROUNDING + TINY)
+    return float(least(total, n))
+
+
+@kernel
+def _linear(rows: Array, count: int, objective: Flags, n: int, out: Array, sizes: Array) -> None:
+    """Compute rows as a linear program sees them: value and slopes, and all that is not linear at its worst."""
+    last = rows.shape[1] - 1
+    for j in range(count):
+        sign = -1.0 if objective[j] else 1.0
+        open_, size, place = rows[j, last], abs(rows[j, VALUE]), LINEAR + n
+        for k in range(n):
+            out[j, 1 + k] = rows[j, LINEAR + k]
+            size += abs(out[j, 1 + k])
+            open_ += max(sign * rows[j, place], 0.0)
+            for m in range(place + 1, place + n - k):
+                open_ += abs(rows[j, m])
+            place += n - k
+        out[j, 0] = rows[j, VALUE] + sign * open_
+        sizes[j] = 1.0 if objective[j] or size == 0.0 else 1.0 / size
+        for k in range(n + 1):
+            out[j, k] *= sizes[j]
+
+
+@kernel
+def best_bound(
+    rows: Array, count: int, objective: Flags, half: Array, work: Array, basis: Indices, linear: Array, sizes: Array,
+    factors: Array, total: Array,
+) -> tuple[float, bool]:  # fmt: skip
+    """Return the best bound (1) of a box, and whether it is one of limits alone:
+    then a positive one empties the box.
+
+    Parameters
+    ----------
+    rows : (m, width) forms, the first ``count`` of them used
+    objective : (m,) which rows are the objective's
+    half : (n,) ones: the variables of forms go from -1 to 1
+    work, basis, linear, sizes, total : scratch of (n + 5, n + 1), (n + 1,), (m, n + 1), (m,), (width,)
+    factors : (m,) out, l_j, and -m_i; zero beyond ``count``
+    """
+    n = half.shape[0]
+    _linear(rows, count, objective, n, linear, sizes)
+    scale = 0.0
+    for j in range(count):
+        if objective[j]:
+            scale = max(scale, abs(linear[j, 0]))
+    # The objective in the size of the limits, so that one notion of rounding serves both.
+    per_scale = 1.0 / scale if scale > 0.0 else 1.0
+    for j in range(count):
+        if objective[j]:
+            for k in range(n + 1):
+                linear[j, k] *= per_scale
+    outcome = multipliers(linear, count, objective, half, work, basis, factors)
+    weight = 0.0
+    for j in range(count):
+        if not objective[j]:
+            factors[j] *= -sizes[j] * (scale if outcome != IMPOSSIBLE and scale > 0.0 else 1.0)
+        elif outcome == IMPOSSIBLE:
+            factors[j] = 0.0
+        else:
+            weight += factors[j]
+    if weight > 1.0 - ROUNDING:  # the sum of the factors as they are stored must not be above 1
+        for j in range(count):
+            factors[j] /= weight * (1.0 + 2.0 * ROUNDING)
+    return combined(rows, factors, count, n, total), outcome == IMPOSSIBLE
+
+
+@kernel
+def looseness(rows: Array, factors: Array, count: int, n: int, total: Array, out: Array) -> None:
+    """Compute what each variable's width costs the bound, to decide which one to halve.
+
+    The cost is that of the combined linear and quadratic terms; what is left open goes to the variables by the size of
+    the rows' own linear terms.
+    """
+    combined(rows, factors, count, n, total)
+    own = 0.0
+    place = LINEAR + n
+    for k in range(n):
+        out[k] = 0.0
+    for k in range(n):
+        out[k] += abs(total[LINEAR + k]) + abs(total[place])
+        for m in range(k + 1, n):
+            mixed = 0.5 * abs(total[place + m - k])
+            out[k] += mixed
+            out[m] += mixed
+        place += n - k
+        for j in range(count):
+            own += abs(factors[j] * rows[j, LINEAR + k])
+    if own > 0.0:
+        for k in range(n):
+            for j in range(count):
+                out[k] += total[total.shape[0] - 1] * abs(factors[j] * rows[j, LINEAR + k]) / own
+
+
+@kernel
+def surely_negative(rows: Array, j: int, n: int, total: Array) -> bool:
+    """Return whether no design of the box has a value of the row that is not negative."""
+    for k in range(total.shape[0] - 1):
+        total[k] = -rows[j, k]
+    total[total.shape[0] - 1] = rows[j, total.shape[0] - 1]
+    return bool(least(total, n) > 0.0)
+
+
+@inline
+def _before(bounds: Array, depths: Indices, one: int, other: int) -> bool:
+    """Return whether a box comes before another: the one of lower bound, among equals the larger one."""
+    if bounds[one] != bounds[other]:
+        return bool(bounds[one] < bounds[other])
+    return bool(depths[one] < depths[other])
+
+
+@kernel
+def push(heap: Indices, count: int, bounds: Array, depths: Indices, box: int) -> None:
+    """Add a box to the ``count`` of a heap whose first has the least bound."""
+    place = count
+    while place > 0:
+        above = (place - 1) // 2
+        if not _before(bounds, depths, box, heap[above]):
+            break
+        heap[place] = heap[above]
+        place = above
+    heap[place] = box
+
+
+@kernel
+def pop(heap: Indices, count: int, bounds: Array, depths: Indices) -> int:
+    """Take the box of least bound from the ``count`` of a heap."""
+    first, last = heap[0], heap[count - 1]
+    place, size = 0, count - 1
+    while 2 * place + 1 < size:
+        below = 2 * place + 1
+        if below + 1 < size and _before(bounds, depths, heap[below + 1], heap[below]):
+            below += 1
+        if not _before(bounds, depths, heap[below], last):
+            break
+        heap[place] = heap[below]
+        place = below
+    heap[place] = last
+    return int(first)

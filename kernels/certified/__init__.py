@@ -1,0 +1,1 @@
+"""Proofs of peaks: polynomials with proven remainders, and the walk over cells that bounds a maximum."""

@@ -1,0 +1,248 @@
+"""The arithmetic of jets, number by number in registers: what :mod:`kernels.certified.enclosure` explains.
+
+The rules are written out for the ORDER of the polynomials and have no branch.  So a loop over designs whose jets lie
+side by side is vector code (:mod:`kernels.certified.lanes`), and the same rules serve one design alone.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kernels.jit import inline
+from kernels.types import EPS, Array
+
+ORDER = 6
+NORM, NOISE, TAIL, WIDTH = ORDER + 1, ORDER + 2, ORDER + 3, ORDER + 4
+GUARD = 1.0 + 2.0**-46  # no rule takes more than a hundred roundings to make a bound
+_LARGEST_LEFT = 0.5  # 1 would do, but remainders would be many times larger than with a slightly shorter reach
+_DOT = (ORDER + 5) * EPS  # rounding of a sum of up to ORDER + 1 products, divided or multiplied once more
+
+
+def _trigonometric_table() -> tuple[Array, Array, Array]:
+    """Tabulate the Taylor coefficients of 1, s, m, s m, m^2, s m^2, m^3 with s = sin z and m = 1 - cos z.
+
+    Returns the coefficients up to ORDER, then per function the sum of the magnitudes of all coefficients, and of those
+    beyond ORDER.
+    """
+    harmonics = (  # of sin z, sin 2z, sin 3z or of cos z, cos 2z, cos 3z; the constants of the even ones cancel
+        (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (1.0, -0.5, 0.0), (-2.0, 0.5, 0.0), (1.25, -1.0, 0.25), (-3.75, 1.5, -0.25),
+    )  # fmt: skip
+    table = np.zeros((7, 40))
+    table[0, 0] = 1.0
+    for i, (one, two, three) in enumerate(harmonics, start=1):
+        for k in range(1 if i % 2 else 2, 40, 2):
+            # Whole numbers, so exact: one + two 2^k + three 3^k.
+            total = int(4 * one) + int(4 * two) * 2**k + int(4 * three) * 3**k
+            table[i, k] = (-1) ** (k // 2) * total / (4 * math.factorial(k))
+    sizes = np.abs(table)
+    return table[:, : ORDER + 1].copy(), sizes.sum(axis=1) * GUARD, sizes[:, ORDER + 1 :].sum(axis=1) * GUARD
+
+
+TABLE, SIZE, REST = _trigonometric_table()
+
+
+class Jet(NamedTuple):
+    """A jet in registers: the ORDER + 1 coefficients of its polynomial, their size, noise and tail."""
+
+    p: Any
+    norm: Any
+    noise: Any
+    tail: Any
+
+
+@inline
+def get(at: Array, i: int, step: int) -> Jet:
+    """Read the jet whose numbers stand ``step`` apart from place i on."""
+    p = (at[i], at[i + step], at[i + 2 * step], at[i + 3 * step], at[i + 4 * step], at[i + 5 * step], at[i + 6 * step])
+    return Jet(p, at[i + NORM * step], at[i + NOISE * step], at[i + TAIL * step])
+
+
+@inline
+def put(at: Array, i: int, step: int, jet: Jet) -> None:
+    """Write a jet as `get` reads it."""
+    p0, p1, p2, p3, p4, p5, p6 = jet.p
+    at[i], at[i + step], at[i + 2 * step], at[i + 3 * step] = p0, p1, p2, p3
+    at[i + 4 * step], at[i + 5 * step], at[i + 6 * step] = p4, p5, p6
+    at[i + NORM * step], at[i + NOISE * step], at[i + TAIL * step] = jet.norm, jet.noise, jet.tail
+
+
+@inline
+def norm_of(p: Any) -> Any:
+    """Bound the size of a polynomial, which all bounds are made of."""
+    p0, p1, p2, p3, p4, p5, p6 = p
+    return (abs(p0) + abs(p1) + abs(p2) + abs(p3) + abs(p4) + abs(p5) + abs(p6)) * GUARD
+
+
+@inline
+def size_of(jet: Jet) -> Any:
+    """Bound the magnitude of a jet's function on its disc."""
+    return (jet.norm + jet.noise + jet.tail) * GUARD
+
+
+@inline
+def harmonic(c0: Any, c1: Any, c2: Any, reach: Any, error: Any) -> Jet:
+    """Enclose c0 + c1 s + c2 m, as :func:`trigonometric` does."""
+    r2 = reach * reach
+    r3, r4 = r2 * reach, r2 * r2
+    p = (
+        c0, reach * c1 * TABLE[1, 1], r2 * c2 * TABLE[2, 2], r3 * c1 * TABLE[1, 3], r4 * c2 * TABLE[2, 4],
+        r4 * reach * c1 * TABLE[1, 5], r4 * r2 * c2 * TABLE[2, 6],
+    )  # fmt: skip
+    whole = reach * abs(c1) * SIZE[1] + r2 * abs(c2) * SIZE[2]
+    rest = abs(c1) * REST[1] + abs(c2) * REST[2]
+    noise = (error + (ORDER + 8) * EPS * whole) * GUARD
+    return Jet(p, norm_of(p), noise, rest * (r4 * r3) * (1.0 + 2.0**-30))
+
+
+@inline
+def double_harmonic(c0: Any, c1: Any, c2: Any, c3: Any, c4: Any, reach: Any, error: Any) -> Jet:
+    """Enclose c0 + c1 s + c2 m + c3 s m + c4 m^2, as :func:`trigonometric` does."""
+    r2 = reach * reach
+    r3, r4 = r2 * reach, r2 * r2
+    p = (
+        c0, reach * c1 * TABLE[1, 1], r2 * c2 * TABLE[2, 2], r3 * (c1 * TABLE[1, 3] + c3 * TABLE[3, 3]),
+        r4 * (c2 * TABLE[2, 4] + c4 * TABLE[4, 4]), r4 * reach * (c1 * TABLE[1, 5] + c3 * TABLE[3, 5]),
+        r4 * r2 * (c2 * TABLE[2, 6] + c4 * TABLE[4, 6]),
+    )  # fmt: skip
+    odd = reach * (abs(c1) * SIZE[1] + r2 * abs(c3) * SIZE[3])
+    whole = odd + r2 * (abs(c2) * SIZE[2] + r2 * abs(c4) * SIZE[4])
+    rest = abs(c1) * REST[1] + abs(c2) * REST[2] + abs(c3) * REST[3] + abs(c4) * REST[4]
+    noise = (error + (ORDER + 8) * EPS * whole) * GUARD
+    return Jet(p, norm_of(p), noise, rest * (r4 * r3) * (1.0 + 2.0**-30))
+
+
+@inline
+def sum_of(a: Jet, b: Jet) -> Jet:
+    """Enclose the sum a + b."""
+    a0, a1, a2, a3, a4, a5, a6 = a.p
+    b0, b1, b2, b3, b4, b5, b6 = b.p
+    p = (a0 + b0, a1 + b1, a2 + b2, a3 + b3, a4 + b4, a5 + b5, a6 + b6)
+    noise = (a.noise + b.noise + EPS * (a.norm + b.norm)) * GUARD
+    return Jet(p, norm_of(p), noise, (a.tail + b.tail) * GUARD)
+
+
+@inline
+def combined(c: Any, p: Any, a: Jet, q: Any, b: Jet, error: Any) -> Jet:
+    """Enclose c + p a + q b; ``error`` bounds what the errors of c, p, q make of it."""
+    noise = abs(p) * a.noise + abs(q) * b.noise + error
+    noise += 3.0 * EPS * (abs(c) + abs(p) * a.norm + abs(q) * b.norm)
+    a0, a1, a2, a3, a4, a5, a6 = a.p
+    b0, b1, b2, b3, b4, b5, b6 = b.p
+    made = (
+        p * a0 + q * b0 + c, p * a1 + q * b1, p * a2 + q * b2, p * a3 + q * b3, p * a4 + q * b4, p * a5 + q * b5,
+        p * a6 + q * b6,
+    )  # fmt: skip
+    return Jet(made, norm_of(made), noise * GUARD, (abs(p) * a.tail + abs(q) * b.tail) * GUARD)
+
+
+@inline
+def beyond(a: Any, b: Any) -> Any:
+    """Bound the size of those terms of the product of two polynomials whose degree is beyond ORDER."""
+    _, a1, a2, a3, a4, a5, a6 = a
+    _, b1, b2, b3, b4, b5, b6 = b
+    s6 = abs(b6)
+    s5 = s6 + abs(b5)
+    s4 = s5 + abs(b4)
+    s3 = s4 + abs(b3)
+    s2 = s3 + abs(b2)
+    s1 = s2 + abs(b1)
+    total = abs(a1) * s6 + abs(a2) * s5 + abs(a3) * s4 + abs(a4) * s3 + abs(a5) * s2 + abs(a6) * s1
+    return total * GUARD
+
+
+@inline
+def product(a: Jet, b: Jet) -> Jet:
+    """Enclose the product a b."""
+    a0, a1, a2, a3, a4, a5, a6 = a.p
+    b0, b1, b2, b3, b4, b5, b6 = b.p
+    p = (
+        a0 * b0,
+        a0 * b1 + a1 * b0,
+        a0 * b2 + a1 * b1 + a2 * b0,
+        a0 * b3 + a1 * b2 + a2 * b1 + a3 * b0,
+        a0 * b4 + a1 * b3 + a2 * b2 + a3 * b1 + a4 * b0,
+        a0 * b5 + a1 * b4 + a2 * b3 + a3 * b2 + a4 * b1 + a5 * b0,
+        a0 * b6 + a1 * b5 + a2 * b4 + a3 * b3 + a4 * b2 + a5 * b1 + a6 * b0,
+    )
+    noise = (_DOT * a.norm * b.norm + a.norm * b.noise + a.noise * (b.norm + b.noise)) * GUARD
+    tail = (beyond(a.p, b.p) + a.tail * (b.norm + b.noise + b.tail) + b.tail * (a.norm + a.noise)) * GUARD
+    return Jet(p, norm_of(p), noise, tail)
+
+
+@inline
+def reciprocal(a: Jet) -> tuple[Jet, Any]:
+    """Enclose 1/a; the second result is false if that is impossible, as where a may have a zero on the disc.
+
+    The recurrence makes the product of both polynomials equal to 1 up to x^ORDER, but for the rounding of its sums.  So
+    d, the size of 1 - a out, is small.  Where d < 1, 1/a = out (1 + r), and the size of r is at most d/(1 - d).
+    """
+    a0, a1, a2, a3, a4, a5, a6 = a.p
+    f = 1.0 / a0
+    q1 = -(a1 * f) * f
+    q2 = -(a1 * q1 + a2 * f) * f
+    q3 = -(a1 * q2 + a2 * q1 + a3 * f) * f
+    q4 = -(a1 * q3 + a2 * q2 + a3 * q1 + a4 * f) * f
+    q5 = -(a1 * q4 + a2 * q3 + a3 * q2 + a4 * q1 + a5 * f) * f
+    q6 = -(a1 * q5 + a2 * q4 + a3 * q3 + a4 * q2 + a5 * q1 + a6 * f) * f
+    p = (f, q1, q2, q3, q4, q5, q6)
+    norm = norm_of(p)
+    noise = (_DOT * a.norm + a.noise) * norm
+    tail = beyond(a.p, p) + a.tail * norm
+    left = (noise + tail) * GUARD
+    scale = norm / (1.0 - left) * GUARD
+    return Jet(p, norm, noise * scale, tail * scale), left < _LARGEST_LEFT  # false for nan
+
+
+@inline
+def _root_polynomial(a: Jet) -> tuple[Any, Any, Any, Any]:
+    """Return the polynomial t of a root, its size, and bounds of noise and tail of a - t^2."""
+    a0, a1, a2, a3, a4, a5, a6 = a.p
+    f = math.sqrt(a0)
+    half = 0.5 / f
+    t1 = a1 * half
+    t2 = (a2 - t1 * t1) * half
+    t3 = (a3 - t1 * t2 - t2 * t1) * half
+    t4 = (a4 - t1 * t3 - t2 * t2 - t3 * t1) * half
+    t5 = (a5 - t1 * t4 - t2 * t3 - t3 * t2 - t4 * t1) * half
+    t6 = (a6 - t1 * t5 - t2 * t4 - t3 * t3 - t4 * t2 - t5 * t1) * half
+    p = (f, t1, t2, t3, t4, t5, t6)
+    norm = norm_of(p)
+    return p, norm, _DOT * (a.norm + 2.0 * norm * norm) + a.noise, beyond(p, p) + a.tail
+
+
+@inline
+def root_of(a: Jet) -> tuple[Jet, Jet, Any]:
+    """Enclose the positive square root of a and its inverse; the last result is false if that is impossible.
+
+    Let t be the polynomial of the root, so that a = t^2 (1 + q) with q = (a - t^2)/t^2.  If the size of q is small
+    enough, the power series of sqrt(1 + q) and of its inverse bound both remainders.  Where a is not positive the
+    numbers become nan, and no comparison with them is true.
+    """
+    p, norm, noise, tail = _root_polynomial(a)
+    per, good = reciprocal(Jet(p, norm, 0.0 * norm, 0.0 * norm))
+    bound = size_of(per)
+    q = (noise + tail) * bound * bound * GUARD
+    s = math.sqrt(1.0 - q)
+    by_root, by_inverse = bound / (1.0 + s) * GUARD, bound * bound * bound / (s * (1.0 + s)) * GUARD
+    inverse_of_root = Jet(
+        per.p, per.norm, (per.noise + noise * by_inverse) * GUARD, (per.tail + tail * by_inverse) * GUARD
+    )
+    return Jet(p, norm, noise * by_root, tail * by_root), inverse_of_root, good & (q < _LARGEST_LEFT)
+
+
+@inline
+def root_alone(a: Jet) -> tuple[Jet, Any]:
+    """Enclose the positive square root of a as :func:`root_of` does, where its inverse is not needed.
+
+    The size of 1/t, by which the remainders grow, is then bounded without its polynomial: of t = f - r it is at most
+    1/(f - size of r).  That widens remainders a little and was measured to cost no cell.
+    """
+    p, norm, noise, tail = _root_polynomial(a)
+    least = 2.0 * p[0] - norm
+    bound = GUARD / least
+    q = (noise + tail) * bound * bound * GUARD
+    by_root = bound / (1.0 + math.sqrt(1.0 - q)) * GUARD
+    return Jet(p, norm, noise * by_root, tail * by_root), (least > 0.0) & (q < _LARGEST_LEFT)

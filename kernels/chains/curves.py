@@ -1,0 +1,190 @@
+"""The curves over the crank angle whose extrema are searched: a derivative of what the last stage moves, or its margin.
+
+Of a chain that moves (x, y) a curve is a x + b y + c, or a derivative of it, with three numbers per design; so
+travel, deviation and the coordinates of a guided point in any frame are one kernel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from kernels.chains.chain import Chained
+from kernels.chains.form import Helper
+from kernels.chains.links import Input
+from kernels.curves.trigonometric_polynomials import rotate
+from kernels.jit import generated_inline, inline
+
+MARGIN = -1  # instead of an order: the squared cosine of the last stage's pressure angle
+JERK = 3  # the highest order
+AHEAD = 1e-5  # [rad] of the difference quotient for the fifth derivative, which only steers the iteration
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Closures of a curve; k are the constants of a design, (a, b, c) what it is made of, (u, v) cosine and sine.
+
+    Samples are taken in two loops, up to the last stage and from there on: half as long, two rounds of each are under
+    way in the processor at the same time, which hides that a root waits for a root.
+
+    Parameters
+    ----------
+    name : for the functions that are made of it
+    guarded : how many stages behind the first have a discriminant that the curve needs to be positive
+    ends : whether the last stage is one of them
+    samples : per distance of the nearest singularity, at least
+    drive : (k, u, v) -> `Input` of the last stage, discriminants of those before
+    jet : (k, a, b, c, u, v) -> the curve and its first two derivatives
+    sample : (k, a, b, c, input) -> the curve, and the discriminant of the last stage
+    hand, take : (rows, i, input) and (rows, i) -> input: what a sample needs of it, to and from place i of five rows
+    rounding : (k, a, b, u, v) -> estimate of its rounding error
+    """
+
+    name: str
+    guarded: int
+    ends: bool
+    samples: float
+    drive: Helper
+    jet: Helper
+    sample: Helper
+    hand: Helper
+    take: Helper
+    rounding: Helper
+
+
+def curve(chain: Chained, order: int, along: bool) -> Curve:
+    """Return the derivative of that order, 0 to 3, or the `MARGIN`; with ``along`` b is 0 for all designs."""
+    kind = "margin" if order == MARGIN else f"{'along' if along else 'order'}{order}"
+    name = f"{kind}_{chain.record.name}"
+    derivatives = (_position, _velocity, _acceleration, _jerk)
+    jet, sample, rounding = (
+        _margin(chain) if order == MARGIN else derivatives[order](chain, _along if along else _in_frame)
+    )
+    hand, take = _handing(max(order, 0))
+    jet, sample, hand, take, rounding = (
+        generated_inline(f"{f.__name__}_{name}", f) for f in (jet, sample, hand, take, rounding)
+    )
+    guarded, samples = chain.stages - (2 if order == MARGIN else 1), 18.0 if order == JERK else 12.0
+    return Curve(name, guarded, order != MARGIN, samples, chain.drive, jet, sample, hand, take, rounding)
+
+
+def _handing(order: int) -> tuple[Helper, Helper]:
+    """Return functions that put an `Input` with so many derivatives to rows, and get it, the others 0."""
+
+    def hand(rows: Any, i: int, t: Any) -> None:
+        rows[0][i], rows[1][i] = t.u, t.v
+        if order >= 1:
+            rows[2][i] = t.t1
+        if order >= 2:
+            rows[3][i] = t.t2
+        if order >= 3:
+            rows[4][i] = t.t3
+
+    def take(rows: Any, i: int) -> Any:
+        t1 = rows[2][i] if order >= 1 else 0.0
+        t2 = rows[3][i] if order >= 2 else 0.0
+        t3 = rows[4][i] if order >= 3 else 0.0
+        return Input(rows[0][i], rows[1][i], t1, t2, t3, 0.0)
+
+    return hand, take
+
+
+@inline
+def _in_frame(a: Any, b: Any, x: Any, y: Any) -> Any:
+    return a * x + b * y
+
+
+@inline
+def _along(a: Any, b: Any, x: Any, y: Any) -> Any:
+    return a * x  # then nothing of y is computed
+
+
+def _position(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
+    travel, land, blur = chain.travel, chain.land, chain.blur
+
+    def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
+        m, _ = travel(k, u, v)
+        return made(a, b, m.x0, m.y0) + c, made(a, b, m.x1, m.y1), made(a, b, m.x2, m.y2)
+
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        m = land(k, t)
+        return made(a, b, m.x0, m.y0) + c, m.delta
+
+    def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
+        e0, _, _, _, f0, _, _, _, _ = blur(k, u, v)
+        return abs(a) * e0 + abs(b) * f0
+
+    return jet, sample, rounding
+
+
+def _velocity(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
+    travel, land, blur = chain.travel, chain.land, chain.blur
+
+    def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
+        m, _ = travel(k, u, v)
+        return made(a, b, m.x1, m.y1), made(a, b, m.x2, m.y2), made(a, b, m.x3, m.y3)
+
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        m = land(k, t)
+        return made(a, b, m.x1, m.y1), m.delta
+
+    def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
+        _, e1, _, _, _, f1, _, _, _ = blur(k, u, v)
+        return abs(a) * e1 + abs(b) * f1
+
+    return jet, sample, rounding
+
+
+def _acceleration(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
+    travel, land, blur = chain.travel, chain.land, chain.blur
+
+    def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
+        m, _ = travel(k, u, v)
+        return made(a, b, m.x2, m.y2), made(a, b, m.x3, m.y3), made(a, b, m.x4, m.y4)
+
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        m = land(k, t)
+        return made(a, b, m.x2, m.y2), m.delta
+
+    def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
+        _, _, e2, _, _, _, f2, _, _ = blur(k, u, v)
+        return abs(a) * e2 + abs(b) * f2
+
+    return jet, sample, rounding
+
+
+def _jerk(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
+    travel, land, blur = chain.travel, chain.land, chain.blur
+
+    def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
+        m, _ = travel(k, u, v)
+        n, _ = travel(k, *rotate(u, v, AHEAD))
+        slope = made(a, b, m.x4, m.y4)
+        return made(a, b, m.x3, m.y3), slope, (made(a, b, n.x4, n.y4) - slope) / AHEAD
+
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        m = land(k, t)
+        return made(a, b, m.x3, m.y3), m.delta
+
+    def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
+        _, _, _, e3, _, _, _, f3, _ = blur(k, u, v)
+        return abs(a) * e3 + abs(b) * f3
+
+    return jet, sample, rounding
+
+
+def _margin(chain: Chained) -> tuple[Helper, Helper, Helper]:
+    drive, dip, blur = chain.drive, chain.dip, chain.blur
+
+    def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
+        t, _ = drive(k, u, v)
+        return dip(k, t)
+
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        y, _, _ = dip(k, t)
+        return y, y
+
+    def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
+        return blur(k, u, v)[8]
+
+    return jet, sample, rounding

@@ -1,0 +1,180 @@
+"""The first look at a block of designs: 32 samples of each, all designs side by side.
+
+It is for designs whose first stage is resolved by so few.  For most of them it is enough, and then nothing of it
+costs a loop over the samples of one design: neither the nearest zero of a later discriminant, nor the local maxima,
+which come as bits of one number.  What needs more samples :mod:`kernels.chains.look` takes by itself.
+"""
+
+from __future__ import annotations
+
+from kernels.arithmetic.max_min import largest, smallest
+from kernels.chains.curves import Curve
+from kernels.chains.form import BLOCK, Helper
+from kernels.chains.halves import TOGETHER, handed_rows, keepers
+from kernels.chains.look import FEWEST, FLAT, ROUGH, SHARE, fourth_difference, zero_beside
+from kernels.chains.peaks import CONSTANTS, A, B, C
+from kernels.jit import generated_inline, inline
+from kernels.types import TWO_PI as TURN
+from kernels.types import Array
+
+# Rows of BLOCK numbers: what the samples say, then the least of each later discriminant.
+SCALE_AT, ROUGHNESS, MARKS, CLOSE, _MOST, _LEAST, _FLOOR = (k * BLOCK for k in range(7))
+LOW = 7 * BLOCK
+RESOLVED, UNRESOLVED, FLAT_CURVE = 0.0, 1.0, 2.0  # what ROUGHNESS says
+ANGLES = TOGETHER // BLOCK  # crank angles together
+AT_ONCE = 4  # samples: so a row is fetched less often
+SAMPLES = (FEWEST + 4) * BLOCK  # closed periodically by two rows on either side
+DIPS = (FEWEST + 2) * BLOCK  # by one row, per later stage
+
+
+@inline
+def _row(rows: Array, i: int) -> Array:
+    """Return one row; an index into it is seen not to be negative, one that is a sum would be written to one by one."""
+    return rows[i * BLOCK : (i + 1) * BLOCK]
+
+
+@inline
+def _close(count: int, rows: Array, first: int, beyond: int) -> None:
+    """Copy rows at the ends, so that ``beyond`` rows on either side of the samples close them periodically."""
+    for k in range(beyond):
+        before, last = _row(rows, first + k), _row(rows, first + FEWEST + k)
+        after, begin = _row(rows, first + FEWEST + beyond + k), _row(rows, first + beyond + k)
+        for i in range(count):
+            before[i] = last[i]
+        for i in range(count):
+            after[i] = begin[i]
+
+
+@inline
+def _spread(count: int, values: Array, said: Array, mode: int) -> None:
+    """Write what counts as the size of each curve, and whether the samples resolve it."""
+    fourth, most, least = _row(said, ROUGHNESS // BLOCK), _row(said, _MOST // BLOCK), _row(said, _LEAST // BLOCK)
+    scale, floor = _row(said, SCALE_AT // BLOCK), _row(said, _FLOOR // BLOCK)
+    for i in range(count):
+        fourth[i], most[i], least[i] = 0.0, -1e300, 1e300
+    for j in range(0, FEWEST, AT_ONCE):
+        at0, at1, at2, at3 = _row(values, j), _row(values, j + 1), _row(values, j + 2), _row(values, j + 3)
+        at4, at5, at6, at7 = _row(values, j + 4), _row(values, j + 5), _row(values, j + 6), _row(values, j + 7)
+        for i in range(count):
+            y0, y1, y2, y3, y4, y5, y6, y7 = at0[i], at1[i], at2[i], at3[i], at4[i], at5[i], at6[i], at7[i]
+            even = largest(fourth_difference(y0, y1, y2, y3, y4), fourth_difference(y1, y2, y3, y4, y5))
+            odd = largest(fourth_difference(y2, y3, y4, y5, y6), fourth_difference(y3, y4, y5, y6, y7))
+            fourth[i] = largest(fourth[i], largest(even, odd))
+            most[i] = largest(most[i], largest(largest(y2, y3), largest(y4, y5)))
+            least[i] = smallest(least[i], smallest(smallest(y2, y3), smallest(y4, y5)))
+    for i in range(count):
+        size, varies = max(most[i], -least[i]), most[i] - least[i]
+        scale[i] = size if mode == 0 else varies
+        floor[i] = SHARE * size if mode == 0 else (most[i] if mode > 0 else -least[i]) - (1.0 - SHARE) * varies
+        rough = UNRESOLVED if fourth[i] > ROUGH * scale[i] else RESOLVED
+        fourth[i] = rough if varies > FLAT * size else FLAT_CURVE
+
+
+@inline
+def _mark(count: int, values: Array, said: Array, up: float, down: float) -> None:
+    """Mark the local maxima that count, as a sum of powers of two."""
+    floor, marks = _row(said, _FLOOR // BLOCK), _row(said, MARKS // BLOCK)
+    for i in range(count):
+        marks[i] = 0.0
+    mark = 1.0
+    for j in range(1, FEWEST + 1, AT_ONCE):
+        at0, at1, at2 = _row(values, j), _row(values, j + 1), _row(values, j + 2)
+        at3, at4, at5 = _row(values, j + 3), _row(values, j + 4), _row(values, j + 5)
+        for i in range(count):
+            least, y0, y1, y2, y3, y4, y5 = floor[i], at0[i], at1[i], at2[i], at3[i], at4[i], at5[i]
+            first = _peak_bit(y0, y1, y2, up, down, least) + 2.0 * _peak_bit(y1, y2, y3, up, down, least)
+            second = _peak_bit(y2, y3, y4, up, down, least) + 2.0 * _peak_bit(y3, y4, y5, up, down, least)
+            marks[i] += mark * (first + 4.0 * second)
+        mark *= 16.0
+
+
+@inline
+def _peak_bit(before: float, y: float, after: float, up: float, down: float, floor: float) -> float:
+    """Return 1 for a local maximum that counts, else 0."""
+    sign = up if y >= 0.0 else down
+    z = sign * y
+    return 1.0 if (z >= floor) & (z > sign * before) & (z >= sign * after) else 0.0
+
+
+@inline
+def _dip(count: int, guards: Array, said: Array, slot: int, enough: float) -> None:
+    """Write the least of a discriminant, and 1 where a complex zero of it may be nearer than ``enough`` asks for.
+
+    ``enough`` is a squared distance [samples], that of
+    :func:`kernels.chains.look.zero_beside`, here without a division.
+    """
+    low, near, row = _row(said, LOW // BLOCK + slot), _row(said, CLOSE // BLOCK), slot * (FEWEST + 2)
+    for i in range(count):
+        low[i] = 1e300
+    for j in range(0, FEWEST, AT_ONCE):
+        at0, at1, at2 = _row(guards, row + j), _row(guards, row + j + 1), _row(guards, row + j + 2)
+        at3, at4, at5 = _row(guards, row + j + 3), _row(guards, row + j + 4), _row(guards, row + j + 5)
+        for i in range(count):
+            y0, y1, y2, y3, y4, y5 = at0[i], at1[i], at2[i], at3[i], at4[i], at5[i]
+            low[i] = smallest(low[i], smallest(smallest(y1, y2), smallest(y3, y4)))
+            first = largest(_dip_bit(y0, y1, y2, enough), _dip_bit(y1, y2, y3, enough))
+            second = largest(_dip_bit(y2, y3, y4, enough), _dip_bit(y3, y4, y5, enough))
+            near[i] = largest(near[i], largest(first, second))
+
+
+@inline
+def _dip_bit(left: float, here: float, right: float, enough: float) -> float:
+    """Return 1 where a parabola has its complex zero nearer than ``enough``, else 0."""
+    bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
+    dips = (here <= left) & (here <= right) & (bend > 0.0)
+    return 1.0 if dips & (here * bend - 0.25 * slope * slope < enough * (bend * bend)) else 0.0
+
+
+@inline
+def nearest_dip(guards: Array, slot: int, lane: int) -> float:
+    """Return the squared distance [samples] of the nearest complex zero of one design's discriminant, by parabolas."""
+    nearest = 1e300
+    for j in range(1, FEWEST + 1):
+        at = (slot * (FEWEST + 2) + j) * BLOCK + lane
+        nearest = smallest(nearest, zero_beside(guards[at - BLOCK], guards[at], guards[at + BLOCK]))
+    return nearest
+
+
+def first_looker(curve: Curve, get: Helper) -> Helper:
+    """Make the function ``look(count, m, cos, sin, mode, values, guards, said, handed)`` of a curve.
+
+    It samples the designs whose constants stand at the places 0 ... count - 1 of the list m, and writes the rows
+    SCALE_AT, ROUGHNESS, MARKS, CLOSE and LOW of ``said``.  The samples stand in the rows 2 ... 33 of ``values``, the
+    discriminants in the rows 1 ... 32 of each later stage in ``guards``.
+    """
+    guarded, drive, sample, hand, take = curve.guarded, curve.drive, curve.sample, curve.hand, curve.take
+    guard_rows, keep, keep_last = keepers(curve)
+    # A little more than asked for: the exact distance of those few is computed afterwards.
+    enough = (1.0 + 1e-6) * (curve.samples / TURN) ** 2
+
+    def look(
+        count: int, m: Array, cos: Array, sin: Array, mode: int, values: Array, guards: Array, said: Array,
+        handed: Array,
+    ) -> None:  # fmt: skip
+        for start in range(0, FEWEST, ANGLES):
+            for j in range(ANGLES):
+                u, v, rows = cos[start + j], sin[start + j], handed_rows(handed, j * BLOCK, (j + 1) * BLOCK)
+                low = guard_rows(guards, DIPS, (start + j + 1) * BLOCK, (start + j + 2) * BLOCK)
+                for i in range(count):
+                    t, deltas = drive(get(m, i + CONSTANTS), u, v)
+                    hand(rows, i, t)
+                    keep(low, deltas, i)
+            for j in range(ANGLES):
+                here, rows = _row(values, start + j + 2), handed_rows(handed, j * BLOCK, (j + 1) * BLOCK)
+                low = guard_rows(guards, DIPS, (start + j + 1) * BLOCK, (start + j + 2) * BLOCK)
+                for i in range(count):
+                    y, delta = sample(get(m, i + CONSTANTS), m[i + A], m[i + B], m[i + C], take(rows, i))
+                    here[i] = y
+                    keep_last(low, delta, i)
+        _close(count, values, 0, 2)
+        near = _row(said, CLOSE // BLOCK)
+        for i in range(count):
+            near[i] = 0.0
+        for slot in range(guarded):
+            _close(count, guards, slot * (FEWEST + 2), 1)
+            _dip(count, guards, said, slot, enough)
+        _spread(count, values, said, mode)
+        # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
+        _mark(count, values, said, 1.0 if mode >= 0 else -1.0, 1.0 if mode > 0 else -1.0)
+
+    return generated_inline(f"look_abreast_{curve.name}", look)

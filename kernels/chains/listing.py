@@ -1,0 +1,197 @@
+"""The list of local maxima of a block of designs: samples that resolve each curve, and the peaks among them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels.arithmetic.bits import lowest_bit
+from kernels.chains.chain import Chained
+from kernels.chains.curves import Curve
+from kernels.chains.form import BLOCK, Helper
+from kernels.chains.halves import HANDED
+from kernels.chains.lanes import (
+    CLOSE,
+    DIPS,
+    FLAT_CURVE,
+    LOW,
+    MARKS,
+    ROUGHNESS,
+    SAMPLES,
+    SCALE_AT,
+    UNRESOLVED,
+    first_looker,
+    nearest_dip,
+)
+from kernels.chains.look import FEWEST, GUARD_ROW, LOOKING, MOST, OPEN, SHARE, looker, samples_for
+from kernels.chains.peaks import CAPACITY, CONSTANTS, MOST_PEAKS, PLACE, A, B, C, append
+from kernels.jit import generated_inline, generated_part, inline
+from kernels.types import TWO_PI as TURN
+from kernels.types import Array, Status
+
+Counts: TypeAlias = NDArray[np.int64]
+
+CHUNK = FEWEST  # samples whose peaks are looked for together
+ROW = 2**62 - 1  # as `kernels.chains.peaks.PLACE`, for rows of a table
+ANGLE = 2**15 - 1  # as `kernels.chains.peaks.PLACE`, for samples and crank angles
+LINE = 8  # numbers in a line of the cache
+ABREAST = MOST + LINE  # where the samples of a block begin, behind those of one design
+
+
+class Room(NamedTuple):
+    """Memory of the search.
+
+    Samples of one design and of a block, discriminants of one and of the other, what a first look says; the designs of
+    a block, column by column, and where they stand in it.
+    """
+
+    values: Array
+    guards: Array
+    dips: Array
+    said: Array
+    block: Array
+    handed: Array
+    place: Counts
+
+
+@inline
+def aligned(numbers: int) -> Array:
+    """Return memory that begins where a line of the cache does: a vector that lies across two is fetched twice."""
+    memory = np.empty(numbers + LINE)
+    begin = -(memory.ctypes.data // memory.itemsize) % LINE
+    return memory[begin : begin + numbers]
+
+
+@inline
+def new_room(guarded: int, wide: int) -> Room:
+    """Return the memory for a curve that so many later stages enter, and for designs of so many columns."""
+    stages = max(guarded, 1)
+    return Room(
+        aligned(ABREAST + SAMPLES), aligned(stages * GUARD_ROW), aligned(stages * DIPS), aligned(LOW + stages * BLOCK),
+        aligned(wide * BLOCK), aligned(HANDED), np.zeros(BLOCK, np.int64),
+    )  # fmt: skip
+
+
+def enlister(chain: Chained, of: Curve) -> Helper:
+    """Make the part ``enlist(designs, begin, end, near, ...)``: samples designs begin, ..., end - 1, lists their
+    local maxima, and returns the length of the list, in whole vectors.
+
+    ``near`` has for each the distance of its nearest singularity, 0 for one that is left out.  ``span`` gets for each
+    the place of its first maximum, and where the others begin and end.
+    """
+    load, loaded, put, get = chain.record.load, chain.record.loaded, chain.record.put, chain.record.get
+    doubts, look, look_abreast, judge = chain.record.doubts, looker(of), first_looker(of, get), _judge(of)
+    last, per_rho = chain.stages - 1, of.samples
+
+    # One function without a return half way: with more the references to each array are counted, which takes time.
+    def enlist(
+        designs: Array, begin: int, end: int, near: Array, cos: Array, sin: Array, made_of: Array, mode: int, m: Array,
+        span: Counts, status: Status, room: Room,
+    ) -> int:  # fmt: skip
+        # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
+        up, down = 1.0 if mode >= 0 else -1.0, 1.0 if mode > 0 else -1.0
+        values, guards, dips, said, block, handed, places = room
+        abreast, count = 0, 0
+        # Those for which the first look is enough as far as is known come first.
+        for some in range(2):
+            abreast = count
+            for i in range(begin, end):
+                distance = near[i - begin]
+                few = distance * FEWEST >= per_rho
+                if few if some == 0 else (not few) & (distance * MOST >= per_rho):
+                    places[i - begin] = count
+                    load(designs, i & ROW, block, count & PLACE)
+                    m[count + A], m[count + B], m[count + C] = made_of[i, 0], made_of[i, 1], made_of[i, 2]
+                    count += 1
+        length = (count + 7) & ~7  # whole vectors; what stands in the surplus is never read
+        for place in range(length):
+            put(m, place + CONSTANTS, loaded(block, place))
+        look_abreast((abreast + 7) & ~7, m, cos, sin, mode, values[ABREAST:], dips, said, handed)
+        for i in range(begin, end):
+            n, distance = FEWEST, near[i - begin]
+            if not distance * MOST >= per_rho:
+                continue
+            while n * distance < per_rho:
+                n *= 2
+            own = places[i - begin] & PLACE
+            k: Any = get(m, own + CONSTANTS)
+            limits: Any = doubts(k)
+            status[i] = LOOKING if limits[last] < math.inf else OPEN
+            if n == FEWEST and status[i] == LOOKING:
+                n, status[i] = judge(limits, own, dips, said)
+            a, b, c = made_of[i, 0], made_of[i, 1], made_of[i, 2]
+            alone, first, stride, scale, floor = status[i] == LOOKING, ABREAST + own, BLOCK, said[SCALE_AT + own], 0.0
+            if alone:
+                first, stride = 0, 1
+                n, most, least, status[i] = look(k, a, b, c, n, cos, sin, mode, limits, values, guards, handed)
+                scale = max(most, -least) if mode == 0 else most - least
+                floor = SHARE * scale if mode == 0 else (most if mode > 0 else -least) - (1.0 - SHARE) * scale
+            if status[i] != st.OK:
+                continue
+            # The first maximum stands where the constants are already.
+            many, begun, width = 0, length, TURN / n
+            for chunk in range(2, n + 2, CHUNK):
+                peaks = _peaks(chunk, values, up, down, floor) if alone else int(said[MARKS + own])
+                while peaks != 0:
+                    j = chunk + (lowest_bit(peaks) & PLACE)
+                    peaks &= peaks - 1
+                    place = (own if many == 0 else length) & PLACE
+                    if (many == 0) | ((many < MOST_PEAKS) & (length < CAPACITY)):
+                        angle, at = (n - FEWEST + j - 2) & ANGLE, (first + j * stride) & ANGLE
+                        sign = up if values[at] >= 0.0 else down
+                        left, z, right = sign * values[at - stride], sign * values[at], sign * values[at + stride]
+                        append(m, place, cos[angle], sin[angle], width, (j - 2) * width, left, z, right, sign, scale)
+                        if many > 0:
+                            m[place + A], m[place + B], m[place + C] = a, b, c
+                            put(m, place + CONSTANTS, k)
+                    length += 0 if many == 0 else 1
+                    many += 1
+            span[i - begin, 0], span[i - begin, 1], span[i - begin, 2] = own, begun, length
+            if many == 0 or many > MOST_PEAKS or length > CAPACITY:
+                status[i], length = OPEN, begun
+        return (length + 7) & ~7
+
+    return generated_part(f"enlist_{of.name}", enlist)
+
+
+def _judge(of: Curve) -> Helper:
+    """Make the function ``judge(limits, lane, dips, said)``: how many samples a design needs by its first look, and its
+    status, as :func:`kernels.chains.look.looker` has it; LOOKING if more are needed than the first 32.
+    """
+    guarded, samples = of.guarded, of.samples
+
+    def judge(limits: Any, lane: int, dips: Array, said: Array) -> tuple[int, int]:
+        code, n = LOOKING, FEWEST
+        for slot in range(guarded):
+            low = said[LOW + slot * BLOCK + lane]
+            if code == LOOKING and not low > limits[slot + 1]:
+                code = st.NOT_ROTATABLE if low < -limits[slot + 1] else OPEN
+            if code == LOOKING and said[CLOSE + lane] != 0.0:
+                n = samples_for(samples, FEWEST, nearest_dip(dips, slot, lane), n)
+        rough = said[ROUGHNESS + lane]
+        if code == LOOKING and rough == FLAT_CURVE:
+            code = OPEN
+        elif code == LOOKING and rough == UNRESOLVED:
+            n = max(n, 2 * FEWEST)
+        return n, st.OK if code == LOOKING and n == FEWEST else code
+
+    return generated_inline(f"judge_{of.name}", judge)
+
+
+@inline
+def _peaks(chunk: int, values: Array, up: float, down: float, floor: float) -> int:
+    """Local maxima that count among the next samples, one bit each; without a branch, so that it is vector code."""
+    found = 0
+    end = chunk + CHUNK
+    before, here, after = values[chunk - 1 : end - 1], values[chunk:end], values[chunk + 1 : end + 1]
+    for j in range(CHUNK):
+        y = here[j]
+        sign = up if y >= 0.0 else down
+        z = sign * y
+        peak = (z >= floor) & (z > sign * before[j]) & (z >= sign * after[j])
+        found |= (1 << j) if peak else 0
+    return found

@@ -1,0 +1,157 @@
+"""Samples of a curve over the turn, as many as resolve it; and the local maxima among them.
+
+Samples stand no wider than a twelfth (of the jerk an eighteenth) of the distance of the nearest complex singularity:
+that of the first stage is known beforehand, those of the others show as dips of their discriminants.  Where the fourth
+difference of the samples says that they do not resolve the curve all the same, twice as many are taken.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from kernels import status as st
+from kernels.arithmetic.max_min import largest, smallest
+from kernels.chains.curves import Curve
+from kernels.chains.form import Helper
+from kernels.chains.halves import TOGETHER, handed_rows, keepers
+from kernels.jit import generated_inline, inline
+from kernels.types import TWO_PI, Array
+
+OPEN = 255  # instead of a status: nothing is decided here, a slower search is to be asked
+LOOKING = 252  # more samples are needed
+FEWEST, MOST = 32, 8192
+AT_ONCE = 8.0  # times as many samples at most: the first look sees a near zero only roughly
+SHARE = 0.6  # a peak below this share of the best sample is not refined
+ROUGH = 0.5  # fourth difference against the size of the curve; at a pole a twelfth of a turn of samples away it is 0.6
+FLAT = 1e-9  # a curve that varies by less of its size is left to the slower search
+GUARD_ROW = MOST + 2
+
+
+def sampling_tables() -> tuple[Array, Array]:
+    """Cosines and sines of N equally spaced angles for N = 32, 64, ... 8192; those of N start at position N - 32."""
+    counts = [FEWEST << k for k in range((MOST // FEWEST).bit_length())]
+    phi = np.concatenate([np.arange(n) * (TWO_PI / n) for n in counts])
+    return np.cos(phi), np.sin(phi)
+
+
+@inline
+def fourth_difference(first: float, left: float, here: float, right: float, last: float) -> float:
+    """Return its magnitude."""
+    return abs((first + last) - 4.0 * (left + right) + 6.0 * here)
+
+
+@inline
+def _spread(n: int, values: Array) -> tuple[float, float, float]:
+    """Largest fourth difference, largest and least of n samples that stand in values[2 ... n + 1]."""
+    fourth, most, least = 0.0, -1e300, 1e300
+    # Indices into such parts are seen not to count from the end; with sums as indices each number is fetched alone.
+    first, left, here, right, last = (
+        values[:n], values[1 : n + 1], values[2 : n + 2], values[3 : n + 3], values[4 : n + 4],
+    )  # fmt: skip
+    for j in range(n):
+        y = here[j]
+        fourth = largest(fourth, fourth_difference(first[j], left[j], y, right[j], last[j]))
+        most, least = largest(most, y), smallest(least, y)
+    return fourth, most, least
+
+
+@inline
+def _dips(n: int, guards: Array, begin: int) -> tuple[float, float]:
+    """Least of n discriminants, and squared distance [samples] of their nearest complex zero, by parabolas."""
+    low, nearest = 1e300, 1e300
+    before, at, after = guards[begin : begin + n], guards[begin + 1 : begin + n + 1], guards[begin + 2 : begin + n + 2]
+    for j in range(n):
+        low = smallest(low, at[j])
+        nearest = smallest(nearest, zero_beside(before[j], at[j], after[j]))
+    return low, nearest
+
+
+@inline
+def zero_beside(left: float, here: float, right: float) -> float:
+    """Return the squared distance [samples] of the complex zero of a parabola, 1e300 unless the middle is lowest."""
+    bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
+    dips = (here <= left) & (here <= right) & (bend > 0.0)
+    per_bend = 1.0 / (bend if dips else 1.0)
+    vertex = largest(here - 0.25 * slope * slope * per_bend, 0.0)
+    return vertex * per_bend if dips else 1e300
+
+
+@inline
+def samples_for(per_distance: float, n: int, nearest: float, needed: int) -> int:
+    """Return how many samples a zero asks for that n samples see at that squared distance, ``needed`` at least."""
+    wanted = per_distance * n / (TWO_PI * math.sqrt(largest(nearest, 1e-12)))
+    while needed < min(wanted, AT_ONCE * n):
+        needed *= 2
+    return needed
+
+
+def looker(curve: Curve) -> Helper:
+    """Make the function ``look(k, a, b, c, n, cos, sin, mode, doubts, values, guards, handed)`` of a curve.
+
+    It samples a design, n times at first, and returns the number of samples that resolve the curve, their largest and
+    least, and a status: OK; NOT_ROTATABLE, where a later stage does not reach; OPEN.  The samples stand in
+    values[2 ... n + 1], closed periodically.
+    """
+    guarded, samples, take = curve.guarded, curve.samples, _taker(curve)
+
+    def look(
+        k: Any, a: float, b: float, c: float, n: int, cos: Array, sin: Array, mode: int, doubts: Any, values: Array,
+        guards: Array, handed: Array,
+    ) -> tuple[int, float, float, int]:  # fmt: skip
+        # One way out only: with several each array's references are counted, which takes as long as the samples do.
+        code, most, least = LOOKING, 0.0, 0.0
+        while code == LOOKING and n <= MOST:
+            take(k, a, b, c, n, cos, sin, values, guards, handed)
+            needed = n
+            for s in range(guarded):
+                low, nearest = _dips(n, guards, s * GUARD_ROW)
+                if code == LOOKING and not low > doubts[s + 1]:
+                    code = st.NOT_ROTATABLE if low < -doubts[s + 1] else OPEN
+                needed = samples_for(samples, n, nearest, needed)
+            fourth, most, least = _spread(n, values)
+            size = max(most, -least)
+            scale = size if mode == 0 else most - least
+            if fourth > ROUGH * scale:
+                needed = max(needed, 2 * n)
+            if code == LOOKING and not most - least > FLAT * size:
+                code = OPEN
+            elif code == LOOKING and needed == n:
+                code = st.OK
+            elif code == LOOKING:
+                n = needed
+        return n, most, least, OPEN if code == LOOKING else code
+
+    return generated_inline(f"look_{curve.name}", look)
+
+
+def _taker(curve: Curve) -> Helper:
+    """Fill ``values`` and ``guards`` with n samples, closed periodically."""
+    guarded, drive, sample, hand, get = curve.guarded, curve.drive, curve.sample, curve.hand, curve.take
+    guard_rows, keep, keep_last = keepers(curve)
+
+    def take(
+        k: Any, a: float, b: float, c: float, n: int, cos: Array, sin: Array, values: Array, guards: Array,
+        handed: Array,
+    ) -> None:  # fmt: skip
+        for start in range(0, n, TOGETHER):
+            many = min(TOGETHER, n - start)
+            begin, first = n - FEWEST + start, start + 2
+            us, vs, here = cos[begin : begin + many], sin[begin : begin + many], values[first : first + many]
+            rows, low = handed_rows(handed, 0, many), guard_rows(guards, GUARD_ROW, 1 + start, 1 + start + many)
+            for j in range(many):
+                t, deltas = drive(k, us[j], vs[j])
+                hand(rows, j, t)
+                keep(low, deltas, j)
+            for j in range(many):
+                y, delta = sample(k, a, b, c, get(rows, j))
+                here[j] = y
+                keep_last(low, delta, j)
+        values[0], values[1], values[n + 2], values[n + 3] = values[n], values[n + 1], values[2], values[3]
+        for s in range(guarded):
+            row = s * GUARD_ROW
+            guards[row], guards[row + n + 1] = guards[row + n], guards[row + 1]
+
+    return generated_inline(f"take_{curve.name}", take)

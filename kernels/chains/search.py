@@ -1,0 +1,170 @@
+"""True extrema of a chain over the turn, refined between samples: the generated kernel (docs/extrema.md).
+
+Per design: samples that resolve the curve (`kernels.chains.listing`); every local maximum of at least 60 % of the best
+is refined, vectorised over the maxima of a block of designs (`kernels.chains.peaks`).  What is not trusted, or what
+rounding may have changed by more than 2^-14 of the target, is left to precise poses.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels.arithmetic.prefetch import prefetch_rows
+from kernels.chains.chain import Chained
+from kernels.chains.curves import MARGIN, curve
+from kernels.chains.form import BLOCK, STRIDE, Helper
+from kernels.chains.listing import aligned, enlister, new_room
+from kernels.chains.look import FEWEST, MOST, OPEN
+from kernels.chains.peaks import (
+    CONSTANTS,
+    ERROR,
+    HEIGHT,
+    LAST,
+    MOVED,
+    PLACE,
+    REACH,
+    ROUNDING,
+    SCALE,
+    START,
+    WIDTH,
+    begin_at_vertex,
+    finisher,
+    refiner,
+)
+from kernels.jit import generated, inline
+from kernels.types import TWO_PI as TURN
+from kernels.types import Array, Status
+
+Counts: TypeAlias = NDArray[np.int64]
+
+PLAIN = 2.0**-14  # of the target: larger rounding errors are left to precise poses
+RIVALS = 1e-3  # of the scale: peaks lower by no more may turn out the highest where rounding has moved them
+SETTLING = 8  # more steps for a maximum that is not trusted after the usual ones
+MORE = 4  # times as many samples for a design of which a maximum is not trusted even so
+ROUNDED, UNTRUSTED = 254, 253  # instead of a status; the first see `find_extrema`
+VALUE, PHI, VALUE_ERROR, PHI_ERROR, SCALE_ROW, SPACING = range(6)
+
+
+@lru_cache(maxsize=64)
+def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
+    """Make the kernel ``find(designs, opening, distance, cos, sin, made_of, mode, target, tie, status, found)``.
+
+    It finds one extremum over the turn of a curve of a chain, one of `kernels.chains.curves`, of that order or the
+    `MARGIN`; with ``along`` of curves whose number b is 0, by fewer operations and with the same bits.
+
+    Its arguments: designs (n, P); opening (n,), OK where the first stage turns, NOT_ROTATABLE where it does not;
+    distance (n,) [rad] of its nearest singularity from the real axis; `sampling_tables`; made_of (n, 3), the numbers a,
+    b, c of the curve; mode: 0 for the largest magnitude, +1 for the largest value, -1 for the least; target: relative
+    error wanted, of the magnitude or of the curve's range; tie: share of that size by which no other peak may come near
+    the highest one, negative where it does not matter which of two is higher.  Then out: status (n,), and found (6, n)
+    with the rows VALUE; PHI, its crank angle in [0, 2 pi); estimates of the errors of both; SCALE, what the target is
+    relative to; SPACING of the samples [rad].
+
+    The status is OK; ROUNDED, where rounding may have moved a single highest peak by more than its share of the target;
+    NOT_ROTATABLE, where a stage does not reach; OPEN, where nothing is decided.  With the last two the others are nan.
+    """
+    of = curve(chain, order, along)
+    get, rows = chain.record.get, CONSTANTS + chain.record.numbers * STRIDE
+    per_rho, guarded, wide, allowed = of.samples, of.guarded, chain.record.wide, 1.0 if order == MARGIN else PLAIN
+    enlist, refine, finish = enlister(chain, of), refiner(of, get), finisher(of, get)
+
+    def find(
+        designs: Array, opening: Status, distance: Array, cos: Array, sin: Array, made_of: Array, mode: int,
+        target: float, tie: float, status: Status, found: Array,
+    ) -> None:  # fmt: skip
+        m, near, span, room = aligned(rows), np.empty(BLOCK), np.empty((BLOCK, 3), np.int64), new_room(guarded, wide)
+        rounds = 2 if target > 1e-4 else 3
+        for start in range(0, designs.shape[0], BLOCK):
+            end = min(start + BLOCK, designs.shape[0])
+            for i in range(start, end):
+                status[i] = st.NOT_ROTATABLE if opening[i] == st.NOT_ROTATABLE else OPEN
+                near[i - start] = distance[i] if opening[i] == st.OK else 0.0
+            length = enlist(designs, start, end, near, cos, sin, made_of, mode, m, span, status, room)
+            prefetch_rows(designs, end, end + BLOCK)  # of the next block
+            begin_at_vertex(length, m)
+            refine(length, m, rounds)
+            finish(length, m, target)
+            for i in range(start, end):
+                if status[i] != st.OK:
+                    continue
+                own, low, high = span[i - start, 0], span[i - start, 1], span[i - start, 2]
+                if not _trusted(own, low, high, m):
+                    for slot in range(low - 1, high):
+                        peak = (own if slot < low else slot) & PLACE
+                        if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
+                            refine(1, m[peak:], SETTLING)
+                            finish(1, m[peak:], target)
+                status[i] = _decide(own, low, high, m, mode, allowed * target, tie, i, found)
+            # Now the list is free for those, one by one, whose tops were not single ones between their samples.
+            for i in range(start, end):
+                rho = per_rho / (FEWEST * MORE)
+                while status[i] == UNTRUSTED and rho * MOST >= per_rho:
+                    near[0] = min(rho, distance[i])
+                    length = enlist(designs, i, i + 1, near, cos, sin, made_of, mode, m, span, status, room)
+                    begin_at_vertex(length, m)
+                    refine(length, m, rounds + SETTLING)
+                    finish(length, m, target)
+                    if status[i] == st.OK:
+                        own, low, high = span[0, 0], span[0, 1], span[0, 2]
+                        status[i] = _decide(own, low, high, m, mode, allowed * target, tie, i, found)
+                    rho /= MORE
+                status[i] = OPEN if status[i] == UNTRUSTED else status[i]
+                if status[i] != st.OK and status[i] != ROUNDED:
+                    found[:, i] = math.nan
+
+    return generated(f"find_{of.name}", find)
+
+
+@inline
+def _decide(
+    own: int, begin: int, end: int, m: Array, mode: int, rounding: float, tie: float, i: int, found: Array
+) -> int:
+    """Write the highest maximum of design i, of the one at ``own`` and those from ``begin`` on.
+
+    Return OK, ROUNDED, UNTRUSTED, or OPEN where it is not sure which is highest.
+    """
+    own, second, third = _first_three(own, begin, end)
+    winner = second if m[second + HEIGHT] > m[own + HEIGHT] else own
+    winner = third if m[third + HEIGHT] > m[winner + HEIGHT] else winner
+    for slot in range(begin + 2, end):
+        peak = slot & PLACE
+        winner = peak if m[peak + HEIGHT] > m[winner + HEIGHT] else winner
+    height, blur, scale = m[winner + HEIGHT], m[winner + ROUNDING], m[winner + SCALE]
+    code = st.OK if blur <= rounding * scale else ROUNDED
+    apart = RIVALS if code == ROUNDED else tie
+    if apart >= 0.0:
+        for slot in range(begin - 1, end):
+            peak = (own if slot < begin else slot) & PLACE
+            if peak != winner and m[peak + HEIGHT] + m[peak + ROUNDING] >= height - blur - apart * scale:
+                code = OPEN
+    place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
+    found[VALUE, i], found[PHI, i] = -height if mode < 0 else height, place - TURN * np.floor(place / TURN)
+    found[VALUE_ERROR, i], found[PHI_ERROR, i] = m[winner + ERROR] + blur, m[winner + REACH]
+    found[SCALE_ROW, i], found[SPACING, i] = scale, m[winner + WIDTH]
+    return code if _trusted(own, begin, end, m) else UNTRUSTED
+
+
+@inline
+def _first_three(own: int, begin: int, end: int) -> tuple[int, int, int]:
+    """Return the places of a design's first three maxima, the first again for those it does not have.
+
+    Few designs have more, and how many they have the processor cannot foresee: these are chosen without a branch.
+    """
+    own = own & PLACE
+    return own, (begin if end > begin else own) & PLACE, (begin + 1 if end > begin + 1 else own) & PLACE
+
+
+@inline
+def _trusted(own: int, begin: int, end: int, m: Array) -> bool:
+    """Tell whether all maxima of a design are trusted."""
+    own, second, third = _first_three(own, begin, end)
+    sure: bool = (m[own + ERROR] < math.inf) & (m[second + ERROR] < math.inf) & (m[third + ERROR] < math.inf)
+    for slot in range(begin + 2, end):
+        sure = sure & (m[(slot & PLACE) + ERROR] < math.inf)
+    return sure

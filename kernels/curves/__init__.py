@@ -1,0 +1,1 @@
+"""Curves over a turn: samples, Fourier series, trigonometric polynomials, polynomials."""

@@ -1,0 +1,139 @@
+"""Inverted slider-crank: the crank pin slides along a slot of the rocker, which oscillates or turns (Whitworth).
+
+Everything is computed in lengths divided by a power of two near the crank length.  Designs may be complex128 (exact
+gradients by the complex step); decisions look at the real part.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kernels import status as st
+from kernels.arithmetic.complex_step import arctan2, magnitude
+from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write
+from kernels.linkage.verdict import follower_status
+from kernels.types import EPS, Numbers, Status
+
+
+class Design(NamedTuple):
+    """Columns of the design matrix: lengths in one unit, branch +1 or -1."""
+
+    a: float
+    e: float
+    h: float
+    branch: float
+
+
+class Outputs(NamedTuple):
+    """Pose outputs, each (n, m), or None: what is None is not computed."""
+
+    psi: Numbers | None
+    dpsi: Numbers | None
+    d2psi: Numbers | None
+    d3psi: Numbers | None
+    s: Numbers | None
+    ds: Numbers | None
+    d2s: Numbers | None
+    discriminant: Numbers | None
+    pressure_angle: Numbers | None
+
+
+@kernel
+def poses(
+    designs: Numbers,
+    cos_phi: Numbers,
+    sin_phi: Numbers,
+    status: Status,
+    out: Outputs,
+    joints: Numbers | None,
+) -> None:
+    """Compute the rocker angle, place of the pin on the rocker
+    and their derivatives of every design at its crank angles; (1)-(5).
+
+    Parameters
+    ----------
+    designs : (n, 4) columns of :class:`Design`
+    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
+    status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR (the crank pin is on the rocker axis) or INVALID_INPUT
+    psi ... pressure_angle : (n, m) out, or None: what is None is neither computed nor compiled
+    joints : (2, n, m) out, crank pin x y, or None
+
+    Notes
+    -----
+    Where the status is not OK the values are nan, except that a dead point keeps its position and the discriminant is
+    given wherever the crank pin is off the rocker axis.
+    """
+    for i in range(designs.shape[0]):
+        _, exponent = math.frexp(designs[i, 0].real)
+        unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+        a, e, h = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit
+        branch = designs[i, 3].real
+        valid = 0.0 < a.real < 1e140 and abs(e.real) < 1e140 and abs(h.real) < 1e140 and branch * branch == 1.0
+        row = i if cos_phi.shape[0] > 1 else 0
+        for j in range(cos_phi.shape[1]):
+            u, v = cos_phi[row, j], sin_phi[row, j]
+            x, y = a * u - e, a * v
+            square = x * x + y * y
+            delta = square - h * h
+            # What rounding makes of X^2 + Y^2 - h^2: 8 x 2^-53 of what it is made of.
+            x_size = a.real + abs(e.real)
+            tolerance = 8.0 * EPS * (abs(x.real) * x_size + a.real * abs(y.real) + h.real * h.real)
+            tolerance += 64.0 * EPS * EPS * x_size * x_size
+            # with h = 0 the discriminant is r^2, which vanishes only on the rocker axis: there is no dead point
+            code = follower_status(valid, square.real <= tolerance, delta.real, tolerance)
+            status[i, j] = code
+            root = np.sqrt(delta) if code == st.OK else 0.0 * delta
+            assembled = code == st.OK or code == st.DEAD_POINT
+            w = branch * root if assembled else math.nan * delta
+            per_square = 1.0 / square
+            c, sine = (x * w + y * h) * per_square, (y * w - x * h) * per_square
+            write(out.psi, i, j, arctan2(0.0 + sine, c))  # + 0.0: -0.0 would turn the angle pi into -pi
+            write(out.s, i, j, w * unit)
+            if out.discriminant is not None:
+                known = code != st.INVALID_INPUT and code != st.SINGULAR
+                write(out.discriminant, i, j, delta * per_square if known else math.nan * delta)
+            # arctangent, not acos: acos loses half the digits near zero.
+            write(out.pressure_angle, i, j, arctan2(magnitude(h), root) if assembled else math.nan * delta)
+            if joints is not None:
+                joints[0, i, j], joints[1, i, j] = designs[i, 0] * u, designs[i, 0] * v
+            if (
+                out.dpsi is not None
+                or out.d2psi is not None
+                or out.d3psi is not None
+                or out.ds is not None
+                or out.d2s is not None
+            ):
+                # at a dead point (w = 0) the position stands and the derivatives do not exist
+                per_w = 1.0 / w if code == st.OK else math.nan * w
+                along, aside = a * (u * c + v * sine), a * (v * c - u * sine)
+                pin = (along, aside, h, per_w)
+                _put_derivatives(out, i, j, pin, unit)
+
+
+@inline
+def _put_derivatives(
+    out: Outputs,
+    i: int,
+    j: int,
+    pin: tuple[Any, Any, Any, Any],
+    unit: float,
+) -> None:
+    """Write the wanted derivatives of the angle and of the place along the slot; (4), (5).
+
+    ``pin`` holds the crank in the rocker's axes, along the slot and across it, the slot's offset, and 1/w.
+    """
+    along, aside, h, per_w = pin
+    p = along * per_w
+    slide = p * h - aside
+    q = (aside * (2.0 * p - 1.0) - p * p * h) * per_w
+    write(out.dpsi, i, j, p)
+    write(out.ds, i, j, slide * unit)
+    write(out.d2psi, i, j, q)
+    write(out.d2s, i, j, (q * h - along * (1.0 - p)) * unit)
+    if out.d3psi is not None:
+        turn = along * (1.0 - p) * (2.0 * p - 1.0) + 2.0 * q * (aside - p * h)
+        write(out.d3psi, i, j, (turn - q * slide) * per_w)

@@ -1,0 +1,193 @@
+"""Crank whose rod slides through a swivel block at a fixed point and carries a working point beyond it.
+
+The planar form is the looper with a rod through a swinging block.
+
+Everything is computed in lengths divided by a power of two near the crank length, so no scale of the drawing costs a
+bit.  Designs may be complex128 (exact gradients by the complex step); decisions look at the real part.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels import status as st
+from kernels.arithmetic.vectors import add, cross, dot, mix, scale
+from kernels.jit import inline, kernel
+from kernels.linkage.bodies import (
+    Links,
+    Moving,
+    acceleration_at,
+    across,
+    put,
+    put_body,
+    put_crank,
+    put_line,
+    shaft,
+    velocity_at,
+)
+from kernels.linkage.outputs import put_block
+from kernels.types import EPS, Array, Numbers, Status
+
+
+class Design(NamedTuple):
+    """Columns of the design matrix: lengths in one unit, alpha in radians."""
+
+    a: float
+    e: float
+    f: float
+    g: float
+    alpha: float
+    Lw: float
+
+
+class Reduced(NamedTuple):
+    """Per-design numbers in units of ``unit``: B = (a u, y0 + ka v, lift - na v), Q = (e, 0, g)."""
+
+    a: float
+    e: float
+    y0: float
+    ka: float
+    lift: float
+    na: float
+    g: float
+    length: float  # Lw
+    size: float  # sum of the magnitudes whose rounding errors make up the vector from B to Q
+    unit: float
+    valid: bool
+
+
+@inline
+def reduce_design(designs: Numbers, i: int) -> Reduced:
+    """Return constants of one design; ``valid`` is false for a crank of no length and for what is not finite."""
+    _, exponent = math.frexp(designs[i, 0].real)
+    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    a, e, f, g = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
+    alpha, length = designs[i, 4], designs[i, 5] * per_unit
+    sa, ca = np.sin(alpha), np.cos(alpha)
+    size = abs(e.real) + abs(f.real) + abs(g.real) + a.real
+    valid = 0.0 < a.real <= 1.0 and size < 1e140 and abs(length.real) < 1e140
+    valid = valid and abs(alpha.real) < 1e5 and unit < math.inf
+    return Reduced(a, e, f * sa, a * ca, f * ca, a * sa, g, length, size, unit, valid)
+
+
+class Outputs(NamedTuple):
+    """Blocks (k, n, m) of outputs, or None: what is None is not computed."""
+
+    rod: Numbers | None
+    point: Numbers | None
+    velocity: Numbers | None
+    acceleration: Numbers | None
+    jerk: Numbers | None
+
+
+@kernel
+def poses(
+    designs: Numbers,
+    cos_phi: Numbers,
+    sin_phi: Numbers,
+    status: Status,
+    out: Outputs,
+    joints: Numbers | None,
+) -> None:
+    """Compute the rod between crank pin and block, and the working point, with derivatives,
+    of every design and crank angle.
+
+    Equations (1)-(4) of docs/swivel.md.
+
+    Parameters
+    ----------
+    designs : (n, 6) columns of :class:`Design`
+    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
+    status : (n, m) out; OK, SINGULAR (the crank pin lies in the block's centre) or INVALID_INPUT
+    rod : (4, n, m) out [length], distance of crank pin and block and its three derivatives, or None
+    point, velocity, acceleration, jerk : (3, n, m) out [length], x y z of the working point and of its derivatives, or
+        None
+    joints : (6, n, m) out, crank pin x y z and direction of the rod x y z, or None
+
+    Notes
+    -----
+    What is None is neither computed nor compiled.  Where the status is not OK the values are nan.
+    """
+    for i in range(designs.shape[0]):
+        r = reduce_design(designs, i)
+        row = i if cos_phi.shape[0] > 1 else 0
+        for j in range(cos_phi.shape[1]):
+            u, v = cos_phi[row, j], sin_phi[row, j]
+            pin = (r.a * u, r.y0 + r.ka * v, r.lift - r.na * v)
+            reach = (r.e - pin[0], -pin[1], r.g - pin[2])
+            reach1, reach2 = (r.a * v, -r.ka * u, r.na * u), (r.a * u, r.ka * v, -r.na * v)
+            square = dot(reach, reach)
+            tolerance = 4.0 * EPS * r.size
+            code = st.OK
+            if not r.valid or square.real != square.real:
+                code = st.INVALID_INPUT
+            elif square.real <= tolerance * tolerance:
+                code = st.SINGULAR
+            status[i, j] = code
+            length = np.sqrt(square) if code == st.OK else square * math.nan
+            per = 1.0 / length if code == st.OK else length
+            n = scale(per, reach)
+            # rho rho' = E.E', and so on; then n = E/rho
+            h1 = dot(n, reach1)
+            n1 = scale(per, mix(1.0, reach1, -h1, n))
+            h2 = dot(n1, reach1) + dot(n, reach2)
+            n2 = scale(per, mix(1.0, mix(1.0, reach2, -h2, n), -2.0 * h1, n1))
+            h3 = dot(n2, reach1) + 2.0 * dot(n1, reach2) - h1  # the third derivative of the rod is minus the first
+            put_block(out.rod, i, j, (length, h1, h2, h3), r.unit)
+            put_block(out.point, i, j, mix(1.0, pin, r.length, n), r.unit)
+            put_block(out.velocity, i, j, mix(r.length, n1, -1.0, reach1), r.unit)
+            put_block(out.acceleration, i, j, mix(r.length, n2, -1.0, reach2), r.unit)
+            n3 = mix(1.0, mix(-1.0, reach1, -h3, n), -3.0, mix(h2, n1, h1, n2))
+            put_block(out.jerk, i, j, mix(r.length, scale(per, n3), 1.0, reach1), r.unit)
+            if joints is not None:
+                for k in range(3):
+                    joints[k, i, j] = pin[k] * r.unit if code == st.OK else math.nan
+                    joints[3 + k, i, j] = n[k]
+
+
+@kernel
+def links(
+    designs: Array,
+    cos_phi: Array,
+    sin_phi: Array,
+    rho: Array,
+    drho: Array,
+    d2rho: Array,
+    direction: Array,
+    out: Links,
+) -> None:
+    """Fill the bodies, freedoms and closing lines of every pose; equation numbers are of docs/swivel.md.
+
+    Parameters
+    ----------
+    designs : (n, 6);  cos_phi, sin_phi : (n, m) or (1, m)
+    rho, drho, d2rho : (n, m), outputs of ``poses``;  direction : (3, n, m), the rod's
+    out : two bodies, three freedoms, two lines: the block's forces on the rod across it
+    """
+    for i in range(designs.shape[0]):
+        d = designs[i]
+        u, e2 = shaft(d[4])
+        centre, block = scale(d[2], u), (d[1], 0.0, d[3])
+        row = i if cos_phi.shape[0] > 1 else 0
+        for j in range(rho.shape[1]):
+            bodies, axes = out.bodies[i, j], out.axes[i, j]
+            first = (1.0, 0.0, 0.0)
+            crank = put_crank(bodies[0], axes[0], centre, u, first, e2, cos_phi[row, j], sin_phi[row, j])
+            pin = add(centre, scale(d[0], mix(cos_phi[row, j], first, sin_phi[row, j], e2)))
+            n = (direction[0, i, j], direction[1, i, j], direction[2, i, j])
+            v, a = velocity_at(crank, pin), acceleration_at(crank, pin)
+            per = 1.0 / rho[i, j]
+            # (3): rho n' = E' - rho' n and rho n'' = E'' - rho'' n - 2 rho' n', with E' = -B'
+            n1 = scale(-per, mix(1.0, v, drho[i, j], n))
+            n2 = scale(-per, mix(1.0, mix(1.0, a, d2rho[i, j], n), 2.0 * drho[i, j], n1))
+            rod = Moving(pin, v, a, cross(n, n1), cross(n, n2))
+            y = across(n)
+            z = cross(n, y)
+            put_body(bodies[1], rod, n, y, z, pin)
+            put(axes[1], y)
+            put(axes[2], z)
+            put_line(out.lines[i, j, 0], block, y)
+            put_line(out.lines[i, j, 1], block, z)

@@ -1,0 +1,162 @@
+"""The one place where compile options are decided.
+
+Every kernel of the house is made by one of the decorators below, which are ``numba.njit`` with these options:
+
+* ``error_model="numpy"``: division by zero gives inf or nan instead of a branch to an exception; the Python
+  model costs a factor of five in the sweep loops.
+* ``nogil=True``: chunks run in threads.
+* fast-math stays off.  The full set makes ``isnan`` answer false.  Only the fused sweep loops (:func:`kernel_fused`)
+  may contract a product and a sum into one instruction: it gains about 8 % there and costs the promise of equal last
+  bits on processors with and without that instruction, which all other kernels keep.  The reductions of
+  :mod:`kernels.arithmetic.max_min` carry the two flags they need themselves.
+* ``no_cfunc_wrapper``: nothing calls kernels from C.  ``no_cpython_wrapper`` of helpers: see :class:`Helper`.
+* Machine code is kept on disk by :mod:`kernels.cache`.
+
+``NUMBA_DISABLE_JIT=1`` leaves every function as Python wrote it.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from functools import cached_property, update_wrapper
+from types import FunctionType
+from typing import Any, TypeVar, cast
+
+import numba
+from numba.core import event
+from numba.extending import typeof_impl
+
+from kernels.cache import config, keep
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+# Flags must be said: a helper without them takes those of the kernel that happens to be compiled first, and keeps
+# them in every other kernel, so the last bits of a result would depend on what was computed before it.
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
+
+
+def _compiled(function: F, **options: Any) -> F:
+    return cast(F, keep(numba.njit(**(OPTIONS | options))(function)))
+
+
+class Helper:
+    """A function that kernels call: it has machine code for its callers alone, which takes a third less time to make.
+
+    Python may call it all the same, as tests do; for that it is compiled once more at the first call.
+    """
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        update_wrapper(self, function)
+        self.py_func = function
+        self.targetoptions = OPTIONS | options
+        self.for_kernels = _compiled(function, no_cpython_wrapper=True, **options)
+
+    @cached_property
+    def _for_python(self) -> Callable[..., Any]:
+        return cast(Callable[..., Any], numba.njit(**self.targetoptions)(self.py_func))
+
+    def __call__(self, *args: Any) -> Any:
+        """Run the helper for a caller in Python."""
+        return self._for_python(*args)
+
+
+@typeof_impl.register(Helper)
+def _type_of_helper(helper: Helper, context: Any) -> Any:
+    """Let numba see the function for kernels wherever one of them names the helper."""
+    return typeof_impl(helper.for_kernels, context)
+
+
+def _helper(function: F, **options: Any) -> F:
+    return function if config.DISABLE_JIT else cast(F, Helper(function, **options))
+
+
+def kernel(function: F) -> F:
+    """Compile a function to machine code at its first call."""
+    return _compiled(function)
+
+
+def kernel_fused(function: F) -> F:
+    """Compile a dense sweep loop, in which products and sums may be contracted."""
+    return _compiled(function, fastmath={"contract"})
+
+
+def inline(function: F) -> F:
+    """Compile a scalar helper for kernels; it is always folded into its caller, so that the loop there vectorises.
+
+    Helpers are kept on disk too: a kernel that is compiled for another set of wanted outputs then finds them, which
+    was measured to take a quarter of the time.
+    """
+    return _helper(function, forceinline=True)
+
+
+def part(function: F) -> F:
+    """Compile a larger function that kernels call; whether it is folded in is up to LLVM."""
+    return _helper(function)
+
+
+def inline_fused(helper: F) -> F:
+    """Compile the same helper again, for :func:`kernel_fused` loops: products and sums may be contracted in it too.
+
+    The flag belongs to the instructions of the function that was compiled, so a helper made by :func:`inline` keeps
+    its products and sums apart wherever it is folded in.
+    """
+    source = source_of(helper)
+    # The cache on disk tells functions by name and line: under one name the two would get each other's machine code.
+    name = f"{source.__name__}_fused"
+    copy = FunctionType(source.__code__, source.__globals__, name, source.__defaults__, source.__closure__)
+    copy.__qualname__, copy.__module__ = name, source.__module__
+    return _helper(cast(F, copy), forceinline=True, fastmath={"contract"})
+
+
+def generated(name: str, function: F) -> F:
+    """Compile a function that a generator made, as :func:`kernel`.
+
+    ``name`` stands for everything that the function closes over, stages, numbers and other generated functions: its
+    machine code is kept under that name, so no two may have the same.
+    """
+    return kernel(_named(name, function))
+
+
+def generated_inline(name: str, function: F) -> F:
+    """Compile a function that a generator made, as :func:`inline`; ``name`` as of :func:`generated`."""
+    return inline(_named(name, function))
+
+
+def generated_part(name: str, function: F) -> F:
+    """Compile a function that a generator made, as :func:`part`; ``name`` as of :func:`generated`."""
+    return part(_named(name, function))
+
+
+def source_of(function: Any) -> Any:
+    """Give the Python function behind a compiled one."""
+    return getattr(function, "py_func", function)
+
+
+def _named(name: str, function: F) -> F:
+    function.__name__ = function.__qualname__ = name
+    return function
+
+
+class _PausedCollector(event.Listener):
+    """Keeps Python from looking for garbage while numba compiles.
+
+    A compiler makes a million objects that refer to each other, and nearly all live until the process ends: looking
+    through them after each kernel took a tenth of a first use.
+    """
+
+    def __init__(self) -> None:
+        self._was_on: list[bool] = []
+
+    def on_start(self, event: Any) -> None:
+        """Pause at the beginning of a compilation, which may be inside another one."""
+        self._was_on.append(gc.isenabled())
+        gc.disable()
+
+    def on_end(self, event: Any) -> None:
+        """Go on as before."""
+        if self._was_on.pop():
+            gc.enable()
+
+
+event.register("numba:compile", _PausedCollector())  # type: ignore[no-untyped-call]

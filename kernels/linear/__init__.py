@@ -1,0 +1,1 @@
+"""What compiled loops need of linear algebra, and nothing else."""

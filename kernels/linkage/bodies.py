@@ -1,0 +1,187 @@
+"""What loads know of a mechanism of any number of links: bodies in a tree, what closes its loops, never the family.
+
+Each body hangs on its parent, or on the frame, by a joint that leaves it some freedoms.  Forces along given lines close
+the loops: a ball joint is three of them, a contact is one or two.  So many lines close the loops as there are freedoms
+besides those that the drive turns; :mod:`kernels.effects.link_loads` finds their forces by virtual power.
+
+A family fills :class:`Links` for its poses.  Rates are with respect to the
+crank angle, in fixed axes.  A link between two balls is a slender rod: what it does about its own axis has no inertia.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
+from kernels.jit import inline
+from kernels.types import Array
+
+Index = NDArray[np.int64]
+
+# Of a body: origin of its axes, its velocity and acceleration, angular velocity and acceleration, its axes x, y, z,
+# and the point of its joint with the parent.
+PER_BODY = 27
+PER_LINE = 6  # a point and a direction
+FRAME = -1  # parent of what hangs on the frame, and the second end of a line between a body and the frame
+
+TURN, SLIDE, DRIVEN = 0, 1, 2  # kinds of freedom; DRIVEN is a turn that the drive imposes
+
+
+class Links(NamedTuple):
+    """How the bodies of a mechanism hang together, and their poses; see PER_BODY and PER_LINE.
+
+    A parent has a lower number than what hangs on it.  Freedoms and ends are given to a family filled with those of its
+    ordinary design; it changes them where a design is another kind.
+    """
+
+    parents: Index  # (B,) FRAME or the number of a body
+    freedoms: Index  # (n, D, 2) the body, and TURN, SLIDE or DRIVEN
+    ends: Index  # (n, K, 2) a line's force acts on the first body and, reversed, on the second or the FRAME
+    bodies: Array  # (n, m, B, PER_BODY)
+    axes: Array  # (n, m, D, 3) of the freedoms, through the body's joint
+    lines: Array  # (n, m, K, PER_LINE)
+
+
+class Moving(NamedTuple):
+    """Rates of a body: velocity and acceleration of its origin, angular velocity and acceleration."""
+
+    at: Vector
+    v: Vector
+    a: Vector
+    omega: Vector
+    eps: Vector
+
+
+@inline
+def vector(a: Array) -> Vector:
+    """Return the first three numbers."""
+    return a[0], a[1], a[2]
+
+
+@inline
+def put(out: Array, a: Vector) -> None:
+    """Write three numbers."""
+    out[0], out[1], out[2] = a[0], a[1], a[2]
+
+
+@inline
+def moving(body: Array) -> Moving:
+    """Return rates of a body from its record, (PER_BODY,)."""
+    return Moving(
+        vector(body), vector(body[3:]), vector(body[6:]), vector(body[9:]), vector(body[12:]),
+    )  # fmt: skip
+
+
+@inline
+def velocity_at(body: Moving, point: Vector) -> Vector:
+    """Return the velocity of the point of a body that is at ``point``."""
+    return add(body.v, cross(body.omega, sub(point, body.at)))
+
+
+@inline
+def acceleration_at(body: Moving, point: Vector) -> Vector:
+    """Return the acceleration of the point of a body that is at ``point``."""
+    return add(body.a, spun(body.omega, body.eps, sub(point, body.at)))
+
+
+@inline
+def put_body(out: Array, body: Moving, x: Vector, y: Vector, z: Vector, joint: Vector) -> None:
+    """Write the record of a body, (PER_BODY,)."""
+    put(out, body.at)
+    put(out[3:], body.v)
+    put(out[6:], body.a)
+    put(out[9:], body.omega)
+    put(out[12:], body.eps)
+    put(out[15:], x)
+    put(out[18:], y)
+    put(out[21:], z)
+    put(out[24:], joint)
+
+
+@inline
+def turning(at: Vector, axis: Vector, first: float, second: float) -> Moving:
+    """Return a body that turns about a fixed axis through its origin."""
+    none = (0.0, 0.0, 0.0)
+    return Moving(at, none, none, scale(first, axis), scale(second, axis))
+
+
+@inline
+def put_turning(out: Array, at: Vector, axis: Vector, x: Vector, first: float, second: float) -> Moving:
+    """Write a body that turns about a fixed axis through its origin, at which its joint is; ``x`` is its first axis."""
+    body = turning(at, axis, first, second)
+    put_body(out, body, x, cross(axis, x), axis, at)
+    return body
+
+
+@inline
+def put_rod(out: Array, axes: Array, on: Moving, at: Vector, to: Moving, end: Vector) -> Moving:
+    """Write a rod between balls of two bodies and its two freedoms; its first axis points from ``at`` to ``end``.
+
+    Its spin is zero.  The other axes are any across it: a slender rod does not tell them apart.
+    """
+    v, a = velocity_at(on, at), acceleration_at(on, at)
+    along = sub(end, at)
+    per = 1.0 / norm(along)
+    s = scale(per, along)
+    ds = scale(per, sub(velocity_at(to, end), v))
+    d2s = scale(per, sub(acceleration_at(to, end), a))
+    body = Moving(at, v, a, cross(s, ds), cross(s, d2s))
+    y = across(s)
+    z = cross(s, y)
+    put_body(out, body, s, y, z, at)
+    put(axes[0], y)
+    put(axes[1], z)
+    return body
+
+
+@inline
+def across(s: Vector) -> Vector:
+    """Return a unit vector across a unit vector."""
+    x, y, z = abs(s[0]), abs(s[1]), abs(s[2])
+    found = (0.0, -s[2], s[1])
+    if y <= x and y <= z:
+        found = (s[2], 0.0, -s[0])
+    elif z <= x and z <= y:
+        found = (-s[1], s[0], 0.0)
+    return scale(1.0 / norm(found), found)
+
+
+@inline
+def put_line(out: Array, point: Vector, direction: Vector) -> None:
+    """Write a line along which a force closes a loop, (PER_LINE,)."""
+    put(out, point)
+    put(out[3:], direction)
+
+
+@inline
+def put_ball(out: Array, point: Vector) -> None:
+    """Write the three lines of a ball joint, (3, PER_LINE)."""
+    put_line(out[0], point, (1.0, 0.0, 0.0))
+    put_line(out[1], point, (0.0, 1.0, 0.0))
+    put_line(out[2], point, (0.0, 0.0, 1.0))
+
+
+@inline
+def shaft(alpha: float) -> tuple[Vector, Vector]:
+    """Return the axis (0, sin alpha, cos alpha) of a crank, and the direction of its crank angle 90 degrees."""
+    sa, ca = math.sin(alpha), math.cos(alpha)
+    return (0.0, sa, ca), (0.0, ca, -sa)
+
+
+@inline
+def put_crank(
+    out: Array, axis_out: Array, centre: Vector, axis: Vector, first: Vector, second: Vector, u: float, v: float
+) -> Moving:
+    """Write a crank of cosine ``u`` and sine ``v``, from the directions of its angles 0 and 90 degrees."""
+    put(axis_out, axis)
+    return put_turning(out, centre, axis, mix(u, first, v, second), 1.0, 0.0)
+
+
+@inline
+def turned_about(axis: Vector, cos: float, sin: float, a: Vector) -> Vector:
+    """Return a vector turned about a unit axis."""
+    return add(mix(cos, a, sin, cross(axis, a)), scale((1.0 - cos) * dot(axis, a), axis))

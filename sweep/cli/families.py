@@ -1,0 +1,144 @@
+"""The verb ``families``, and what shells complete: families, chains of them, outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import click
+
+from sweep.errors import LinksweepError
+from sweep.evaluation.summaries import output, output_names
+from sweep.families import NAMES, chain_names, family
+from sweep.families.base import Family
+from sweep.families.capabilities import (
+    Assembly,
+    CrankRockerLoop,
+    GuidedPoint,
+    JointRecords,
+    LimitLocus,
+    OutputLink,
+    Points,
+    PressureEllipse,
+    ProvableLocus,
+)
+from sweep.families.link_tree import LinkTree
+from sweep.families.machines import Machine
+from sweep.families.reduction import prefixes
+from sweep.quantities.resolve import event_names
+
+CAPABILITIES = (
+    (Assembly, "rotatability"),
+    (JointRecords, "loads"),
+    (LinkTree, "loads"),
+    (PressureEllipse, "pressure extrema"),
+    (CrankRockerLoop, "proofs"),
+    (LimitLocus, "limit locus"),
+    (ProvableLocus, "proven optimum"),
+    (GuidedPoint, "line fit"),
+    (Points, "points"),
+    (OutputLink, "tip"),
+)
+
+
+def family_names(text: str) -> str | list[str]:
+    """Family of ``rssr``, or the families of a chain: ``rssr+guide`` or ``rssr,guide``."""
+    names = chain_names(text)
+    return list(names) if len(names) > 1 else names[0]
+
+
+def complete_families(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Complete a family, behind a + the next stage of a chain."""
+    before, plus, last = incomplete.rpartition("+")
+    return [f"{before}{plus}{name}" for name in NAMES if name.startswith(last)]
+
+
+def complete_outputs(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Complete an output of the FAMILY given before, behind a comma the next one."""
+    # Where an option still lacks its value, click leaves the arguments before it unread.
+    given = context.params.get("family") or next(iter(context.args), None)
+    if given is None:
+        return []
+    try:
+        entry = family(family_names(given))
+    except LinksweepError:
+        return []  # a misspelt family is said when the command runs
+    names = list(entry.pose_names) if context.command.name == "eval" else main_outputs(entry)
+    before, comma, last = incomplete.rpartition(",")
+    return [f"{before}{comma}{name}" for name in names if name.startswith(last)]
+
+
+@click.command()
+@click.argument("name", required=False, shell_complete=complete_families)
+def families(name: str | None) -> None:
+    """List the mechanism families, or the parameters and outputs of one (or of a chain: rssr+guide)."""
+    if name is None:
+        found = [family(known) for known in NAMES]
+        rows = [(entry.name, over(entry), entry.title, ", ".join(capability_words(entry))) for entry in found]
+        echo_columns([("family", "over", "", "can be asked for"), *rows])
+        click.echo("\nchains: any of them in series, such as rssr+guide; `sweep families NAME` shows what one takes")
+        return
+    for line in describe(family(family_names(name))):
+        click.echo(line)
+
+
+def over(family: Family) -> str:
+    """Say in a word or two over what a family is evaluated."""
+    domain = family.domain
+    return domain.kind if domain.kind != "interval" else f"interval of {domain.name}"
+
+
+def capability_words(family: Family) -> list[str]:
+    """Say what a family can be asked for besides its motion."""
+    return [word for kind, word in CAPABILITIES if family.find(kind) is not None]
+
+
+def describe(family: Family) -> list[str]:
+    """Parameters, pose outputs and design outputs of a family with their units, one per line."""
+    lines = [f"{family.name}: {family.title}", "", f"over: {over(family)}"]
+    if words := capability_words(family):
+        lines.append(f"can be asked for: {', '.join(words)}")
+    if points := [name for found in family.every(Points) for name in found.at]:
+        lines.append(f"points: {', '.join(points)}")
+    lines += ["", "parameters (one length unit throughout, angles in rad)"]
+    parameters = []
+    for p in family.parameters:
+        notes = [p.sign] if p.sign else []
+        notes += [p.choice] if p.choices else []
+        notes += [f"default {p.default:g}"] if p.default is not None else []
+        parameters.append((p.name, p.unit, p.text + (f" ({', '.join(notes)})" if notes else "")))
+    lines += aligned(parameters)
+    lines += ["", "pose outputs (sweep eval)"]
+    lines += aligned([(o.name, o.unit, o.text) for o in family.pose_outputs])
+    lines += ["", "design outputs (sweep summarise, and [scene] want of a study)"]
+    lines += aligned([(o.name, o.unit, o.text) for o in (output(family, n) for n in main_outputs(family))])
+    lines += [f"  and of any pose output x: {', '.join(f'{prefix}x' for prefix in prefixes(family.domain))}"]
+    return lines
+
+
+def main_outputs(family: Family) -> list[str]:
+    """Design outputs of a family; of the reductions of its pose outputs only those a designer asks for first."""
+    if isinstance(family, Machine):
+        members = [f"{m.name}.{name}" for m in family.members for name in main_outputs(m.family)]
+        between = [f"min_{r.outputs[0].name}" for r in family.relations] + [t.name for t in family.timings]
+        between += [name for event in family.events for name in event_names(family, event)]
+        return [*members, *between]
+    general = {f"{prefix}{name}" for prefix in prefixes(family.domain) for name in family.pose_names}
+    first = {f"max_abs_{name}" for name in family.derivative_of.values()}
+    first |= {f"max_abs_{o.name}" for o in family.pose_outputs if o.windowed}
+    first |= {f"max_{loop.pressure_angle}" for loop in family.every(Assembly)}
+    return [name for name in output_names(family) if name not in general or name in first]
+
+
+def aligned(rows: Iterable[Sequence[str]]) -> list[str]:
+    """Rows of words as indented lines with aligned columns."""
+    table = [tuple(row) for row in rows]
+    if not table:
+        return []
+    widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
+    return ["  " + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in table]
+
+
+def echo_columns(rows: Iterable[Sequence[str]]) -> None:
+    """Print rows of words as aligned columns."""
+    for line in aligned(rows):
+        click.echo(line)

@@ -1,0 +1,134 @@
+"""The verbs of the first minutes: init, schema."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import click
+
+from sweep.cli.families import complete_families, family_names
+from sweep.cli.first_machine import machine_smoke_text, machine_text
+from sweep.cli.first_study import smoke_text, study_text
+from sweep.errors import InputError, StoreError
+from sweep.families import family as find_family
+from sweep.families.machines import Machine
+from sweep.study.schema import study_schema
+
+SCHEMA = "study.schema.json"
+NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
+
+
+@click.command()
+@click.argument("name")
+@click.option("--family", shell_complete=complete_families, help="A family, or a chain such as rssr+guide.")
+@click.option(
+    "--member",
+    "members",
+    multiple=True,
+    help="Of a machine, once for each: NAME=FAMILY, such as needle=rssr+guide.",
+)
+@click.option(
+    "--into",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path(),
+    help="Where the folder NAME is made; default: here.",
+)
+def init(name: str, family: str | None, members: tuple[str, ...], into: Path) -> None:
+    """Write a first study of a mechanism or a machine: NAME/study.toml, every line explained, and its tiny version.
+
+    It holds the example of the family, or of every --member, with two dimensions swept, passes `sweep check` and runs
+    as it is.  Its first line names the JSON schema by which an editor completes and checks it; the schema lies beside.
+    """
+    if (family is None) == (not members):
+        raise InputError("--family", family, "either --family, or --member once for each member", "command line")
+    if NAME.fullmatch(name) is None:
+        raise InputError("NAME", name, "a plain word of a-z, 0-9 and '-'", "command line")
+    machine = _machine(members)
+    folder = into / name
+    if folder.exists():
+        raise InputError("NAME", name, f"a folder that is not there yet; {folder} is", "command line")
+    shared = _shared_schema(into)
+    seen = _seen_from(folder, shared)
+    if machine is not None:
+        files = {"study.toml": machine_text(name, machine, seen), "smoke.toml": machine_smoke_text(machine)}
+    else:
+        assert family is not None
+        mechanism = find_family(family_names(family))
+        files = {"study.toml": study_text(name, mechanism, seen), "smoke.toml": smoke_text(mechanism)}
+    if shared is None:
+        files[SCHEMA] = _current_schema()
+    try:
+        folder.mkdir(parents=True)
+        for file, text in files.items():
+            (folder / file).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{folder}: cannot be written: {error.strerror}") from error
+    click.echo(f"study: {folder / 'study.toml'}\nnext: sweep check {folder}")
+
+
+def _machine(members: tuple[str, ...]) -> Machine | None:
+    """Return the machine of NAME=FAMILY texts; None where there are none."""
+    found: dict[str, str | list[str]] = {}
+    for text in members:
+        name, _, family = text.partition("=")
+        if not family or name in found:
+            raise InputError(
+                "--member", text, "NAME=FAMILY, every name once, such as needle=rssr+guide", "command line"
+            )
+        found[name] = family_names(family)
+    if len(found) == 1:
+        raise InputError("--member", members[0], "two members or more; --family takes one mechanism", "command line")
+    machine = find_family(found) if found else None
+    assert machine is None or isinstance(machine, Machine)
+    return machine
+
+
+@click.command()
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A file; default: standard output.")
+def schema(out: Path | None) -> None:
+    """Write the JSON schema of study files, by which editors complete and check them."""
+    if out is None:
+        click.echo(_current_schema(), nl=False)
+        return
+    try:
+        out.write_text(_current_schema(), encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"--out {out}: cannot be written: {error.strerror}") from error
+
+
+def schema_text(found: dict[str, Any]) -> str:
+    """Return a schema as it stands in a file: a line for each table, each family and each definition."""
+    parts = []
+    for key, value in found.items():
+        opening, closing = ("[", "]") if isinstance(value, list) else ("{", "}")
+        if isinstance(value, dict):
+            inner = [f"{json.dumps(name)}: {_line(entry)}" for name, entry in value.items()]
+        elif isinstance(value, list):
+            inner = [_line(entry) for entry in value]
+        else:
+            parts.append(f"{json.dumps(key)}: {_line(value)}")
+            continue
+        parts.append(f"{json.dumps(key)}: {opening}\n  " + ",\n  ".join(inner) + f"\n {closing}")
+    return "{\n " + ",\n ".join(parts) + "\n}\n"
+
+
+def _line(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _current_schema() -> str:
+    return schema_text(study_schema())
+
+
+def _shared_schema(into: Path) -> Path | None:
+    """Return the schema that a project keeps for all its studies, docs/study.schema.json, if ``into`` lies in one."""
+    here = into.resolve()
+    return next((file for up in (here, *here.parents) if (file := up / "docs" / SCHEMA).is_file()), None)
+
+
+def _seen_from(folder: Path, schema: Path | None) -> str:
+    return SCHEMA if schema is None else Path(os.path.relpath(schema, folder.resolve())).as_posix()

@@ -1,0 +1,27 @@
+"""Arguments and options that several verbs share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+STUDY = click.argument("study", type=click.Path(exists=True, path_type=Path))
+FOLDER = click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+OUT = click.option(
+    "--out", type=click.Path(file_okay=False, path_type=Path), help="Dataset folder; default results/<study>/designs."
+)
+JOBS = click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers.")
+BACKEND = click.option(
+    "--backend",
+    default="threading",
+    show_default=True,
+    help="threading, loky (processes), dask (processes of a local cluster) or dask=tcp://HOST:8786 (docs/cluster.md).",
+)
+SMOKE = click.option("--smoke", is_flag=True, help="The tiny version: smoke.toml beside the study.")
+DESIGN = click.option("--design", help="optimum, reference, best, or the number of a row; default: optimum, else best.")
+ANGLES = click.option(
+    "--angles",
+    type=click.Choice(["rad", "deg"]),
+    help="Unit of the angles in TABLE; a header such as `alpha [deg]` says it of one column. Default: rad.",
+)

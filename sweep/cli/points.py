@@ -1,0 +1,74 @@
+"""The verbs that take points in and pass designs on: points, export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import pandas as pd
+
+from sweep.cli.families import complete_families
+from sweep.cli.options import DESIGN, FOLDER
+from sweep.cli.tables import checked_format, write_table
+from sweep.dataset.store import beside, located
+from sweep.evaluation.angles import grid_in_radians
+from sweep.exchange.export import FORMATS
+from sweep.exchange.export import export as write
+from sweep.exchange.points import TOLERANCE, from_points, read_points, reader_of
+from sweep.report.dataset import chosen
+
+FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+
+
+@click.command()
+@click.argument("family", shell_complete=complete_families)
+@FILE
+@click.option("--part", default="", help="Of a file with several: `stage 1`, the member's name, or both.")
+@click.option("--tolerance", type=float, help="Largest residual as a part of the drawing's size; default 1e-4.")
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A table for `sweep eval`: one design.")
+def points(family: str, file: Path, part: str, tolerance: float | None, out: Path | None) -> None:
+    """Find the dimensions of FAMILY from the points of a drawing: FILE.csv with the columns name, x, y, z.
+
+    FILE may also be a .csv, .dxf or .glb that `sweep export` wrote; of several stages or members --part names one.
+
+    Names are A (centre of the crank circle), axis_A (crank axis), B (crank pin), C, D, axis_D and so on: see
+    docs/frames.md.  Printed are the parameters, the crank angle of the drawn position, where the family's frame stands
+    in the drawing, and the residual: how far a point lies from its joint at most.  --out writes the parameters and phi
+    as a table.
+    """
+    out = checked_format(out)
+    given = read_points(file, reader_of(family), part=part)
+    found = from_points(family, tolerance=TOLERANCE if tolerance is None else tolerance, **given)
+    if out is not None:
+        write_table(pd.DataFrame([found.parameters | {"phi": found.phi}]), out)
+    for name, value in (*found.parameters.items(), ("phi", found.phi)):
+        click.echo(f"{name:10} {value:.17g}")
+    for name, vector in (("at", found.place.at), ("axis", found.place.axis), ("zero", found.place.zero)):
+        click.echo(f"{name:10} {' '.join(f'{x:.17g}' for x in vector)}")
+    click.echo(f"{'residual':10} {found.residual:.3g}")
+
+
+@click.command()
+@FOLDER
+@DESIGN
+@click.option("--format", "kind", required=True, type=click.Choice(["csv", "glb", "dxf", "mjcf", "law"]))
+@click.option(
+    "--out", type=click.Path(dir_okay=False, path_type=Path), help="Default: export/DESIGN.ending beside FOLDER."
+)
+@click.option("--phi", type=float, default=0.0, show_default=True, help="Crank angle of the drawn position [rad].")
+@click.option("--poses", type=click.IntRange(min=3), default=120, show_default=True, help="Steps of a turn.")
+def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: float, poses: int) -> None:
+    """Write one design of a dataset to a file that other programs read.
+
+    csv: hardpoints and axes.  glb: an animated model that a browser opens.  dxf: a drawing.  mjcf: a model for MuJoCo.
+    law: the motion over one turn with units, .csv or .parquet.  dxf needs `pip install 'linksweep[cad]'`.
+    """
+    grid_in_radians("phi", "rad", phi, None)  # --phi is in rad, whatever the design is
+    found = chosen(folder, design)
+    if out is None:
+        name = f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
+        out = beside(located(folder)) / "export" / name
+        out.parent.mkdir(exist_ok=True)
+    click.echo(
+        f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed, angles='rad')}"
+    )

@@ -1,0 +1,62 @@
+"""The verb ``run``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sweep.cli.options import BACKEND, JOBS, OUT, SMOKE, STUDY
+from sweep.engine.opening import is_part
+from sweep.engine.run import run as run_study
+from sweep.errors import SearchCutShort
+from sweep.report.terminal import ending
+
+
+@click.command()
+@STUDY
+@OUT
+@JOBS
+@BACKEND
+@click.option("--accuracy", type=float, help="Relative error of the extrema, instead of the study's own target.")
+@click.option("--certify", is_flag=True, help="Prove that no peak of the wanted maxima is missed.")
+@SMOKE
+@click.option(
+    "--force",
+    is_flag=True,
+    help="No budget: start and go on whatever it costs; set data of another study in the folder aside.",
+)
+def run(
+    study: Path,
+    out: Path | None,
+    jobs: int,
+    backend: str,
+    accuracy: float | None,
+    certify: bool,
+    smoke: bool,
+    force: bool,
+) -> None:
+    """Run or resume a study.
+
+    An interrupted run is resumed by the same command.  Finished chunks are never computed twice, and the result is the
+    same, bit for bit, with any number of workers.  The answer comes last; where no design keeps all limits, it says
+    which of them have to give way, and the exit code is 4.
+    """
+    proof = True if certify else None
+    late: SearchCutShort | None = None
+    try:
+        folder = run_study(
+            study, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
+        )
+    except SearchCutShort as error:
+        late, folder = error, error.folder
+    if is_part(folder):  # the answer is for the whole, once the parts are merged
+        click.echo(f"part: {folder}")
+        return
+    found = ending(folder)
+    for line in found.lines:
+        click.echo(line)
+    click.echo(f"dataset: {folder}")
+    if late is not None:
+        raise late
+    click.get_current_context().exit(found.exit_code)

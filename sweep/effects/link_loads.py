@@ -1,0 +1,246 @@
+"""D1-D3 of any number of links: reactions, driving torque, friction, a tool; what :class:`LinkTree` is needed for."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.effects import link_friction, link_loads
+from sweep.effects import loads
+from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT, Named, together
+from sweep.effects.scene import Index, Scene, Status, refuse
+from sweep.families.base import Array, Columns, Parameter
+from sweep.families.link_tree import LinkJoint, LinkTree
+
+KINDS = {
+    "shaft": link_loads.SHAFT,
+    "hinge": link_loads.HINGED_BALL,
+    "sleeve": link_loads.GUIDE,
+    "ball": link_loads.BALL,
+    "contact": link_loads.CONTACT,
+}
+FRAME = {
+    "shaking_force": ("force", "force on the frame"),
+    "shaking_moment": ("torque", "moment on the frame about the origin of the family's frame, drive torque included"),
+}
+INERTIAS = {
+    "reduced_inertia": ("inertia", "inertia of all links and the tool, of later stages too, reduced to the crank"),
+    "dreduced_inertia": ("inertia", "derivative of the reduced inertia by the crank angle"),
+}
+TOOL_VECTOR = {"tool_load": ("force", "force of its link on the tool")}
+TOOL_TORQUE = "tool_torque"
+SCALARS = {
+    "drive_torque": ("torque", "torque that drives the cranks, about their axes"),
+    **INERTIAS,
+    TOOL_TORQUE: ("torque", "share of the tool in the torque about this stage's crank"),
+}
+TORQUE_WITH_FRICTION = f"drive_torque{FRICTION_SUFFIX}"
+PASSES = "friction_passes"
+SUPPORTED = ("shaft", "sleeve")
+
+
+def tree_of(scene: Scene) -> LinkTree:
+    """Find the tree of links of a scene's family."""
+    tree = scene.family.find(LinkTree)
+    assert tree is not None
+    return tree
+
+
+@lru_cache
+def body_inputs(tree: LinkTree) -> tuple[Parameter, ...]:
+    """Masses, centres and inertias of all bodies."""
+    return tuple(
+        p for body in tree.bodies for p in (loads.rod_inputs if body.slender else _whole)(body.name, body.axes)
+    )
+
+
+def _whole(name: str, axes: str) -> tuple[Parameter, ...]:
+    return loads.body_inputs(name, axes, 0.0)
+
+
+def inputs(tree: LinkTree) -> tuple[Parameter, ...]:
+    """All inputs of the loads of a tree."""
+    load = (loads.LINK_TORQUE,) if tree.output >= 0 else ()
+    tip = loads.TIP if tree.tip is None else ()
+    return (*body_inputs(tree), *loads.GRAVITY, *loads.FREE_TOOL, *tip, *load, loads.SPEED, loads.CHANGE)
+
+
+def friction_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
+    """List the inputs of a joint in the order of the kernel's columns: those that it has."""
+    j, text = joint.name, joint.text
+    bare = 0.0 if joint.kind in ("contact", "sleeve") else None
+    found = [
+        Parameter(f"mu_{j}", "ratio", f"coefficient of friction: {text}", not_negative=True),
+        Parameter(f"radius_{j}", "length", f"friction radius: {text}", default=bare, not_negative=True),
+    ]
+    if joint.kind == "shaft":
+        words = f"mean thrust radius: {text}"
+        found.append(Parameter(f"thrust_radius_{j}", "length", words, default=0.0, not_negative=True))
+    if joint.kind in SUPPORTED:
+        found += [
+            Parameter(f"support_{j}{k}", "length", f"{which} support along the axis, from its joint: {text}")
+            for k, which in ((1, "first"), (2, "second"))
+        ]
+    return tuple(found)
+
+
+def vectors(tree: LinkTree, suffix: str = "", text: str = "") -> Named:
+    """Vectors that are given: forces and moments of the joints, and what the frame bears."""
+    found = {}
+    for joint in tree.joints:
+        found[f"force_{joint.name}{suffix}"] = ("force", f"{joint.text}: force of the {joint.acts}{text}")
+        if joint.kind in SUPPORTED:
+            found[f"moment_{joint.name}{suffix}"] = (
+                "torque", f"{joint.text}: moment of the {joint.acts}{text}",
+            )  # fmt: skip
+    return found | {f"{name}{suffix}": (unit, f"{words}{text}") for name, (unit, words) in FRAME.items()}
+
+
+def losses(tree: LinkTree) -> Named:
+    """Shares of the joints' friction in the driving torque, and the passes of the iteration."""
+    found = {
+        f"lost_torque_{j.name}": ("torque", f"share of the friction in the driving torque: {j.text}")
+        for j in tree.joints
+    }
+    return found | {PASSES: ("1", "passes of the friction iteration")}
+
+
+def support_loads(tree: LinkTree) -> dict[str, tuple[int, int, str]]:
+    """Name the loads of supports: the number of the joint, that of the support, in words."""
+    return {
+        f"load_support_{j.name}{k + 1}": (q, k, f"load across the axis of support {k + 1}: {j.text}{FRICTION_TEXT}")
+        for q, j in enumerate(tree.joints)
+        if j.kind in SUPPORTED
+        for k in (0, 1)
+    }
+
+
+@lru_cache
+def joint_table(tree: LinkTree) -> Index:
+    """Joints as the kernels take them, (Q, PER_JOINT)."""
+    rows = [(KINDS[j.kind], j.body, j.freedom, *j.lines, rod(tree, j)) for j in tree.joints]
+    return np.array(rows, np.int64)
+
+
+def rod(tree: LinkTree, joint: LinkJoint) -> int:
+    """Find the slender body among those of a joint; -1 where there is none."""
+    ends = (joint.body,) if joint.lines[1] == 0 else tree.ends[joint.lines[0]]
+    return next((k for k in ends if k >= 0 and tree.bodies[k].slender), -1)
+
+
+def load_name(scene: Scene) -> str | None:
+    """Name of the useful load on the output link; None where the tree has no such link."""
+    return loads.LINK_TORQUE.name if tree_of(scene).output >= 0 else None
+
+
+def force_name(scene: Scene) -> str:
+    """Name of a force that leaves all reactions in the scene when it is computed."""
+    return f"force_{tree_of(scene).joints[0].name}"
+
+
+def _bodies(scene: Scene) -> Array:
+    """Masses, centres, inertias and gravity in the order of the kernel, (n, 10 B + 3)."""
+    tree, given = tree_of(scene), scene.inputs
+    columns: list[Array] = []
+    zero = np.zeros(len(scene.designs))
+    for body in tree.bodies:
+        if body.slender:
+            across = given[f"j_{body.name}"]
+            columns += [given[f"m_{body.name}"], given[f"com_{body.name}_x"], *[zero] * 5, across, zero, across]
+        else:
+            columns += [given[p.name] for p in _whole(body.name, body.axes)]
+    return np.column_stack([*columns, *(given[p.name] for p in loads.GRAVITY)])
+
+
+def _tool(scene: Scene) -> Array:
+    """Mass of the tool and its place in the axes of the body that carries it, (n, 4)."""
+    tree = tree_of(scene)
+    tip = scene.table(tuple(p.name for p in loads.TIP)) if tree.tip is None else tree.tip(scene.designs)
+    return np.column_stack([scene.inputs["m_tool"], tip])
+
+
+def _drive(scene: Scene, load: Array) -> Array:
+    """Crank speed and its rate, load of the output link, force on the tool, (n, m or 1, 6)."""
+    force = [scene.load(p.name) for p in loads.FREE_TOOL[1:]]
+    return np.stack(np.broadcast_arrays(*scene.crank(), load, *force), axis=2)
+
+
+def _vector_columns(
+    tree: LinkTree, forces: Array | None, on_frame: Array | None, wanted: frozenset[str], suffix: str = ""
+) -> Columns:
+    """Wanted magnitudes and components of joint reactions (n, m, Q, 6) and of what the frame bears, (n, m, 6)."""
+    found = {}
+    if forces is not None:
+        for k, joint in enumerate(tree.joints):
+            found[f"force_{joint.name}{suffix}"] = forces[:, :, k, :3]
+            found[f"moment_{joint.name}{suffix}"] = forces[:, :, k, 3:]
+    if on_frame is not None:
+        found |= {f"shaking_force{suffix}": on_frame[:, :, :3], f"shaking_moment{suffix}": on_frame[:, :, 3:]}
+    return loads.vector_columns(found, wanted)
+
+
+def _asked_for(scene: Scene, wanted: frozenset[str], suffix: str = "") -> tuple[Array | None, Array | None]:
+    """Room for the reactions of the joints and for what the frame bears; None where no output of it is wanted."""
+    tree, frame = tree_of(scene), tuple(f"{name}{suffix}" for name in FRAME)
+    joints = tuple(name for name in vectors(tree, suffix) if name not in frame)
+    forces = np.empty((*scene.shape, len(tree.joints), 6)) if loads.asked(joints, wanted) else None
+    return forces, np.empty((*scene.shape, 6)) if loads.asked(frame, wanted) else None
+
+
+def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
+    """Wanted reactions, driving torque and inertias; what is not wanted is not compiled."""
+    tree, shape = tree_of(scene), scene.shape
+    forces, on_frame = _asked_for(scene, wanted)
+    torque = np.empty(shape) if "drive_torque" in wanted else None
+    inertia = np.empty((*shape, 2)) if not wanted.isdisjoint(INERTIAS) else None
+    of_tool = loads.asked(TOOL_VECTOR, wanted) or TOOL_TORQUE in wanted
+    on_tool = np.empty((*shape, 4)) if of_tool else None
+    link_loads.link_loads(
+        scene.links, joint_table(tree), _bodies(scene), _tool(scene), _drive(scene, load), tree.carrier, tree.output,
+        status, forces, on_frame, torque, inertia, on_tool,
+    )  # fmt: skip
+    if forces is not None:
+        scene.memo["reactions"] = forces.reshape(*shape, 6 * len(tree.joints)), status
+    columns = _vector_columns(tree, forces, on_frame, wanted)
+    if on_tool is not None:
+        columns |= loads.vector_columns({"tool_load": on_tool[:, :, :3]}, wanted)
+        columns |= {TOOL_TORQUE: on_tool[:, :, 3]} if TOOL_TORQUE in wanted else {}
+    if torque is not None:
+        columns["drive_torque"] = torque
+    return columns | loads.scalar_columns(INERTIAS, inertia, wanted)
+
+
+def _friction_data(scene: Scene) -> Array:
+    """Columns of the friction kernel of each joint, (n, Q, 5); 0 for what a kind of joint does not have."""
+    zero, rows = np.zeros(len(scene.designs)), []
+    for j in (joint.name for joint in tree_of(scene).joints):
+        names = (f"mu_{j}", f"radius_{j}", f"thrust_radius_{j}", f"support_{j}1", f"support_{j}2")
+        rows.append(np.column_stack([scene.inputs.get(name, zero) for name in names]))
+    return np.ascontiguousarray(np.stack(rows, axis=1))
+
+
+def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
+    """Wanted quantities with friction; status JAMMED where the iteration does not settle."""
+    tree, shape = tree_of(scene), scene.shape
+    same: NDArray[np.bool_] = np.zeros(len(scene.designs), np.bool_)
+    for joint in tree.joints:
+        same |= together(scene, joint.name) if joint.kind in SUPPORTED else False
+    refuse(status, same)
+    number, lost, supports = len(tree.joints), tuple(losses(tree)), support_loads(tree)
+    forces, on_frame = _asked_for(scene, wanted, FRICTION_SUFFIX)
+    torque = np.empty(shape) if TORQUE_WITH_FRICTION in wanted else None
+    given = np.empty((*shape, number + 1)) if not wanted.isdisjoint(lost) else None
+    carried = np.empty((*shape, number, 2)) if not wanted.isdisjoint(supports) else None
+    link_friction.link_friction(
+        scene.links, joint_table(tree), _bodies(scene), _tool(scene), _drive(scene, load), _friction_data(scene),
+        tree.carrier, tree.output, status, forces, on_frame, torque, given, carried,
+    )  # fmt: skip
+    columns = _vector_columns(tree, forces, on_frame, wanted, FRICTION_SUFFIX)
+    if torque is not None:
+        columns[TORQUE_WITH_FRICTION] = torque
+    columns |= loads.scalar_columns(lost, given, wanted)
+    if carried is not None:
+        columns |= {name: carried[:, :, q, k] for name, (q, k, _) in supports.items() if name in wanted}
+    return columns

@@ -1,0 +1,143 @@
+"""Loads of a stage of a chain, and what it hands back to the stage that drives it, by what its family offers.
+
+A family with joint records has its loads in closed form, one with a tree of links by virtual power.  The tree alone
+would do: for 1 100 crank-rockers at 360 angles both agree to 2e-15, but the closed form takes
+0.46 us per pose against 2.0 without friction, 1.6 us against 18 with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from sweep.effects import kinetostatics, link_loads, loads
+from sweep.effects.base import tool_place
+from sweep.effects.scene import Scene, Status, take_over
+from sweep.families.base import Array, Columns, Family, Parameter
+from sweep.families.capabilities import JointRecords
+from sweep.families.link_tree import LinkTree
+
+LOADS, FRICTION = "D1, D3", "D2"  # keys of the effects that hand something back
+INERTIAS = ("reduced_inertia", "dreduced_inertia")
+_TORQUE = {LOADS: "drive_torque", FRICTION: "drive_torque_friction"}
+_HANDED_BACK = {LOADS: frozenset({_TORQUE[LOADS], *INERTIAS}), FRICTION: frozenset({_TORQUE[FRICTION]})}
+
+Reactions: TypeAlias = Callable[[Scene, Array, frozenset[str], Status], Columns]
+"""``(scene, load, wanted, status)``: wanted columns under a load on the output; the status is written on."""
+
+
+class Route(NamedTuple):
+    """How the loads of families with a capability are found.
+
+    ``inputs(family)`` are those of its loads, ``load(scene)`` names the useful one on its output, if any, and
+    ``force(scene)`` an output that leaves all reactions in the scene when it is computed.
+    """
+
+    frictionless: Reactions
+    with_friction: Reactions
+    inputs: Callable[[Family], tuple[Parameter, ...]]
+    load: Callable[[Scene], str | None]
+    force: Callable[[Scene], str]
+
+
+def _inputs_by_records(family: Family) -> tuple[Parameter, ...]:
+    place = tool_place(family)
+    return (*loads.follower_of(family).parameters, *(() if place is None else loads.TOOLS[place]))
+
+
+def _inputs_by_links(family: Family) -> tuple[Parameter, ...]:
+    tree = family.find(LinkTree)
+    return () if tree is None else link_loads.inputs(tree)
+
+
+_ROUTES = {
+    LinkTree: Route(link_loads.frictionless, link_loads.with_friction, _inputs_by_links, link_loads.load_name,
+                    link_loads.force_name),
+    JointRecords: Route(kinetostatics.frictionless, kinetostatics.with_friction, _inputs_by_records,
+                        kinetostatics.load_name, kinetostatics.force_name),
+}  # fmt: skip
+
+
+def route(family: Family) -> Route | None:
+    """How the loads of a family are found; None where it has nothing to find them from."""
+    return next((found for capability, found in _ROUTES.items() if family.find(capability) is not None), None)
+
+
+def inputs_of_loads(family: Family) -> tuple[Parameter, ...]:
+    """List the inputs of the effect that hands back a family's load; none where there is no such effect."""
+    found = route(family)
+    return () if found is None else found.inputs(family)
+
+
+def compute_loads(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Wanted reactions, driving torque and inertias of one stage, those of the later stages included."""
+    found, status, handed_back = _route_of(scene), scene.status(), behind(scene, LOADS)
+    columns = found.frictionless(scene, _on_output(scene, found, handed_back, LOADS), wanted, status)
+    if handed_back is not None:
+        take_over(status, handed_back["status"])
+        if not wanted.isdisjoint(INERTIAS):
+            more = _carried(scene, handed_back)
+            columns |= {name: np.asarray(columns[name], np.float64) + more[name] for name in INERTIAS if name in wanted}
+    return columns | {"status": status}
+
+
+def compute_friction(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Wanted reactions, driving torque and losses of one stage with friction."""
+    found, status, handed_back = _route_of(scene), scene.status(), behind(scene, FRICTION)
+    if handed_back is not None:
+        take_over(status, handed_back["status"])
+    columns = found.with_friction(scene, _on_output(scene, found, handed_back, FRICTION), wanted, status)
+    return columns | {"status": status}
+
+
+def computed(scene: Scene, key: str, wanted: frozenset[str]) -> Columns:
+    """Compute outputs of the effect of that key for one stage."""
+    return (compute_loads if key == LOADS else compute_friction)(scene, wanted)
+
+
+def behind(scene: Scene, key: str) -> Columns | None:
+    """Compute what the next stage hands back, its status among it; None at the end of the chain."""
+    if scene.driven is None:
+        return None
+    memo = f"behind {key}"
+    if memo not in scene.memo:
+        scene.memo[memo] = computed(scene.driven, key, _HANDED_BACK[key])
+    found: Columns = scene.memo[memo]
+    return found
+
+
+def reactions(scene: Scene) -> tuple[Array, Status]:
+    """All reactions side by side as the kernel of the family's route gives them, (n, m, F), and the status.
+
+    They are computed once for all bearings of a scene.
+    """
+    if "reactions" not in scene.memo:
+        compute_loads(scene, frozenset({_route_of(scene).force(scene)}))
+    found: tuple[Array, Status] = scene.memo["reactions"]
+    return found
+
+
+def _route_of(scene: Scene) -> Route:
+    found = route(scene.family)
+    if found is None:
+        raise TypeError(f"{scene.family.name} has neither joint records nor a tree of links")
+    return found
+
+
+def _carried(scene: Scene, handed_back: Columns) -> dict[str, Array]:
+    """Inertia of the later stages reduced to this crank, and its derivative."""
+    inertia, slope = (np.asarray(handed_back[name], np.float64) for name in INERTIAS)
+    first, second = scene.gear
+    both = first * first * inertia, 2.0 * first * second * inertia + first**3 * slope
+    return dict(zip(INERTIAS, both, strict=True))
+
+
+def _on_output(scene: Scene, found: Route, handed_back: Columns | None, key: str) -> Array:
+    """Load of the output link, with the next stage's driving torque that acts on it besides."""
+    name = found.load(scene)
+    load = np.zeros((len(scene.designs), 1)) if name is None else scene.load(name)
+    if handed_back is None:
+        return load
+    return load - scene.after[0].kappa[:, None] * np.asarray(handed_back[_TORQUE[key]], np.float64)

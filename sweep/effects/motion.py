@@ -1,0 +1,149 @@
+"""C0, M1: motion of the coupler and of a point of it, and of the common centre of mass of links of one section."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.effects.coupler import centre_acceleration, coupler_point
+from sweep.effects.base import Advice, Effect
+from sweep.effects.scene import Scene
+from sweep.families.base import Columns, Output, Parameter
+from sweep.families.poses import filled_each
+
+EQUATION = "C0 (1)-(4)"
+FORMULAS = (
+    "(1) m = w x s (times the branch for a driven finger), n = m/|m|; w = rho (driven) or u (driving)",
+    "(2) P = B + x s + y (n x s) + z n",
+    "(3) omega = s x s' + q s, q = -m' . (n x s)/|m|; P' = B' + omega x p, P'' = B'' + eps x p + omega x (omega x p)",
+    "(4) finger at C: Rz(psi) Rx(euler_theta) Rz(euler_phi) turns x to s, z to n",
+    "    finger at B: euler_theta = atan2(s . e1, -s . e2) about u, euler_phi = atan2(-s . u, |u x s|)",
+)
+
+CONSTRUCTION = Parameter(
+    "finger", "choice", "which ball joint carries the finger: 0 the driven one (at C), 1 the driving one (at B)",
+    default=0.0, choices=(0.0, 1.0),
+)  # fmt: skip
+
+INPUTS = (
+    Parameter("x_point", "length", "coupler point from B along the coupler", default=0.0),
+    Parameter("y_point", "length", "coupler point along n x s, in the coupler's plane", default=0.0),
+    Parameter("z_point", "length", "coupler point along n, normal to the coupler's plane", default=0.0),
+    CONSTRUCTION,
+)
+
+_GROUPS = {
+    "": ("{axis}_p", "length", "{axis} of the coupler point, fixed axes"),
+    "d": ("d{axis}_p", "length", "velocity analogue of the coupler point along {axis}"),
+    "d2": ("d2{axis}_p", "length", "acceleration analogue of the coupler point along {axis}"),
+    "n": ("n_{axis}", "1", "{axis} of the unit vector n of the coupler"),
+    "omega": ("omega_{axis}", "1", "angular velocity of the coupler along {axis} per unit crank speed"),
+    "eps": ("eps_{axis}", "1", "angular acceleration of the coupler along {axis} per unit crank speed squared"),
+}
+_EULER = (
+    Output(
+        "euler_theta", "rad", "nutation of the coupler: about the node line, after the precession", EQUATION, wraps=True
+    ),
+    Output("euler_phi", "rad", "rotation of the coupler about its own third axis", EQUATION, wraps=True),
+)
+OUTPUTS = _EULER + tuple(
+    Output(name.format(axis=axis), unit, text.format(axis=axis), EQUATION)
+    for name, unit, text in _GROUPS.values()
+    for axis in "xyz"
+)
+
+_POINT = ("x_point", "y_point", "z_point")
+
+
+def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Wanted components; each group of three costs what one of them does."""
+    status = scene.status()
+    groups = [[name.format(axis=axis) for axis in "xyz"] for name, _, _ in _GROUPS.values()]
+    out = [None if wanted.isdisjoint(names) else np.empty((*scene.shape, 3)) for names in groups]
+    angles = None if wanted.isdisjoint(o.name for o in _EULER) else np.empty((*scene.shape, 2))
+    coupler_point(*scene.records, scene.table(_POINT), scene.inputs["finger"], status, *[*out, angles])
+    columns: Columns = {
+        name: values[:, :, k]
+        for names, values in zip(groups, out, strict=True)
+        for k, name in enumerate(names)
+        if values is not None and name in wanted
+    }
+    if angles is not None:
+        columns |= {o.name: angles[:, :, k] for k, o in enumerate(_EULER) if o.name in wanted}
+    return columns | {"status": status}
+
+
+def advise(scene: Scene) -> Advice | None:
+    """Compare the coupler's mass with the follower's inertia at C, and its centre of mass with the line B-C."""
+    given, slider = scene.inputs, "m_slider" in scene.inputs
+    follower = "slider" if slider else "rocker"
+    if not {"m_coupler", f"m_{follower}"} <= set(given):
+        return None
+    b, c = scene.records[1][:, 13], scene.records[1][:, 14]
+    inertia = given[f"m_{follower}"]
+    if not slider:
+        square = given["com_rocker_x"] ** 2 + given["com_rocker_y"] ** 2
+        inertia = (given["j_rocker_zz"] + inertia * square) / c**2
+    off = np.hypot(given["com_coupler_y"], given["com_coupler_z"]) / b
+    with np.errstate(divide="ignore", invalid="ignore"):  # without a mass the quotient is not used
+        share = np.where(given["m_coupler"] > 0.0, given["m_coupler"] / inertia, 0.0)
+    return Advice("coupler's mass over the follower's, brought to C, plus its eccentricity", share + off, 0.05)
+
+
+EFFECT = Effect(
+    key="C0",
+    name="coupler",
+    title="motion of a coupler point, orientation and rates of the coupler",
+    equation=EQUATION,
+    formulas=FORMULAS,
+    needs=(),
+    inputs=INPUTS,
+    outputs=OUTPUTS,
+    compute=compute,
+    called_for="a tool on the coupler, a coupler whose centre of mass is off the line B-C",
+    negligible="coupler mass below 5 % of the rocker's inertia over c^2 (of the slider's mass), and balanced",
+    advise=advise,
+)
+
+
+SHAKING_EQUATION = "M1 (1), (2)"
+SHAKING = "shaking_estimate"
+
+SHAKING_OUTPUTS = (
+    Output(
+        SHAKING, "length",
+        "acceleration analogue of the links' common centre of mass: shaking force over moving mass and square of the "
+        "crank speed, if the links are slender rods of one mass per length",
+        SHAKING_EQUATION,
+    ),
+    *(
+        Output(f"{SHAKING}_{axis}", "length", f"{axis} of the shaking estimate, fixed axes", SHAKING_EQUATION)
+        for axis in "xyz"
+    ),
+)  # fmt: skip
+_SHAKING_NAMES = tuple(o.name for o in SHAKING_OUTPUTS)
+
+
+def compute_shaking(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Magnitude and components of every pose; in a chain with respect to the crank angle of stage 1."""
+    first, second = scene.rates or (np.ones(scene.shape), np.zeros(scene.shape))
+    rates = np.ascontiguousarray(first), np.ascontiguousarray(second)
+    return filled_each(centre_acceleration, (*scene.records, *rates), _SHAKING_NAMES, wanted, scene.status())
+
+
+SHAKING_EFFECT = Effect(
+    key="M1",
+    name="shaking",
+    title="shaking force without masses: links like slender rods of one mass per length",
+    equation=SHAKING_EQUATION,
+    formulas=(
+        "(1) (a + b + c) S'' = a B''/2 + b (B'' + C'')/2 + c C''/2; a slider counts for nothing (c = 0)",
+        "(2) crank of a chain's later stage: P'' becomes w^2 P'' + w' P', w = its speed over that of stage 1",
+        "    shaking force = moving mass * crank speed^2 * S''",
+    ),
+    needs=(),
+    inputs=(),
+    outputs=SHAKING_OUTPUTS,
+    compute=compute_shaking,
+    called_for="comparing mechanisms before masses are known; joint loads give the shaking force itself",
+    negligible="slow machines, heavy frames",
+)

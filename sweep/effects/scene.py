@@ -1,0 +1,249 @@
+"""Designs at their crank angles as the effects see them: joint records or links, inputs, the stages of a chain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels.linkage.bodies import PER_BODY, PER_LINE, Links
+from kernels.linkage.joints import PER_DESIGN, PER_POSE
+from sweep.families.base import Angles, Array, Columns, Family
+from sweep.families.capabilities import JointRecords
+from sweep.families.chain import Chain, drive, driving_names
+from sweep.families.link_tree import LinkTree
+from sweep.families.names import at_stage
+from sweep.numerics.curves import Curve
+
+_PER_LINK = (PER_BODY, 3, PER_LINE)
+
+Status: TypeAlias = NDArray[np.uint8]
+Rows: TypeAlias = NDArray[np.intp]
+Index: TypeAlias = NDArray[np.int64]
+
+
+class Driven(NamedTuple):
+    """A later stage of a chain, as the stage before it drives it: phi = kappa psi + offset."""
+
+    family: Family
+    designs: Array
+    kappa: Array
+    offset: Array
+    inputs: dict[str, Array]
+    curves: Mapping[str, Curve] = {}
+
+    def only(self, rows: Rows) -> Driven:
+        """Keep some of the designs."""
+        given = {name: x[rows] for name, x in self.inputs.items()}
+        return Driven(self.family, self.designs[rows], self.kappa[rows], self.offset[rows], given, self.curves)
+
+
+@dataclass
+class Scene:
+    """One block of designs at their crank angles, as the effects see it; what two effects share is computed once.
+
+    In a chain it is one stage: ``after`` are the stages behind it, ``before`` the scene that drives it.  ``curves`` are
+    loads over the turn of the first crank, by the input they add to.  ``uneven`` are its speed and acceleration at the
+    poses, (n, m); None where they are the constants among the inputs.
+    """
+
+    family: Family
+    designs: Array  # (n, P) of the bare family
+    angles: Angles
+    inputs: dict[str, Array]  # input name -> (n,)
+    after: tuple[Driven, ...] = ()
+    before: Scene | None = None
+    curves: Mapping[str, Curve] = field(default_factory=dict)
+    uneven: tuple[Array, Array] | None = None
+    memo: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of designs and of poses of each."""
+        return len(self.designs), self.angles.cos.shape[1]
+
+    @cached_property
+    def motion(self) -> Columns:
+        """Pose outputs of the family that its joint records, or the poses of its links, are made of."""
+        tree = self.family.find(LinkTree)
+        needs = self._joints.needs if tree is None else tree.needs
+        return self.family.poses(self.designs, self.angles, frozenset(needs))
+
+    @cached_property
+    def records(self) -> tuple[Array, Array]:
+        """Joint records per pose (n, m, PER_POSE) and per design (n, PER_DESIGN); see :mod:`kernels.linkage.joints`."""
+        per_pose, per_design = np.empty((*self.shape, PER_POSE)), np.empty((len(self.designs), PER_DESIGN))
+        self._joints.fill(self.designs, self.angles, self.motion, per_pose, per_design)
+        return per_pose, per_design
+
+    @cached_property
+    def links(self) -> Links:
+        """Bodies of the family and their poses; see :mod:`kernels.linkage.bodies`."""
+        tree = self.family.find(LinkTree)
+        if tree is None:
+            raise TypeError(f"{self.family.name} has no tree of links")
+        n, every = len(self.designs), (len(tree.bodies), len(tree.freedoms), len(tree.ends))
+        bodies, axes, lines = (np.empty((*self.shape, k, per)) for k, per in zip(every, _PER_LINK, strict=True))
+        parents = np.array(tree.parents, np.int64)
+        freedoms, ends = (np.tile(np.array(given, np.int64), (n, 1, 1)) for given in (tree.freedoms, tree.ends))
+        found = Links(parents, freedoms, ends, bodies, axes, lines)
+        tree.fill(self.designs, self.angles, self.motion, found)
+        return found
+
+    @cached_property
+    def _joints(self) -> JointRecords:
+        joints = self.family.find(JointRecords)
+        if joints is None:
+            raise TypeError(f"{self.family.name} has no joint records")
+        return joints
+
+    @cached_property
+    def driven(self) -> Scene | None:
+        """The stage that this one drives, at its own crank angles; None at the end of the chain."""
+        if not self.after:
+            return None
+        following, *rest = self.after
+        names = frozenset(driving_names(self.family, following.family))
+        turn = self.family.poses(self.designs, self.angles, names)
+        angles = drive(turn, self.family.position, following.kappa, following.offset)
+        return Scene(following.family, following.designs, angles, following.inputs, tuple(rest), self, following.curves)
+
+    def stage(self, index: int) -> Scene:
+        """Scene of the stage ``index`` places behind this one."""
+        scene = self
+        for _ in range(index):
+            assert scene.driven is not None
+            scene = scene.driven
+        return scene
+
+    @cached_property
+    def gear(self) -> tuple[Array, Array]:
+        """First and second derivative of the next stage's crank angle with respect to this stage's, (n, m)."""
+        rate = self.family.derivative_of[self.family.position]
+        names = rate, self.family.derivative_of[rate]
+        turn = self.family.poses(self.designs, self.angles, frozenset(names))
+        kappa = self.after[0].kappa[:, None]
+        first, second = (kappa * np.asarray(turn[name], np.float64) for name in names)
+        return first, second
+
+    @cached_property
+    def rates(self) -> tuple[Array, Array] | None:
+        """First and second derivative of the crank angle with respect to that of stage 1; None where it is that one."""
+        if self.before is None:
+            return None
+        first, second = self.before.gear
+        if self.before.rates is not None:
+            inner, bend = self.before.rates
+            first, second = first * inner, second * inner * inner + first * bend
+        return first, second
+
+    def crank(self) -> tuple[Array, Array]:
+        """Speed and angular acceleration of this stage's crank, (n, m), or (n, 1) where it turns evenly."""
+        even = self.inputs["speed"][:, None], self.inputs["speed_change"][:, None]
+        speed, change = self._first.uneven or even
+        if self.rates is None:
+            return speed, change
+        first, second = self.rates
+        return speed * first, speed * speed * second + change * first
+
+    def status(self) -> Status:
+        """Copy the motion's status afresh for a kernel to write on; stages before speak first."""
+        status = np.array(self.motion["status"], dtype=np.uint8)
+        if self.before is not None:
+            earlier = self.before.status()
+            np.copyto(status, earlier, where=earlier != st.OK)
+        return status
+
+    def table(self, names: tuple[str, ...]) -> Array:
+        """Put inputs side by side, (n, len(names))."""
+        return np.column_stack([self.inputs[name] for name in names])
+
+    def load(self, name: str) -> Array:
+        """Give a load at the poses: (n, 1) where it is constant, (n, m) where a curve adds to it."""
+        constant, curve = self.inputs[name][:, None], self.curves.get(name)
+        return constant if curve is None else constant + curve(self._first.angles.phi)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether no load of this stage or a later one is given over the turn, or jumps while a tool pierces."""
+        piercing = "pierce_force" in self.inputs and bool(self.inputs["pierce_force"].any())
+        return not self.curves and not piercing and (self.driven is None or self.driven.smooth)
+
+    @property
+    def _first(self) -> Scene:
+        return self if self.before is None else self.before._first
+
+    def only(self, rows: Rows) -> Scene:
+        """Keep some of the designs; the scene itself where these are all."""
+        if rows.size == len(self.designs):
+            return self
+        angles = Angles(*(x[rows] for x in self.angles)) if self.angles.cos.shape[0] > 1 else self.angles
+        given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
+        return Scene(self.family, self.designs[rows], angles, given, after, curves=self.curves)
+
+    def posed(self, rows: Rows, phi: Array) -> Scene:
+        """Take some of the designs, each as often as wanted, at crank angles (k, m) of their own."""
+        given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
+        return Scene(self.family, self.designs[rows], Angles.of(phi), given, after, curves=self.curves)
+
+    def precise(self) -> Scene:
+        """Give the same scene with the most accurate poses that its families have."""
+        after = tuple(d._replace(family=d.family.precise()) for d in self.after)
+        return Scene(self.family.precise(), self.designs, self.angles, self.inputs, after, curves=self.curves)
+
+    def on_grid(self, size: int) -> Scene:
+        """Sample a whole turn: the same designs at ``size`` equidistant crank angles."""
+        angles = Angles.of(2.0 * np.pi * np.arange(size)[None] / size)
+        return Scene(self.family, self.designs, angles, self.inputs, self.after, curves=self.curves)
+
+
+def stages_of(family: Family) -> tuple[tuple[Family, str], ...]:
+    """Stages of a chain with their numbers; a family alone is one stage without a number."""
+    if isinstance(family, Chain):
+        return tuple((stage.family, str(stage.number)) for stage in family.stages)
+    return ((family, ""),)
+
+
+def first_scene(
+    family: Family,
+    designs: Array,
+    angles: Angles,
+    given: dict[str, Array],
+    curves: Mapping[str, Curve] = MappingProxyType({}),
+) -> Scene:
+    """Scene of a family, or of a chain's first stage with those behind it.
+
+    ``given`` are the inputs by name, each (n,), ``curves`` what adds to some of them over the turn.
+    """
+    if not isinstance(family, Chain):
+        return Scene(family, designs, angles, {"speed_change": 0.0 * designs[:, 0]} | given, curves=curves)
+    still = {"speed_change": 0.0 * designs[:, 0]}
+    crank = still | {name: given[f"{name}1"] for name in ("speed", "speed_change") if f"{name}1" in given}
+    parts = []
+    for stage in family.stages:
+        number = str(stage.number)
+        own = {plain: x for name, x in given.items() if (plain := at_stage(name, number))}
+        over = {plain: x for name, x in curves.items() if (plain := at_stage(name, number))}
+        parts.append((stage.family, stage.designs(designs), own | crank, over))
+    after = tuple(
+        Driven(bare, matrix, designs[:, stage.kappa], designs[:, stage.offset], own, over)
+        for stage, (bare, matrix, own, over) in zip(family.stages[1:], parts[1:], strict=True)
+    )
+    bare, matrix, own, over = parts[0]
+    return Scene(bare, matrix, angles, own, after, curves=over)
+
+
+def take_over(status: Status, later: NDArray[np.generic]) -> None:
+    """Make ``later`` the status of what is OK so far, in place."""
+    np.copyto(status, later, where=status == st.OK)
+
+
+def refuse(status: Status, designs: NDArray[np.bool_]) -> None:
+    """Make INVALID_INPUT the status of these designs, (n,), where it is OK so far, in place."""
+    np.copyto(status, st.INVALID_INPUT, where=designs[:, None] & (status == st.OK))

@@ -1,0 +1,160 @@
+"""What a run searches after its sweep: the optimum, the proof and the front that its study asks for."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from sweep import optimise
+from sweep.chunks import plan as plans
+from sweep.dataset import store
+from sweep.dataset.files import TABLES, altered, digests, metadata
+from sweep.errors import Interrupted, SearchCutShort
+from sweep.jobs.executors import Executor, Here, executor
+from sweep.jobs.progress import Phases, Progress
+from sweep.jobs.signals import stop_on_signal
+from sweep.proof import Proof, known_proof, prove_study
+from sweep.proof.question import question_of
+from sweep.proof.rounds import Cores
+from sweep.study import Study
+
+# What is written together with the optimum.
+OF_OPTIMUM = (store.CURVES, store.SENSITIVITY, store.TOLERANCE)
+
+
+def search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> None:
+    """Compute optimum, proof and front, as far as the study asks for them."""
+    if study.optimise is not None:
+        _optimise(replace(study, pareto=None), folder, jobs, progress)
+    proof_cut_short = prove(study, folder, jobs, backend, progress)
+    _front(study, folder, jobs, progress)
+    _raise_if_cut_short(folder)
+    if proof_cut_short:
+        raise SearchCutShort(folder, f"{folder}: optimise.prove.time ran out; run again, and the proof goes on")
+
+
+def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
+    """Return what an optimum or a front depends on:
+    the chunks by their plan's note, the study, the optimiser's sources.
+    """
+    return f"{note['identity']}-{study.fingerprint[:12]}-{plans.optimiser_hash()}"
+
+
+def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
+    """Run the optimiser unless its result for these very sources is there already, whole."""
+    note = store.read_plan(folder) or {}
+    key = optimum_key(study, note)
+    place = store.beside(folder)
+    found = optimise.read_survey(place / store.OPTIMUM)
+    noted = [name for name in OF_OPTIMUM if name in (note.get(TABLES) or {})]
+    whole = not altered(place, note, [store.OPTIMUM, *noted])
+    if note.get("optimised") == key and whole and (found is None or found.ended != "time"):
+        return
+    assert study.optimise is not None
+    store.write_plan(folder, note | {"optimised": None})
+    with stop_on_signal() as stop, Phases(progress) as phases:
+        phases.say("optimum", 0, study.optimise.starts, "starts")
+        try:
+            optimise.optimise_study(study, folder, lambda: bool(stop), jobs, phases.say)
+        except KeyboardInterrupt:
+            number = stop.signal_number or signal.SIGINT
+            text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
+            raise Interrupted(number, text) from None
+    store.write_plan(folder, note | {"optimised": key, TABLES: digests(place, [store.OPTIMUM, *OF_OPTIMUM])})
+
+
+def _raise_if_cut_short(folder: Path) -> None:
+    """Raise where the optimum stands there but the emergency brake has kept some starts from being searched."""
+    found = optimise.read_survey(store.beside(folder) / store.OPTIMUM)
+    if found is not None and found.ended == "time":
+        text = f"{folder}: {found.warnings[0]} searched; run again with a greater optimise.time_budget for all of them"
+        raise SearchCutShort(folder, text)
+
+
+def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
+    """Search the study's front, from where an earlier run of these very sources left it."""
+    if study.pareto is None:
+        (store.beside(folder) / store.PARETO).unlink(missing_ok=True)
+        return
+
+    note = store.read_plan(folder) or {}
+    key = optimum_key(study, note)
+    place, known = store.beside(folder), dict(note.get(TABLES) or {})
+    damaged = altered(place, note, [store.PARETO])
+    if damaged:
+        (place / store.PARETO).unlink(missing_ok=True)
+    if store.PARETO in known and (damaged or metadata(place / store.PARETO).get(b"key") != key.encode()):
+        del known[store.PARETO]  # of a front that is over: the new one grows step by step
+        store.write_plan(folder, note | {TABLES: known})
+    with stop_on_signal() as stop, Phases(progress) as phases:
+        try:
+            optimise.front_study(study, folder, key, lambda: bool(stop), jobs, phases.say)
+        except KeyboardInterrupt:
+            number = stop.signal_number or signal.SIGINT
+            text = f"{folder}: stopped by signal {number} while searching the front; run again to continue"
+            raise Interrupted(number, text) from None
+    if digests(place, [store.PARETO]).items() - known.items():
+        store.write_plan(folder, note | {TABLES: known | digests(place, [store.PARETO])})
+
+
+def refuse_unprovable(study: Study) -> None:
+    """Refuse a study that asks for a proof of what cannot be proven, before it has computed anything.
+
+    Raises
+    ------
+    InputError
+        with what is allowed.
+    """
+    if study.optimise is not None and study.optimise.prove is not None:
+        question_of(study)
+
+
+def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> bool:
+    """Prove what ``optimise.prove`` asks for, going on where an earlier run stopped; nothing where it asks for nothing.
+
+    Returns
+    -------
+    bool
+        whether its emergency brake, ``optimise.prove.time``, has pulled.
+
+    Raises
+    ------
+    InputError
+        if the study asks for what cannot be proven
+    Interrupted
+        by a signal; finished work is kept.
+    """
+    place = store.beside(folder)
+    if study.optimise is None or study.optimise.prove is None:
+        (place / store.PROOF).unlink(missing_ok=True)
+        return False
+    note = store.read_plan(folder) or {}
+    if altered(place, note, [store.PROOF]):
+        (place / store.PROOF).unlink(missing_ok=True)
+    found = known_proof(study, folder) or _proven(study, folder, jobs, backend, progress)
+    known, now = dict(note.get(TABLES) or {}), digests(place, [store.PROOF])
+    if now.items() - known.items():
+        store.write_plan(folder, note | {TABLES: known | now})
+    return found.cut_short
+
+
+def _proven(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> Proof:
+    """Judge the boxes, on as many cores as there are workers."""
+    assert study.optimise is not None and study.optimise.prove is not None
+    boxes = study.optimise.prove.boxes
+    with stop_on_signal() as stop, Progress("proof", boxes, 0, progress, unit="boxes") as shown:
+
+        def tell(judged: int, expected: int) -> None:
+            shown.expect(expected)
+            shown.advance(judged - shown.done)
+
+        where: Executor = Here() if jobs == 1 else executor(backend, jobs)
+        try:
+            return prove_study(study, folder, Cores(where, jobs, stop), tell)
+        except KeyboardInterrupt:
+            number = stop.signal_number or signal.SIGINT
+            text = f"{folder}: stopped by signal {number} while proving; run again to continue"
+            raise Interrupted(number, text) from None

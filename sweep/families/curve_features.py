@@ -1,0 +1,229 @@
+"""What curves over a turn hold between any even samples: fast waves, narrow peaks, kinks at angles known beforehand.
+
+A family says so by capabilities; a chain, a machine and a family with loads make theirs of those of their parts.  The
+searches for extrema, means and events begin with samples that are dense enough, and cut the turn where it switches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.types import TWO_PI, Array
+from sweep.families.base import Angles, Columns, Family
+from sweep.families.capabilities import Assembly, DesignMap
+from sweep.families.parts import Member, Stage
+
+T = TypeVar("T")
+SingularCurve: TypeAlias = Callable[[Array, Angles], Array]
+
+
+@dataclass(frozen=True)
+class Waves:
+    """How many waves, or turns of the fastest part, one turn of the crank holds: ``count(designs)``, (n,).
+
+    A wave as fast as the samples stand would look like a constant to all of them.
+    """
+
+    count: DesignMap
+
+
+@dataclass(frozen=True)
+class Singular:
+    """A smooth function of the crank angle that is positive where the motion is regular, beside those of `Assembly`.
+
+    Near a complex zero of it lies a narrow peak, whose width is the distance of that zero from the real angles.
+    ``curve(designs, angles, found)`` gives its values, (n, m), from the pose outputs ``needs``.  As the motion has to
+    exist all over the turn, what it is where the links do not reach does not count.
+    """
+
+    curve: Callable[[Array, Angles, Columns], Array]
+    needs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Switches:
+    """Crank angles, known beforehand, at which outputs have a kink or a jump: ``angles(designs)``, (n, k) [rad].
+
+    They are the ends of a law's phases, or the points of a table of loads.
+    """
+
+    angles: DesignMap
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Outputs jump where the pose output ``of`` passes ``level(designs)``, (n,), in designs that it ``matters`` for.
+
+    A tool that pierces is loaded from there to its turning point: perhaps for less of the turn than two samples span.
+    """
+
+    of: str
+    level: DesignMap
+    matters: Callable[[Array], NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class Bends:
+    """Smooth functions of the crank angle at whose zeros the pose outputs ``of`` have kinks, jumps or narrow peaks.
+
+    ``curves(designs, angles)`` gives their values, (n, m, q).  A bearing's load changes its formula where the load
+    along the shaft passes a share of that across it, friction turns where a joint stops, and what a bearing permits
+    has a narrow peak where nothing acts along the shaft.  Of ``squares``, which are never negative, the places count
+    where they nearly vanish: the direction of a velocity turns at once there.
+    """
+
+    of: frozenset[str]
+    curves: Callable[[Array, Angles], Array]
+    squares: bool = False
+
+
+def waves(family: Family, designs: Array) -> Array:
+    """Return how many waves one turn holds at least, (n,)."""
+    most = np.ones(len(designs))
+    for fast in family.every(Waves):
+        count = np.abs(fast.count(designs))
+        most = np.fmax(most, np.where(np.isfinite(count), count, 1.0))
+    return most
+
+
+def switches(family: Family, designs: Array) -> Array:
+    """Return the angles at which outputs switch, in [0, 2 pi), (n, k); 0 for what is no number."""
+    every = [np.zeros((len(designs), 0)), *(known.angles(designs) for known in family.every(Switches))]
+    angles = np.mod(np.concatenate(every, axis=1), TWO_PI)
+    return np.where(np.isfinite(angles), angles, 0.0)
+
+
+def crossed(family: Family, designs: Array) -> NDArray[np.bool_]:
+    """Return which designs have outputs that jump where a pose output passes a level, (n,)."""
+    found: NDArray[np.bool_] = np.zeros(len(designs), np.bool_)
+    for known in family.every(Crossing):
+        found = found | known.matters(designs)
+    return found
+
+
+def bends(family: Family, output: str) -> tuple[Bends, ...]:
+    """Return what tells at which crank angles curves of a pose output bend."""
+    return tuple(known for known in family.every(Bends) if output in known.of)
+
+
+def singular_curves(family: Family) -> Sequence[SingularCurve]:
+    """Return the functions of designs (n, P) and angles whose complex zeros are the motion's singularities."""
+    loops = [Singular(_only, (loop.discriminant,)) for loop in family.every(Assembly)]
+    return [partial(_measured, family, known) for known in (*loops, *family.every(Singular))]
+
+
+def _only(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Return the one pose output that is needed."""
+    (value,) = (np.asarray(values, np.float64) for name, values in found.items() if name != "status")
+    return value
+
+
+def _measured(family: Family, known: Singular, designs: Array, angles: Angles) -> Array:
+    found = family.poses(designs, angles, frozenset(known.needs)) if known.needs else {}
+    return known.curve(designs, angles, {name: found[name] for name in known.needs})
+
+
+def of_table(phi: Sequence[float]) -> Switches:
+    """Return the switches at the points of a table that all designs share."""
+    return Switches(partial(_alike, np.array(phi, np.float64)))
+
+
+def of_order(order: int) -> Waves:
+    """Return the waves of a Fourier series of that order."""
+    return Waves(partial(_many, float(order)))
+
+
+def of_stages(stages: Sequence[Stage]) -> list[object]:
+    """Return what the stages of a chain bring in: waves multiply; the switches of stage 1 are at known angles."""
+    first = stages[0]
+    found: list[object] = [
+        Switches(partial(_on_part, first.designs, known.angles)) for known in first.family.every(Switches)
+    ]
+    for stage in stages:
+        for known in stage.family.every(Singular):
+            if known.needs or stage is first:
+                names = {name: f"{name}{stage.number}" for name in known.needs}
+                found.append(Singular(partial(_renamed, stage.designs, names, known.curve), tuple(names.values())))
+    if any(stage.family.every(Waves) for stage in stages):
+        found.append(Waves(partial(_of_chain, tuple(stages))))
+    return found
+
+
+def of_members(members: Sequence[Member]) -> list[object]:
+    """Return what the members of a machine bring in: their ratios, and the switches of those that the shaft drives."""
+    found: list[object] = [Waves(partial(_of_member, tuple(members)))]
+    for m in members:
+        if m.driver is None:
+            found += [Switches(partial(_on_shaft, m, known.angles)) for known in m.family.every(Switches)]
+        found += [_of_part(m, known) for known in m.family.every(Crossing)]
+        found += [_of_shaft(m, known) for known in m.family.every(Bends) if m.driver is None]
+        for known in m.family.every(Singular):
+            if known.needs:
+                names = {name: f"{m.name}.{name}" for name in known.needs}
+                found.append(Singular(partial(_renamed, m.designs, names, known.curve), tuple(names.values())))
+    return found
+
+
+def _of_part(member: Member, known: Crossing) -> Crossing:
+    level, matters = partial(_on_part, member.designs, known.level), partial(_on_part, member.designs, known.matters)
+    return Crossing(f"{member.name}.{known.of}", level, matters)
+
+
+def _of_shaft(member: Member, known: Bends) -> Bends:
+    names = frozenset(f"{member.name}.{name}" for name in known.of)
+    return Bends(names, partial(_turned, member, known.curves), known.squares)
+
+
+def _turned(member: Member, curves: Callable[[Array, Angles], Array], designs: Array, angles: Angles) -> Array:
+    """Return functions of a member that the main shaft drives, at angles of the main shaft."""
+    phase = designs[:, member.columns.stop]
+    return curves(member.designs(designs), Angles.of(member.ratio * angles.phi + phase[:, None]))
+
+
+def _alike(angles: Array, designs: Array) -> Array:
+    return np.tile(angles, (len(designs), 1))
+
+
+def _many(count: float, designs: Array) -> Array:
+    return np.full(len(designs), count)
+
+
+def _on_part(part: Callable[[Array], Array], of_design: Callable[[Array], T], designs: Array) -> T:
+    return of_design(part(designs))
+
+
+def _renamed(
+    part: Callable[[Array], Array], names: dict[str, str], curve: Callable[[Array, Angles, Columns], Array],
+    designs: Array, angles: Angles, found: Columns,
+) -> Array:  # fmt: skip
+    return curve(part(designs), angles, {own: found[name] for own, name in names.items()})
+
+
+def _of_chain(stages: tuple[Stage, ...], designs: Array) -> Array:
+    total = np.ones(len(designs))
+    for stage in stages:
+        total = total * waves(stage.family, stage.designs(designs))
+    return total
+
+
+def _of_member(members: tuple[Member, ...], designs: Array) -> Array:
+    total: dict[str, Array] = {}
+    for m in members:
+        own: Array = abs(m.ratio) * waves(m.family, m.designs(designs))
+        total[m.name] = own if m.driver is None else own * total[m.driver[0]]
+    most: Array = np.maximum.reduce([np.ones(len(designs)), *total.values()])
+    return most
+
+
+def _on_shaft(member: Member, angles: DesignMap, designs: Array) -> Array:
+    """Return angles of the main shaft at which a member's crank passes its switches."""
+    own = angles(member.designs(designs)) - designs[:, [member.columns.stop]]
+    turns = TWO_PI * np.arange(abs(member.ratio))
+    every: Array = (own[:, :, None] + turns) / member.ratio
+    return every.reshape(len(designs), -1)

@@ -1,0 +1,246 @@
+"""Several mechanisms on one main shaft as one `Family`: dotted names, every point in the machine's frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from kernels.chains.derivatives import chain_rule
+from kernels.status import OK
+from kernels.types import Array
+from sweep.families.base import Angles, Columns, Event, Family, Output, Parameter
+from sweep.families.capabilities import Assembly, Points
+from sweep.families.curve_features import of_members
+from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
+from sweep.families.relations import Frame, Reading, Relation, Timing
+
+
+@dataclass(frozen=True)
+class Machine(Family):
+    """A family made of members.
+
+    Pose outputs of a member carry its name, derivatives are with respect to the angle of the main shaft.  A point
+    ``point`` of a member gives ``point_x``, ``point_y``, ``point_z`` in the machine's frame, and ``dpoint_x`` ... where
+    the member's outputs give its velocity.
+    """
+
+    members: tuple[Member, ...] = ()
+    relations: tuple[Relation, ...] = ()
+    timings: tuple[Timing | Reading, ...] = ()
+
+    def member(self, name: str) -> Member:
+        """Return the member of that name."""
+        return next(m for m in self.members if m.name == name)
+
+    def split(self, name: str) -> tuple[Member, str] | None:
+        """Return the member and the name there of a dotted name; None for a name of the machine itself."""
+        return next(((m, m.own(name)) for m in self.members if m.own(name)), None)
+
+    @cached_property
+    def positions(self) -> Mapping[str, str]:
+        """Positions of all members' followers."""
+        return {f"{m.name}.{p}": f"{m.name}.{stage}" for m in self.members for p, stage in m.family.positions.items()}
+
+    def outward_sign(self, position: str) -> str:
+        """Return the sign parameter of the member whose position it is."""
+        found = self.split(position)
+        assert found is not None
+        own = found[0].family.outward_sign(found[1])
+        return own and f"{found[0].name}.{own}"
+
+    def precise(self) -> Machine:
+        """Return the machine with the most accurate poses its members have."""
+        return _built(self, tuple(replace(m, family=m.family.precise()) for m in self.members))
+
+    def with_families(self, families: Mapping[str, Family]) -> Machine:
+        """Return the same machine with other families of its members: those that effects extended."""
+        return _built(self, tuple(replace(m, family=families.get(m.name, m.family)) for m in self.members))
+
+
+def assemble(
+    name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | Reading | Event, ...]
+) -> Machine:
+    """Return the machine of these members; each may be driven by one that stands before it."""
+    timings = tuple(r for r in relations if isinstance(r, Timing | Reading))
+    events = tuple(r for r in relations if isinstance(r, Event))
+    others = tuple(r for r in relations if not isinstance(r, Timing | Reading | Event))
+    bare = Machine(name, "", (), "", (), _no_poses, relations=others, timings=timings, events=events)
+    return _built(bare, members)
+
+
+def _no_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    raise AssertionError("a machine without members")
+
+
+def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
+    parameters: list[Parameter] = []
+    placed = []
+    for m in members:
+        start = len(parameters)
+        own = [replace(p, name=f"{m.name}.{p.name}", text=f"{m.name}: {p.text}") for p in m.family.parameters]
+        parameters += own
+        placed.append(replace(m, columns=slice(start, start + len(own))))
+        parameters += [replace(p, name=f"{m.name}.{p.name}", text=f"{m.name}: {p.text}") for p in m.added]
+    parameters += [p for relation in machine.relations for p in relation.parameters]
+    outputs = [
+        replace(o, name=f"{m.name}.{o.name}", own=f"{m.name}.{o.base}") for m in placed for o in m.family.pose_outputs
+    ]
+    for m in placed:
+        outputs += [
+            Output(f"{m.name}.{point}_{axis}", "length", f"{m.name}: {axis} of {point}, machine's frame", "ours")
+            for point in m.points
+            for axis in AXES
+        ]
+        outputs += [
+            Output(
+                f"{m.name}.d{point}_{axis}",
+                "length",
+                f"{m.name}: velocity analogue of {point} along {axis}, machine's frame",
+                "ours",
+            )
+            for point in m.moving
+            for axis in AXES
+        ]
+    derivative_of = {
+        f"{m.name}.{name}": f"{m.name}.{of}" for m in placed for name, of in m.family.derivative_of.items()
+    }
+    outputs += [o for relation in machine.relations for o in relation.outputs]
+    loops = tuple(_loop(m, loop) for m in placed for loop in m.family.every(Assembly))
+    found = replace(
+        machine,
+        title=" and ".join(f"{m.name} ({m.family.title})" for m in placed),
+        parameters=tuple(parameters),
+        position=f"{placed[0].name}.{placed[0].family.position}",
+        pose_outputs=tuple(outputs),
+        derivative_of=derivative_of,
+        outward="",
+        analytic=all(m.family.analytic for m in placed),
+        capabilities=(*loops, *of_members(placed)),
+        dear={f"{m.name}.{k}": (f"{m.name}.{what}", ns) for m in placed for k, (what, ns) in m.family.dear.items()},
+        members=tuple(placed),
+    )
+    poses = partial(_poses, found)
+    precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
+    return replace(found, poses=poses, precise_poses=precise)
+
+
+def _loop(member: Member, loop: Assembly) -> Assembly:
+    return Assembly(
+        f"{member.name}.{loop.discriminant}", f"{member.name}.{loop.pressure_angle}", partial(_scale, member, loop),
+        f"{member.name}.{loop.stage}",
+    )  # fmt: skip
+
+
+def _scale(member: Member, loop: Assembly, designs: Array) -> Array:
+    return loop.scale(member.designs(designs))
+
+
+def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    return machine.precise().poses(designs, angles, wanted)
+
+
+def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Compute the wanted outputs of members and relations, and the first status that is not OK."""
+    relations = [r for r in machine.relations if not wanted.isdisjoint(o.name for o in r.outputs)]
+    needed = set(wanted).union(*(r.needs(wanted) for r in relations))
+    for m in reversed(machine.members):
+        needed |= _driving(m, needed)
+    shape = (len(designs), angles.cos.shape[1])
+    status = np.zeros(shape, np.uint8)
+    found: dict[str, Any] = {}
+    for m in machine.members:
+        own = {name for name in map(m.own, needed) if name}
+        if own:
+            columns = _member(m, designs, angles, own, found)
+            np.copyto(status, columns.pop("status"), where=status == OK)
+            found |= {f"{m.name}.{name}": values for name, values in columns.items()}
+    frames = {m.name: Frame(m.place.rotation, m.origin(designs)) for m in machine.members} if relations else {}
+    found["phi"] = angles.phi
+    columns_of = machine.parameter_names
+    found |= {p.name: designs[:, [columns_of.index(p.name)]] for r in relations for p in r.parameters}
+    for relation in relations:
+        found |= relation.compute(found, frames, wanted)
+    return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
+
+
+def _whole(values: Any, shape: tuple[int, int]) -> Any:
+    """Spread what was computed for one design over all: an array of their own, which may be written on."""
+    return values if values.shape == shape else np.array(np.broadcast_to(values, shape))
+
+
+def _driving(member: Member, needed: set[str]) -> set[str]:
+    """Name what a member's driver has to give: its output and the derivatives that the member's outputs need."""
+    own = {name for name in map(member.own, needed) if name}
+    if member.driver is None or not own:
+        return set()
+    driver, output = member.driver
+    most = max((len(member.family.orders(name)) for name in own), default=0)
+    names = [output]
+    for _ in range(most):
+        names.append(member.drives[names[-1]])
+    return {f"{driver}.{name}" for name in names}
+
+
+def _member(m: Member, designs: Array, angles: Angles, own: set[str], found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return pose outputs of a member by their own names, and ``status``; what no design varies is computed once."""
+    columns = slice(m.columns.start, m.columns.stop + 1)  # its own parameters and the phase
+    rows = designs[:, columns]
+    if m.driver is None and angles.cos.shape[0] == 1 and len(rows) > 1 and (rows[1:] == rows[0]).all():
+        rows = rows[:1]
+    own_designs, phase = np.ascontiguousarray(rows[:, :-1]), rows[:, -1]
+    motion = {name for name in own if name in m.family.pose_output}
+    motion |= {x for point in m.points for x in _made_of(m, point, own)}
+    motion |= {name for derivative in motion for name in m.family.orders(derivative)}
+    turned = _turned(m, phase, angles, found)
+    result: dict[str, Any] = dict(m.family.poses(own_designs, turned, frozenset(motion)))
+    _with_respect_to_shaft(m, result, found)
+    for point in m.points:
+        if any(f"{point}_{axis}" in own for axis in AXES):
+            result |= coordinates(m, point, designs, own_designs, result)
+        if any(f"d{point}_{axis}" in own for axis in AXES):
+            result |= velocity(m, point, designs, result)
+    return {name: result[name] for name in (*own, "status")}
+
+
+def _turned(m: Member, phase: Array, angles: Angles, found: Mapping[str, Any]) -> Angles:
+    """Return the input angles of a member: of its driver, times its ratio, plus its phase."""
+    if m.driver is not None:
+        return Angles.of(m.ratio * found[".".join(m.driver)] + phase[:, None])
+    if m.ratio == 1 and not phase.any():
+        return angles
+    return Angles.of(m.ratio * angles.phi + phase[:, None])
+
+
+def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str, Any]) -> None:
+    """Make derivatives by the member's crank angle those by the angle of the main shaft, in place."""
+    tops = [name for name in result if name in m.derivatives and m.family.derivative_of.get(name) not in result]
+    for top in tops:
+        names = m.family.orders(top)
+        if m.driver is None:
+            for order, name in enumerate(names, start=1):
+                if m.ratio != 1:
+                    result[name] = result[name] * float(m.ratio) ** order
+            continue
+        driver, output = m.driver
+        inner = [output]
+        for _ in names:
+            inner.append(m.drives[inner[-1]])
+        given: list[Any] = [np.ascontiguousarray(found[f"{driver}.{name}"]) for name in inner[1:]]
+        outer: list[Any] = [result[name] for name in names]
+        missing: list[Any] = [None] * (3 - len(names))
+        chain_rule(np.full(len(outer[0]), float(m.ratio)), *given, *missing, *outer, *missing)
+
+
+def _made_of(m: Member, point: str, own: set[str]) -> set[str]:
+    """Return pose outputs that a point's coordinates and velocity are made of, as far as they are wanted."""
+    at, moves = (any(f"{of}{point}_{axis}" in own for axis in AXES) for of in ("", "d"))
+    found = {name for name in m.moving.get(point, ()) if name} if moves else set()
+    if point == TIP:
+        return found | ({m.family.position} if at or moves else set())
+    if point == EYE:
+        return {name for joint in coupler_joints(m) or () for name in joint if name and at}
+    return found | {name for points in m.family.every(Points) for name in points.at.get(point, ()) if name and at}

@@ -1,0 +1,119 @@
+"""The one place where names of quantities are taken apart: ``needle.max_abs_d2s2`` is member, stem and stage."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from typing import NamedTuple
+
+
+class Parts(NamedTuple):
+    """A name without what tells where it belongs: the member of a machine, and the stage of a chain ("" for none)."""
+
+    member: str
+    stem: str
+    stage: str
+
+
+@lru_cache(maxsize=4096)
+def parts(name: str) -> Parts:
+    """Take a name apart.
+
+    >>> parts("needle.phi01")
+    Parts(member='needle', stem='phi0', stage='1')
+    >>> parts("swing")
+    Parts(member='', stem='swing', stage='')
+    """
+    member, _, rest = name.rpartition(".")
+    if rest == "phi0" or rest.endswith("_phi0"):
+        return Parts(member, rest, "")
+    stem, stage = re.fullmatch(r"(.*?)(\d*)", rest, re.DOTALL).groups()  # type: ignore[union-attr]
+    if (stem == "phi" or stem.endswith("_phi")) and stage.startswith("0"):
+        return Parts(member, f"{stem}0", stage[1:])  # phi01 is phi0 of stage 1
+    return Parts(member, stem, stage)
+
+
+def stem(name: str) -> str:
+    """Return the name without member and stage."""
+    return parts(name).stem
+
+
+def at_stage(name: str, number: str) -> str:
+    """Return the name at the stage of that number without the number; "" for a name of another stage.
+
+    Names such as ``support_d1`` end in a digit of their own, so that the stage has to be known.
+
+    >>> at_stage("support_d12", "2")
+    'support_d1'
+    """
+    return name.removesuffix(number) if name.endswith(number) else ""
+
+
+def reduced(prefix: str, name: str) -> str:
+    """Return the name of a reduction of an output.
+
+    >>> reduced("max_abs", "needle.d2s")
+    'needle.max_abs_d2s'
+    """
+    member, dot, rest = name.rpartition(".")
+    return f"{member}{dot}{prefix}_{rest}"
+
+
+def is_error(name: str) -> bool:
+    """Return whether a column holds the error of another."""
+    return without_error(name) != name
+
+
+def without_error(name: str) -> str:
+    """Return the name of the column whose error a column holds, or the name itself."""
+    return name.removeprefix(ERROR)
+
+
+def error_of(name: str) -> str:
+    """Return the name of the column that holds the error of another."""
+    return f"{ERROR}{name}"
+
+
+ERROR = "err_"
+
+
+def negative(name: str) -> str:
+    """Return the name of the negative of a design output, which is small where the output is to be large."""
+    return f"{MINUS}{name}"
+
+
+def without_minus(name: str) -> str:
+    """Return the output that a name is the negative of; "" for any other name."""
+    return name.removeprefix(MINUS) if name.startswith(MINUS) else ""
+
+
+MINUS = "minus_"
+
+
+def is_place(name: str) -> bool:
+    """Return whether a design output is a crank angle at which something happens, not a size that could be compared."""
+    return parts(name).stem.startswith("phi_")
+
+
+def is_largest(name: str, *, magnitude: bool = False) -> bool:
+    """Return whether a design output is the largest value of a pose output, or its largest magnitude."""
+    return stem(name).startswith("max_abs_" if magnitude else "max_")
+
+
+def is_flag(name: str) -> bool:
+    """Return whether a design output is a yes or no."""
+    return stem(name) == "rotatable"
+
+
+def judged_by(name: str) -> str:
+    """Return the number whose sign decides a yes or no; the name itself where it is one already.
+
+    >>> judged_by("needle.rotatable2")
+    'needle.margin2'
+    """
+    return name.replace("rotatable", "margin") if is_flag(name) else name
+
+
+def by_magnitude(name: str) -> bool:
+    """Tell whether limits and objectives compare the magnitude of an output whose sign is the assembly mode."""
+    return stem(name) in ("swing", "stroke")

@@ -1,0 +1,251 @@
+"""Parts of chains and machines: a stage, a member with its place in the machine's frame, and points of a member."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from kernels.types import Array
+from sweep.errors import InputError
+from sweep.families.base import Family, Parameter
+from sweep.families.capabilities import Coordinates, OutputLink, Points
+
+TIP = "tip"
+EYE = "eye"  # on the coupler, the link between the points b and c
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A member's frame in the machine's frame.
+
+    Parameters
+    ----------
+    at : where the origin of the member's frame stands [length]
+    axis : direction of the member's z, of any length
+    zero : direction of the member's x; what it has along ``axis`` does not count
+    """
+
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    zero: tuple[float, float, float] = (1.0, 0.0, 0.0)
+
+    @property
+    def rotation(self) -> Array:
+        """R (3, 3): a vector v of the member's frame is R v in the machine's frame."""
+        z = np.array(self.axis) / np.linalg.norm(self.axis)
+        x = np.array(self.zero) - np.dot(self.zero, z) * z
+        x /= np.linalg.norm(x)
+        return np.column_stack([x, np.cross(z, x), z])
+
+
+def placement(member: str, given: Placement | dict[str, Any] | None) -> Placement:
+    """Placement of a member from what a user gives, checked.
+
+    Raises
+    ------
+    InputError
+        for a key that is none, a vector without three finite numbers, an axis of no length or along ``zero``.
+    """
+    if given is None:
+        return Placement()
+    if isinstance(given, Placement):
+        return given
+    where = f"machine.{member}.place"
+    for key in given:
+        if key not in ("at", "axis", "zero"):
+            raise InputError(key, given[key], "at, axis, zero", where)
+    found = Placement(**{key: vector(value, f"{where}.{key}") for key, value in given.items()})
+    if not np.linalg.norm(found.axis) > 0.0:
+        raise InputError("axis", found.axis, "a direction", where)
+    if not np.linalg.norm(np.cross(found.axis, found.zero)) > 1e-9 * np.linalg.norm(found.axis) * np.linalg.norm(
+        found.zero
+    ):
+        raise InputError("zero", found.zero, "a direction that is not along axis", where)
+    return found
+
+
+def vector(value: object, where: str) -> tuple[float, float, float]:
+    """Three finite numbers out of what a user gives.
+
+    Raises
+    ------
+    InputError
+        for anything else.
+    """
+    allowed = "three finite numbers [x, y, z]"
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str) or len(value) != 3:
+        raise InputError(where, value, allowed, where)
+    try:
+        x, y, z = (float(part) for part in value)
+    except (TypeError, ValueError):
+        raise InputError(where, value, allowed, where) from None
+    if not np.isfinite([x, y, z]).all():
+        raise InputError(where, value, allowed, where)
+    return x, y, z
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One mechanism of a chain: its number from 1, and where its parameters stand in the chain's design matrix."""
+
+    number: int
+    family: Family
+    columns: slice
+    kappa: int | None = None  # columns of the coupling to the stage before; none for stage 1
+    offset: int | None = None
+
+    def designs(self, designs: Array) -> Array:
+        """Design matrix of this stage alone."""
+        return np.ascontiguousarray(designs[:, self.columns])
+
+
+@dataclass(frozen=True)
+class Member:
+    """One mechanism of a machine.
+
+    Parameters
+    ----------
+    name : what stands before the dot of its parameters and outputs
+    family : a family or chain, evaluated over a closed turn
+    ratio : whole turns of its crank for one of what drives it, with the sense; not 0
+    offset : its crank angle where the driving angle is 0 [rad]; the default of the parameter ``offset``
+    driver : member and pose output that drive it, as ("needle", "psi1"); None is the main shaft
+    place : its frame in the machine's frame; ``at`` is the default of the parameters ``x_at``, ``y_at``, ``z_at``
+    drives : of the driver's outputs, the derivative of each
+    tip : a point fixed to the output link: along it, across it, along its axis; the defaults of ``x_tip`` ...
+    eye : a point of the coupler: along it from its first joint; of a planar one also across it and along the axes; the
+        defaults of ``x_eye`` ...
+    columns : where its own parameters stand in the machine's design matrix
+    """
+
+    name: str
+    family: Family
+    ratio: int = 1
+    offset: float = 0.0
+    driver: tuple[str, str] | None = None
+    drives: Mapping[str, str] = field(default_factory=dict)
+    place: Placement = field(default_factory=Placement)
+    tip: tuple[float, float, float] | None = None
+    eye: tuple[float, ...] | None = None
+    columns: slice = field(default_factory=lambda: slice(0, 0))
+
+    def designs(self, designs: Array) -> Array:
+        """Design matrix of this member's family."""
+        return np.ascontiguousarray(designs[:, self.columns])
+
+    def origin(self, designs: Array) -> Array:
+        """Origin of its frame in the machine's frame, (n, 3)."""
+        start = self.columns.stop + 1  # behind its own parameters and the phase
+        return designs[:, start : start + 3]
+
+    def own(self, name: str) -> str:
+        """Give a dotted name as the member's family knows it; "" for a name of another member."""
+        prefix = f"{self.name}."
+        return name.removeprefix(prefix) if name.startswith(prefix) else ""
+
+    @property
+    def added(self) -> tuple[Parameter, ...]:
+        """Its parameters beside those of its family: phase, place and tip."""
+        crank = Parameter("offset", "angle", "crank angle where the driving angle is 0", default=self.offset)
+        place = [
+            Parameter(f"{axis}_at", "length", f"{axis} of the member's origin in the machine's frame", default=x)
+            for axis, x in zip(AXES, self.place.at, strict=True)
+        ]
+        tip = [
+            Parameter(f"{axis}_tip", "length", f"tip {way} the output link", default=x)
+            for axis, way, x in zip(AXES, ("along", "across", "along the axis of"), self.tip or (), strict=False)
+        ]
+        eye = [
+            Parameter(f"{axis}_eye", "length", f"point of the coupler {way}", default=x)
+            for axis, way, x in zip(AXES, ("along it", "across it", "along the axes"), self.eye or (), strict=False)
+        ]
+        return crank, *place, *tip, *eye
+
+    @cached_property
+    def derivatives(self) -> frozenset[str]:
+        """Pose outputs that are derivatives with respect to the crank angle."""
+        return frozenset(self.family.derivative_of.values())
+
+    @cached_property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points whose coordinates are given in the machine's frame."""
+        named = [name for points in self.family.every(Points) for name in points.at]
+        return (*named, *((TIP,) if self.tip is not None else ()), *((EYE,) if self.eye is not None else ()))
+
+    @cached_property
+    def moving(self) -> Mapping[str, tuple[str | None, ...]]:
+        """Of the points whose velocity the family's outputs give, the outputs that it is made of."""
+        found: dict[str, tuple[str | None, ...]] = {}
+        rates = self.family.derivative_of
+        for name, at in ((n, at) for points in self.family.every(Points) for n, at in points.at.items()):
+            if all(x is None or x in rates for x in at):
+                found[name] = tuple(x and rates[x] for x in at)
+        if self.tip is not None and self.family.position in rates:
+            found[TIP] = (rates[self.family.position],)
+        return found
+
+
+def coordinates(m: Member, point: str, designs: Array, own_designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
+    """Coordinates of a point in the machine's frame, (n, m)."""
+    start, at = m.columns.stop + 1, m.origin(designs)
+    if point == TIP:
+        link = m.family.find(OutputLink)
+        assert link is not None
+        x, y, z = (designs[:, [start + k]] for k in range(3, 6))
+        angle = result[m.family.position]
+        cos, sin, origin = np.cos(angle), np.sin(angle), link.origin(own_designs)
+        local = [origin[:, [0]] + x * cos - y * sin, origin[:, [1]] + x * sin + y * cos, origin[:, [2]] + z + 0.0 * cos]
+    elif point == EYE:
+        first = start + (3 if m.tip is None else 6)
+        local = _on_coupler(m, result, [designs[:, [first + k]] for k in range(len(m.eye or ()))])
+    else:
+        local = _local(m, point, result)
+    turn = m.place.rotation
+    return {f"{point}_{axis}": at[:, [k]] + sum(turn[k, j] * local[j] for j in range(3)) for k, axis in enumerate(AXES)}
+
+
+def coupler_joints(m: Member) -> tuple[Coordinates, Coordinates] | None:
+    """Coordinates of both joints of the coupler; None where the family does not give them."""
+    named = {name: at for points in m.family.every(Points) for name, at in points.at.items()}
+    return (named["b"], named["c"]) if {"b", "c"} <= set(named) else None
+
+
+def is_planar(m: Member) -> bool:
+    """Whether the coupler moves in a plane z = constant, so that its two joints tell how it stands."""
+    joints = coupler_joints(m)
+    return joints is not None and all(at[2] is None for at in joints)
+
+
+def _local(m: Member, point: str, result: Mapping[str, Any]) -> list[Any]:
+    names = next(points.at[point] for points in m.family.every(Points) if point in points.at)
+    return [result[name] if name else 0.0 for name in names]
+
+
+def _on_coupler(m: Member, result: Mapping[str, Any], eye: list[Any]) -> list[Any]:
+    """Place a point of the coupler: along it from b; of a planar one also across it, counter-clockwise, and along z."""
+    b, c = (_local(m, point, result) for point in "bc")
+    along = [end - start for start, end in zip(b, c, strict=True)]
+    length = np.sqrt(along[0] ** 2 + along[1] ** 2 + along[2] ** 2)
+    point = [start + eye[0] / length * part for start, part in zip(b, along, strict=True)]
+    if len(eye) == 1:
+        return point
+    return [point[0] - eye[1] / length * along[1], point[1] + eye[1] / length * along[0], point[2] + eye[2]]
+
+
+def velocity(m: Member, point: str, designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
+    """Velocity analogue of a point in the machine's frame, (n, m): the frame of a member does not move."""
+    if point == TIP:
+        start = m.columns.stop + 1
+        x, y = designs[:, [start + 3]], designs[:, [start + 4]]
+        angle, rate = result[m.family.position], result[str(m.moving[TIP][0])]
+        cos, sin = np.cos(angle), np.sin(angle)
+        local = [rate * (-x * sin - y * cos), rate * (x * cos - y * sin), 0.0 * rate]
+    else:
+        local = [result[name] if name else 0.0 for name in m.moving[point]]
+    turn = m.place.rotation
+    return {f"d{point}_{axis}": sum(turn[k, j] * local[j] for j in range(3)) for k, axis in enumerate(AXES)}

@@ -1,0 +1,192 @@
+"""How kernels of poses are called: for the wanted outputs, guarded against what is no number, one set from another.
+
+A kernel of poses is compiled for every set of outputs that it gives: what is not in the set is not in the machine code.
+That takes a quarter of a second per set, and a study with an optimum asks for dozens of sets, most of them on a few
+thousand poses.  So in :class:`Together` a set on few poses is taken from a larger one, and gets machine code of its own
+as soon as it is asked for on many.  The larger set is that of all outputs.  Where arguments are complex, which takes
+longer to compile, it is the first set that was asked for, as long as that will do: who wants slopes asks for all curves
+first.  The bits are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import update_wrapper
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from kernels.status import INVALID_INPUT, OK
+from kernels.types import Array, Status
+from sweep.families.base import Angles, Columns, Output, PoseFunction
+
+
+def guarded(poses: PoseFunction) -> PoseFunction:
+    """Return poses that answer a parameter that is no number, and a value beyond float64, by INVALID_INPUT and nan.
+
+    For kernels that read some parameters only where they matter.
+    """
+
+    def safe(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+        with np.errstate(all="ignore"):  # what is no number has its status
+            columns = poses(designs, angles, wanted)
+        status = np.array(columns["status"], np.uint8)
+        bad = np.zeros(status.shape, np.bool_)
+        for name in wanted:
+            bad |= ~np.isfinite(columns[name])
+        bad &= status == OK  # any other status explains its nan
+        bad[~np.all(np.isfinite(designs), axis=1)] = True
+        status[bad & (status == OK)] = INVALID_INPUT
+        found: Columns = {name: np.where(bad, np.nan, columns[name]) for name in wanted}
+        return found | {"status": status}
+
+    return safe
+
+
+def filled(
+    kernel: Callable[..., object],
+    arguments: Sequence[object],
+    outputs: Any,
+    wanted: frozenset[str],
+    status: Status,
+    dtype: DTypeLike = np.float64,
+) -> Columns:
+    """Call ``kernel(*arguments, status, out)``; the wanted outputs, shaped like ``status``, and ``status``.
+
+    ``outputs`` is the kernel's NamedTuple of arrays, or None, by the names of the outputs.
+    """
+    out = outputs(*optional_outputs(outputs._fields, wanted, status.shape, dtype))
+    kernel(*arguments, status, out)
+    return {name: values for name, values in out._asdict().items() if values is not None} | {"status": status}
+
+
+def filled_each(
+    kernel: Callable[..., object], arguments: Sequence[object], names: tuple[str, ...], wanted: frozenset[str],
+    status: Status,
+) -> Columns:  # fmt: skip
+    """Call ``kernel(*arguments, status, *arrays)`` of an effect, which takes one array or None per output."""
+    arrays = optional_outputs(names, wanted, status.shape)
+    kernel(*arguments, status, *arrays)
+    columns: Columns = {name: array for name, array in zip(names, arrays, strict=True) if array is not None}
+    return columns | {"status": status}
+
+
+def poses_of(kernel: Callable[..., object], outputs: Any) -> PoseFunction:
+    """Make poses of a kernel(designs, cos, sin, status, out) and its NamedTuple of outputs."""
+
+    def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+        status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
+        dtype = np.result_type(designs, angles.cos)
+        return filled(kernel, (designs, angles.cos, angles.sin), outputs, wanted, status, dtype)
+
+    return poses
+
+
+def filled_with_places(
+    kernel: Callable[..., object], designs: Array, angles: Angles, outputs: Any, places: tuple[str, ...],
+    wanted: frozenset[str],
+) -> Columns:  # fmt: skip
+    """Call a kernel of poses that takes, behind ``out``, one array (k, n, m) of all joint coordinates or None."""
+    shape, dtype = (len(designs), angles.cos.shape[1]), np.result_type(designs, angles.cos)
+    room = None if wanted.isdisjoint(places) else np.empty((len(places), *shape), dtype)
+
+    def with_places(*given: object) -> None:
+        kernel(*given, room)
+
+    status = np.empty(shape, np.uint8)
+    columns = filled(with_places, (designs, angles.cos, angles.sin), outputs, wanted, status, dtype)
+    if room is not None:
+        columns |= {name: x for name, x in zip(places, room, strict=True) if name in wanted}
+    return columns
+
+
+def optional_outputs(
+    names: tuple[str, ...], wanted: frozenset[str], shape: tuple[int, ...], dtype: DTypeLike = np.float64
+) -> list[Array | None]:
+    """Return an empty array for each wanted name and None for the others, in the order of a kernel's out arguments.
+
+    ``dtype`` is complex128 where the designs or angles are (exact gradients by the complex step).
+    """
+    return [np.empty(shape, dtype) if name in wanted else None for name in names]
+
+
+def filled_blocks(
+    kernel: Callable[..., None], outputs: Any, designs: Array, angles: Angles, blocks: Sequence[Sequence[Output]],
+    wanted: frozenset[str],
+) -> Columns:  # fmt: skip
+    """Call a kernel of poses whose outputs are arrays (k, n, m), one per block of outputs, or None.
+
+    A block is computed when one of its outputs is wanted.  The last one, of joints, is no part of ``outputs``, the
+    kernel's NamedTuple of the others.
+    """
+    shape, dtype = (len(designs), angles.cos.shape[1]), np.result_type(designs, angles.cos)
+    status = np.empty(shape, np.uint8)
+    rooms = [
+        None if wanted.isdisjoint(o.name for o in block) else np.empty((len(block), *shape), dtype) for block in blocks
+    ]
+    kernel(designs, angles.cos, angles.sin, status, outputs(*rooms[:-1]), rooms[-1])
+    columns: Columns = {
+        output.name: values
+        for block, room in zip(blocks, rooms, strict=True)
+        if room is not None
+        for output, values in zip(block, room, strict=True)
+        if output.name in wanted
+    }
+    return columns | {"status": status}
+
+
+MANY = 2**16  # poses of one call: dense samples, or the price of an output being measured
+# Poses of all calls so far.  All outputs take up to 40 ns more per pose than a few, 60 ns more where they are complex:
+# for so many, less than a set takes to compile.
+PAID = 2**21
+
+_each_its_own = ContextVar("every set of outputs has machine code of its own", default=False)
+
+
+@contextmanager
+def own_code() -> Iterator[None]:
+    """Give every set of outputs machine code of its own at once: what a long study comes to, to be timed."""
+    token = _each_its_own.set(True)
+    try:
+        yield
+    finally:
+        _each_its_own.reset(token)
+
+
+class Together:
+    """Poses whose kernel gives the outputs ``names``; ``poses`` calls it for exactly the wanted ones."""
+
+    def __init__(self, poses: PoseFunction, names: Sequence[str]) -> None:
+        update_wrapper(self, poses)
+        self._poses = poses
+        self._all = frozenset(names)
+        self._asked: dict[tuple[frozenset[str], bool], int] = {}
+        self._first: frozenset[str] | None = None  # set that was asked for with complex arguments
+
+    def __reduce__(self) -> str:
+        """By its name, as a function: a process that gets it has its own."""
+        return self._poses.__qualname__
+
+    def __call__(self, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+        """Return the wanted outputs and the status of every design at its angles, each (n, m)."""
+        key = wanted, np.iscomplexobj(angles.cos) or np.iscomplexobj(designs)
+        count = len(designs) * angles.cos.shape[1]
+        self._asked[key] = self._asked.get(key, 0) + count
+        if count >= MANY or self._asked[key] > PAID or _each_its_own.get():
+            return self._poses(designs, angles, wanted)
+        found = self._poses(designs, angles, self._larger(*key))
+        return {name: found[name] for name in (*wanted, "status")}
+
+    def _larger(self, wanted: frozenset[str], is_complex: bool) -> frozenset[str]:
+        """Return the set that a set on few poses is taken from."""
+        if is_complex and self._first is None:
+            self._first = wanted
+        return self._first if is_complex and self._first is not None and wanted <= self._first else self._all
+
+
+def together(*names: str) -> Callable[[PoseFunction], PoseFunction]:
+    """Decorate poses whose kernel gives these outputs."""
+    return lambda poses: Together(poses, names)

@@ -1,0 +1,186 @@
+"""The studies of a night: which, in which order, and each run in a process of its own.
+
+A crash there ends neither the night nor the other studies.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sweep.dataset import store
+from sweep.dataset.files import store_errors
+from sweep.errors import InputError, LinksweepError
+from sweep.nights.records import read_night
+from sweep.study import Study, load_study
+
+FILE, FIGURE = "study.toml", "figure.py"
+RUN_LOG = "run.log"
+# For a run to leave once it is told that the time is over [s]; it promises two.
+GRACE = 10.0
+# The same, where the night itself was told to leave and has promised two.
+HURRY = 0.9
+# So long a command of the user's may take [s].
+COMMAND_SECONDS = 60.0
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A study of the night; ``study`` is None where its file has faults, which ``fault`` tells."""
+
+    name: str
+    path: Path
+    study: Study | None
+    fault: str = ""
+
+
+def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
+    """Return the studies in these places: study files, folders with one, or folders of such folders.
+
+    Raises
+    ------
+    InputError
+        if there is no study, or two have one name: each has a folder of its name in the night.
+    """
+    places = list(places)
+    found: list[Chosen] = []
+    broken: list[tuple[int, Path, str]] = []
+    for path in [path for place in places for path in _files(place)]:
+        try:
+            study = load_study(path, smoke=smoke)
+        except (LinksweepError, OSError) as error:
+            broken.append((len(found) + len(broken), path, str(error)))
+            continue
+        twin = next((other for other in found if other.name == study.name), None)
+        if twin is not None:
+            raise InputError("study", study.name, f"one study of a name, {twin.path} has it already", str(path))
+        found.append(Chosen(study.name, path, study))
+    for place, path, fault in broken:
+        name = free = path.parent.name if path.name == FILE else path.stem
+        count = 1
+        while free in [one.name for one in found]:
+            count += 1
+            free = f"{name}-{count}"
+        found.insert(place, Chosen(free, path, None, fault))
+    if not found:
+        raise InputError("studies", ", ".join(map(str, places)), f"study files, or folders with a {FILE}", "nightly")
+    return found
+
+
+def _files(place: Path) -> list[Path]:
+    """Return the study files of a place; a link that leads nowhere is one, with a fault."""
+    if not place.is_dir():
+        return [place]
+    return [place / FILE] if os.path.lexists(place / FILE) else sorted(place.glob(f"*/{FILE}"))
+
+
+def in_order(studies: Sequence[Chosen], earlier: Sequence[Path]) -> list[Chosen]:
+    """Sort the studies: what was cut off or not begun in the last night comes first, the rest in the order given.
+
+    Parameters
+    ----------
+    studies : of this night
+    earlier : folders of nights, the newest first; one that was killed has no record, then its datasets tell
+    """
+    if not earlier:
+        return list(studies)
+    last = earlier[0]
+    record = read_night(last)
+
+    def late(one: Chosen) -> bool:
+        if record is not None:
+            return one.name in record.studies and record.studies[one.name].state in ("cut", "waiting")
+        return not store.is_complete(last / one.name / store.DESIGNS)
+
+    return sorted(studies, key=lambda one: not late(one))
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a process ended: exit code (that of the time limit is 124), time [s], and its last line."""
+
+    code: int
+    seconds: float
+    message: str
+
+
+def call(words: Sequence[str], log: Path, seconds: float) -> Ended:
+    """Run a verb of the command line; what it says goes to the end of ``log``.
+
+    Parameters
+    ----------
+    words : the verb and its arguments
+    log : file
+    seconds : after so long it is told to leave
+    """
+    return _process(["-m", "sweep", *words], log, seconds)
+
+
+def draw(figure: Path, folder: Path, log: Path, seconds: float) -> Ended:
+    """Draw the figures that a study has a program of its own for; parameters as for :func:`call`."""
+    return _process([str(figure.resolve()), str(folder.resolve())], log, seconds)
+
+
+def _process(words: Sequence[str], log: Path, seconds: float) -> Ended:
+    home = str(Path(__file__).resolve().parents[2])
+    path = os.pathsep.join([home, *filter(None, [os.environ.get("PYTHONPATH")])])
+    # -P: a folder that happens to be the current one adds no modules.
+    command = [sys.executable, "-P", *words]
+    begin = time.monotonic()
+    with store_errors(log):
+        log.parent.mkdir(parents=True, exist_ok=True)
+        with log.open("ab") as file:
+            start = file.tell()
+            process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=file, stderr=subprocess.STDOUT,
+                env=os.environ | {"PYTHONPATH": path}, start_new_session=True,
+            )  # fmt: skip
+            code = _wait(process, seconds)
+        with log.open("rb") as read:
+            read.seek(start)
+            lines = [line for line in read.read().decode(errors="replace").splitlines() if line.strip()]
+    return Ended(code, time.monotonic() - begin, lines[-1].strip() if lines else "")
+
+
+def _wait(process: subprocess.Popen[bytes], seconds: float) -> int:
+    """Return the exit code as a shell has it; 124 where the time was over."""
+    try:
+        code = process.wait(timeout=max(seconds, 0.0))
+    except subprocess.TimeoutExpired:
+        _end(process, GRACE)
+        return 124
+    except BaseException:
+        _end(process, HURRY)
+        raise
+    return code if code >= 0 else 128 - code
+
+
+def _end(process: subprocess.Popen[bytes], grace: float) -> None:
+    process.terminate()
+    try:
+        process.wait(timeout=grace)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def notify(command: str, night: Path, code: int, text: str) -> str:
+    """Run the user's command in a shell; the summary is its input.  Returns what went wrong, or nothing.
+
+    The command finds the folder of the night in LINKSWEEP_NIGHT, the exit code in LINKSWEEP_CODE.
+    """
+    about = {"LINKSWEEP_NIGHT": str(night.resolve()), "LINKSWEEP_CODE": str(code)}
+    try:
+        done = subprocess.run(
+            command, shell=True, input=text, text=True, check=False, timeout=COMMAND_SECONDS, capture_output=True,
+            env=os.environ | about,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return f"took longer than {COMMAND_SECONDS:g} s"
+    lines = done.stderr.strip().splitlines()
+    return f"ended with {done.returncode}{': ' + lines[-1] if lines else ''}" if done.returncode else ""

@@ -1,0 +1,1 @@
+"""Extrema of a design's curves, followed as it moves, and their gradients."""

@@ -1,0 +1,134 @@
+"""Exact gradients: one call of the family's poses with the complex step in every variable at every point at once."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from sweep.families.base import Angles, Array
+from sweep.optimise.extrema.points import STEP, Curves, Points
+from sweep.optimise.extrema.scanned import CROSSING, EDGE, PASSING, followed
+from sweep.optimise.problem.statement import Problem
+
+# Mixed derivative of the slope: complex step in the variable, fourth-order difference in the crank angle.
+OFFSET = 1e-3
+ALONG = 1e-5  # of the bounds of a variable, for differences between designs at their edges
+STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
+
+# Twelve times the weights of the derivative at the first of five points, in their middle, and at the last.
+FIVE_POINTS = {
+    2.0: (-25.0, 48.0, -36.0, 16.0, -3.0),
+    0.0: (1.0, -8.0, 0.0, 8.0, -1.0),
+    -2.0: (3.0, -16.0, 36.0, -48.0, 25.0),
+}
+
+
+def stepped(problem: Problem, base: Array, fractions: Array) -> Any:
+    """Return the complex designs (n, P):
+    the imaginary step STEP in one scaled variable (n,) each, and in all that follows.
+    """
+    return problem.placed(base, fractions + 1j * STEP * np.eye(len(fractions)))
+
+
+def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tuple[Array, Array]:
+    """Return derivatives of the curves at the points, and of the points' crank angles, by the scaled variables.
+
+    A stationary point needs no account of its own motion (envelope theorem); a crossing of the window's edge moves with
+    the position curve and its two ends, and takes the curve along its slope.  The angle of a stationary point moves by
+    -(dx'/dp)/x'', that of the passage of a level by -(dx/dp)/x'.
+
+    Parameters
+    ----------
+    curves : of the problem
+    designs : (n, P) complex: the design with the imaginary step STEP in one scaled variable each, see :func:`stepped`
+    points : as left by :meth:`Curves.follow` on this design (values, slopes and curvatures are used)
+    places : whether the second result is wanted; without it the array is zero
+
+    Returns
+    -------
+    (K, n) and (K, n), per unit of the variables scaled to their bounds.  Measured against mpmath: 2e-15 relative for
+    values and angles of passages, 5e-10 for angles of extrema (the difference that gives the curvature).
+    """
+    values = curves.values(designs, points).imag.T / STEP
+    moves = np.zeros_like(values)
+    if places:
+        mixed = np.zeros_like(values)
+        for offset, weight in STENCIL:
+            mixed += weight / OFFSET * curves.values(designs, points.shifted(offset * OFFSET)).imag.T / STEP
+        with np.errstate(divide="ignore", invalid="ignore"):
+            moves = -mixed / points.curvature[:, None]
+    passing = points.how == PASSING
+    if passing.any():
+        # The root's implicit derivative; the curve itself stays at its level.
+        moves[passing] = -values[passing] / points.slope[passing, None]
+        values[passing] = 0.0
+    if (points.how == EDGE).any():
+        _at_edges(curves, designs, points, values, moves)
+    edges = points.how == CROSSING
+    low, high = curves.stroke(points) if edges.any() else (-1, -1)
+    if low >= 0:
+        place = curves.positions(designs, points)
+        level = points.level[edges]
+        target = place[:, [low]] + level * (place[:, [high]] - place[:, [low]])
+        moves[edges] = (-(place[:, edges] - target).imag / STEP / points.pace[edges]).T
+        values[edges] += points.slope[edges, None] * moves[edges]
+    return values, moves
+
+
+def _at_edges(curves: Curves, designs: Any, points: Points, values: Array, moves: Array) -> None:
+    """Fill in the derivatives at the edges of curves, which move: differences between designs, each at its own edge.
+
+    What tolerances add to the curves there counts as constant.
+    """
+    base, direction = designs[0].real, designs.imag / STEP
+    both = np.concatenate([base + ALONG * direction, base - ALONG * direction])
+    which, n = np.flatnonzero(points.how == EDGE), len(direction)
+    phi = followed(curves.problem.family, both, points.phi[which], points.level[which])
+    columns = curves.family.poses(both, Angles.of(phi), curves.wanted)
+    moves[which] = ((phi[:n] - phi[n:]) / (2.0 * ALONG)).T
+    for number, series in enumerate(curves.series):
+        own = points.series[which] == number
+        x = curves.curve(series, columns)[:, own] if own.any() else np.zeros((2 * n, 0))
+        values[which[own]] = ((x[:n] - x[n:]) / (2.0 * ALONG)).T
+
+
+def reading_gradient(curves: Curves, designs: Any, output: str, phi: float, moves: Array) -> Array:
+    """Return the gradient of a pose output at a crank angle that moves with the design.
+
+    Parameters
+    ----------
+    curves, designs : as of :func:`gradients`
+    output : the pose output
+    phi : where it is read [rad];  moves : (n,) derivatives of that angle by the scaled variables
+    """
+    wanted = frozenset((output,))
+    standing = curves.poses(designs, np.array([phi]), wanted)[output][:, 0].imag / STEP
+    along = curves.poses(designs[:1].real, np.array([phi + 1j * STEP]), wanted)[output][0, 0].imag / STEP
+    return np.asarray(standing + along * moves, np.float64)
+
+
+def scalar_gradient(function: Any, fractions: Array) -> Array:
+    """Return the gradient of a function of scaled variables that comes as a plain number,
+    from five values per variable.
+
+    Exact steps of a family are good to 1e-15, so a fourth-order difference over 1e-3 of the bounds is good to 1e-11.
+    Near a bound the five points lie on the inner side.
+
+    Parameters
+    ----------
+    function : takes (k, n) scaled variables, returns (k,)
+    fractions : (n,) where
+    """
+    n, step = len(fractions), 1e-3
+    samples, weights = [], []
+    for j in range(n):
+        shift = 0.0 if 2.0 * step <= fractions[j] <= 1.0 - 2.0 * step else 2.0 * math.copysign(1.0, 0.5 - fractions[j])
+        nodes = np.arange(-2.0, 3.0) + shift
+        weights.append(np.array(FIVE_POINTS[shift]) / (12.0 * step))
+        moved = np.repeat(fractions[None, :], 5, axis=0)
+        moved[:, j] += nodes * step
+        samples.append(moved)
+    values = np.reshape(function(np.concatenate(samples)), (n, 5))
+    return np.asarray(np.sum(values * np.array(weights), axis=1), np.float64)

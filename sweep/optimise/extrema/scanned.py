@@ -1,0 +1,202 @@
+"""Where a scan of a curve finds extrema, passages through a level, and edges at which it bends or jumps."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.families.base import Array, Family
+from sweep.families.curve_features import Crossing, Singular, Switches, Waves, crossed, switches
+from sweep.families.domain import Interval
+from sweep.reductions.resolution import FEWEST, denser, events
+from sweep.reductions.sampling import TWO_PI
+
+STATIONARY, CROSSING, STATIC, EDGE = 0, 1, 2, 4  # how a point is held; 3 is PASSING of sweep.optimise.extrema.scanned
+
+Row: TypeAlias = tuple[int, float, float, int, float, float]
+
+
+def extrema(
+    n: int, phi: Array, x: Array, wrapped: bool, sense: float, inside: NDArray[np.bool_] | None = None
+) -> list[Row]:
+    """Return the maxima (sense +1) or minima (-1) of a curve."""
+    if not np.isfinite(x).all():
+        return []
+    if wrapped:
+        x = np.unwrap(x)
+        if abs(x[0] - x[-1] + math.remainder(x[-1] - x[0], 2.0 * math.pi)) > 1.0:
+            return []  # turns fully: no limit positions
+    counts = np.ones(len(x), dtype=np.bool_) if inside is None else inside
+    if not counts.any():
+        return []
+    top, bottom = float(x[counts].max()), float(x[counts].min())
+    if top - bottom <= 1e-13 * max(abs(top), abs(bottom)):
+        return [(n, float(phi[0]), sense, STATIC, math.nan, float(x[0]))]
+    before, after, middle = np.roll(x, 1), np.roll(x, -1), 0.5 * (top + bottom)
+    peak = counts & (sense * x > sense * before) & (sense * x >= sense * after)
+    if inside is None:
+        peak &= sense * (x - middle) >= 0.0  # in a window all count: a refused step cannot add those it met
+    return [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
+
+
+def tops(n: int, phi: Array, which: Array, values: Array, curve: Array) -> list[Row]:
+    """Return rows of points at the higher side of every edge for maxima, at the lower one for minima.
+
+    Their level says what the edge is, negative for a point before it.
+
+    Parameters
+    ----------
+    n : number of the series
+    phi, values : (2, k) both sides of the edges, and the curve there
+    which : (k,) what each edge is
+    curve : (m,) the curve over the turn: as elsewhere, only what is in its upper half can be a maximum that matters
+    """
+    if not np.isfinite(values).all():
+        return []
+    every = np.concatenate([curve, values.ravel()])
+    middle = 0.5 * (float(every.max()) + float(every.min()))
+    rows: list[Row] = []
+    for sense in (1.0, -1.0):
+        side = np.argmax(sense * values, axis=0)
+        for k, x in enumerate(np.take_along_axis(values, side[None, :], axis=0)[0].tolist()):
+            if sense * (x - middle) >= 0.0:
+                rows.append((n, float(phi[side[k], k]), sense, EDGE, (2.0 * float(side[k]) - 1.0) * float(which[k]), x))
+    return rows
+
+
+NEARING, PASSING = 0, 3  # how a point is held: an extremum that only points to the level; the passage itself
+
+
+def passages(
+    n: int, phi: Array, x: Array, level: float, sense: float
+) -> list[tuple[int, float, float, int, float, float]]:
+    """List where samples over the turn pass the level in that sense, and where they only come near it.
+
+    Rows are those of :meth:`sweep.optimise.extrema.points.Points.of`.  The extrema that point to the level without
+    reaching it say how far another passage is.
+    """
+    if not np.isfinite(x).all():
+        return []
+    off = sense * (x - level)
+    before, after, step = np.roll(off, 1), np.roll(off, -1), 2.0 * math.pi / len(phi)
+    found = np.flatnonzero((off < 0.0) & (after >= 0.0))
+    near = np.flatnonzero((off < 0.0) & (off > before) & (off >= after))
+    passing = [(n, float(phi[j] + step * off[j] / (off[j] - after[j])), sense, PASSING, level, level) for j in found]
+    return passing + [(n, float(phi[j]), sense, NEARING, level, float(x[j])) for j in near]
+
+
+def first_passage(phi: Array, how: NDArray[np.intp], own: Sequence[int]) -> tuple[int | None, list[int]]:
+    """Return the point of a curve where it first passes its level in [0, 2 pi),
+    and those before it that only near the level.
+
+    Parameters
+    ----------
+    phi, how : (K,) angles of the points, and how each is held
+    own : numbers of the curve's points
+
+    Notes
+    -----
+    Where one of the latter reaches the level, an earlier passage arises and the event jumps to it.  No slope says so:
+    the search has to keep these points on their side.
+    """
+    order = sorted(own, key=lambda k: math.remainder(phi[k] - math.pi, math.tau))
+    before = list(itertools.takewhile(lambda k: how[k] != PASSING, order))
+    first = order[len(before)] if len(before) < len(order) else None
+    return first, before
+
+
+LOOKS = 512  # poses among which levels that are passed, and followers that reverse, are looked for
+BESIDE = 1e-11  # distance from an edge at which its sides are looked at [rad]
+REACH = 0.1  # by which an edge moves with a step of the search at most [rad]: further ones are others
+
+
+def poses_needed(family: Family, design: Array) -> int:
+    """Return how many poses of a turn show all that a design's curves hold; 0 where any number will do."""
+    if isinstance(family.domain, Interval) or not any(family.every(kind) for kind in (Waves, Singular, Switches)):
+        return 0
+    return int(FEWEST * denser(family, design[None, :])[0])
+
+
+def may_bend(family: Family, outputs: tuple[str, ...]) -> bool:
+    """Return whether some of the pose outputs have kinks or jumps in some design."""
+    if isinstance(family.domain, Interval):
+        return False
+    return bool(family.every(Crossing)) or any(_bends(family, name) for name in outputs)
+
+
+def bending(family: Family, design: Array, outputs: tuple[str, ...]) -> list[int]:
+    """Return the numbers of the pose outputs that have kinks or jumps in this design."""
+    jumps = bool(crossed(family, design[None, :])[0])
+    return [n for n, name in enumerate(outputs) if jumps or _bends(family, name)]
+
+
+def edges(family: Family, design: Array) -> tuple[Array, Array]:
+    """Return crank angles just before and just behind every edge, (2, k) [rad], and what the edge is, (k,).
+
+    The latter is 1 + j for the end j of those known beforehand, 1/2 where a level is passed or a follower reverses.
+    """
+    known, found = switches(family, design[None, :])[0], events(family.precise(), design[None, :], LOOKS)[1]
+    cut = np.concatenate([known, found])
+    which = np.concatenate([np.arange(1.0, 1.0 + known.size), np.full(found.size, 0.5)])
+    return np.stack([cut - BESIDE, cut + BESIDE]), which
+
+
+def followed(family: Family, designs: Array, phi: Array, level: Array) -> Array:
+    """Return where points at edges belong on other designs, (n, k).
+
+    An end known beforehand is found by its number, another one as the nearest: where that is far away the point stays.
+
+    Parameters
+    ----------
+    family, designs : (n, P)
+    phi : (k,) crank angles of the points, beside an edge of a design near by
+    level : (k,) what the edge is, negative for a point before it
+    """
+    side, number = np.sign(level), np.abs(level)
+    at, moved = phi - BESIDE * side, np.zeros((len(designs), len(phi)))
+    known = np.flatnonzero(number >= 1.0)
+    if known.size:
+        moved[:, known] = _way(at[known], switches(family, designs)[:, number[known].astype(np.intp) - 1])
+    other = np.flatnonzero(number < 1.0)
+    if other.size:
+        rows, found = events(family.precise(), designs, LOOKS)
+        for row in range(len(designs)):
+            ways = _way(at[other], found[rows == row][:, None])
+            nearest = np.abs(ways).argmin(axis=0) if len(ways) else np.zeros(other.size, np.intp)
+            way = ways[nearest, np.arange(other.size)] if len(ways) else np.zeros(other.size)
+            moved[row, other] = np.where(np.abs(way) <= REACH, way, 0.0)
+    return np.asarray(phi + moved, np.float64)
+
+
+def distances(edges: Array, phi: Array) -> Array:
+    """Return the distance of every crank angle (k,) from the nearest of some edges [rad]."""
+    return np.asarray(np.abs(_way(phi, edges[:, None])).min(axis=0, initial=math.pi), np.float64)
+
+
+def _way(start: Array, end: Array) -> Array:
+    """Return the shorter way from one crank angle to another [rad]."""
+    return np.asarray(np.remainder(end - start + math.pi, TWO_PI) - math.pi, np.float64)
+
+
+def _bends(family: Family, name: str) -> bool:
+    output = family.pose_output[name]
+    return output.kinks or output.jumps
+
+
+def discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
+    """Divide the discriminant by cos^2 of the pressure angle, (n, 1): one number for all crank angles.
+
+    Taken at the pose whose pressure angle is nearest to half a radian: well away from the dead points, where the ratio
+    is 0/0, and from a pressure angle of zero, where the angle (not its cosine) has a kink and no derivative.
+    """
+    angle = pressure_angle.real
+    distance = np.where(np.isfinite(angle), np.abs(angle - 0.5), np.inf)
+    best = np.argmin(distance, axis=1)[:, None]
+    cos = np.cos(np.take_along_axis(pressure_angle, best, axis=1))
+    with np.errstate(invalid="ignore"):  # where nothing assembles the scale is nan, and so is all that needs it
+        return np.take_along_axis(discriminant, best, axis=1) / (cos * cos)

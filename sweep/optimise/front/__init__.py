@@ -1,0 +1,1 @@
+"""The least objective for each bound on a second output."""

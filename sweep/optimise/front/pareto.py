@@ -1,0 +1,297 @@
+"""Fronts: the least objective for each of several bounds on a second output (epsilon constraint)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels import status as st
+from sweep.errors import InputError
+from sweep.evaluation.summaries import design_outputs
+from sweep.families.base import Array
+from sweep.optimise.front.front_refinement import gaps
+from sweep.optimise.local.kkt import Result
+from sweep.optimise.multistart.multistart import minimise
+from sweep.optimise.multistart.survey import CUT
+from sweep.optimise.problem.statement import PLACE, Problem
+from sweep.quantities.limits import compared
+from sweep.study import Limit, OptimiseSettings
+
+if TYPE_CHECKING:
+    from sweep.study import ParetoSettings
+
+
+@dataclass(frozen=True)
+class Front:
+    """Bounds on a second output, the loosest first, with the best result known for each.
+
+    ``results`` holds None where no search has begun; ``found`` says in which step a result was found; ``taken`` counts
+    the steps that are finished.  The first ``given`` bounds are those asked for, further ones are placed until there
+    are ``points``, or until the front is ``filled``: no gap is left that a point could fill.  A front is all that a
+    search interrupted between two steps needs to go on.
+    """
+
+    bounds: tuple[float, ...]
+    results: tuple[Result | None, ...]
+    found: tuple[int, ...]
+    taken: int = 0
+    given: int = 0
+    points: int = 0
+    filled: bool = False
+
+    @classmethod
+    def of(cls, settings: ParetoSettings) -> Front:
+        """Return a front of which nothing is known yet."""
+        bounds = tuple(sorted(set(settings.bounds), reverse=not settings.at_least))
+        none, never = (None,) * len(bounds), (-1,) * len(bounds)
+        return cls(bounds, none, never, given=len(bounds), points=settings.points or len(bounds))
+
+    @property
+    def steps(self) -> int:
+        """How many there are: for the bounds that were given, and one for each further point."""
+        return len(steps(self.given)) + max(self.points - self.given, 0)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every step is finished."""
+        return self.taken == self.steps or self.filled
+
+    def known(self) -> list[tuple[float, Result]]:
+        """Return the bounds that were begun, with their results."""
+        return [(b, r) for b, r in zip(self.bounds, self.results, strict=True) if r is not None]
+
+
+@dataclass(frozen=True)
+class Step:
+    """Search bound number ``target`` from the result of its neighbour, at first from all other starts as well."""
+
+    target: int
+    neighbour: int
+    first: bool
+
+
+def steps(count: int) -> tuple[Step, ...]:
+    """List the steps of a front: from the loosest bound to the tightest, back, and to the tightest again.
+
+    Each search starts from its neighbour's result, so a good design reaches every bound that it keeps.
+    """
+    there = [Step(k, k - 1, first=True) for k in range(count)]
+    back = [Step(k, k + 1, first=False) for k in range(count - 2, -1, -1)]
+    again = [Step(k, k - 1, first=False) for k in range(1, count)]
+    return (*there, *back, *again)
+
+
+def searches(settings: ParetoSettings) -> int:
+    """Return local searches a front takes at most, from the settings alone."""
+    count = len(Front.of(settings).bounds)
+    placed = max((settings.points or count) - count, 0)
+    # One more start is the optimum itself, one more from the second bound on the result before.  A placed bound begins
+    # with both neighbours besides, and is lent to them.
+    return count * (settings.starts + 1) + max(0, 3 * (count - 1)) + placed * (settings.starts + 5)
+
+
+def bounded(problem: Problem, settings: ParetoSettings, bound: float) -> Problem:
+    """Return the problem with the bound in place of its own limit on that side of the second output."""
+    name = settings.output
+    others = tuple(limit for limit in problem.limits if limit.output != name)
+    own = [limit for limit in problem.limits if limit.output == name]
+    if settings.at_least:
+        highest = min((x.maximum for x in own if x.maximum is not None), default=None)
+        return replace(problem, limits=(*others, Limit(name, float(bound), highest)))
+    lowest = max((x.minimum for x in own if x.minimum is not None), default=None)
+    return replace(problem, limits=(*others, Limit(name, lowest, float(bound))))
+
+
+def pareto(
+    problem: Problem,
+    settings: ParetoSettings,
+    starts: Array | Sequence[Array],
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+) -> list[Result]:
+    """Return the least objective with the second output at most (at least) each of the bounds,
+    the loosest bound first.
+
+    With ``settings.points`` further bounds are placed, one after the other in the middle of the largest gap.
+    Every bound is searched from its starts and from the result of the next looser one.  Then the results go back from
+    the tighter to the looser bounds, for which they are good designs too, and forth again, so a bound never has a worse
+    design than a tighter one.  A bound that makes no difference repeats the design.
+
+    Parameters
+    ----------
+    problem : objective and limits; a limit on the second output gives way to the bound on its side, the other stays
+    settings : second output and bounds; ``time_budget`` is an emergency deadline for the whole front
+    starts : (k, P) designs for all bounds, or one such array for each bound, the loosest first
+    stop : as for :func:`sweep.optimise.minimise`; the bounds reached by then are returned
+    jobs : processes
+
+    Returns
+    -------
+    One result per bound that was begun; an infeasible one says so in its ``status``.  Same starts, same results, unless
+    it was stopped.
+
+    Raises
+    ------
+    InputError
+        if the second output is no design output of the family, or the objective itself, or there is no start.
+    """
+    front = Front.of(settings)
+    for advanced in advance(problem, settings, front, starts, stop, jobs):
+        front = advanced
+    return [result for _, result in front.known()]
+
+
+def advance(
+    problem: Problem,
+    settings: ParetoSettings,
+    front: Front,
+    starts: Array | Sequence[Array],
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+) -> Iterator[Front]:
+    """Yield the front after each further step; parameters as for :func:`pareto`.
+
+    The steps of a front taken up half way are those of one that was never left, to the bit.  A step that ``stop`` cut
+    short leaves the best it found but counts as not taken, and nothing follows it.
+    """
+    if settings.output == problem.objective:
+        raise InputError("second output", settings.output, "another output than the objective", PLACE)
+    own = [np.atleast_2d(s) for s in ([starts] * len(front.bounds) if isinstance(starts, np.ndarray) else starts)]
+    end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
+
+    def asked() -> bool:
+        return time.monotonic() >= end or (stop is not None and stop())
+
+    plan = steps(front.given)
+    for number in range(front.taken, len(plan)):
+        step = plan[number]
+        begin = _begin(front, step, number, own[step.target])
+        if begin is not None:
+            result = _search(problem, settings, front.bounds[step.target], begin, asked, jobs)
+            front = _with(front, step, number, result)
+            if result.ended in CUT or asked():
+                yield front
+                return
+        front = replace(front, taken=number + 1)
+        yield front
+    while not front.complete:
+        front, cut = _placed(problem, settings, front, own, asked, jobs)
+        yield front
+        if cut:
+            return
+
+
+def _placed(
+    problem: Problem,
+    settings: ParetoSettings,
+    front: Front,
+    starts: Sequence[Array],
+    asked: Callable[[], bool],
+    jobs: int,
+) -> tuple[Front, bool]:
+    """Return the front with one more bound, in the middle of its largest gap, and whether it was cut short.
+
+    It is searched from the results of both neighbours and from the starts of the next tighter bound that was given.
+    Its tighter neighbour is searched from what it finds, and so are looser bounds as far as that is better there.
+    """
+    found = gaps(np.array(front.bounds), *places(problem, settings, front))
+    if not found:
+        return replace(front, filled=True), False
+    at, bound, number = found[0].number + 1, found[0].middle, front.taken
+    given = Front.of(settings).bounds
+    tighter = next(k for k, b in enumerate(given) if (b >= bound if settings.at_least else b <= bound))
+    beside = [r.design[None, :] for r in (front.results[at - 1], front.results[at]) if r is not None]
+    designs = np.concatenate([*beside, starts[tighter]])
+    _, first = np.unique(designs, axis=0, return_index=True)
+    front = replace(
+        front,
+        bounds=(*front.bounds[:at], bound, *front.bounds[at:]),
+        results=(*front.results[:at], None, *front.results[at:]),
+        found=(*front.found[:at], -1, *front.found[at:]),
+    )
+    front = _with(
+        front,
+        Step(at, at - 1, first=True),
+        number,
+        _search(problem, settings, bound, designs[np.sort(first)], asked, jobs),
+    )
+    for step in (Step(at + 1, at, first=False), *(Step(k, k + 1, first=False) for k in range(at, -1, -1))):
+        near, held = front.results[step.neighbour], front.results[step.target]
+        if near is None or held is None or near.status == st.LIMIT_EXCEEDED or asked():
+            continue
+        if step.target < step.neighbour and not _order(near) < _order(held):
+            continue
+        better = _search(problem, settings, front.bounds[step.target], near.design[None, :], asked, jobs)
+        front = _with(front, step, number, better)
+    cut = asked()
+    return replace(front, taken=number + (not cut)), cut
+
+
+def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Array, Array]:
+    """Return what the results reach of the second output, and their objective;
+    the bound and nan where there is none.
+    """
+    reached, values = np.array(front.bounds, np.float64), np.full(len(front.bounds), np.nan)
+    good = [k for k, r in enumerate(front.results) if r is not None and r.status != st.LIMIT_EXCEEDED]
+    if good:
+        designs = np.array([r.design for k in good if (r := front.results[k]) is not None])
+        outputs = design_outputs(problem.family, designs, [settings.output], problem.accuracy, problem.window)
+        size = compared(settings.output, np.asarray(outputs[settings.output], np.float64))
+        reached[good] = np.where(np.isfinite(size), size, reached[good])
+        values[good] = [r.objective for k in good if (r := front.results[k]) is not None]
+    return reached, values
+
+
+def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None:
+    """Return designs to start from; None where the neighbour has nothing new to offer."""
+    near = front.results[step.neighbour] if 0 <= step.neighbour < len(front.bounds) else None
+    if step.first:
+        designs = starts if near is None else np.concatenate([near.design[None, :], starts])
+        _, places = np.unique(designs, axis=0, return_index=True)
+        return np.asarray(designs[np.sort(places)], np.float64)
+    held = front.results[step.target]
+    if near is None or held is None:
+        return None
+    seen = step.neighbour < step.target and front.found[step.neighbour] < front.given
+    worse = near.status == st.LIMIT_EXCEEDED and held.status != st.LIMIT_EXCEEDED
+    offers = not (seen or worse or np.array_equal(near.design, held.design))
+    # A search that did not settle goes on from where it ended.
+    unfinished = held.status == st.NOT_CONVERGED
+    begin = [near.design] * offers + [held.design] * unfinished
+    return np.array(begin) if begin else None
+
+
+def _search(
+    problem: Problem,
+    settings: ParetoSettings,
+    bound: float,
+    begin: Array,
+    asked: Callable[[], bool],
+    jobs: int,
+) -> Result:
+    # All starts of a bound count: none of them may be lost to a rule that has seen enough.
+    search = OptimiseSettings(len(begin), unseen=0.0, looks=settings.looks)
+    results = minimise(bounded(problem, settings, bound), begin, search, asked, jobs)
+    cut = any(r.ended in CUT for r in results) or len(results) < len(begin)
+    return replace(results[0], ended="time") if cut and results[0].ended not in CUT else results[0]
+
+
+def _with(front: Front, step: Step, number: int, result: Result) -> Front:
+    """Return the front with this result where it is the better one."""
+    held = front.results[step.target]
+    if held is not None and not _order(result) < _order(held):
+        return front
+    results, found = list(front.results), list(front.found)
+    results[step.target], found[step.target] = result, number
+    return replace(front, results=tuple(results), found=tuple(found))
+
+
+def _order(result: Result) -> tuple[bool, float]:
+    missed = result.status == st.LIMIT_EXCEEDED
+    value = result.violation if missed else result.objective
+    return missed, math.inf if math.isnan(value) else value

@@ -1,0 +1,196 @@
+"""A study's front: from its dataset and its optimum to ``_pareto.parquet``, step by step and resumable."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels import status as st
+from sweep.dataset import store
+from sweep.dataset.files import metadata
+from sweep.errors import InputError, SearchCutShort
+from sweep.evaluation.summaries import output
+from sweep.families.base import Array
+from sweep.families.names import by_magnitude
+from sweep.jobs.progress import Say, unsaid
+from sweep.optimise.front.pareto import Front, advance
+from sweep.optimise.local.kkt import Result
+from sweep.optimise.starts.candidates import diverse
+from sweep.optimise.starts.posing import problem_of_dataset
+from sweep.optimise.study import certificates, outputs, write
+from sweep.study.units import internal_unit
+
+if TYPE_CHECKING:
+    from sweep.optimise.problem.statement import Problem
+    from sweep.study import ParetoSettings, Study
+
+KEPT = 2048  # best rows of the dataset within each bound among which starts are chosen
+KEY, STATE = b"key", b"state"
+
+
+def front_study(
+    study: Study,
+    folder: str | Path,
+    key: str,
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+    say: Say = unsaid,
+) -> Path:
+    """Search the least objective for each bound of [pareto] and write the front beside the optimum, step by step.
+
+    A front in the folder that carries the same key is taken up where it stopped and ends with the bytes of one that was
+    never stopped.
+
+    Parameters
+    ----------
+    study : with [pareto]
+    folder : its dataset, with ``_optimum.parquet``
+    key : what the result depends on, in a word
+    stop : asked often; true ends the search as Ctrl-C does
+    jobs : processes the starts are spread over; the result does not depend on it
+    say : called with how many steps of the front are done, and how many there are
+
+    Returns
+    -------
+    Path of ``_pareto.parquet``.
+
+    Raises
+    ------
+    InputError
+        if the study has no [pareto] section
+    StoreError
+        if the folder cannot be written
+    KeyboardInterrupt
+        if the search was stopped, after the best so far was written
+    SearchCutShort
+        if ``pareto.time_budget`` stopped it, likewise.
+    """
+    if study.pareto is None:
+        raise InputError("pareto", None, "a [pareto] section", str(study.path))
+    place = Path(folder)
+    settings, path = study.pareto, store.beside(place) / store.PARETO
+    front = saved(path, key) or Front.of(settings)
+    if front.complete and path.exists():
+        return path
+    many = front.steps
+    say("front", front.taken, many, "steps")
+    ends, optimum = _searched(study, place)
+    problem = problem_of_dataset(study, place, ends)
+    starts = _starts(study, settings, problem, place, optimum)
+    kept, begin = front, time.monotonic()
+    for best in advance(problem, settings, front, starts, stop, jobs):
+        kept = best if best.taken > kept.taken else kept
+        say("front", kept.taken, many, "steps")
+        _write(path, study, settings, best, key, kept)
+    late = settings.time_budget is not None and time.monotonic() - begin >= settings.time_budget
+    if not kept.complete and (not late or (stop is not None and stop())):
+        raise KeyboardInterrupt
+    if not kept.complete:
+        _write(path, study, settings, best, key, kept, "time")
+        done = f"{kept.taken} of {kept.steps} steps of the front"
+        raise SearchCutShort(place, f"{path}: time ran out: {done}; run again to continue the front")
+    return path
+
+
+def saved(path: Path, key: str) -> Front | None:
+    """Return the front a file holds, as its search left it; None where there is no file, or one with another key."""
+    about = metadata(path)
+    if about.get(KEY) != key.encode():
+        return None
+    try:
+        state = json.loads(about[STATE])
+        return Front(
+            tuple(state["bounds"]), tuple(_result(r) for r in state["results"]), tuple(state["found"]), state["taken"],
+            state["given"], state["points"], state["filled"],
+        )  # fmt: skip
+    except (ValueError, KeyError, TypeError):  # damaged: the search begins anew
+        return None
+
+
+def _result(noted: dict[str, Any] | None) -> Result | None:
+    if noted is None:
+        return None
+    return Result(**noted | {"design": np.array(noted["design"]), "active": tuple(noted["active"])})
+
+
+def _noted(result: Result | None) -> dict[str, Any] | None:
+    return None if result is None else asdict(result) | {"design": result.design.tolist()}
+
+
+def _write(
+    path: Path, study: Study, settings: ParetoSettings, best: Front, key: str, kept: Front, ended: str = ""
+) -> None:
+    """Write ``best`` as the rows; ``kept``, the front after its last finished step, is what a search goes on from."""
+    bounds, results = (list(column) for column in zip(*best.known(), strict=True))
+    designs = np.array([r.design for r in results])
+    columns: dict[str, Any] = {"bound": bounds}
+    columns |= {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}
+    columns |= outputs(study, designs) | certificates(results)
+    side = "lower" if settings.at_least else "upper"
+    texts = {"bound": (_unit(study, settings.output), f"{side} bound on {settings.output}")}
+    state = asdict(replace(kept, results=())) | {"results": [_noted(r) for r in kept.results]}
+    about = {"output": settings.output, "side": "at least" if settings.at_least else "at most"}
+    about |= {"complete": str(best.complete).lower(), "steps": f"{kept.taken} of {kept.steps}"}
+    about |= {"ended": ended} if ended else {}
+    about |= {KEY.decode(): key, STATE.decode(): json.dumps(state)}
+    write(path, columns, study, texts, about)
+
+
+def _unit(study: Study, name: str) -> str:
+    return internal_unit(output(study.family, name).unit)
+
+
+def _searched(study: Study, folder: Path) -> tuple[Array, Array]:
+    """Return the designs that the search for the optimum ended at (k, P), and of them the optimum (1, P)."""
+    names = list(study.family.parameter_names)
+    rows = _columns(store.beside(folder) / store.OPTIMUM, [*names, "role"])
+    designs = np.column_stack([rows[name] for name in names]).astype(np.float64)
+    return designs[rows["role"] != "reference"], designs[rows["role"] == "optimum"]
+
+
+def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path, own: Array) -> list[Array]:
+    """Return for each bound, the loosest first,
+    the optimum ``own`` and then diverse best designs of the dataset within the bound.
+    """
+    chosen = []
+    for designs, merit in within(study, settings, Front.of(settings).bounds, folder):
+        found = diverse(problem, designs, merit, settings.starts) if settings.starts else designs[:0]
+        chosen.append(np.concatenate([own, found]))
+    return chosen
+
+
+def within(
+    study: Study, settings: ParetoSettings, bounds: tuple[float, ...], folder: Path
+) -> list[tuple[Array, Array]]:
+    """Return the best feasible designs (k, P) of a dataset within each bound, k up to 2048, and their objective."""
+    assert study.objective is not None
+    names = study.family.parameter_names
+    kept = [(np.empty((0, len(names))), np.empty(0)) for _ in bounds]
+    for part in store.parts(folder):
+        columns = _columns(part.path, [*names, study.objective.output, settings.output, "status"])
+        designs = np.column_stack([columns[name] for name in names]).astype(np.float64)
+        merit = columns[study.objective.output].astype(np.float64)
+        second = columns[settings.output].astype(np.float64)
+        size = np.abs(second) if by_magnitude(settings.output) else second
+        good = (columns["status"] == st.OK) & np.isfinite(merit)
+        for k, bound in enumerate(bounds):
+            inside = good & (size >= bound if settings.at_least else size <= bound)
+            more, values = (
+                np.concatenate(pair) for pair in zip(kept[k], (designs[inside], merit[inside]), strict=True)
+            )
+            best = np.sort(np.argsort(values, kind="stable")[:KEPT])
+            kept[k] = more[best], values[best]
+    return kept
+
+
+def _columns(path: Path, names: list[str]) -> dict[str, Any]:
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(path, columns=list(dict.fromkeys(names)))
+    return {name: table[name].to_numpy() for name in table.column_names}

@@ -1,0 +1,1 @@
+"""The search from one start: SLSQP, Newton rounds, polish, and what is known of its end."""

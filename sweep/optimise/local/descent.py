@@ -1,0 +1,189 @@
+"""One start: rounds of SLSQP, then of Newton steps, each checked against the true extrema; then polish."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from sweep.families.base import Array
+from sweep.optimise.extrema.points import Points
+from sweep.optimise.extrema.scanned import STATIC
+from sweep.optimise.local import newton, slsqp
+from sweep.optimise.local.kkt import ACTIVE
+from sweep.optimise.local.model import FEASIBLE, Model, State
+from sweep.optimise.problem.on_locus import in_parameters
+from sweep.optimise.problem.program import Program
+from sweep.optimise.problem.rows import Form
+from sweep.optimise.problem.statement import Problem
+
+ROUNDS, CYCLES = 60, 3
+PATIENCE, AGAIN = 8, 2  # rounds of learnt curvature that may halve a violation, at first and after Newton rounds
+NEWTON = 240  # rounds of Newton steps: along a narrow curved valley hundreds are needed, and each gains
+SOON = 30  # of these on a locus, before the parameters are tried: near its singular places they creep
+KKT = 1e-6  # residual of a converged result
+DEARER = 10.0  # violations become so many times where a search comes to rest outside of its limits
+DWINDLING = 1e-9  # gain of a round from which a fulfilled condition of optimality ends the search
+REMEMBERED = 48  # extrema of refused designs that stay among the rows: the next long step would meet them again
+NEAR_ANGLE = 0.1  # a followed point reaches this far by itself [rad]
+NEAR = 1e-3  # scaled violation from which the objective is looked at
+Propose: TypeAlias = Callable[[Model, State, Form, float, float, float | None], tuple[Array, float]]
+
+
+class Descent:
+    """Search from one start; ``best`` always holds the best checked design so far, ``gap`` is that of the last round.
+
+    Parameters
+    ----------
+    problem, program : what to minimise
+    start : (P,) design; its signs are kept
+    stop : asked at every evaluation; true ends the search by :class:`sweep.optimise.local.model.Stopped`
+    allowed : evaluations after which it ends as well
+    """
+
+    def __init__(
+        self, problem: Problem, program: Program, start: Array, stop: Callable[[], bool], allowed: float = math.inf
+    ) -> None:
+        fractions = np.clip(problem.scaled(start[None, :])[0], 0.0, 1.0)
+        self.model = Model(problem, program, problem.placed(start, fractions), stop, allowed)
+        self.gap = math.nan
+        self.best = self.model.state(fractions)
+
+    def run(self) -> State:
+        """Search for a feasible design first, then for the best;
+        the result is polished and verified on a finer grid.
+        """
+        for _ in range(3):
+            if not self.best.feasible:
+                self._restore()
+            if math.isfinite(self.best.objective) and self.best.violation < NEAR:
+                self._settle()
+                self.best = newton.polish(self.model, newton.repair(self.model, self.best))
+            if self._verified():
+                break
+        return self.best
+
+    def _settle(self) -> None:
+        """Make the objective small until the conditions of optimality hold; on a locus that is slow, go on without."""
+        other = in_parameters(self.model.problem, self.best.design)
+        for _ in range(CYCLES):
+            self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=8)
+            self._rounds(newton.propose, relaxed=False, enough=1e-13, rounds=NEWTON if other is None else SOON)
+            if self.model.certificate(self.best).residual <= KKT:
+                break
+            if self.best.violation > ACTIVE:
+                self.model.price *= DEARER
+            elif other is not None:
+                self._detour(other)
+                other = None
+
+    def _detour(self, other: Problem) -> None:
+        """Search from the present design in other coordinates, and come back with what is found there."""
+        model = self.model
+        there = Descent(other, Program(other), self.best.design, model.stop, model.allowed - model.looks)
+        try:
+            there.run()
+        finally:
+            model.looks += there.model.looks
+            fractions = model.problem.scaled(there.best.design[None, :])[0]
+            if np.isfinite(fractions).all():
+                new = model.uncounted(np.clip(fractions, 0.0, 1.0))
+                if new.merit(model.price) < self.best.merit(model.price):
+                    self.best = new
+
+    def _restore(self) -> None:
+        """Find the smallest relaxation of the limits: zero where a feasible design is near.
+
+        In a narrow curved valley learnt curvature, which every round begins anew, creeps; there Newton rounds go on.
+        """
+        patience = PATIENCE
+        for _ in range(ROUNDS):
+            before = self.best
+            if math.isinf(before.known):
+                return  # the links reach nowhere: there is nothing to follow
+            crept = self._rounds(slsqp.propose, relaxed=True, enough=1e-4, patience=patience)
+            if crept and self.best.form.complete:
+                self._rounds(newton.propose, relaxed=True, enough=1e-4)
+                patience = AGAIN
+            same_rows = before.form.complete == self.best.form.complete
+            if self.best.feasible or (same_rows and self.best.known > 0.999 * before.known):
+                break
+        if not self.best.feasible and self.best.form.complete:
+            self._rounds(newton.propose, relaxed=True, enough=1e-13)
+
+    def _rounds(
+        self, propose: Propose, relaxed: bool, enough: float, rounds: int = ROUNDS, patience: int | None = None
+    ) -> bool:
+        """Let ``propose`` find the next design, keep it if its true extrema are better, until it gains too little.
+
+        A refused design shortens the next step, and its extrema that the rows did not know are added to them.
+
+        Returns
+        -------
+        Whether it crept: ``patience`` rounds in a row have not halved what the limits are missed by.
+        """
+        radius, extra, refused = 0.25, Points.of([]), False
+        missed: list[float] = []
+        for _ in range(rounds):
+            at = self.best
+            if patience is not None and at.form.complete:
+                missed.append(at.known)
+                if len(missed) > patience and at.known > 0.5 * missed[-1 - patience]:
+                    return True
+            form, t, floor = self.model.with_points(at, extra), at.objective, None
+            if not refused:
+                known = at.atoms if not len(extra) else self.model.atoms(at.design, form, form.points)
+                form = form.near(known, t if math.isfinite(t) else 0.0)
+            if relaxed:
+                form, t, floor = form.relaxed({"rotatable"} if at.form.complete else set()), at.short, 0.0
+                if not at.form.complete:
+                    t = at.known
+            fractions, reached = propose(self.model, at, form, t, radius, floor)
+            new = self.model.state(fractions)
+            gain = at.short - new.short if relaxed else at.merit(self.model.price) - new.merit(self.model.price)
+            step = float(np.abs(fractions - at.fractions).max())
+            if gain > 0.0:
+                self.best, refused = new, False
+                residual = math.nan if relaxed else self.model.learn(new)
+                radius = max(radius, min(1.0, 2.0 * step))
+                true = new.known if relaxed else new.objective
+                self.gap = abs(true - reached) / max(abs(true), 1e-300)
+                if gain <= enough * max(abs(true), 1.0) or (relaxed and new.feasible):
+                    break
+                if residual <= (KKT if gain <= DWINDLING else 1e-2 * KKT):
+                    break  # the polish makes the rest of the way in one step
+            elif step < 1e-10 or gain > -1e-13 or radius < 1e-7:
+                break
+            else:
+                radius, refused = 0.25 * min(radius, step), True
+                extra = Points.joined(extra, self._unknown(new.form.points, form.points))
+                extra = extra.take(slice(-REMEMBERED, None))
+        return False
+
+    def _unknown(self, found: Points, known: Points) -> Points:
+        """Return the extrema of a refused design that are not near a known point, to be held at their crank angles."""
+        apart = np.abs(np.remainder(found.phi[:, None] - known.phi + np.pi, 2.0 * np.pi) - np.pi)
+        same = (found.series[:, None] == known.series) & (found.sense[:, None] == known.sense)
+        new = ~((apart < NEAR_ANGLE) & same).any(axis=1)
+        # A window moves with the design: a fixed angle may lie outside of it, where nothing is asked; so do passages.
+        held = [s.window is None and s.passes is None for s in self.model.curves.series]
+        new &= np.array(held, dtype=np.bool_)[found.series]
+        return replace(found, how=np.full(len(found), STATIC)).take(new)
+
+    def _verified(self) -> bool:
+        """Return whether four times as many poses show the same extrema; if not, the search goes on with them."""
+        model = self.model
+        fine = model.state(self.best.fractions, 4 * model.samples)
+        if math.isfinite(self.best.objective):
+            difference = abs(fine.objective - self.best.objective)
+            self.gap = difference / max(abs(fine.objective), 1e-300)
+            same = difference <= max(model.problem.accuracy.target or 0.0, 1e-10) * max(1.0, abs(fine.objective))
+        else:
+            same = True
+        if same and (fine.violation <= self.best.violation + FEASIBLE or math.isinf(self.best.violation)):
+            return True
+        self.best, model.samples = fine, 4 * model.samples
+        return False

@@ -1,0 +1,132 @@
+"""What is known about a result: multipliers, optimality residual, active limits in words, agreement of the starts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from sweep.families.base import Array
+from sweep.optimise.local.least_squares import non_negative
+from sweep.optimise.problem.rows import Form, Label
+
+ACTIVE = 1e-6  # a row within this of its bound (scaled) may carry a multiplier
+EDGE = 1e-10  # a variable within this of its bound, as a fraction of the bounds, may carry a multiplier
+AGREE = 1e-4  # starts whose objective is within this of the best agree
+
+CAVEAT = (
+    "The conditions hold at a local optimum; starts that agree make a better one less likely, they do not exclude it: "
+    "this is no proof of a global optimum."
+)
+
+WORDS = {"minimum": "at its minimum", "maximum": "at its maximum", "equal": "held by its equation"}
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """Least-squares multipliers: ``gradient of t = sum weights * gradient of rows + bounds``.
+
+    ``residual`` is the largest component of what is left, in variables scaled to their bounds and the objective scaled
+    by its value at the start; ``bounds`` holds the multipliers of the lower (+) and upper (-) bounds.
+    """
+
+    weights: Array
+    bounds: Array
+    at_bound: NDArray[np.bool_]
+    residual: float
+
+
+def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, within: float = ACTIVE) -> Multipliers:
+    """Return multipliers of the active rows and bounds by non-negative least squares (equations are free in sign).
+
+    Parameters
+    ----------
+    form : the program at the design
+    rows : (R,) its rows there
+    jacobian : (R, n) their gradients by the scaled variables
+    fractions : (n,) scaled variables
+    within : scaled distance from its bound at which a row may carry a multiplier
+    """
+    n = len(fractions)
+    active = np.flatnonzero((rows <= within) | form.equal)
+    lower, upper = np.flatnonzero(fractions <= EDGE), np.flatnonzero(fractions >= 1.0 - EDGE)
+    if not np.isfinite(jacobian[active]).all():
+        return Multipliers(np.zeros(len(rows)), np.zeros(n), np.zeros(n, np.bool_), math.nan)
+    full = np.column_stack([jacobian[active], form.slack[active]]).T
+    equations = full[:, form.equal[active]]
+    edges = np.zeros((n + 1, len(lower) + len(upper)))
+    edges[lower, np.arange(len(lower))] = 1.0
+    edges[upper, len(lower) + np.arange(len(upper))] = -1.0
+    matrix = np.concatenate([full, -equations, edges], axis=1)
+    target = np.concatenate([np.zeros(n), [1.0]])
+    # Columns of very different size would hide the small ones from the active-set choice.
+    size = np.sqrt((matrix * matrix).sum(axis=0))
+    size[size == 0.0] = 1.0
+    solution = non_negative(matrix / size, target) / size
+    residual = np.abs(matrix @ solution - target).max()
+    weights = np.zeros(len(rows))
+    weights[active] = solution[: len(active)]
+    weights[active[form.equal[active]]] -= solution[len(active) : len(active) + equations.shape[1]]
+    edge = solution[len(active) + equations.shape[1] :]
+    bounds = np.zeros(n)
+    bounds[lower] += edge[: len(lower)]
+    bounds[upper] -= edge[len(lower) :]
+    at_bound = bounds != 0.0
+    complementarity = np.abs(weights * rows)[~form.equal].max(initial=0.0)
+    return Multipliers(weights, bounds, at_bound, float(max(residual, complementarity)))
+
+
+@dataclass(frozen=True)
+class Result:
+    """A start's outcome.
+
+    ``design`` (P,) in the family's units.  ``gap`` is the difference between the maximum the search worked with and the
+    true one found afterwards on a finer grid, relative to the objective.  ``violation`` is the largest scaled
+    violation; ``relaxation`` says by how much every violated limit would have to give way, in the unit of its output.
+    ``multipliers`` are relative changes of the objective (of cos^2 of a pressure angle) per relative change of each
+    active limit (of sin^2 of a pressure angle, of a margin itself; per width between the bounds of a variable), not
+    negative but for equations.  Where infeasible, they are changes of the smallest relaxation per relative change of
+    each limit, and ``kkt_residual`` is that of the smallest relaxation.  ``status`` is OK, LIMIT_EXCEEDED (infeasible)
+    or NOT_CONVERGED, and ``ended`` says how the search ended: "converged", "stalled", "differs" (from what
+    ``summarise`` finds, see :mod:`sweep.optimise.local.start`), "infeasible", "looks", "time" or "interrupted".
+    ``basin`` numbers the values that starts ended at, 1 for the best, 0 where infeasible; ``looks`` counts the
+    evaluations.
+    """
+
+    start: int
+    design: Array
+    objective: float
+    gap: float
+    violation: float
+    kkt_residual: float
+    active: tuple[str, ...]
+    multipliers: dict[str, float]
+    relaxation: dict[str, float]
+    values: dict[str, float]
+    status: int
+    ended: str
+    agree: int = 1
+    basin: int = 0
+    looks: int = 0
+    caveat: str = CAVEAT
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every limit is kept."""
+        return self.status != st.LIMIT_EXCEEDED
+
+
+def in_words(labels: tuple[Label, ...], found: Multipliers, variables: tuple[str, ...]) -> dict[str, float]:
+    """Return active limits and bounds with their multipliers, by name; several points of one limit are one."""
+    words: dict[str, float] = {}
+    for label, weight in zip(labels, found.weights, strict=True):
+        if label.side != "objective" and abs(weight) > 1e-9:
+            text = f"{label.name} {WORDS[label.side]}"
+            words[text] = words.get(text, 0.0) + float(weight) * label.per
+    for name, weight in zip(variables, found.bounds, strict=True):
+        if abs(weight) > 1e-9:
+            words[f"{name} at its {'lower' if weight > 0 else 'upper'} bound"] = abs(float(weight))
+    return words

@@ -1,0 +1,187 @@
+"""A start's mechanism as the searches see it: true extrema of a design, rows of its program, their gradients."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sweep.evaluation.summaries import design_outputs
+from sweep.families.base import Array
+from sweep.optimise.extrema.gradients import gradients, reading_gradient, scalar_gradient, stepped
+from sweep.optimise.extrema.points import STEP, Curves, Points
+from sweep.optimise.local.kkt import ACTIVE, Multipliers, multipliers
+from sweep.optimise.problem.program import Program
+from sweep.optimise.problem.rows import Form
+from sweep.optimise.problem.statement import Problem
+
+FEASIBLE = 1e-9  # largest scaled violation of a feasible design
+PRICE = 10.0  # of a unit of scaled violation when two designs are compared, until multipliers are known
+SAMPLES = 256  # poses per turn on which extrema are looked for
+NOT_TURNING = 1e6  # added to the violation of a design some of whose limits do not exist
+
+
+class Stopped(Exception):
+    """The caller wants to stop."""
+
+
+class LooksUsedUp(Stopped):
+    """The start has had all the evaluations it is allowed."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A design with its true extrema: objective (in units of the start's) and largest scaled violation."""
+
+    fractions: Array
+    design: Array
+    form: Form
+    atoms: Array
+    objective: float
+    violation: float
+
+    def merit(self, price: float) -> float:
+        """Return the objective and violation in one number; infinite where the objective does not exist."""
+        return self.objective + price * self.violation
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every limit is kept."""
+        return self.violation <= FEASIBLE
+
+    @property
+    def known(self) -> float:
+        """Largest scaled violation of the limits that exist for this design."""
+        return self.form.known_violation(self.atoms)
+
+    @property
+    def short(self) -> float:
+        """What the elastic program makes small; designs that do not turn rank behind all that do."""
+        return self.known if self.form.complete else self.known + NOT_TURNING
+
+
+class Model:
+    """One start: its signs and fixed parameters, the scale of its objective, and who may stop the search.
+
+    Parameters
+    ----------
+    problem, program : what to minimise
+    start : (P,) design; its signs are kept
+    stop : asked at every evaluation; true ends the search by :class:`Stopped`
+    allowed : evaluations after which it ends by :class:`LooksUsedUp`; ``looks`` counts them
+    """
+
+    def __init__(
+        self, problem: Problem, program: Program, start: Array, stop: Callable[[], bool], allowed: float = math.inf
+    ) -> None:
+        self.looks, self.allowed = 0, allowed
+        self.problem, self.program, self.stop, self.base = problem, program, stop, start
+        self.curves = Curves(problem, program.series, program.places)
+        self.samples = problem.accuracy.samples or SAMPLES
+        self.scale, self.price = 1.0, PRICE
+        if program.objective.inner == "same":
+            size = abs(self.state(problem.scaled(start[None, :])[0]).objective)
+            self.scale = size if 1e-12 < size < math.inf else 1.0
+
+    def check(self) -> None:
+        """Count one more look at a design; raise :class:`Stopped` if the search is to end."""
+        if self.looks >= self.allowed:
+            raise LooksUsedUp
+        if self.stop():
+            raise Stopped
+        self.looks += 1
+
+    def design(self, fractions: Array) -> Array:
+        """Return the design (P,) with its variables at the fractions of their bounds."""
+        return self.problem.placed(self.base, fractions)
+
+    def state(self, fractions: Array, samples: int | None = None) -> State:
+        """Return the true extrema of a design, looked for on ``samples`` poses and refined."""
+        self.check()
+        return self.uncounted(fractions, samples)
+
+    def uncounted(self, fractions: Array, samples: int | None = None) -> State:
+        """Return what :meth:`state` does, of a design that was looked at before, whoever wants to stop."""
+        design = self.design(fractions)
+        points, turns = self.curves.scan(design, samples or self.samples)
+        form = self.program.lay_out(self.curves, design, points, turns, self.scale)
+        atoms = self.atoms(design, form, points)
+        return State(fractions, design, form, atoms, form.objective(atoms), form.violation(atoms))
+
+    def with_points(self, at: State, extra: Points) -> Form:
+        """Return the form of a design with further points at fixed crank angles."""
+        if not len(extra):
+            return at.form
+        points = Points.joined(at.form.points, self.curves.follow(at.design, extra))
+        return self.program.lay_out(self.curves, at.design, points, at.form.complete, self.scale)
+
+    def atoms(self, design: Array, form: Form, points: Points) -> Array:
+        """Return what the form's rows are made of: curves at the points, their angles, plain numbers."""
+        scalars = [self._scalar(name, design[None, :])[0] for name in form.scalars]
+        return np.concatenate([points.value, points.phi, scalars])
+
+    def moved(self, fractions: Array, form: Form, points: Points) -> tuple[Points, Array]:
+        """Return the points followed to another design, and the atoms there."""
+        self.check()
+        design = self.design(fractions)
+        there = self.curves.follow(design, points)
+        return there, self.atoms(design, form, there)
+
+    def jacobian(self, fractions: Array, form: Form, points: Points) -> Array:
+        """Return gradients (R, n) of the form's rows by the scaled variables, at followed points."""
+        designs = stepped(self.problem, self.base, fractions)
+        values, moves = gradients(self.curves, designs, points, self.program.places)
+        scalars = [self._scalar_gradient(name, fractions, designs, points, moves)[None, :] for name in form.scalars]
+        jacobian = np.concatenate([values, moves, *scalars])
+        # What has no derivative, as the angle of a vanishing extremum, spoils the rows that ask for it and no others.
+        lost = ~np.isfinite(jacobian).all(axis=1)
+        jacobian[lost] = 0.0
+        rows = np.asarray(form.matrix @ jacobian)
+        rows[form.matrix[:, lost].any(axis=1)] = np.nan
+        return rows
+
+    def certificate(self, state: State) -> Multipliers:
+        """Return multipliers and residual of the optimality conditions at a checked design."""
+        jacobian = self.jacobian(state.fractions, state.form, state.form.points)
+        return multipliers(state.form, state.form.rows(state.atoms, state.objective), jacobian, state.fractions)
+
+    def learn(self, state: State) -> float:
+        """Price violations at twice what the multipliers of the limits say they are worth (exact penalty).
+
+        A higher price than needed forbids steps along curved limits that a later step would bring back.
+
+        Returns
+        -------
+        The residual of the optimality conditions; nan where the rows that hold are not at their bounds, so that their
+        multipliers mean nothing.
+        """
+        if state.violation > ACTIVE:
+            return math.nan
+        found = self.certificate(state)
+        limits = [
+            abs(w) for w, label in zip(found.weights, state.form.labels, strict=True) if label.side != "objective"
+        ]
+        self.price = max(2.0 * float(sum(limits)), 0.5 * self.price, 1.0)
+        return found.residual
+
+    def _scalar_gradient(self, name: str, fractions: Array, designs: Any, points: Points, moves: Array) -> Array:
+        if name in self.problem.family.parameter_names or name in self.program.pieces:
+            return np.asarray(self._scalar(name, designs).imag / STEP, np.float64)
+        if name in self.program.readings:
+            k, of = self.program.place(name, self.curves, designs[0].real, points), self.program.readings[name].of
+            none = np.full(len(fractions), math.nan)
+            return none if k < 0 else reading_gradient(self.curves, designs, of, points.phi[k], moves[k])
+        return scalar_gradient(lambda f: self._scalar(name, self.problem.placed(self.base, f)), fractions)
+
+    def _scalar(self, name: str, designs: Any) -> Any:
+        names = self.problem.family.parameter_names
+        if name in names:
+            return designs[:, names.index(name)]
+        if name in self.program.pieces:
+            return self.program.pieces[name](designs)
+
+        columns = design_outputs(self.problem.family, designs, [name], self.problem.accuracy, self.problem.window)
+        return np.asarray(columns[name], dtype=np.float64)

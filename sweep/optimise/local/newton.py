@@ -1,0 +1,202 @@
+"""The next design near a solution: sequential quadratic programming with the exact Hessian of the Lagrangian.
+
+Curvature that is learnt from the steps comes late: in a narrow curved valley (a straightness of 0.05 mm on links of
+50 mm) that takes hundreds.  Here the curvature comes from differences of exact gradients, so a few steps do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.families.base import Array
+from sweep.optimise.extrema.points import Index
+from sweep.optimise.local.kkt import ACTIVE, EDGE, Multipliers, multipliers
+from sweep.optimise.local.least_squares import FLAT, least_squares, quadratic_step, split
+from sweep.optimise.local.model import FEASIBLE, Model, State
+from sweep.optimise.problem.rows import Form
+
+CORRECTIONS = 8  # of a step along curved limits, each two or three milliseconds
+SHORTENED, KEPT = 4, 0.1  # times a step is halved, and the share of the promised gain that it must keep
+LOST = 1.0  # scaled violation that no correction mends, above all of links that do not reach: the step must be shorter
+DIFFERENCE = 1e-5  # of the scaled variables; gradients are good to 1e-12, so the Hessian is to 1e-5
+CENTRAL = 1e-6  # the same to both sides of a design
+SLIPPED = 1e-5  # by so much the merit may grow in between while a design is polished
+RANK = 1e-9  # of rows that hold: what is left of one below this, relative to the largest, is rounding
+
+
+def propose(model: Model, at: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:
+    """Minimise the quadratic model of the Lagrangian under linear rows, with a second-order correction.
+
+    Parameters and results are those of :func:`sweep.optimise.local.slsqp.propose`.
+    """
+    points = form.points
+    jacobian = np.nan_to_num(model.jacobian(at.fractions, form, points))
+    rows = form.rows(model.atoms(at.design, form, points), t)
+    # Of a design that misses its limits a little, the rows that will hold are not all at their bounds.
+    found = multipliers(form, rows, jacobian, at.fractions, max(ACTIVE, 10.0 * min(at.violation, 1e-3)))
+    curvature = hessian(model, at, form, found, np.arange(len(at.fractions)))
+    curvature = _upward(curvature, _holding(jacobian, form, found))
+    full = np.column_stack([jacobian, form.slack])
+    best, value, reach = np.zeros(len(at.fractions) + 1), np.inf, radius
+    now = model.price * _missed(form, rows)
+    for _ in range(SHORTENED):
+        box = (np.maximum(-reach, -at.fractions), np.minimum(reach, 1.0 - at.fractions))
+        step, merit, promised = _corrected(model, at, form, t, (curvature, full, rows), (*box, floor))
+        if merit < value:
+            best, value = step, merit
+        if merit <= now - KEPT * promised:
+            break
+        # The limits bend more than their corrections can follow: a shorter step, with the same curvature.
+        reach = 0.5 * min(reach, float(np.abs(step[:-1]).max()))
+    return np.clip(at.fractions + best[:-1], 0.0, 1.0), t + float(best[-1])
+
+
+def _corrected(
+    model: Model, at: State, form: Form, t: float, parts: tuple[Array, Array, Array],
+    bounds: tuple[Array, Array, float | None],
+) -> tuple[Array, float, float]:  # fmt: skip
+    """Return the step within bounds brought back to the curved rows, the merit it reaches,
+    and the gain that was promised.
+    """
+    curvature, full, rows = parts
+    low, high, floor = bounds
+    box = (low, high, -np.inf if floor is None else floor - t)
+    step, _ = quadratic_step(curvature, full, rows, form, box, model.price)
+    promised = model.price * (_missed(form, rows) - _missed(form, rows + full @ step)) - float(step[-1])
+    best, value = step, np.inf
+    for _ in range(CORRECTIONS):
+        there = np.clip(at.fractions + step[:-1], 0.0, 1.0)
+        _, atoms = model.moved(there, form, form.points)
+        true = form.rows(atoms, t + step[-1])
+        missed = _missed(form, true)
+        merit = float(step[-1]) + model.price * missed
+        if not merit < value:
+            break
+        best, value = step, merit
+        if missed <= FEASIBLE or missed > LOST:
+            break
+        # The rows bend away from their tangents: aim beside by what was missed.
+        step, _ = quadratic_step(curvature, full, true - full @ step, form, box, model.price)
+    return best, value, promised
+
+
+def _missed(form: Form, rows: Array) -> float:
+    return float(np.maximum(np.where(form.equal, np.abs(rows), -rows), 0.0).max(initial=0.0))
+
+
+def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index, both_sides: bool = False) -> Array:
+    """Return the second derivatives of the Lagrangian by the free variables, from differences of exact gradients.
+
+    With ``both_sides`` they are good to 1e-8 instead of 1e-5, for twice as many looks: the curvature along a valley may
+    be 1e-9 of that across it.
+    """
+
+    def slope(j: int, step: float) -> Array:
+        moved = at.fractions.copy()
+        moved[j] += step
+        points, _ = model.moved(moved, form, form.points)
+        return np.asarray((found.weights @ np.nan_to_num(model.jacobian(moved, form, points)))[free])
+
+    if both_sides:
+        square = np.array([(slope(j, CENTRAL) - slope(j, -CENTRAL)) / (-2.0 * CENTRAL) for j in free])
+    else:
+        base = (found.weights @ np.nan_to_num(model.jacobian(at.fractions, form, form.points)))[free]
+        steps = [DIFFERENCE if at.fractions[j] <= 0.5 else -DIFFERENCE for j in free]
+        square = np.array([(slope(j, step) - base) / -step for j, step in zip(free, steps, strict=True)])
+    return np.asarray(0.5 * (square + square.T), np.float64)
+
+
+def _holding(jacobian: Array, form: Form, found: Multipliers) -> Array:
+    """Give gradients whose null space are the steps that keep the active set.
+
+    Such a step changes no active limit and no bound, and it changes all active rows of the objective alike.
+    """
+    active = found.weights != 0.0
+    slack, weights = form.slack[active], found.weights[active]
+    sinking = (weights * slack) @ jacobian[active] / max(float((weights * slack).sum()), 1e-300)
+    rows = jacobian[active] - slack[:, None] * sinking
+    return np.concatenate([rows, np.eye(jacobian.shape[1])[found.at_bound]])
+
+
+def _upward(curvature: Array, held: Array) -> Array:
+    """Return the curvature with negative parts made positive,
+    along the rows that hold (their null space) and across apart.
+
+    Along them the curvature decides how far to go; across, the rows do.  Turned positive in one go, the strong
+    curvature across would stiffen a flat valley, and every step along it would be a hundred times too short.
+    """
+    out = np.zeros_like(curvature)
+    for part in split(held, RANK):
+        if len(part):
+            values, turned = np.linalg.eigh(part @ curvature @ part.T)
+            own = part.T @ turned
+            out += (own * np.maximum(np.abs(values), FLAT)) @ own.T
+    return out
+
+
+def repair(model: Model, state: State) -> State:
+    """Bring a nearly feasible design within its limits by small steps that mend violated rows and keep close ones."""
+    for _ in range(5):
+        if state.feasible or not state.violation < 1e-2:
+            break
+        c = state.form.rows(state.atoms, state.objective)
+        limits = np.array([label.side != "objective" for label in state.form.labels], dtype=np.bool_)
+        close = limits & ((c <= ACTIVE) | state.form.equal)
+        wanted = np.where(state.form.equal, -c, np.maximum(-c, 0.0))[close]
+        jacobian = np.nan_to_num(model.jacobian(state.fractions, state.form, state.form.points))[close]
+        # A variable that left its bound by a hair would lose its multiplier: those at bounds move only if they must.
+        inside = (state.fractions > EDGE) & (state.fractions < 1.0 - EDGE)
+        new = state
+        for free in (inside, np.ones_like(inside)):
+            step = np.where(free, least_squares(jacobian * free, wanted, 1e-12), 0.0)
+            new = model.state(np.clip(state.fractions + step, 0.0, 1.0))
+            if new.violation < state.violation:
+                break
+        if not new.violation < state.violation:
+            break
+        state = new
+    return state
+
+
+def polish(model: Model, state: State) -> State:
+    """Take Newton steps on the optimality conditions of the active rows, as long as they improve them."""
+    residual, begun, size = model.certificate(state).residual, state, max(1.0, abs(state.objective))
+    best = state
+    for _ in range(6):
+        if not residual > 1e-12 and state.feasible:
+            break
+        fractions = _conditions_step(model, state)
+        if fractions is None:
+            break
+        new = model.state(fractions)
+        # Limits that bend are missed by the square of a step; the next one brings them back.
+        if not new.merit(model.price) <= begun.merit(model.price) + SLIPPED * size:
+            break
+        new_residual = model.certificate(new).residual
+        if new_residual > 0.5 * residual and new.violation >= 0.5 * state.violation:
+            break
+        state, residual = new, new_residual
+        if new.merit(model.price) <= begun.merit(model.price) + 1e-9 * size:
+            best = new
+    return best
+
+
+def _conditions_step(model: Model, state: State) -> Array | None:
+    jacobian = model.jacobian(state.fractions, state.form, state.form.points)
+    c = state.form.rows(state.atoms, state.objective)
+    found = multipliers(state.form, c, jacobian, state.fractions)
+    free, active = np.flatnonzero(~found.at_bound), np.flatnonzero(found.weights != 0.0)
+    if not len(free) or not len(active):
+        return None
+    n = len(free)
+    system = np.zeros((n + 1 + len(active), n + 1 + len(active)))
+    system[:n, :n] = hessian(model, state, state.form, found, free, both_sides=True)
+    a = np.column_stack([jacobian[np.ix_(active, free)], state.form.slack[active]])
+    system[: n + 1, n + 1 :], system[n + 1 :, : n + 1] = -a.T, a
+    gradient = np.concatenate([np.zeros(n), [1.0]]) - a.T @ found.weights[active]
+    step = least_squares(system, -np.concatenate([gradient, c[active]]), 1e-12)[:n]
+    if not np.isfinite(step).all() or np.abs(step).max() > 0.05:
+        return None
+    fractions = state.fractions.copy()
+    fractions[free] = np.clip(fractions[free] + step, 0.0, 1.0)
+    return fractions

@@ -1,0 +1,83 @@
+"""The next design from far away: scipy's SLSQP on the epigraph program, whose rows follow their extrema."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sweep.families.base import Array
+from sweep.optimise.local.model import Model, State
+from sweep.optimise.problem.rows import Form
+
+ITERATIONS, PER_VARIABLE = 30, 3  # at most; in few variables Newton does the rest faster
+SETTLED = 1e-13  # change of t at which the rows are as good as they get
+
+
+def propose(model: Model, at: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:
+    """Minimise t under the rows of a form, at most ``radius`` away in every scaled variable.
+
+    Parameters
+    ----------
+    model, at : the start and its present design
+    form : rows; their points are followed as the design moves
+    t : value to begin with
+    radius : of the box the search may not leave
+    floor : lower bound of t, if any
+
+    Returns
+    -------
+    The scaled variables (n,) and the t reached with these rows.
+    """
+    from scipy.optimize import minimize
+
+    trail = _Trail(model, form)
+    low, high = np.maximum(at.fractions - radius, 0.0), np.minimum(at.fractions + radius, 1.0)
+    begin = np.append(np.clip(at.fractions, low, high), t)
+    of_t = np.append(np.zeros(len(low)), 1.0)
+    kinds = [(kind, own) for kind, own in (("ineq", ~form.equal), ("eq", form.equal)) if own.any()]
+    constraints = [
+        {
+            "type": kind,
+            "fun": lambda z, own=own: trail.rows(z)[own],
+            "jac": lambda z, own=own: trail.jacobian(z)[own],
+        }
+        for kind, own in kinds
+    ]
+    run: Any = minimize
+    found = run(
+        lambda z: (z[-1], of_t), begin, jac=True, method="SLSQP", constraints=constraints,
+        bounds=[*zip(low, high, strict=True), (floor, None)],
+        options={"maxiter": min(ITERATIONS, PER_VARIABLE * len(low)), "ftol": SETTLED},
+    )  # fmt: skip
+    z = found.x if np.isfinite(found.x).all() else begin
+    return np.clip(z[:-1], low, high), float(z[-1])
+
+
+class _Trail:
+    """Rows and gradients along one run; the points are followed from the last design that took a gradient."""
+
+    def __init__(self, model: Model, form: Form) -> None:
+        self.model, self.form = model, form
+        self.origin = self.points = form.points
+        self.seen = self.atoms = np.empty(0)
+        self.slopes: Array | None = None
+
+    def _move(self, x: Array) -> None:
+        if not np.array_equal(self.seen, x):
+            self.points, self.atoms = self.model.moved(x, self.form, self.origin)
+            self.seen, self.slopes = x.copy(), None
+
+    def rows(self, z: Array) -> Array:
+        """Rows (R,) at the scaled variables and t."""
+        self._move(z[:-1])
+        return self.form.rows(self.atoms, float(z[-1]))
+
+    def jacobian(self, z: Array) -> Array:
+        """Gradients (R, n + 1) by the scaled variables and by t."""
+        self._move(z[:-1])
+        if self.slopes is None:
+            self.slopes = self.model.jacobian(z[:-1], self.form, self.points)
+            if np.isfinite(self.points.value).all():
+                self.origin = self.points
+        return np.column_stack([np.nan_to_num(self.slopes, posinf=0.0, neginf=0.0), self.form.slack])

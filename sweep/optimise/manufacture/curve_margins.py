@@ -1,0 +1,196 @@
+"""Margins of curves along the turn: what tolerances do to a pose output, and how that changes with the design."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sweep.families.base import Angles, Array, Family
+from sweep.optimise.extrema.points import STEP
+from sweep.optimise.local.least_squares import least_squares
+from sweep.optimise.problem.program import Program
+from sweep.optimise.problem.statement import Problem
+
+POSES, HARMONICS = 64, 16  # per turn at which the room is known, and of the sum that runs through it
+MOVED = 1e-4  # of the variables' bounds: a deviation from exact derivatives, so its difference is good to 1e-4
+
+
+@dataclass(frozen=True)
+class CurveMargin:
+    """Trigonometric sum whose (M,) coefficients are ``constant + slopes (values of the columns - place)``.
+
+    ``columns`` (V,) of the design matrix, ``place`` (V,) their values where the sum is exact, ``slopes`` (M, V).
+    """
+
+    columns: tuple[int, ...]
+    place: Array
+    constant: Array
+    slopes: Array
+
+    def at(self, designs: Any, phi: Array) -> Any:
+        """Return the room (n, m) of designs (n, P), which may carry the imaginary step, at crank angles (m,)."""
+        moved = designs[:, list(self.columns)] - self.place
+        room = trigonometric_sum(self.constant + moved.real @ self.slopes.T, phi)
+        if np.iscomplexobj(moved):
+            return room + 1j * trigonometric_sum(moved.imag @ self.slopes.T, phi)
+        return room
+
+    def slope(self, design: Array, phi: Array) -> Array:
+        """Return the derivative (m,) of the room of one design (P,) by the crank angle."""
+        moved = design[list(self.columns)] - self.place
+        return np.asarray(trigonometric_sum((self.constant + self.slopes @ moved)[None, :], phi, True)[0], np.float64)
+
+
+@dataclass(frozen=True)
+class Allowance:
+    """What a limit gives up to tolerances beyond a fixed amount: ``slopes`` (V,) times what the ``names`` have moved.
+
+    ``place`` (V,) are the values of these parameters at which the fixed amount is exact.
+    """
+
+    names: tuple[str, ...]
+    place: Array
+    slopes: Array
+
+
+def allowances(problem: Problem, design: Array, spread: Callable[[Array], dict[str, float]]) -> dict[str, Allowance]:
+    """Return how the rooms of some outputs change with the variables, to first order.
+
+    Parameters
+    ----------
+    problem : its variables are the ones that may change
+    design : (P,)
+    spread : gives the room of every output for a design
+    """
+    around, moved = _around(problem, design)
+    found = [spread(row) for row in around[1:]]
+    n, columns = len(moved), list(problem.columns)
+    names = tuple(problem.family.parameter_names[k] for k in columns)
+    change = {name: np.array([found[k][name] - found[n + k][name] for k in range(n)]) for name in found[0]}
+    return {
+        name: Allowance(names, design[columns], _shortest(moved, own))
+        for name, own in change.items()
+        if np.isfinite(own).all()
+    }
+
+
+def _around(problem: Problem, design: Array) -> tuple[Array, Array]:
+    """Return a design with those a step to either side of it in every variable, and by how much columns differ."""
+    n = len(problem.variables)
+    steps = np.concatenate([np.zeros((1, n)), MOVED * np.eye(n), -MOVED * np.eye(n)])
+    designs = problem.placed(design, problem.scaled(design[None, :])[0] + steps)
+    return designs, np.stack([designs[1 : n + 1, k] - designs[n + 1 :, k] for k in problem.columns], axis=1)
+
+
+def trigonometric_sum(coefficients: Array, phi: Array, derivative: bool = False) -> Array:
+    """Sum ``c_0 + sum over k of (c_(2k-1) cos k phi + c_2k sin k phi)`` or its derivative by phi, (n, m).
+
+    Parameters
+    ----------
+    coefficients : (n, 2 K + 1)
+    phi : (m,) angles in rad
+    derivative : whether the derivative is wanted
+    """
+    k = np.arange(1, coefficients.shape[1] // 2 + 1)
+    cos, sin = np.cos(np.outer(k, phi)), np.sin(np.outer(k, phi))
+    along, aside = coefficients[:, 1::2], coefficients[:, 2::2]
+    if derivative:
+        return np.asarray((k * aside) @ cos - (k * along) @ sin, np.float64)
+    return np.asarray(coefficients[:, :1] + along @ cos + aside @ sin, np.float64)
+
+
+def curves_with_margin(problem: Problem) -> dict[str, str]:
+    """Return pose outputs whose limits can have a room along the turn, by the names of these limits.
+
+    Those of largest and smallest values, as long as no other kind of limit is made of the same curve.
+    """
+    program = Program(problem)
+    measures = [program.objective, *(r.measure for r in program.requirements)]
+    # The room pushes maxima up and minima down: a largest value that has to be large needs it the other way.
+    inward = {
+        r.measure.name
+        for r in program.requirements
+        if (r.maximum if r.measure.kind == "min" else r.minimum) is not None
+    }
+    kinds = ("max_abs", "max", "min")
+    plain = {m.name for m in measures if m.kind in kinds and len(m.series) == 1 and m.name not in inward}
+    others = {s.output for m in measures if m.name not in plain for s in m.series}
+    limits = {r.measure.name: r.measure.series[0] for r in program.requirements if r.measure.name in plain}
+    return {
+        name: s.output
+        for name, s in limits.items()
+        if s.output not in others and not s.pressure and not s.wrapped and name != problem.objective
+    }
+
+
+def curve_margins(problem: Problem, design: Array, sigma: Array, levels: Mapping[str, float]) -> dict[str, CurveMargin]:
+    """Return standard deviations of pose outputs along the turn, and how they change with the variables.
+
+    Parameters
+    ----------
+    problem : its variables are the ones that may change
+    design : (P,)
+    sigma : (P,) standard deviations of the dimensions
+    levels : how many standard deviations of each pose output; what is not finite is left out
+    """
+    n = len(problem.variables)
+    # Parameters that follow from coordinates move together: the slopes by the parameters that reproduce those seen.
+    designs, moved = _around(problem, design)
+    turn: Array = np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
+    found = curve_derivatives(problem.family, designs, sigma, tuple(levels), turn)
+    columns = tuple(problem.columns)
+    waves = np.array([trigonometric_sum(row[None, :], turn)[0] for row in np.eye(2 * HARMONICS + 1)])
+    weights = waves * (np.where(np.arange(len(waves)) == 0, 1.0, 2.0) / POSES)[:, None]
+    out = {}
+    for name, level in levels.items():
+        spread = level * np.sqrt((found[name] ** 2).sum(axis=1))
+        if not np.isfinite(spread).all():
+            continue
+        coefficients = spread @ weights.T
+        change = coefficients[1 : n + 1] - coefficients[n + 1 :]
+        slopes = np.array([_shortest(moved, change[:, k]) for k in range(change.shape[1])])
+        out[name] = CurveMargin(columns, design[list(columns)], coefficients[0], slopes)
+    return out
+
+
+def _shortest(moved: Array, change: Array) -> Array:
+    """Return slopes (V,) by the columns that explain the changes (n,) seen with the moves (n, V)."""
+    size = np.abs(moved).max(axis=0)
+    size[size == 0.0] = 1.0
+    return np.asarray(least_squares(moved / size, change, 1e-10) / size, np.float64)
+
+
+def curve_derivatives(
+    family: Family, designs: Array, sigma: Array, outputs: Sequence[str], phi: Array
+) -> dict[str, Array]:
+    """Return how much outputs change when one dimension is off by its standard deviation, by the complex step.
+
+    Parameters
+    ----------
+    family : of the designs
+    designs : (n, P)
+    sigma : (P,) standard deviations; what is exact has none and no row
+    outputs : names of pose outputs
+    phi : (m,) crank angles
+
+    Returns
+    -------
+    For each output (n, q, m), one row per dimension that is not exact.  The root of the sum of their squares is the
+    standard deviation of the curve there, to first order and for independent dimensions; nan for designs with a nan.
+    """
+    own = np.flatnonzero(sigma)
+    # Complex kernels raise where they divide by zero: designs that do not exist are left out.
+    known = np.flatnonzero(np.isfinite(designs).all(axis=1))
+    stepped = np.repeat(designs[known].astype(np.complex128), len(own), axis=0)
+    stepped[np.arange(len(stepped)), np.tile(own, len(known))] += 1j * STEP * np.tile(sigma[own], len(known))
+    angles = Angles.of(phi[None, :].astype(np.complex128))
+    with np.errstate(all="ignore"):  # a design may not reach every pose; its nan is answered by the caller
+        found = family.poses(np.ascontiguousarray(stepped), angles, frozenset(outputs))
+    out = {name: np.full((len(designs), len(own), len(phi)), np.nan) for name in outputs}
+    for name, values in out.items():
+        values[known] = (found[name].imag / STEP).reshape(len(known), len(own), len(phi))
+    return out

@@ -1,0 +1,180 @@
+"""Limits drawn in: the room that tolerances need, the price of that room, and who misses a limit all the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sweep.families.base import Array
+from sweep.optimise.local.model import Model
+from sweep.optimise.manufacture.curve_margins import POSES, allowances, curve_margins, curves_with_margin
+from sweep.optimise.manufacture.tolerance import SIGMAS, sensitivities, touched
+from sweep.optimise.problem.program import Program
+from sweep.optimise.problem.statement import Problem
+from sweep.quantities.limits import meets
+
+if TYPE_CHECKING:
+    from sweep.study import Limit, Tolerance
+
+CLOSE = 3.0  # rooms from its bound at which the slopes of a limit's room are still asked for
+MOVED = 1e-3  # standard deviations by which bounds move to see what their rows do
+TURN: Array = np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
+
+Levels = Mapping[str, float]
+"""Numbers of standard deviations that limits give up, by the keys of :func:`keyed`."""
+
+
+def bounded(problem: Problem) -> list[Limit]:
+    """Return the limits on outputs that leave room; those on parameters are about the drawing."""
+    own = [x for x in problem.limits if x.output not in problem.family.parameter_names]
+    return [x for x in own if x.minimum is None or x.minimum != x.maximum]
+
+
+def keyed(problem: Problem) -> dict[str, str]:
+    """Return the limited outputs that give up room, each with the key of its number of standard deviations.
+
+    Limits of one curve share its room, so their key is the pose output; that of all others is their own name.
+    """
+    along = curves_with_margin(problem)
+    names = dict.fromkeys(x.output for x in bounded(problem))
+    return {name: along.get(name, name) for name in names if not name.startswith("rotatable")}
+
+
+def with_margins(
+    problem: Problem, design: Array, tolerance: Tolerance, levels: Levels, radius: float | None
+) -> Problem:
+    """Return the problem with the room that a design needs taken from its limits, within a distance of it.
+
+    Parameters
+    ----------
+    problem : with the limits as they are asked for
+    design : (P,)
+    tolerance : of what is made
+    levels : standard deviations that each limit gives up
+    radius : of the box about the design in scaled variables; None for the bounds of the problem
+    """
+    sigma, keys = touched(problem.family, tolerance) / SIGMAS, keyed(problem)
+    along = {key: levels[key] for name, key in keys.items() if key != name}
+    curves = curve_margins(problem, design, sigma, along)
+    others = [name for name, key in keys.items() if key not in curves]
+
+    def room(row: Array, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+        found = _spreads(problem, row, sigma, names)
+        return {name: (levels[keys[name]] * spread, value) for name, (spread, value) in found.items()}
+
+    fixed = room(design, others)
+    limits = tuple(_drawn_in(x, fixed[x.output][0]) if x.output in fixed else x for x in problem.limits)
+    close = [x.output for x in problem.limits if x.output in fixed and _close(x, *fixed[x.output])]
+    given = allowances(problem, design, lambda row: {name: found[0] for name, found in room(row, close).items()})
+    lower, upper = problem.lower, problem.upper
+    if radius is not None:
+        place = np.clip(problem.scaled(design[None, :])[0], 0.0, 1.0)
+        lower = problem.lower + np.maximum(place - radius, 0.0) * problem.span
+        upper = problem.lower + np.minimum(place + radius, 1.0) * problem.span
+    return replace(problem, limits=limits, curve_margins=curves, allowances=given, lower=lower, upper=upper)
+
+
+@dataclass(frozen=True)
+class Price:
+    """What a limit's room costs, and its unit.
+
+    ``price`` is the relative change of the objective per standard deviation of room; ``spread`` is that standard
+    deviation, of a curve where it is at its limit.
+    """
+
+    price: float
+    spread: float
+
+
+def prices(problem: Problem, design: Array, tolerance: Tolerance, levels: Levels) -> dict[str, Price]:
+    """Return what the room of every limit costs at an optimum of :func:`with_margins`, by its key.
+
+    The multipliers of the rows that hold tell it: a bound that moves by a standard deviation moves its rows, and the
+    objective by their multipliers times that.
+    """
+    sigma, keys = touched(problem.family, tolerance) / SIGMAS, keyed(problem)
+    whole = with_margins(problem, design, tolerance, levels, None)
+    units = curve_margins(problem, design, sigma, dict.fromkeys(whole.curve_margins, 1.0))
+    spreads = _spreads(problem, design, sigma, [name for name, key in keys.items() if key not in units])
+    model = Model(whole, Program(whole), design, lambda: False)
+    state = model.state(whole.scaled(design[None, :])[0])
+    found, form, points = model.certificate(state), state.form, state.form.points
+    moved = tuple(_drawn_in(x, MOVED * spreads[x.output][0]) if x.output in spreads else x for x in whole.limits)
+    other = Program(replace(whole, limits=moved)).lay_out(model.curves, design, points, form.complete, model.scale)
+    change = (form.rows(state.atoms, 0.0) - other.rows(state.atoms, 0.0)) / MOVED
+    price, weight = dict.fromkeys(keys.values(), 0.0), dict.fromkeys(units, 0.0)
+    for row, label in enumerate(form.labels):
+        key = keys.get(label.name)
+        if key is None:
+            continue
+        if key in units:
+            size = found.weights[row] * np.abs(form.matrix[row, : len(points)])
+            price[key] += float((size * units[key].at(design[None, :], points.phi)[0]).sum())
+            weight[key] += float(size.sum())
+        else:
+            price[key] += float(found.weights[row] * change[row])
+    out = {key: Price(max(price[key], 0.0), spreads[key][0]) for key in keys.values() if key not in units}
+    for key, unit in units.items():
+        own = price[key] / weight[key] if weight[key] > 0.0 else float(unit.at(design[None, :], TURN)[0].max())
+        out[key] = Price(max(price[key], 0.0), own)
+    return out
+
+
+def excesses(problem: Problem, found: Mapping[str, Array], known: Mapping[str, Price]) -> dict[str, Array]:
+    """Return by how many standard deviations outputs exceed their limits, by the keys of these.
+
+    It is infinite for what has no such output, and wherever a mechanism does not turn: no room helps there.
+
+    Parameters
+    ----------
+    problem : with the limits as they are asked for
+    found : limited outputs of n mechanisms, as they are compared
+    known : the standard deviation of every limit
+    """
+    keys, out = keyed(problem), dict[str, Array]()
+    lost = np.zeros(len(found[problem.objective]), np.bool_)
+    for limit in bounded(problem):
+        key, values = keys.get(limit.output), found[limit.output]
+        if key is None:
+            lost |= ~meets(limit, values)
+            continue
+        low = -math.inf if limit.minimum is None else limit.minimum
+        high = math.inf if limit.maximum is None else limit.maximum
+        beyond, unit = np.maximum(low - values, values - high), known[key].spread
+        own = beyond / unit if unit > 0.0 else np.where(beyond > 0.0, math.inf, -math.inf)
+        own = np.where(np.isnan(own), math.inf, own)
+        out[key] = np.maximum(out[key], own) if key in out else own
+    return {key: np.where(lost, math.inf, own) for key, own in out.items()}
+
+
+def _close(limit: Limit, room: float, value: float) -> bool:
+    """Return whether a limit is so near that how its room changes may matter."""
+    low = limit.minimum is not None and value - CLOSE * room < limit.minimum
+    return low or (limit.maximum is not None and value + CLOSE * room > limit.maximum)
+
+
+def _spreads(problem: Problem, design: Array, sigma: Array, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return standard deviations of outputs, from exact derivatives by every toleranced dimension, and their values."""
+    if not names:
+        return {}
+    rows = sensitivities(problem.family, design, names, problem.window)
+    spread = dict(zip(problem.family.parameter_names, sigma, strict=True))
+    variance, values = dict.fromkeys(names, 0.0), dict.fromkeys(names, math.nan)
+    kinds = ("parameter", "output", "value", "growing", "shrinking")
+    for name, output, value, up, down in zip(*(rows[k] for k in kinds), strict=True):
+        steep = max(abs(up), abs(down)) * spread[name]
+        variance[output] += steep * steep if math.isfinite(steep) else 0.0
+        values[output] = value
+    return {name: (math.sqrt(v), values[name]) for name, v in variance.items()}
+
+
+def _drawn_in(limit: Limit, room: float) -> Limit:
+    low = None if limit.minimum is None else limit.minimum + room
+    high = None if limit.maximum is None else limit.maximum - room
+    if low is not None and high is not None and low > high:  # the band is narrower than what the tolerances need
+        low = high = 0.5 * (low + high)
+    return replace(limit, minimum=low, maximum=high)

@@ -1,0 +1,294 @@
+"""Limits that hold for what is made: they give up room until the wanted share of toleranced mechanisms keeps them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.evaluation.summaries import design_outputs
+from sweep.families.base import Array
+from sweep.optimise.local.kkt import Result
+from sweep.optimise.local.model import Model
+from sweep.optimise.local.start import search
+from sweep.optimise.manufacture.margins import Levels, bounded, excesses, keyed, prices, with_margins
+from sweep.optimise.manufacture.risk_allocation import risk_allocation
+from sweep.optimise.manufacture.tolerance import deviating
+from sweep.optimise.multistart.parallel import spread_over
+from sweep.optimise.multistart.survey import CUT
+from sweep.optimise.problem.program import Program
+from sweep.optimise.problem.statement import Problem
+from sweep.quantities.limits import compared, meets
+
+if TYPE_CHECKING:
+    from sweep.study import OptimiseSettings, Tolerance
+
+SAMPLES = 8192  # a power of two: the share of 95 % is good to 0.25 %
+BOTH = 4.0  # ways in which a design misses a limit that know little of each other, to begin with
+TRIED = 4  # basins of the search that are begun with
+ENDED = 3  # designs that go on after the first rounds
+HEAT = 400  # looks of each of the first rounds
+ROUNDS, CORRECTIONS = 4, 10  # of search with the room of the design before; of the number of standard deviations
+ONCE = 2  # looks that say how good a design is
+STAYED = 1e-3  # step of a design that the room and the share agree on
+RADIUS = 0.15  # of the first rounds, in scaled variables
+SETTLED = 1e-5  # step of a round, in scaled variables
+NEARLY = 1e-4  # scaled violation of a design whose objective counts
+ALIKE = 0.02  # greatest distance in scaled variables of designs that are taken for one
+REACH, FADING = (
+    0.6,
+    0.7,
+)  # distance of two limits' numbers of standard deviations in the first correction; of later ones
+LEAP, AMPLE = 1.0, 4.0  # of a correction at most; standard deviations that hardly anything exceeds
+SAVED = 2e-6  # of the objective that another share-out should save, below which it is as good as it gets
+ENOUGH = 0.0005  # by so much the sampled share may exceed the wanted one; 0.003 cost 0.02 % of acceleration
+
+
+@dataclass(frozen=True)
+class Robust:
+    """A robust result, the sampled share of mechanisms that keep all limits, and whether time cut it short."""
+
+    result: Result
+    share: float
+    cut: bool = False
+
+
+def kept(problem: Problem, designs: Array) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+    """Return limited outputs of designs (n, P), and which designs keep all limits on outputs."""
+    limits = bounded(problem)
+    names = list(dict.fromkeys([x.output for x in limits] + [problem.objective]))
+    found = design_outputs(problem.family, designs, names, problem.accuracy, problem.window)
+    good = np.ones(len(designs), dtype=np.bool_)
+    for limit in limits:
+        good &= meets(limit, found[limit.output])
+    return {name: compared(name, np.asarray(found[name], np.float64)) for name in names}, good
+
+
+def robust(
+    problem: Problem,
+    results: Sequence[Result],
+    tolerance: Tolerance,
+    settings: OptimiseSettings,
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+    more: Array | None = None,
+    tell: Callable[[int, int], None] = lambda _, __: None,
+) -> Robust | None:
+    """Return the best design of which the wanted share of toleranced mechanisms keeps all limits.
+
+    Every limit gives up the room that the tolerances need, a number of standard deviations of its own: of curves it is
+    followed along the turn, and to first order as the design changes, so the search trades acceleration for
+    insensitivity; of other outputs it is a fixed amount.  Rounds of search with the room of the design before end where
+    the design stays.  The numbers are corrected until the share of a sample holds, and until no other way to spend what
+    may miss its limits is cheaper.
+
+    Parameters
+    ----------
+    problem : with the limits as they are asked for
+    results : of the search, best first; the best of up to four basins are begun with
+    tolerance : with ``robust``, the share
+    settings, stop, jobs : as for ``minimise``
+    more : (k, P) designs that a search for insensitive ones has found, to begin with as well
+    tell : called with how many searches are done, and how many there are at most
+
+    Returns
+    -------
+    The best one that reaches the share, else the one with the largest share; None where there is nothing to begin with.
+    ``violation`` and ``relaxation`` of the result are about the limits as they are asked for.
+    """
+    heads: list[Result] = []
+    for result in results:
+        if result.feasible and result.ended not in CUT and result.basin not in [h.basin for h in heads]:
+            heads.append(result)
+    heads = heads[:TRIED]
+    number = 1 + max((r.start for r in results), default=-1)
+    begin = [h.design for h in heads] + list(np.empty((0, 0)) if more is None else more)
+    starts = [h.start for h in heads] + list(range(number, number + len(begin) - len(heads)))
+    if not begin:
+        return None
+    asked = stop or _never
+    level = NormalDist().inv_cdf(1.0 - (1.0 - (tolerance.robust or 0.0)) / BOTH)
+    near = _Approach(problem, np.array(begin), tuple(starts), tolerance, level, min(HEAT, settings.looks))
+    count = _Count(tell, len(begin) + min(ENDED, len(begin)))
+    found = spread_over(near, list(range(len(begin))), asked, jobs, count)
+    # The objective of designs that miss their limits still says little.
+    order = sorted(found, key=lambda r: (r.violation > NEARLY, r.objective if r.violation <= NEARLY else r.violation))
+    ends = _different(problem, order)[:ENDED]
+    if not ends:  # stopped before any of them was begun
+        return None
+    numbers = {r.start: k for k, r in enumerate(ends)}
+    last = _Calibrate(problem, tuple(ends), tolerance, level, settings.seed, settings.looks)
+    count.total = len(begin) + len(ends)
+    made = spread_over(last, list(numbers.values()), asked, jobs, count) or [
+        Robust(r, _share(problem, r.design, tolerance, settings.seed), True) for r in ends[:1]
+    ]
+    good = [x for x in made if x.share >= (tolerance.robust or 0.0)]
+    best = min(good, key=lambda x: x.result.objective) if good else max(made, key=lambda x: x.share)
+    return replace(best, cut=best.cut or any(x.cut for x in made) or len(made) < len(ends) or len(found) < len(begin))
+
+
+class _Count:
+    """Counts what is done and tells it."""
+
+    def __init__(self, tell: Callable[[int, int], None], total: int) -> None:
+        self.tell, self.done, self.total = tell, 0, total
+        tell(0, total)
+
+    def __call__(self) -> None:
+        self.done += 1
+        self.tell(self.done, self.total)
+
+
+def _never() -> bool:
+    return False
+
+
+def _different(problem: Problem, results: Sequence[Result]) -> list[Result]:
+    """Return results whose designs are not near those of better ones."""
+    places = [problem.scaled(r.design[None, :])[0] for r in results]
+    apart: list[int] = []
+    for k, place in enumerate(places):
+        if all(float(np.abs(place - places[other]).max()) > ALIKE for other in apart):
+            apart.append(k)
+    return [results[k] for k in apart]
+
+
+@dataclass(frozen=True)
+class _Approach:
+    """First rounds from some designs: a task for processes."""
+
+    problem: Problem
+    designs: Array
+    numbers: tuple[int, ...]
+    tolerance: Tolerance
+    level: float
+    looks: int
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Result:
+        start = self.numbers[number]
+        return _approached(
+            self.problem,
+            start,
+            self.designs[number],
+            self.tolerance,
+            dict.fromkeys(keyed(self.problem).values(), self.level),
+            should_stop,
+            ROUNDS,
+            self.looks,
+            RADIUS,
+        )[0]
+
+
+@dataclass(frozen=True)
+class _Calibrate:
+    """The rest of the way, and how many standard deviations each limit gives up: a task for processes."""
+
+    problem: Problem
+    results: tuple[Result, ...]
+    tolerance: Tolerance
+    level: float
+    seed: int
+    looks: int
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Robust:
+        head, wanted = self.results[number], self.tolerance.robust or 0.0
+        levels: Levels = dict.fromkeys(keyed(self.problem).values(), self.level)
+        best = Robust(head, _share(self.problem, head.design, self.tolerance, self.seed), True)
+        design, radius, reach = head.design, RADIUS, REACH
+        for corrected in range(CORRECTIONS):
+            if should_stop():
+                return replace(best, cut=True)
+            result, radius, step = _approached(
+                self.problem, head.start, design, self.tolerance, levels, should_stop, ROUNDS, self.looks, radius
+            )
+            design = result.design
+            values, share = self._made(design)
+            better = share >= wanted and (best.share < wanted or result.objective < best.result.objective)
+            if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
+                best = Robust(replace(result, agree=head.agree), share, result.ended in CUT)
+            if corrected and share >= wanted and not better and result.ended == "looks":
+                break  # what the limits of a search cost that does not settle leads nowhere
+            levels, saved = self._corrected(design, levels, values, reach)
+            if wanted <= share <= wanted + ENOUGH and step < STAYED and saved < SAVED:
+                break
+            reach *= FADING
+        nominal = Model(self.problem, Program(self.problem), best.result.design, _never)
+        state = nominal.state(self.problem.scaled(best.result.design[None, :])[0])
+        return replace(best, result=replace(best.result, violation=state.violation, relaxation={}))
+
+    def _corrected(
+        self, design: Array, levels: Levels, values: Mapping[str, Array], reach: float
+    ) -> tuple[Levels, float]:
+        """Return the numbers of standard deviations that share out what may miss best,
+        and by what part of itself the objective should fall.
+        """
+        known = prices(self.problem, design, self.tolerance, levels)
+        found = excesses(self.problem, values, known)
+        if not levels:
+            return levels, 0.0
+        keys, wanted = list(levels), (self.tolerance.robust or 0.0) + 0.5 * ENOUGH
+        excess = np.stack([found[key][1:] for key in keys], axis=1)
+        shifts, saved = risk_allocation(excess, np.array([known[key].price for key in keys]), wanted, reach)
+        out = {}
+        for key, shift in zip(keys, shifts.tolist(), strict=True):
+            # A limit that nothing presses against has more room than it was asked for.
+            now = levels[key] if known[key].price > 0.0 else max(levels[key], -float(found[key][0]))
+            out[key] = min(max(now + min(shift, LEAP), 0.0), AMPLE)
+        return out, saved
+
+    def _made(self, design: Array) -> tuple[dict[str, Array], float]:
+        """Return limited outputs of a design and of mechanisms about it, and the share of these that keeps limits."""
+        about = deviating(self.problem.family, design, self.tolerance, self.seed, SAMPLES)
+        values, good = kept(self.problem, np.concatenate([design[None, :], about]))
+        return values, float(good[1:].mean())
+
+
+def _approached(
+    problem: Problem,
+    number: int,
+    design: Array,
+    tolerance: Tolerance,
+    levels: Levels,
+    asked: Callable[[], bool],
+    rounds: int,
+    looks: int,
+    radius: float,
+) -> tuple[Result, float, float]:
+    """Search again and again, each time with the room of the design before, until the design stays.
+
+    Returns
+    -------
+    The last result, the radius for further rounds, and the last step, in scaled variables.
+    """
+    total, step, room_of, before = 0, math.inf, design, np.zeros(len(problem.variables))
+    for _ in range(rounds):
+        result = search(number, with_margins(problem, design, tolerance, levels, radius), design, asked, looks)
+        total += result.looks
+        move = (problem.scaled(result.design[None, :]) - problem.scaled(design[None, :]))[0]
+        step, room_of, design = float(np.abs(move).max()), design, result.design
+        if result.ended in CUT or step < SETTLED:
+            break
+        # The room is exact where it was taken.  Who turns round goes to and fro in a flat valley.
+        if (move * before).sum() < 0.0:
+            radius *= 0.5
+        elif step > 0.9 * radius:
+            radius = min(2.0 * radius, RADIUS)
+        before = move
+    # Bounds of the last round may hold the design where those of the problem do not.
+    whole = search(number, with_margins(problem, room_of, tolerance, levels, None), design, asked, ONCE)
+    kept_ended = result.ended if whole.ended == "looks" else whole.ended
+    return replace(whole, looks=total, ended=kept_ended), radius, step
+
+
+def _share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> float:
+    return float(kept(problem, deviating(problem.family, design, tolerance, seed, SAMPLES))[1].mean())
+
+
+def yields(problem: Problem, designs: Array, tolerance: Tolerance, seed: int) -> list[float]:
+    """Return the share of toleranced mechanisms about each design (k, P) that keep all limits on outputs."""
+    return [_share(problem, design, tolerance, seed) for design in designs]

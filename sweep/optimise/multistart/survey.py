@@ -1,0 +1,269 @@
+"""How far a search can be relied upon: the basins its starts ended in, and the estimated share of unseen ones."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels import status as st
+from sweep.families.base import Array
+from sweep.optimise.local.kkt import AGREE, Result
+from sweep.optimise.problem.statement import Problem
+
+if TYPE_CHECKING:
+    from sweep.study import OptimiseSettings
+
+MET = 3  # starts from distinct valleys that have to end in the best basin
+UNSEEN = 0.02  # share of basins that starts may leave unseen, unless a study asks for another
+DISTINCT = 0.05  # of the average distance of two random designs: nearer starts stand in one valley
+CUT = ("time", "interrupted")  # how a start ends that was not searched to its end
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What the starts of a search tell of it.
+
+    Parameters
+    ----------
+    starts : starts that were searched to their end
+    asked : the most starts that the study allows
+    offered : starts that there were
+    basins : different values the feasible ones ended at; values within 1e-4 count as one basin
+    best : starts from distinct valleys or distinct samples that ended in the best basin
+    unseen : estimated share of basins, by their volume, that no start has met; 1 where no start became feasible
+    wanted : what ``unseen`` should fall below
+    ended : "enough" where the rule was fulfilled, "starts" where none was left, "time" or "interrupted"
+    kinds : starts and basins for each combination of signs, as ``(("branch = 1", 7, 3), ...)``
+    late : whether all starts were searched, and time ran out over what follows them
+    populations : global searches that were counted, each with its best end; 0 where starts were counted
+    """
+
+    starts: int
+    asked: int
+    offered: int
+    basins: int
+    best: int
+    unseen: float
+    wanted: float
+    ended: str
+    kinds: tuple[tuple[str, int, int], ...] = ()
+    late: bool = False
+    populations: int = 0
+
+    @property
+    def enough(self) -> bool:
+        """Whether the best basin was met often enough and few basins are likely to be unseen."""
+        return self.best >= MET and self.unseen <= self.wanted
+
+    @property
+    def words(self) -> str:
+        """``14 basins met, the best 5 times, estimated unseen 1 %``."""
+        if self.basins == 0:
+            return f"none of {started(self.starts)} became feasible"
+        basins = f"{self.basins} basin{'s' if self.basins > 1 else ''} met"
+        times = {1: "once", 2: "twice"}.get(self.best, f"{self.best} times")
+        by = f" by {self.populations} populations" if self.populations else ""
+        return f"{basins}{by}, the best {times}, estimated unseen {_percent(self.unseen)}"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader has to know before trusting the result."""
+        return (*self.shortcomings, *self.doubts)
+
+    @property
+    def shortcomings(self) -> tuple[str, ...]:
+        """What the search did not do that it was asked for."""
+        found = []
+        if self.ended in CUT:
+            why = "time ran out" if self.ended == "time" else "interrupted"
+            of = started(min(self.asked, self.offered))
+            after = "; not all that follows them, neighbouring values and robust designs, was" if self.late else ""
+            found.append(f"{why}: {self.starts} of {of}{after}")
+        elif self.starts < self.asked and not self.enough:
+            found.append(
+                f"only {started(self.starts)} of the {self.asked} asked: no more were found in the design space"
+            )
+        return tuple(found)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why there may be something better than what the search found."""
+        found = []
+        if self.ended == "starts" and self.basins and not self.enough:
+            of = "populations" if self.populations else "distinct valleys"
+            rare = f"the best basin was met from {self.best} of the {MET} {of} wanted"
+            parts = [rare] if self.best < MET else []
+            if self.unseen > self.wanted:
+                parts.append(f"the share of unseen basins is estimated at {_percent(self.unseen)}, not the "
+                             f"{_percent(self.wanted)} asked")  # fmt: skip
+            more = "populations" if self.populations else "starts"
+            found.append(f"{' and '.join(parts)}: more {more} may find a better one")
+        return tuple(found)
+
+
+def survey(
+    problem: Problem,
+    starts: Array,
+    results: Sequence[Result],
+    settings: OptimiseSettings,
+    ended: str,
+    origins: Sequence[int] | None = None,
+    samples: Sequence[int] | None = None,
+) -> Survey:
+    """Return what the results of a search tell of it.
+
+    Parameters
+    ----------
+    problem : whose variables tell how far two starts are apart
+    starts : (k, P) all starts that were offered
+    results : of those that were begun, in any order
+    settings : the number of starts asked, and the share of unseen basins that is allowed
+    ended : how the search ended
+    origins : (k,) number of the global search that each start comes from, -1 for none; without them every start stands
+        for itself.  Of one global search the best result counts, and no other: it has chosen its ends itself.
+    samples : (k,) number of the sample that each start comes from.  Starts of different samples are distinct wherever
+        they stand: the samples know nothing of each other.
+
+    Notes
+    -----
+    The unseen share is the larger of two estimates for n starts that met w basins, s of them once: s / n (Good and
+    Turing) and w (w + 1) / (n (n - 1)) (Boender and Rinnooy Kan 1987, for unknown volumes).  Both suppose that starts
+    are drawn at random; ours are the best of samples, so the estimate says how much to expect from more of their kind.
+    Populations are drawn at random: they differ by their seeds alone.
+    """
+    whole = [r for r in results if r.ended not in CUT]
+    numbered = with_basins(whole)
+    drawn = numbered if origins is None else _best_of_each(numbered, origins)
+    met = Counter(r.basin for r in drawn if r.basin)
+    n, w = sum(met.values()), len(met)
+    ends = [r.start for r in drawn if r.basin == 1]
+    best = _distinct(problem, starts, ends, samples) if origins is None else len(ends)
+    share = wanted(settings, origins is not None)
+    return Survey(
+        len(whole), settings.starts, len(starts), w, best, _unseen(n, met), share, ended,
+        _kinds(problem, starts, numbered), populations=0 if origins is None else n,
+    )  # fmt: skip
+
+
+def wanted(settings: OptimiseSettings, populations: bool) -> float:
+    """Share of unseen basins below which a search ends: of populations the best basin alone decides unless asked."""
+    if settings.unseen is not None:
+        return settings.unseen
+    return 1.0 if populations else UNSEEN
+
+
+def settled(values: Sequence[float], share: float) -> bool:
+    """Whether populations that ended at these values tell enough: the rule of :class:`Survey`."""
+    met = _counted(values)
+    n, best = len(values), met[min(met)] if met else 0
+    return Survey(n, n, n, len(met), best, _unseen(n, met), share, "", populations=n).enough
+
+
+def enough(values: Sequence[float], share: float) -> int | None:
+    """How many of the first populations tell enough, None where all of them do not.
+
+    Values are infinite where nothing feasible was found.  What later populations have ended at does not matter, so the
+    answer does not depend on how many are made at a time.
+    """
+    known = [[x for x in values[:n] if math.isfinite(x)] for n in range(len(values) + 1)]
+    return next((n for n, first in enumerate(known) if settled(first, share)), None)
+
+
+def _counted(values: Sequence[float]) -> Counter[float]:
+    """Return how often each basin was met, by the lowest value of it."""
+    first, met = -math.inf, Counter[float]()
+    for value in sorted(values):
+        first = value if not value - first <= AGREE * abs(value) else first
+        met[first] += 1
+    return met
+
+
+def _best_of_each(ranked: Sequence[Result], origins: Sequence[int]) -> list[Result]:
+    """Return the best result of every global search, of results in the order of their basins."""
+    found: dict[int, Result] = {}
+    for r in ranked:
+        if r.basin and origins[r.start] >= 0:
+            found.setdefault(origins[r.start], r)
+    return list(found.values())
+
+
+def later(found: Survey) -> Survey:
+    """Return the survey of a search whose time ran out when its starts had been searched."""
+    return replace(found, ended="time", late=True)
+
+
+def with_basins(results: Sequence[Result]) -> list[Result]:
+    """Return results, ranked by their objective, with the number of their basin: 1 for the best, 0 where infeasible."""
+    order = sorted(results, key=lambda r: (r.status == st.LIMIT_EXCEEDED, _objective(r), r.start))
+    number, first, found = 0, math.nan, []
+    for r in order:
+        if r.status == st.LIMIT_EXCEEDED or not math.isfinite(r.objective):
+            found.append(replace(r, basin=0))
+            continue
+        if not abs(r.objective - first) <= AGREE * max(abs(first), 1e-300):
+            number, first = number + 1, r.objective
+        found.append(replace(r, basin=number))
+    return found
+
+
+def _objective(r: Result) -> float:
+    return math.inf if math.isnan(r.objective) else r.objective
+
+
+def _unseen(n: int, met: Counter[Any]) -> float:
+    """Return the larger of both estimates of the share of unseen basins."""
+    once = sum(1 for count in met.values() if count == 1)
+    return min(1.0, max(once / max(n, 1), _by_volumes(n, len(met))))
+
+
+def _by_volumes(n: int, w: int) -> float:
+    """Return the share by Boender and Rinnooy Kan of n searches that met w basins; 1 where they say nothing."""
+    return 1.0 if n < 2 else w * (w + 1) / (n * (n - 1))
+
+
+def _distinct(problem: Problem, starts: Array, numbers: list[int], samples: Sequence[int] | None) -> int:
+    """Return how many of some starts stand in distinct valleys, or come from distinct samples."""
+    of = samples or [0] * len(starts)
+    place = problem.scaled(starts)
+    others = [c for c in range(starts.shape[1]) if c not in problem.columns]
+    least = DISTINCT * math.sqrt(place.shape[1] / 6.0)
+    taken: list[int] = []
+    for k in sorted(numbers):
+        near = (
+            np.linalg.norm(place[k] - place[j]) < least
+            and of[k] == of[j]
+            and np.array_equal(starts[k, others], starts[j, others])
+            for j in taken
+        )
+        if not any(near):
+            taken.append(k)
+    return len(taken)
+
+
+def _kinds(problem: Problem, starts: Array, results: Sequence[Result]) -> tuple[tuple[str, int, int], ...]:
+    """Return starts and basins for each combination of the parameters that are chosen, not varied."""
+    others = [c for c in range(starts.shape[1]) if c not in problem.columns]
+    differ = [c for c in others if len(np.unique(starts[:, c])) > 1]
+    names = problem.family.parameter_names
+    count: Counter[str] = Counter()
+    basins: dict[str, set[int]] = {}
+    for r in results:
+        words = ", ".join(f"{names[c]} = {starts[r.start, c]:.6g}" for c in differ)
+        count[words] += 1
+        basins.setdefault(words, set()).update({r.basin} - {0})
+    return tuple((words, count[words], len(basins[words])) for words in sorted(count)) if differ else ()
+
+
+def started(count: int) -> str:
+    """Return a number of starts in words."""
+    return f"{count} start{'' if count == 1 else 's'}"
+
+
+def _percent(share: float) -> str:
+    value = 100.0 * share
+    return f"{value:.0f} %" if value >= 9.95 or value == round(value) else f"{value:.2g} %"

@@ -1,0 +1,133 @@
+"""Equations for limit positions eliminated: the same problem in coordinates in which they hold by construction; and
+back again, for the places where these coordinates are bad ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from sweep.families.base import Array
+from sweep.families.capabilities import LimitLocus
+from sweep.families.chain import Chain, stages_of
+from sweep.optimise.problem.coordinates import LocusCoordinates
+from sweep.optimise.problem.statement import Problem
+from sweep.study import Limit
+from sweep.synthesis.prescription import OnLocus
+
+# The place on the locus is an angle without ends: a search that begins within one turn may leave it on either side.
+PLACE_BOUNDS = (-math.pi, 3.0 * math.pi)
+WHOLE_TURN = 2.0 * math.pi * (1.0 - 1e-9)
+SHORTEST = 0.1  # of its present length is a link without a lower limit
+
+
+def on_locus(problem: Problem) -> Problem:
+    """Return the problem on the locus of its first stage,
+    or the problem itself where that has no equations to eliminate.
+
+    Equations for swing (rssr) or stroke (rssp) and phi0 of the first stage become fixed coordinates, the place on the
+    locus a variable; the links that follow keep their bounds as limits.  Where the rocker's length is fixed and e and g
+    are not, the direction of (e, g) is the variable and both follow.
+
+    Parameters
+    ----------
+    problem : in the parameters themselves
+    """
+    family = problem.family
+    first = stages_of(family)[0].family
+    number = "1" if isinstance(family, Chain) else ""
+    locus = first.find(LimitLocus)
+    if problem.coordinates is not None or locus is None:
+        return problem
+    wanted = (f"{locus.travel}{number}", f"phi0{number}")
+    equations = {x.output: x.minimum for x in problem.limits if x.minimum is not None and x.minimum == x.maximum}
+    if not all(name in equations for name in wanted):
+        return problem
+    bounds = {n: (float(x), float(y)) for n, x, y in zip(problem.variables, problem.lower, problem.upper, strict=True)}
+    ends = _directions(problem, bounds, tuple(f"{name}{number}" for name in locus.sized))
+    coordinates = LocusCoordinates(OnLocus(first.name, number, "phi1" if ends is None else "direction"))
+    places = {f"phi_ext{number}": PLACE_BOUNDS}
+    if ends is not None:
+        places[f"direction{number}"] = ends
+    held = {name: (float(x), float(x)) for name, x in problem.fixed.items()}
+    links = [Limit(name, *(bounds | held)[name]) for name in coordinates.made]
+    varied = {name: ends for name, ends in bounds.items() if name not in coordinates.made} | places
+    fixed = {name: float(x) for name, x in problem.fixed.items() if name not in coordinates.made}
+    return replace(
+        problem,
+        variables=tuple(varied),
+        lower=np.array([low for low, _ in varied.values()]),
+        upper=np.array([high for _, high in varied.values()]),
+        fixed=fixed | {name: abs(float(equations[name] or 0.0)) for name in wanted},
+        limits=(*(limit for limit in problem.limits if limit.output not in wanted), *links),
+        coordinates=coordinates,
+    )
+
+
+def in_parameters(problem: Problem, design: Array) -> Problem | None:
+    """Return a problem on the locus in the parameters themselves.
+
+    What the locus holds becomes limits, equations where it is fixed, and the links that follow become variables.
+    None where the problem is in the parameters anyway, where the place on the locus is not free, and where limits
+    leave a link no room.
+
+    Parameters
+    ----------
+    problem : as of :func:`on_locus`, or of a study with [locus]
+    design : (P,) where the search stands; links without limits may grow and shrink by the longest of its links
+    """
+    coordinates = problem.coordinates
+    if not isinstance(coordinates, LocusCoordinates):
+        return None
+    held, places = coordinates.given[:2], coordinates.given[2:]  # swing or stroke and phi0; where on the locus
+    bounds = {n: (float(x), float(y)) for n, x, y in zip(problem.variables, problem.lower, problem.upper, strict=True)}
+    if any(n not in bounds or (n in coordinates.periodic and np.ptp(bounds[n]) < WHOLE_TURN) for n in places):
+        return None
+    ends = {name: bounds[name] for name in problem.variables if name not in coordinates.given}
+    ends |= {name: _around(problem, design, coordinates.made, name) for name in coordinates.made}
+    if any(low > high for low, high in ends.values()):
+        return None
+    varied = {name: (low, high) for name, (low, high) in ends.items() if low < high}
+    known = {name: (float(x), float(x)) for name, x in problem.fixed.items()} | bounds
+    fixed = {name: x for name, x in problem.fixed.items() if name not in held}
+    return replace(
+        problem,
+        variables=tuple(varied),
+        lower=np.array([low for low, _ in varied.values()]),
+        upper=np.array([high for _, high in varied.values()]),
+        fixed=fixed | {name: low for name, (low, high) in ends.items() if low == high},
+        limits=(
+            *(limit for limit in problem.limits if limit.output not in coordinates.made),
+            *(Limit(name, *known[name]) for name in held),
+        ),
+        coordinates=None,
+    )
+
+
+def _around(problem: Problem, design: Array, links: tuple[str, ...], name: str) -> tuple[float, float]:
+    """Return the bounds of a link that follows: its limits; where it has none, some way about the present design."""
+    names = problem.family.parameter_names
+    reach = float(np.abs([design[names.index(link)] for link in links]).max())
+    here, parameter = float(design[names.index(name)]), problem.family.parameters[names.index(name)]
+    limits = [limit for limit in problem.limits if limit.output == name]
+    least = SHORTEST * here if parameter.positive else here - reach
+    low = max((x.minimum for x in limits if x.minimum is not None), default=least)
+    return low, min((x.maximum for x in limits if x.maximum is not None), default=here + reach)
+
+
+def _directions(
+    problem: Problem, bounds: Mapping[str, tuple[float, float]], sized: tuple[str, ...]
+) -> tuple[float, float] | None:
+    """Return the least and greatest direction of the offsets (e,
+    g) where the rocker's length c alone is fixed, else None.
+    """
+    if not sized:
+        return None
+    c, e, g = sized
+    if c not in problem.fixed or e not in bounds or g not in bounds or bounds[e][0] < 0.0:
+        return None
+    ends = [math.atan2(y, x) for x in bounds[e] for y in bounds[g]]
+    return min(ends), max(ends)

@@ -1,0 +1,315 @@
+"""The epigraph program of a problem, laid out as rows for any design (:mod:`sweep.optimise.problem.rows`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from sweep.errors import InputError
+from sweep.families.base import Array
+from sweep.optimise.extrema.points import Curves, Points
+from sweep.optimise.extrema.scanned import first_passage
+from sweep.optimise.problem.rows import Form, Label, Term, box, numbers
+from sweep.optimise.problem.statement import PLACE, Problem
+from sweep.quantities.measures import Measure, Series, margins, measure
+from sweep.quantities.resolve import output
+
+if TYPE_CHECKING:
+    from sweep.optimise.manufacture.curve_margins import Allowance
+
+SMALLEST = 1e-100  # a limit nearer to zero is a limit at zero
+
+
+Moving: TypeAlias = tuple[Mapping[str, float], float]
+NOT_MOVING: Moving = ({}, 0.0)
+DIFFERENCE = 1e-6  # relative, for the derivative of an inner value by its output
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """One limit in the optimiser's inner values (`Measure`); it is an equation where ``minimum == maximum``.
+
+    ``raised`` and ``lowered`` say how its lower and upper bound change with parameters, by their names: derivatives,
+    and the sum of these times the values at which the bounds are as given.
+    """
+
+    measure: Measure
+    minimum: float | None
+    maximum: float | None
+    raised: Moving = NOT_MOVING
+    lowered: Moving = NOT_MOVING
+
+    @property
+    def equal(self) -> bool:
+        """Whether this is an equation."""
+        return self.minimum is not None and self.minimum == self.maximum
+
+
+def measured_in(size: float) -> float:
+    """Give the divisor of violations of a limit of that size; it is 1 where the quotient would overflow."""
+    return size if size > SMALLEST else 1.0
+
+
+class Program:
+    """The objective and the limits of a problem, ready to be laid out as rows for any design."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.objective = measure(problem.family, problem.objective, problem.window)
+        if self.objective.inner == "rotatable":
+            raise InputError("objective", problem.objective, "a quantity that changes steadily", PLACE)
+        for name in (problem.objective, *(limit.output for limit in problem.limits)):
+            measure(problem.family, name, problem.window)  # unknown names end here
+            if name not in problem.family.parameter_names and output(problem.family, name).jumps:
+                raise InputError(name, "constant in pieces", "a quantity that changes steadily", PLACE)
+        self.turning = Measure("rotatable", "min", margins(problem.family), "rotatable")
+        turns = Requirement(self.turning, self.turning.to_inner(1.0), None)
+        self.requirements = [turns] if self.turning.series else []
+        for limit in problem.limits:
+            found = measure(problem.family, limit.output, problem.window)
+            if found.inner == "rotatable":
+                if limit.maximum is not None or limit.minimum not in (1, 1.0, True):
+                    raise InputError(limit.output, (limit.minimum, limit.maximum), "at least 1 (it turns)", PLACE)
+                continue  # demanded of every design anyway
+            sides = [None if side is None else found.to_inner(float(side)) for side in (limit.minimum, limit.maximum)]
+            if (
+                found.inner == "pressure"
+                and limit.minimum is None
+                and not 0.0 < float(limit.maximum or 0) < math.pi / 2
+            ):
+                raise InputError(limit.output, limit.maximum, "an angle between 0 and pi/2", PLACE)
+            if found.inner == "transmission" and not all(
+                side is None or 0.0 < float(side) < math.pi / 2 for side in (limit.minimum, limit.maximum)
+            ):
+                raise InputError(limit.output, (limit.minimum, limit.maximum), "angles between 0 and pi/2", PLACE)
+            given = problem.allowances.get(limit.output)
+            raised, lowered = (_moving(found, b, given, s) for b, s in ((limit.minimum, 1.0), (limit.maximum, -1.0)))
+            self.requirements.append(Requirement(found, sides[0], sides[1], raised, lowered))
+        measures = [self.objective, *(r.measure for r in self.requirements)]
+        self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
+        moving = [name for r in self.requirements for side in (r.raised, r.lowered) for name in side[0]]
+        self.scalars = tuple(dict.fromkeys([*(name for m in measures for name in m.numbers), *moving]))
+        self.pieces = {name: piece for m in measures for name, piece in zip(m.numbers, m.pieces, strict=False)}
+        self.places = any(m.follows_angles for m in measures)
+        readings = (m.parts[0] if m.kind == "minus" else m for m in measures)
+        self.readings = {m.name: m for m in readings if m.kind == "scalar" and m.parts}
+
+    def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
+        """Lay out the rows for a design; ``points`` are its extrema, ``scale`` divides the objective."""
+        layout = _Layout(curves, points, design, self.scalars)
+        complete = turns
+        for requirement in self.requirements:
+            complete = layout.require(requirement) and complete
+        for term, shift in layout.upper(self.objective):
+            layout.add(term, shift, -1.0 / scale, 0.0, 1.0, False, Label(self.objective.name, "objective"))
+        reaches = all(curves.series.index(s) in points.series for s in self.turning.series)
+        return layout.form(complete and layout.has_objective, reaches)
+
+    def place(self, name: str, curves: Curves, design: Array, points: Points) -> int:
+        """Return the number of the point where one of the ``readings`` is taken; -1 where the design has none."""
+        found = _Layout(curves, points, design, self.scalars).upper(self.readings[name].parts[0])
+        return next(iter(found[0][0])) - len(points) if found else -1
+
+    def value(self, found: Measure, form: Form, curves: Curves, design: Array, atoms: Array) -> float:
+        """Give the value of a measure in its own unit; nan where it does not exist."""
+        layout = _Layout(curves, form.points, design, self.scalars)
+        inner = [sum(w * atoms[k] for k, w in term.items()) + shift for term, shift in layout.upper(found)]
+        return found.from_inner(float(max(inner))) if inner else math.nan
+
+
+def _moving(found: Measure, bound: float | None, given: Allowance | None, sense: float) -> Moving:
+    """Return how a bound changes in inner values when its allowance grows; ``sense`` is +1 for a lower bound."""
+    if bound is None or given is None:
+        return NOT_MOVING
+    step = DIFFERENCE * max(abs(bound), DIFFERENCE)
+    per = sense * (found.to_inner(bound + step) - found.to_inner(bound - step)) / (2.0 * step)
+    slopes = {name: per * float(slope) for name, slope in zip(given.names, given.slopes, strict=True) if slope != 0.0}
+    at = dict(zip(given.names, given.place.tolist(), strict=True))
+    return slopes, sum(slope * at[name] for name, slope in slopes.items())
+
+
+def _label(r: Requirement, side: str, bound: float, size: float) -> Label:
+    """Make the label of a limit's row; violations of pressure angles and margins are not divided by the bound."""
+    own = r.measure.inner == "pressure" or any(s.pressure for s in r.measure.series)
+    return Label(r.measure.name, side, 1.0 if own else abs(bound) / size)
+
+
+class _Layout:
+    def __init__(self, curves: Curves, points: Points, design: Array, scalars: tuple[str, ...]) -> None:
+        self.curves, self.points, self.scalars = curves, points, scalars
+        self.design = design
+        self.terms: list[Term] = []
+        self.rest: list[tuple[float, float, bool, Label]] = []
+
+    @property
+    def has_objective(self) -> bool:
+        return any(label.side == "objective" for *_, label in self.rest)
+
+    def add(
+        self, term: Term, shift: float, weight: float, bound: float, slack: float, equal: bool, label: Label
+    ) -> None:
+        self.terms.append({k: weight * w for k, w in term.items()})
+        self.rest.append((weight * shift + bound, slack, equal, label))
+
+    def require(self, r: Requirement) -> bool:
+        """Add the rows of one limit; the result is false where the design has none of the extrema that it is about."""
+        found = True
+        self._keep_first(r, "minimum" if r.maximum is None else "maximum")
+        if r.equal and r.minimum is not None:
+            for term, shift in self.lower(r.measure)[:1]:
+                size = self._size(r, r.minimum)
+                label = _label(r, "equal", r.minimum, size)
+                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, True, label)
+            return bool(self.lower(r.measure))
+        if r.minimum is not None:
+            terms, size = self.lower(r.measure), self._size(r, r.minimum)
+            found = found and bool(terms)
+            for term, shift in self._moved(terms, r.raised):
+                label = _label(r, "minimum", r.minimum, size)
+                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, False, label)
+        if r.maximum is not None:
+            terms, size = self.upper(r.measure), self._size(r, r.maximum)
+            found = found and bool(terms)
+            for term, shift in self._moved(terms, r.lowered):
+                label = _label(r, "maximum", r.maximum, size)
+                self.add(term, shift, -1.0 / size, r.maximum / size, 0.0, False, label)
+        return found
+
+    def _moved(self, terms: list[tuple[Term, float]], moving: Moving) -> list[tuple[Term, float]]:
+        """Return sums less by how much their bound has moved."""
+        first = 2 * len(self.points)
+        more = {first + self.scalars.index(name): -slope for name, slope in moving[0].items()}
+        return [
+            ({k: term.get(k, 0.0) + more.get(k, 0.0) for k in term | more}, shift + moving[1]) for term, shift in terms
+        ]
+
+    def upper(self, m: Measure) -> list[tuple[Term, float]]:
+        """List sums of atoms: the inner value is below a bound if and only if all of them are."""
+        return self._bounded(m, above=m.sign > 0.0)
+
+    def lower(self, m: Measure) -> list[tuple[Term, float]]:
+        """List sums of atoms: the inner value is above a bound if and only if all of them are."""
+        return self._bounded(m, above=m.sign < 0.0)
+
+    def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        if m.kind == "minus":
+            of = m.parts[0]
+            return [({k: -w for k, w in t.items()}, -shift) for t, shift in (self.lower if above else self.upper)(of)]
+        if m.numbers:
+            return self._numbers(m, above)
+        if m.kind == "difference":
+            return self._difference(m, above)
+        if m.kind == "phi_event":
+            first, _ = self._passage(m.series[0])
+            return [] if first is None else [({len(self.points) + first: 1.0}, self._turns(first))]
+        maxima, minima = self._ends(m.series)
+        if m.kind in ("max", "min"):
+            many = above == (m.kind == "max")
+            ends = maxima if m.kind == "max" else minima
+            return [({k: m.sign}, 0.0) for k in (ends if many else ends[:1])]
+        if m.kind in ("phi_max", "phi_min"):
+            ends = maxima if m.kind == "phi_max" else minima
+            return [({len(self.points) + k: 1.0}, self._turns(k)) for k in ends[:1]]
+        if m.kind in ("max_abs", "phi_max_abs"):
+            value = self.points.value
+            ends = sorted([*maxima, *minima], key=lambda k: -self.points.sense[k] * value[k])
+            if m.kind == "phi_max_abs":
+                return [({len(self.points) + k: 1.0}, self._turns(k)) for k in ends[:1]]
+            return [({k: float(self.points.sense[k])}, 0.0) for k in (ends if above else ends[:1])]
+        if not maxima or not minima:
+            return []
+        if m.kind == "range":
+            pairs = [(i, j) for i in maxima[:4] for j in minima[:4]]
+            return [({i: 1.0, j: -1.0}, 0.0) for i, j in (pairs if above else pairs[:1])]
+        outward = self._outward(m.series[0].output)
+        ext, fold = (maxima[0], minima[0]) if outward > 0.0 else (minima[0], maxima[0])
+        k, other = len(self.points), {"ext": ext, "fold": fold}
+        if m.kind in ("ext", "fold"):
+            return [({other[m.kind]: 1.0}, 0.0)]
+        if m.kind in ("phi_ext", "phi_fold"):
+            end = other[m.kind.removeprefix("phi_")]
+            return [({k + end: 1.0}, self._turns(end))]
+        apart = self.points.phi[fold] - self.points.phi[ext]
+        return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
+
+    def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        """Return sums of plain numbers, and of the ends of curves with them."""
+        first = 2 * len(self.points)
+        if m.kind == "box":
+            tops, bottoms = ([(float(self.points.value[k]), k) for k in side] for side in self._ends(m.series))
+            return box(m, tops, bottoms, self.design, self.scalars, first, above)
+        return numbers(m, self.design, self.curves.family.parameter_names, self.scalars, first, above)
+
+    def _difference(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+        """Give the second angle minus the first, with whole turns so that it is in (-pi, pi] at the present points."""
+        ends = [self._bounded(part, above)[:1] for part in m.parts]
+        if not all(ends):
+            return []
+        (first, shift), (second, other) = (end[0] for end in ends)
+        count = len(self.points)
+        apart = sum(w * self.points.phi[k - count] for k, w in second.items()) + other
+        apart -= sum(w * self.points.phi[k - count] for k, w in first.items()) + shift
+        turns = 2.0 * math.pi * math.ceil((apart - math.pi) / (2.0 * math.pi))
+        return [(second | {k: -w for k, w in first.items()}, other - shift - turns)]
+
+    def _passage(self, series: Series) -> tuple[int | None, list[int]]:
+        own = np.flatnonzero(self.points.series == self.curves.series.index(series)).tolist()
+        return first_passage(self.points.phi, self.points.how, own)
+
+    def _keep_first(self, r: Requirement, side: str) -> None:
+        """Add rows that let no earlier passage arise where an event is limited."""
+        for series in r.measure.series:
+            if series.passes is None:
+                continue
+            level, sense = series.passes
+            for k in self._passage(series)[1]:
+                size = measured_in(max(abs(level), 1e-3 * abs(self.points.value[k])))
+                self.add({k: -sense}, 0.0, 1.0 / size, sense * level / size, 0.0, False, Label(r.measure.name, side))
+
+    def _outward(self, position: str) -> float:
+        """Return +1 where the extended position of that follower is the largest, -1 where it is the smallest."""
+        family = self.curves.family
+        sign = family.outward_sign(position)
+        return float(self.design[family.parameter_names.index(sign)]) if sign else 1.0
+
+    def _turns(self, k: int) -> float:
+        return -2.0 * math.pi * math.floor(float(self.points.phi[k]) / (2.0 * math.pi))
+
+    def _ends(self, series: Sequence[Series]) -> tuple[list[int], list[int]]:
+        """List the points that are maxima, highest first, and those that are minima, lowest first, of some series."""
+        numbers = [self.curves.series.index(s) for s in series]
+        own = np.isin(self.points.series, numbers)
+        value, sense = self.points.value, self.points.sense
+        maxima = sorted(np.flatnonzero(own & (sense > 0)).tolist(), key=lambda k: -value[k])
+        minima = sorted(np.flatnonzero(own & (sense < 0)).tolist(), key=lambda k: value[k])
+        return maxima, minima
+
+    def _size(self, r: Requirement, bound: float) -> float:
+        """Give the divisor of a limit's violations: its bound, unless that is tiny against the curve; 1 for margins.
+
+        For a plain number, which has no curve, it is the larger of both bounds.
+        """
+        if r.measure.inner == "pressure":
+            return 1.0 + bound  # sin^2 of the limit: a few degrees are as hard a limit as forty
+        if any(s.pressure for s in r.measure.series):
+            return 1.0
+        if r.measure.numbers:
+            return measured_in(max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)))
+        ends = [k for side in self._ends(r.measure.series) for k in side]
+        amplitude = 1.0 if r.measure.is_angle else max((abs(self.points.value[k]) for k in ends), default=0.0)
+        return measured_in(max(abs(bound), 1e-3 * amplitude))
+
+    def form(self, complete: bool, reaches: bool) -> Form:
+        matrix = np.zeros((len(self.terms), 2 * len(self.points) + len(self.scalars)))
+        for row, term in enumerate(self.terms):
+            for k, weight in term.items():
+                matrix[row, k] += weight
+        constant, slack, equal, labels = (list(c) for c in zip(*self.rest, strict=True)) if self.rest else ([],) * 4
+        return Form(
+            self.points, self.scalars, matrix, np.array(constant, np.float64), np.array(slack, np.float64),
+            np.array(equal, np.bool_), tuple(labels), complete, reaches,
+        )  # fmt: skip

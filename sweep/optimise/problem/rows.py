@@ -1,0 +1,165 @@
+"""The epigraph program of one design: rows ``c = constant + matrix @ atoms + slack * t``, to be >= 0 or = 0.
+
+Atoms are what the gradients know: the curves at K points, the crank angles of these points, and plain numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.families.base import Array
+from sweep.optimise.extrema.points import Points
+from sweep.quantities.measures import Measure
+
+AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first
+FAR = 1e3  # stands for a row that cannot be computed at a trial design: far outside, but a number
+
+
+@dataclass(frozen=True)
+class Label:
+    """What a row stands for: an output and its side, "objective", "minimum", "maximum" or "equal".
+
+    ``per`` turns the row's multiplier into one per relative change of the bound: the bound over the row's scale.
+    """
+
+    name: str
+    side: str
+    per: float = 1.0
+
+
+@dataclass(frozen=True)
+class Form:
+    """Rows of the program and the points whose curves they use.
+
+    ``complete`` says that the design turns and every limit exists for it, ``reaches`` that every stage assembles
+    somewhere, so that its margin says how far it is from turning.
+    """
+
+    points: Points
+    scalars: tuple[str, ...]
+    matrix: Array
+    constant: Array
+    slack: Array
+    equal: NDArray[np.bool_]
+    labels: tuple[Label, ...]
+    complete: bool
+    reaches: bool
+
+    def rows(self, atoms: Array, t: float) -> Array:
+        """Return the rows' values; a row that is nan counts as far outside."""
+        if np.isfinite(atoms).all():
+            return np.asarray(self.constant + self.matrix @ atoms + self.slack * t)
+        far = self.matrix @ np.nan_to_num(atoms, nan=1e30)
+        return np.nan_to_num(self.constant + far + self.slack * t, nan=-FAR)
+
+    def objective(self, atoms: Array) -> float:
+        """Return the largest of the objective's rows: the smallest t they allow."""
+        own = np.array([label.side == "objective" for label in self.labels], dtype=np.bool_)
+        if not own.any():
+            return math.inf
+        return float(-(self.constant + self.matrix @ atoms)[own].min())
+
+    def violation(self, atoms: Array) -> float:
+        """Return the largest scaled violation of the limits;
+        infinite where one of them does not exist for this design.
+        """
+        if not self.complete:
+            return math.inf
+        return self.known_violation(atoms)
+
+    def known_violation(self, atoms: Array) -> float:
+        """Return the largest scaled violation of those limits that exist for this design;
+        infinite where it reaches nowhere.
+        """
+        if not self.reaches:
+            return math.inf
+        c = self.constant + self.matrix @ atoms
+        own = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
+        if np.isnan(c[own]).any():
+            return math.inf
+        return float(np.maximum(np.where(self.equal, np.abs(c), -c)[own], 0.0).max(initial=0.0))
+
+    def near(self, atoms: Array, t: float) -> Form:
+        """Return the form without the rows that are far inside: no short step reaches them."""
+        keep = (self.rows(atoms, t) < AT_HAND) | self.equal
+        labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
+        return replace(
+            self, matrix=self.matrix[keep], constant=self.constant[keep], slack=self.slack[keep],
+            equal=self.equal[keep], labels=labels,
+        )  # fmt: skip
+
+    def relaxed(self, hard: set[str]) -> Form:
+        """Return the elastic program: smallest t by which all limits but the ``hard`` ones have to give way."""
+        keep = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
+        soft = np.array([label.name not in hard for label in self.labels], dtype=np.float64)[keep]
+        both = self.equal[keep]
+        matrix, constant = self.matrix[keep], self.constant[keep]
+        labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
+        return replace(
+            self,
+            matrix=np.concatenate([matrix, -matrix[both]]),
+            constant=np.concatenate([constant, -constant[both]]),
+            slack=np.concatenate([soft, soft[both]]),
+            equal=np.zeros(len(labels) + int(both.sum()), dtype=np.bool_),
+            labels=labels + tuple(label for label, twice in zip(labels, both, strict=True) if twice),
+        )
+
+
+Term = dict[int, float]
+ENDS = 4  # foremost and rearmost joints that are followed: a step rarely brings a further one to the end
+
+
+def numbers(
+    m: Measure, design: Array, parameters: tuple[str, ...], scalars: tuple[str, ...], first: int, above: bool
+) -> list[tuple[Term, float]]:
+    """Return a plain number, every piece of a size, or every length with both signs.
+
+    Where only one of them has to stay on its side of a bound, it is the one that makes the output.
+
+    Parameters
+    ----------
+    m : the measure;  design : (P,);  parameters : names of its columns
+    scalars : names of all plain numbers; ``first`` is the place of the first among the atoms
+    above : whether the sums have to stay below a bound for the inner value to do so
+    """
+    if m.kind == "scalar":
+        return [({first + scalars.index(m.name): m.sign}, 0.0)]
+    if m.kind in ("least", "most"):
+        each = [float(piece(design[None, :])[0]) for piece in m.pieces]
+        order = sorted(range(len(each)), key=each.__getitem__, reverse=m.kind == "most")
+        asked = order if above == (m.kind == "most") else order[:1]
+        return [({first + scalars.index(m.numbers[k]): 1.0}, 0.0) for k in asked]
+    sizes = {name: float(design[parameters.index(name)]) for name in m.numbers}
+    if above:
+        return [({first + scalars.index(name): sign}, 0.0) for name in sizes for sign in (1.0, -1.0)]
+    name = max(sizes, key=lambda name: abs(sizes[name]))
+    return [({first + scalars.index(name): math.copysign(1.0, sizes[name])}, 0.0)]
+
+
+def box(
+    m: Measure,
+    maxima: list[tuple[float, int]],
+    minima: list[tuple[float, int]],
+    design: Array,
+    scalars: tuple[str, ...],
+    first: int,
+    above: bool,
+) -> list[tuple[Term, float]]:
+    """Return the foremost ends of the joints less the rearmost ones, joints that stand still among them.
+
+    ``maxima`` and ``minima`` are the values of the joints' coordinates at their extrema, and their places among the
+    atoms; none where the design has none of them.
+    """
+    if not maxima or not minima:
+        return []
+    still = [
+        (float(piece(design[None, :])[0]), first + scalars.index(name))
+        for name, piece in zip(m.numbers, m.pieces, strict=True)
+    ]
+    tops, ends = sorted([*maxima, *still], reverse=True)[:ENDS], sorted([*minima, *still])[:ENDS]
+    pairs = [(i, j) for _, i in tops for _, j in ends if i != j]
+    return [({i: 1.0, j: -1.0}, 0.0) for i, j in (pairs if above else pairs[:1])]

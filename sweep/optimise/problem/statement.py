@@ -1,0 +1,167 @@
+"""What is to be optimised: a family, the dimensions that may change, the objective and the limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sweep.errors import InputError, nearest
+from sweep.families.base import Accuracy, Array, Family
+from sweep.families.domain import March
+from sweep.optimise.problem.coordinates import Coordinates
+
+if TYPE_CHECKING:
+    from sweep.optimise.manufacture.curve_margins import Allowance, CurveMargin
+    from sweep.study import Limit
+
+PLACE = "optimisation problem"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Minimise one design output of a family between bounds, under limits on others.
+
+    Parameters
+    ----------
+    family : single family or chain
+    variables : names of the parameters that may change; signs (branches) are fixed by each start, never varied
+    lower, upper : (n,) bounds of the variables, in the family's internal units
+    fixed : values of the other parameters; what is missing takes the family's default
+    objective : design output to be minimised, or a parameter
+    limits : ``Limit(output, minimum, maximum)``, also of parameters that follow from others; equal minimum and maximum
+        make an equation.  That every stage assembles over the whole turn is demanded without being asked.
+    window : part of the stroke in which ``max_abs_dev`` counts, as fractions from the smallest position
+    accuracy : relative error to which the extrema over the turn are verified (``target``), or the number of poses per
+        turn they are looked for on (``samples``)
+    coordinates : variables that are no parameters, and what follows from them; None varies parameters alone
+    curve_margins : what tolerances add to pose outputs along the turn, where limits are to hold for what is made
+    allowances : how what other limits give up to tolerances changes with the design, by their outputs
+
+    Raises
+    ------
+    InputError
+        for an unknown or doubled name, a sign among the variables, bounds that are not finite or not in order.
+    """
+
+    family: Family
+    variables: tuple[str, ...]
+    lower: Array
+    upper: Array
+    fixed: Mapping[str, float]
+    objective: str
+    limits: tuple[Limit, ...] = ()
+    window: tuple[float, float] | None = None
+    accuracy: Accuracy = field(default_factory=lambda: Accuracy(target=1e-9))
+    coordinates: Coordinates | None = None
+    curve_margins: Mapping[str, CurveMargin] = field(default_factory=dict)
+    allowances: Mapping[str, Allowance] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.family.domain, March):
+            allowed = "a family without history: poses that depend on those before have no gradient"
+            raise InputError("family", self.family.name, allowed, PLACE)
+        names = tuple(name for name in self.family.parameter_names if name not in self.made) + self.given
+        for name in (*self.variables, *self.fixed):
+            if name not in names:
+                raise InputError("parameter", name, f"{', '.join(names)}{nearest(name, names)}", PLACE)
+        if len(set(self.variables)) < len(self.variables) or not self.variables:
+            raise InputError("variables", self.variables, "at least one parameter, each once", PLACE)
+        for parameter in self.family.parameters:
+            if parameter.name in self.variables and parameter.choices is not None:
+                raise InputError("variables", parameter.name, "parameters that change steadily", PLACE)
+        for name, low, high in zip(self.variables, self.lower, self.upper, strict=True):
+            if not (np.isfinite(low) and np.isfinite(high) and low < high):
+                raise InputError(name, (float(low), float(high)), "finite bounds, lower below upper", PLACE)
+        for name in self.given:
+            if name not in self.variables and name not in self.fixed:
+                raise InputError(name, None, "a variable or a fixed value", PLACE)
+        if self.window is not None and not 0.0 <= self.window[0] < self.window[1] <= 1.0:
+            raise InputError("window", self.window, "two fractions of the stroke, in order, between 0 and 1", PLACE)
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Variables of the coordinates that are no parameters."""
+        return () if self.coordinates is None else self.coordinates.given
+
+    @property
+    def made(self) -> tuple[str, ...]:
+        """Parameters that follow from the coordinates."""
+        return () if self.coordinates is None else self.coordinates.made
+
+    @cached_property
+    def columns(self) -> tuple[int, ...]:
+        """Columns of the design matrix that the variables change."""
+        changed = (*self.variables, *self.made)
+        return tuple(k for k, name in enumerate(self.family.parameter_names) if name in changed)
+
+    @cached_property
+    def span(self) -> Array:
+        """Upper minus lower bounds (n,)."""
+        return np.asarray(self.upper, np.float64) - np.asarray(self.lower, np.float64)
+
+    def scaled(self, designs: Array) -> Array:
+        """Return variables of designs (k, P) as fractions of their bounds (k, n);
+        nan where a coordinate does not exist.
+        """
+        read = {} if self.coordinates is None else self.coordinates.read(self.family, designs)
+        names = self.family.parameter_names
+        values = [read[n] if n in read else designs[:, names.index(n)] for n in self.variables]
+        return (np.column_stack(values) - self.lower) / self.span
+
+    def placed(self, base: Array, fractions: Array) -> Array:
+        """Return designs like ``base`` (P,) with their variables at fractions of their bounds.
+
+        Parameters
+        ----------
+        base : (P,) one design
+        fractions : (n,) or (k, n); complex ones give complex designs
+
+        Returns
+        -------
+        (P,) or (k, P); what follows from the coordinates is nan where there is no such design.
+        """
+        values = np.atleast_2d(self.lower + fractions * self.span)
+        designs = self._filled(np.asarray(base, np.float64), values)
+        return designs if fractions.ndim == 2 else np.asarray(designs[0])
+
+    def rows(self, values: Array, **signs: float) -> Array:
+        """Return the design matrix (k, P) of variable values (k, n);
+        ``signs`` and ``fixed`` and the defaults fill the rest.
+
+        Raises
+        ------
+        InputError
+            for a parameter that has no value.
+        """
+        values = np.atleast_2d(np.asarray(values, np.float64))
+        base = np.full(len(self.family.parameters), np.nan)
+        for column, parameter in enumerate(self.family.parameters):
+            value = signs.get(parameter.name, self.fixed.get(parameter.name, parameter.default))
+            if value is None and column not in self.columns:
+                raise InputError(parameter.name, None, "a variable or a fixed value", PLACE)
+            base[column] = np.nan if value is None else value
+        return self._filled(base, values)
+
+    def _filled(self, base: Array, values: Array) -> Array:
+        designs = np.empty((len(values), len(base)), values.dtype)
+        designs[:] = base
+        own, columns = self._direct
+        designs[:, columns] = values[:, own]
+        if self.coordinates is not None:
+            names = self.family.parameter_names
+            given = dict(zip(self.variables, values.T, strict=True))
+            given |= {name: np.full(len(values), self.fixed[name]) for name in self.given if name not in given}
+            for name, column in self.coordinates.make(dict(zip(names, designs.T, strict=True)) | given).items():
+                designs[:, names.index(name)] = column
+        return designs
+
+    @cached_property
+    def _direct(self) -> tuple[list[int], list[int]]:
+        """Which variables are parameters, and their columns of the design matrix."""
+        names = self.family.parameter_names
+        own = [k for k, name in enumerate(self.variables) if name in names]
+        return own, [names.index(self.variables[k]) for k in own]

@@ -1,0 +1,1 @@
+"""Where searches begin: samples, datasets, populations of descents."""

@@ -1,0 +1,302 @@
+"""Starts without a dataset: the best of large samples, improved by ever smaller samples around them.
+
+Each half a dozen starts has a sample of its own, so that what one of them does not hit the next one may.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.evaluation.summaries import design_outputs
+from sweep.families.base import Accuracy, Array
+from sweep.families.names import is_flag, stem
+from sweep.optimise.problem.program import measured_in
+from sweep.optimise.problem.statement import Problem
+from sweep.optimise.samples import sobol
+from sweep.quantities.limits import compared
+from sweep.quantities.measures import ROTATABLE_MARGIN, margins
+
+GROUP = 6  # starts of one sample: as many as a search begins together
+SAMPLED = 1 << 15  # designs per start: on a locus they cost a third of a microsecond each
+BLOCK, LEAST = 1 << 15, 1 << 12  # designs ranked together; the least number, where there are many signs
+BEYOND = 0.35  # of the width of the bounds, to either side: two coordinates in five are brought back onto a bound
+KEPT = 512  # best of the sample per start, and as many of those that miss their limits
+PARENTS, CHILDREN, ROUNDS = 16, 24, 12  # improved per start; samples around each and round
+FARTHEST = 1e100
+RADIUS = 0.06  # of the first of these samples, in variables scaled to their bounds
+ACCURACY = Accuracy(samples=64)  # misses a peak by less than what the local search gains ...
+VERIFIED, HIDDEN = Accuracy(target=1e-3), 2.0  # ... but near a pole, told by a true extremum so many times larger
+NEARLY = 0.03  # a search mends so small a violation in passing: the objective tells more
+PRICE = 3.0  # of such a violation, in objectives
+ABSENT = 100.0  # violation of a limit on what a design does not have, as the swing of a rocker that turns
+ALIKE = 0.02  # of the average distance of two random designs: nearer designs of a sweep are one start
+OUTSIDE, STUCK = 1e100, 1e200  # above every objective: misses its limits, does not turn
+
+
+def from_sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int) -> Array:
+    """Return the starts of :func:`from_samples` alone."""
+    return from_samples(problem, signs, count, seed)[0]
+
+
+def from_samples(
+    problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int
+) -> tuple[Array, tuple[int, ...]]:
+    """Return at most ``count`` good designs, and the number of the sample that each comes from.
+
+    Up to six designs come from one sample, the best first; then those of the next sample follow.  Same arguments, same
+    designs.
+
+    Parameters
+    ----------
+    problem : what is to be minimised
+    signs : combinations of the parameters that are not varied (branches); each sample is shared out among them
+    count : how many at most
+    seed : of the samples
+    """
+    number = -(-count // GROUP)
+    size = -(-count // number)
+    found = [sample(problem, signs, size, seed, k) for k in range(number)]
+    numbers = [k for k, designs in enumerate(found) for _ in designs]
+    return np.concatenate(found)[:count], tuple(numbers[:count])
+
+
+def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int, number: int) -> Array:
+    """Return diverse good designs of one Sobol sample and of what is found around the best of it, the best first.
+
+    Each sample is scrambled anew, so that it has points of its own.  Half of them are drawn from beyond the bounds and
+    brought back onto them.
+
+    Parameters
+    ----------
+    problem, signs, seed : see :func:`from_samples`
+    count : how many designs at most
+    number : of the sample
+    """
+    centre = problem.lower + 0.5 * problem.span
+    bases = [problem.rows(centre, **choice)[0] for choice in signs]
+    block = BLOCK
+    while block > LEAST and block * len(bases) > SAMPLED * count:
+        block //= 2
+    blocks = max(-(-SAMPLED * count // block), len(bases))
+    rng = np.random.default_rng((seed, number))
+    points = sobol(len(problem.variables), rng)
+    place, kind, merit = np.empty((0, len(problem.variables))), np.empty(0, np.intp), np.empty(0)
+    for k in range(blocks):
+        fractions, own = _brought_in(problem, points.random(block)), k % len(bases)
+        found = ranking(problem, problem.placed(bases[own], fractions))
+        place = np.concatenate([place, fractions])
+        kind = np.concatenate([kind, np.full(block, own)])
+        merit = np.concatenate([merit, found])
+        order = np.argsort(merit, kind="stable")
+        good = merit[order] < OUTSIDE
+        best = np.sort(np.concatenate([order[good][: KEPT * count], order[~good][: KEPT * count]]))
+        place, kind, merit = place[best], kind[best], merit[best]
+    merit = _verified(problem, bases, place, kind, merit)
+    chosen, near = _parents(place, kind, merit, PARENTS * count)
+    place, merit = _improved(problem, bases, place[chosen], kind[chosen], merit[chosen], rng)
+    ranked = np.argsort(merit, kind="stable")
+    if near >= count:  # what was brought within the limits has to be as good as what was there
+        ranked = ranked[merit[ranked] <= merit[:near].max()]
+    place, kind = place[ranked], kind[chosen][ranked]
+    designs = [problem.placed(bases[kind[k]], place[k]) for k in spread(place, kind, count)]
+    return np.array(designs).reshape(-1, len(problem.family.parameters))
+
+
+def _brought_in(problem: Problem, fractions: Array) -> Array:
+    """Return the places of a block of a sample between the bounds, half of them drawn from beyond the bounds.
+
+    Optima stand at bounds, often at several at once, and the designs that keep the limits there may fill less than a
+    millionth of the space between the bounds.
+    """
+    low, high = _one_turn(problem)
+    bounded = high - low == 1.0  # an angle of a whole turn has no ends
+    half = len(fractions) // 2
+    out = fractions.copy()
+    wide = np.clip((1.0 + 2.0 * BEYOND) * fractions[:half] - BEYOND, 0.0, 1.0)
+    out[:half] = np.where(bounded, wide, fractions[:half])
+    return np.asarray(low + out * (high - low), np.float64)
+
+
+def _parents(place: Array, kind: NDArray[np.intp], merit: Array, count: int) -> tuple[NDArray[np.intp], int]:
+    """Return numbers of diverse designs to be improved, and how many of them, the first, keep the limits.
+
+    These are up to half; the others miss the limits and are away from them.
+
+    A limit may leave several separate regions, the smallest of which a sample does not hit, but finds the way to.
+    """
+    order = np.argsort(merit, kind="stable")
+    order = order[np.isfinite(merit[order])]
+    near, turning = merit[order] < OUTSIDE, merit[order] < STUCK
+    taken = order[near][spread(place[order[near]], kind[order[near]], count // 2)]
+    first = len(taken)
+    for others in (order[turning & ~near], order):
+        rows = np.concatenate([taken, others[~np.isin(others, taken)]])
+        taken = rows[spread(place[rows], kind[rows], count, first=len(taken))]
+    return np.asarray(taken, np.intp), first
+
+
+def _one_turn(problem: Problem) -> tuple[Array, Array]:
+    """Return the bounds in which samples are drawn:
+    what repeats itself after a turn only in the middle turn of its bounds.
+    """
+    periodic = () if problem.coordinates is None else problem.coordinates.periodic
+    share = np.array(
+        [
+            min(1.0, 2.0 * np.pi / width) if name in periodic else 1.0
+            for name, width in zip(problem.variables, problem.span, strict=True)
+        ]
+    )
+    return 0.5 - 0.5 * share, 0.5 + 0.5 * share
+
+
+def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array) -> Array:
+    """Return ranks of designs that the poses found good;
+    where these hid most of a peak, the rank by the true extrema.
+    """
+    out = merit.copy()
+    for own, base in enumerate(bases):
+        rows = np.flatnonzero((kind == own) & (merit < OUTSIDE))
+        found = ranking(problem, problem.placed(base, place[rows]), VERIFIED)
+        hidden = found > HIDDEN * merit[rows]
+        out[rows[hidden]] = found[hidden]
+    return out
+
+
+def _improved(
+    problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Replace every design by the best of a sample around it, again and again; no better one halves the radius."""
+    place, merit = place.copy(), merit.copy()
+    radius = np.full(len(place), RADIUS)
+    for _ in range(ROUNDS):
+        steps = radius[:, None, None] * rng.standard_normal((len(place), CHILDREN, place.shape[1]))
+        children = np.clip(place[:, None, :] + steps, 0.0, 1.0)
+        values = np.empty((len(place), CHILDREN))
+        for own, base in enumerate(bases):
+            rows = np.flatnonzero(kind == own)
+            designs = problem.placed(base, children[rows].reshape(-1, place.shape[1]))
+            values[rows] = ranking(problem, designs).reshape(-1, CHILDREN)
+        chosen = np.arange(len(place)), np.argmin(values, axis=1)
+        best = children[chosen]
+        found = _verified(problem, bases, best, kind, values[chosen])
+        better = found < merit
+        place[better], merit[better] = best[better], found[better]
+        radius[~better] *= 0.5
+    return place, merit
+
+
+def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> Array:
+    """Return the objective where all limits are nearly kept; far above it the largest violation;
+    then what does not turn.
+
+    Cheap limits first: parameters, then margins and pressure angles, then the others; only designs that nearly keep
+    them go on.  Infinite where there is no design or no objective.
+
+    Parameters
+    ----------
+    problem : whose objective and limits count
+    designs : (n, P)
+    accuracy : of their extrema over the turn
+    """
+    limits = [limit for limit in problem.limits if not is_flag(limit.output)]
+    names = problem.family.parameter_names
+    turning = ["margin"] if margins(problem.family) else []
+    groups: list[list[Any]] = [[], [], []]
+    for limit in limits:
+        groups[
+            0 if limit.output in names else 1 if stem(limit.output) in ("margin", "max_pressure_angle") else 2
+        ].append(limit)
+    merit = np.full(len(designs), np.inf)
+    alive = np.flatnonzero(np.isfinite(designs).all(axis=1))
+    violation = np.zeros(len(designs))
+    for left, group in zip((3.0, 2.0, 1.0), groups, strict=True):
+        wanted = list(dict.fromkeys(limit.output for limit in group)) + (turning if left == 2.0 else [])
+        columns = _values(problem, designs[alive], wanted, accuracy)
+        for limit in group:
+            violation[alive] = np.maximum(violation[alive], _missed(limit, columns[limit.output]))
+        bad = violation[alive] > NEARLY
+        merit[alive[bad]] = OUTSIDE * (left + violation[alive[bad]])
+        if left == 2.0 and turning:
+            stuck = ~(columns["margin"] >= ROTATABLE_MARGIN)
+            # How far a crank is from turning is a rank only; numbers beyond this are all alike, and would overflow.
+            margin = np.maximum(np.nan_to_num(columns["margin"][stuck]), -FARTHEST)
+            merit[alive[stuck]] = STUCK * (1.0 - margin)
+            bad |= stuck
+        alive = alive[~bad]
+    values = _values(problem, designs[alive], [problem.objective], accuracy)[problem.objective]
+    objective = compared(problem.objective, values)
+    merit[alive] = np.nan_to_num(objective + PRICE * np.abs(objective) * violation[alive], nan=np.inf, posinf=np.inf)
+    return merit
+
+
+def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accuracy) -> dict[str, Array]:
+    """Return outputs and parameters (n,) of designs."""
+    names = problem.family.parameter_names
+    columns: dict[str, Any] = {name: designs[:, names.index(name)] for name in wanted if name in names}
+    outputs = [name for name in wanted if name not in names]
+    if outputs and len(designs):
+        columns |= design_outputs(problem.family, designs, outputs, accuracy, problem.window)
+    return {name: np.asarray(columns.get(name, np.empty(0)), np.float64) for name in wanted}
+
+
+def _missed(limit: Any, value: Array) -> Array:
+    """Return the violation relative to the bound (n,);
+    an output that a design does not have misses its limit by far.
+    """
+    value = compared(limit.output, value)
+    out = np.zeros(len(value))
+    for bound, sense in ((limit.minimum, 1.0), (limit.maximum, -1.0)):
+        if bound is not None:
+            size = measured_in(max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)))
+            out = np.maximum(out, sense * (bound - value) / size)
+    return np.nan_to_num(out, nan=ABSENT)
+
+
+def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: float = 0.0) -> Array:
+    """Return the best designs that keep a distance from each other, best first.
+
+    The best one is taken, its neighbourhood left out, and so on; the distance (in variables scaled to their bounds) is
+    halved until there are enough.  Designs of different signs are never neighbours.  Ties go to the earlier row.
+
+    Parameters
+    ----------
+    problem : whose variables count
+    designs : (k, P)
+    merit : (k,) the smaller the better; rows that are not finite are never taken
+    count : how many at most
+    least : distance that is kept in any case, as a share of the average one of two random designs
+    """
+    order = np.argsort(merit, kind="stable")
+    ranked = designs[order[np.isfinite(merit[order])]]
+    others = [c for c in range(designs.shape[1]) if c not in problem.columns]
+    _, kind = np.unique(ranked[:, others], axis=0, return_inverse=True)
+    return ranked[spread(problem.scaled(ranked), kind.reshape(-1), count, least)]
+
+
+def spread(place: Array, kind: NDArray[np.intp], count: int, least: float = 0.0, first: int = 0) -> list[int]:
+    """Return numbers of at most ``count`` rows of ``place`` (k, n), ranked best first,
+    that keep a distance from each other.
+
+    ``kind`` (k,): rows of different kinds are never neighbours.  The distance is never less than ``least``, a share of
+    the average one of two random designs.  The ``first`` rows are taken in any case.
+    """
+    distance = 0.5 * np.sqrt(place.shape[1] / 6.0)  # half of what two random designs keep on average
+    taken: list[int] = []
+    for _ in range(12):
+        taken, free = list(range(first)), np.ones(len(place), dtype=np.bool_)
+        for row in taken:
+            free &= ~((np.linalg.norm(place - place[row], axis=1) < distance) & (kind == kind[row]))
+        free[:first] = False
+        while len(taken) < count and free.any():
+            best = int(np.argmax(free))
+            taken.append(best)
+            free &= ~((np.linalg.norm(place - place[best], axis=1) < distance) & (kind == kind[best]))
+            free[best] = False
+        if len(taken) == count or 0.5 * distance < least * np.sqrt(place.shape[1] / 6.0):
+            break
+        distance *= 0.5
+    return taken

@@ -1,0 +1,145 @@
+"""Starts of a study: the best of its sweep, filled up from samples where they are too few or too similar."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels import status as st
+from sweep.chunks.parameters import parameter_matrix
+from sweep.dataset.store import parts
+from sweep.families.base import Array, Family
+from sweep.optimise.problem.statement import Problem
+from sweep.optimise.starts.candidates import ALIKE, GROUP, diverse, ranking, sample
+from sweep.quantities.limits import compared
+from sweep.synthesis.fit import fit_line
+from sweep.synthesis.tasks import solve
+
+if TYPE_CHECKING:
+    from sweep.study import Study
+
+KEPT = 100_000  # best rows of a dataset that are looked at
+SCREENED = 256  # designs of a study's space per start where a dataset gives none
+
+
+def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Array]:
+    """Return the best feasible designs of a dataset (k, P), k up to 10^5, and their objective as it is compared.
+
+    Only the parameters, the objective and the status are read, batch by batch.
+    """
+    import pyarrow.parquet as pq
+
+    names = family.parameter_names
+    designs, merit = np.empty((0, len(names))), np.empty(0)
+    for part in parts(folder):
+        with pq.ParquetFile(part.path) as file:
+            for batch in file.iter_batches(batch_size=KEPT, columns=[*names, objective, "status"]):
+                good = np.asarray(batch["status"]) == st.OK
+                more = np.column_stack([np.asarray(batch[name], np.float64) for name in names])[good]
+                designs = np.concatenate([designs, more])
+                merit = np.concatenate([merit, compared(objective, np.asarray(batch[objective], np.float64)[good])])
+                if len(merit) > KEPT:
+                    best = np.sort(np.argsort(merit, kind="stable")[:KEPT])
+                    designs, merit = designs[best], merit[best]
+    return designs, merit
+
+
+def of_task(study: Study, count: int, seed: int) -> Array:
+    """Return designs of the study that do its [task], the best first, (k, P), at most ``count``;
+    none without a task.
+
+    A parameter that the study gives as a number keeps it.
+    """
+    names = study.family.parameter_names
+    if study.task is None:
+        return np.empty((0, len(names)))
+
+    found = solve(study.task, starts=count, seed=seed)
+    default = {p.name: p.default for p in study.family.parameters}
+    rows = [default | {n: x for n, x in s.mechanism.items() if n in names} | dict(study.space.fixed) for s in found]
+    rows = [row for row in rows if None not in (row[name] for name in names)]
+    return np.array([[row[name] for name in names] for row in rows], np.float64).reshape(-1, len(names))[:count]
+
+
+def drawn(study: Study, count: int, seed: int) -> Array:
+    """Return designs of a study's space at random, finished by its [locus] and [fit]:
+    for datasets without feasible rows.
+    """
+    length = min(64, study.space.count)
+    blocks = max(1, SCREENED * count // length)
+    begins = np.random.default_rng(seed).integers(0, study.space.count - length + 1, blocks)
+    drawn_blocks = [parameter_matrix(study, int(k), int(k) + length) for k in begins]
+    designs = np.concatenate([matrix[made == st.OK] for matrix, made in drawn_blocks])
+    if study.fit is None or not len(designs):
+        return designs
+    fitted, status = fit_line(study.family, designs, study.fit, study.window)
+    return np.asarray(fitted[status == st.OK], np.float64)
+
+
+LOOKED_AT = 4  # times 256 designs of a space, that tell which signs it has
+SAMPLES = 2  # times as many as would do if no start were near another
+MOST_KINDS = 64  # combinations of signs among which a sample is shared out
+
+
+def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]]:
+    """Return the combinations of signs and other values that are chosen, not varied,
+    as the designs of a study have them.
+
+    Parameters
+    ----------
+    study, problem : the columns that the problem does not vary are looked at
+    known : (k, P) designs whose combinations come first
+    """
+    names = problem.family.parameter_names
+    others = [c for c in range(len(names)) if c not in problem.columns]
+    designs = np.concatenate([known, drawn(study, LOOKED_AT, study.optimise.seed if study.optimise else 0)])
+    _, first = np.unique(designs[:, others], axis=0, return_index=True)
+    chosen = designs[np.sort(first)][:MOST_KINDS]
+    return [{names[c]: float(design[c]) for c in others} for design in chosen]
+
+
+def filled(study: Study, problem: Problem, starts: Array, count: int, seed: int) -> Array:
+    """Return at most ``count`` starts: those given (k, P), then the best of samples that are not near one of them.
+
+    A sample of the problem's own variables finds more than the space of the study, unless [fit] has to finish every
+    design; then designs of the space are drawn.
+    """
+    if len(starts) >= count:
+        return starts
+    taken = starts
+    for more in _offered(study, problem, starts, count, seed):
+        taken = apart(problem, taken, more, count)
+        if len(taken) == count:
+            break
+    return taken
+
+
+def _offered(study: Study, problem: Problem, starts: Array, count: int, seed: int) -> Iterator[Array]:
+    """Yield designs to begin with, one sample after the other."""
+    if study.fit is None:
+        signs = kinds(study, problem, starts)
+        for number in range(SAMPLES * -(-count // GROUP)):
+            yield sample(problem, signs, min(count, GROUP), seed, number)
+        return
+    designs = drawn(study, count, seed)
+    if len(designs):
+        yield diverse(problem, designs, ranking(problem, designs), count)
+
+
+def apart(problem: Problem, starts: Array, more: Array, count: int) -> Array:
+    """Return the starts and, up to a number, those of others that are not near one of them."""
+    both = np.concatenate([starts, more])
+    place = problem.scaled(both)
+    others = [c for c in range(both.shape[1]) if c not in problem.columns]
+    least = ALIKE * math.sqrt(place.shape[1] / 6.0)
+    taken = list(range(len(starts)))
+    for k in range(len(starts), len(both)):
+        away = np.linalg.norm(place[taken] - place[k], axis=1) >= least
+        other = (both[taken][:, others] != both[k, others]).any(axis=1)
+        if len(taken) < count and bool((away | other).all()):
+            taken.append(k)
+    return np.asarray(both[taken], np.float64)

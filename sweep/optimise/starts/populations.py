@@ -1,0 +1,286 @@
+"""Starts from generations of descents: stages of good mechanisms are put together anew, and descended from again.
+
+A guide that suits one crank-rocker suits others, so the parts of two good mechanisms are a far better beginning than a
+mechanism at random.  Populations know nothing of each other: where several end at the same design, it is no accident.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.families.base import Array
+from sweep.jobs.progress import Say, unsaid
+from sweep.optimise.local.kkt import AGREE
+from sweep.optimise.multistart.parallel import spread_over
+from sweep.optimise.samples import sobol
+from sweep.optimise.starts.batched_sqp import BatchedSqp
+from sweep.optimise.starts.candidates import spread
+from sweep.optimise.starts.linear import Elimination
+from sweep.optimise.starts.pose_rows import PoseRows
+from sweep.optimise.starts.proportions import STUCK, turned_into
+
+BLOCK = 1 << 13  # proportions that are looked at together
+PARENTS = 40  # best ends, no two of them alike, from which a generation is made: as many of all signs
+TRIES, STRANGERS = 64, 256  # of every child, the best of which descends; of one half of which is at random
+DRIVERS = 4  # among the tries of a child
+MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations, one of which a child is varied by
+NICHE = 0.15  # of the average distance of two random guides: nearer ones are alike
+CLASSES = 5  # of swings, each of which has parents
+SMALLEST = 1e-3  # swing that is none [rad]
+USELESS = 1.3  # times the best value: worse ends are no parents
+
+
+class Size(NamedTuple):
+    """How large a population is.
+
+    ``sampled`` proportions for each combination of signs, two to eight in a hundred of which turn; ``first`` descents
+    of the first generation, ``later`` of each of the other ``generations``; ``heat`` steps of all descents, ``steps``
+    of the better half of them.
+    """
+
+    sampled: int = 1 << 14
+    first: int = 120
+    later: int = 60
+    generations: int = 10
+    heat: int = 14
+    steps: int = 60
+
+
+FULL = Size()
+
+
+class Bred(NamedTuple):
+    """Ends of a population, no two alike and the best first: designs (k, P), what they are worth (k,), and looks."""
+
+    designs: Array
+    worth: Array
+    looks: int
+
+
+class _End(NamedTuple):
+    worth: float
+    kind: int
+    place: Array
+    design: Array
+    swing: float = 0.0
+
+
+@dataclass(frozen=True)
+class Population:
+    """Generations from one seed: a task for processes."""
+
+    linear: Elimination
+    signs: tuple[dict[str, float], ...]
+    seed: int
+    size: Size = FULL
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Bred:
+        """Return the ends of the population of that number."""
+        rows = [PoseRows(self.linear, choice) for choice in self.signs]
+        rng = np.random.default_rng((self.seed, number))
+        ends: list[_End] = []
+        looks = 0
+        for generation in range(1 + self.size.generations):
+            if should_stop():
+                break
+            parents = _parents(ends, -(-PARENTS // len(rows)), ~rows[0].driving)
+            if generation and not parents:
+                break
+            classes = _Classes.between(np.array([p.swing for p in parents]))
+            for kind, own in enumerate(rows):
+                if generation == 0:
+                    places, classes = _sampled(own, rng, self.size, len(rows))
+                else:
+                    places = _children(
+                        own, [p for p in parents if p.kind == kind], parents, rng, -(-self.size.later // len(rows))
+                    )
+                found, spent = _descended(own, kind, places, classes, self.size, should_stop)
+                ends, looks = ends + found, looks + spent
+        best = _parents(ends, PARENTS, ~rows[0].driving)[:PARENTS]
+        names = self.linear.problem.family.parameter_names
+        designs = np.array([end.design for end in best]).reshape(-1, len(names))
+        return Bred(turned_into(self.linear.problem, designs), np.array([end.worth for end in best]), looks)
+
+
+def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, kinds: int) -> tuple[Array, _Classes]:
+    """Places of a Sobol sample that turn, the best of every class of swings that are not alike; and these classes."""
+    place = sobol(len(rows.own.columns), rng).random(size.sampled)
+    worth = np.concatenate([rows.own.merit(block) for block in np.split(place, max(1, size.sampled // BLOCK))])
+    order = np.argsort(worth, kind="stable")
+    order = order[worth[order] < STUCK]
+    place, found = place[order], list[int]()
+    swings = rows.own.swings(rows.own.placed(place))
+    classes = _Classes.between(swings[: len(swings) // 4])
+    number = classes.of(swings)
+    for k in range(CLASSES):
+        own = np.flatnonzero(number == k)
+        found += own[spread(place[own], number[own], -(-size.first // (kinds * CLASSES)))].tolist()
+    return np.asarray(place[sorted(found)], np.float64), classes
+
+
+def _children(
+    rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int
+) -> Array:
+    """Places of children: the best of many tries for each, by what they are worth before any descent.
+
+    Most of them are stage 1 of one parent and the guide of another, slightly varied, a sixth is stage 1 of a parent
+    with a guide at random, a sixth the guide of a parent with a stage 1 at random.
+    """
+    if not own:
+        return np.empty((0, len(rows.own.columns)))
+    few = count // 6
+    drivers = np.array([p.place for p in parents])[rng.integers(0, len(parents), few)]
+    guides = np.array([p.place for p in own])[rng.integers(0, len(own), few)]
+    found = [_mixed(rows, own, parents, rng, count - 2 * few)]
+    for kept, part in ((drivers, ~rows.driving), (guides, rows.driving)):
+        places = np.repeat(kept[:, None], STRANGERS, axis=1)
+        places[:, :, part] = rng.random((few, STRANGERS, int(part.sum())))
+        found.append(_best(rows, places))
+    return np.concatenate(found)
+
+
+def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int) -> Array:
+    """Places with stage 1 of one parent and the guide of another, slightly varied.
+
+    Offsets whose bounds lie on both sides of zero alike change their side in every second try: a crank-rocker and
+    its mirror image move alike.
+    """
+    guide = rng.integers(0, len(own), count)
+    # Among all drivers the best try would be that of the same valley nearly every time.
+    driver = np.repeat(rng.integers(0, len(parents), (count, DRIVERS)), TRIES // DRIVERS, axis=1)
+    places = np.repeat(np.array([p.place for p in own])[guide][:, None], TRIES, axis=1)
+    places[:, :, rows.driving] = np.array([p.place for p in parents])[driver][:, :, rows.driving]
+    other = (rng.random((count, TRIES)) < 0.5)[:, :, None] & rows.mirrored
+    places = np.where(other, 1.0 - places, places)
+    # A parent put together as it was only ends where it stands.
+    numbers = np.array([next(k for k, p in enumerate(parents) if p is end) for end in own])
+    same = driver == numbers[guide][:, None]
+    spread_by = np.where(same, MUTATIONS[-1], np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)][:, None])
+    return _best(rows, places + spread_by[:, :, None] * rng.standard_normal(places.shape))
+
+
+def _best(rows: PoseRows, tries: Array) -> Array:
+    """Return the best try of each child: places (count, n) of (count, tries, n)."""
+    places = rows.wrapped(tries.reshape(-1, tries.shape[2]))
+    worth = rows.begun(rows.without_middle(places))[1].reshape(tries.shape[:2])
+    return np.asarray(places.reshape(tries.shape)[np.arange(len(tries)), np.argmin(worth, axis=1)], np.float64)
+
+
+def _descended(
+    rows: PoseRows, kind: int, places: Array, classes: _Classes, size: Size, stop: Callable[[], bool]
+) -> tuple[list[_End], int]:
+    """Where descents from some places end, the worse half given up after a heat; and how many looks that took.
+
+    Each class of swings has its own worse half.
+    """
+    if not len(places):
+        return [], 0
+    many = BatchedSqp(rows, rows.without_middle(places))
+    many.advance(size.heat, stop)
+    own = classes.of(rows.own.swings(rows.own.placed(many.places)))
+    order = np.argsort(many.worth, kind="stable")
+    better = [some[: -(-len(some) // 2)] for some in (order[own[order] == number] for number in range(CLASSES))]
+    many.keep(np.sort(np.concatenate(better)))
+    many.advance(size.steps - size.heat, stop)
+    designs, there = rows.designs(many.places, many.x), rows.with_middle(many.places)
+    swings = rows.own.swings(designs)
+    known = np.flatnonzero(many.worth < STUCK)
+    return [_End(float(many.worth[k]), kind, there[k], designs[k], float(swings[k])) for k in known], many.looks
+
+
+class _Classes(NamedTuple):
+    """Classes of swings, equal on a log scale between those of useful mechanisms; beyond these are the outer ones."""
+
+    low: float
+    high: float
+
+    @classmethod
+    def between(cls, swings: Array) -> _Classes:
+        """Return the classes from the smallest to the largest of some swings."""
+        known = swings[swings > SMALLEST]
+        return cls(float(known.min(initial=math.inf)), float(known.max(initial=0.0)))
+
+    def of(self, swings: Array) -> NDArray[np.intp]:
+        """Return the class (k,) of each swing."""
+        if not self.low < self.high:
+            return np.zeros(len(swings), np.intp)
+        # numpy's logarithm depends on the processor, that of the C library does not
+        place = np.array([math.log(max(x, SMALLEST) / self.low) for x in swings.tolist()])
+        place *= CLASSES / math.log(self.high / self.low)
+        return np.asarray(np.clip(place, 0.0, CLASSES - 1.0), np.intp)
+
+
+def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[_End]:
+    """Return the best ends, half as many as said of the same signs, and the best of each class of swings,
+    no two of which have the same value or nearly the same guide.
+
+    Else the many that stopped on their way down one valley would take the places of all others, and guides that
+    suit large swings those of all that suit small ones.
+    """
+    found: list[_End] = []
+    beside: Counter[tuple[int, int]] = Counter()
+    first: Counter[int] = Counter()
+    least = NICHE * math.sqrt(int(guide.sum()) / 6.0)
+    useful = sorted(ends, key=lambda end: end.worth)
+    useful = [end for end in useful if end.worth < USELESS * useful[0].worth]
+    swings = np.array([end.swing for end in useful])
+    classes = dict(zip(map(id, useful), _Classes.between(swings).of(swings).tolist(), strict=True))
+    for end in useful:
+        own = [p for p in found if p.kind == end.kind]
+        alike = any(
+            abs(end.worth - p.worth) <= 2.0 * AGREE * abs(p.worth)
+            or math.sqrt(float(((end.place - p.place)[guide] ** 2).sum())) < least
+            for p in own
+        )
+        place = (end.kind, classes[id(end)])
+        if not alike and (first[end.kind] < most // 2 or beside[place] < -(-most // (2 * CLASSES))):
+            first[end.kind] += 1
+            beside[place] += 1
+            found.append(end)
+    return found
+
+
+def bred(
+    linear: Elimination,
+    signs: Sequence[dict[str, float]],
+    most: int,
+    seed: int,
+    stop: Callable[[], bool] = lambda: False,
+    jobs: int = 1,
+    say: Say = unsaid,
+    enough: Callable[[list[Bred]], int | None] = lambda found: None,
+    size: Size = FULL,
+) -> list[Bred]:
+    """Breed populations that know nothing of each other, as many at a time as there are workers.
+
+    Parameters
+    ----------
+    linear : the linear part of the problem
+    signs : combinations of the parameters that are not varied
+    most : populations at most; each takes some 14 000 looks
+    seed : of samples and children
+    stop : true ends the populations where they are
+    jobs : processes; the ends do not depend on it
+    say : called with how many populations have ended, and how many there are at most
+    enough : says how many of those that are there tell enough, None where more are to be made; the others are left out
+    size : of each
+    """
+    task, ended, found = Population(linear, tuple(signs), seed, size), itertools.count(1), list[Bred]()
+    say("global search", 0, most, "populations")
+    while len(found) < most:
+        numbers = list(range(len(found), min(len(found) + max(1, jobs), most)))
+        found += spread_over(task, numbers, stop, jobs, lambda: say("global search", next(ended), most, "populations"))
+        if stop():
+            break
+        count = enough(found)
+        if count is not None:
+            return found[:count]
+    return found

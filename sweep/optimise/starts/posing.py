@@ -1,0 +1,206 @@
+"""What a study asks of the optimiser: its problem, and the designs that the search starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sweep.errors import InputError
+from sweep.families.base import Array, Parameter
+from sweep.jobs.progress import Say, unsaid
+from sweep.optimise.multistart.discrete import listed
+from sweep.optimise.problem.coordinates import LocusCoordinates
+from sweep.optimise.problem.statement import Problem
+from sweep.optimise.starts.candidates import ALIKE, diverse, ranking
+from sweep.optimise.starts.dataset import apart, best_rows, drawn, filled, of_task
+from sweep.optimise.starts.global_starts import Begun, from_populations, holding
+
+if TYPE_CHECKING:
+    from sweep.study import OptimiseSettings, Study
+
+WHOLE_TURN = 2.0 * np.pi - 1e-9
+SHORTEST = 0.02  # of its upper limit is a length without a lower one
+TAILS = (2.0, 98.0)  # percent; beyond are needles that hardly moved and were scaled up to the stroke
+
+
+def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Problem:
+    """Return the optimisation problem of a study.
+
+    Swept steady parameters vary between the ends of their axes, those that [locus] or [fit] sets or scales as far as
+    ``designs`` (k, P) reach and half their size beyond; limits on parameters narrow both.  An angle swept over a whole
+    turn may go on for half a turn.  Parameters given as lists of values are not varied: each start keeps its own.
+
+    On the locus, what it prescribes is varied instead of the links: fixed values hold by construction, axes are bounds,
+    limits on links stay limits.  Otherwise what is prescribed becomes limits: equations where it is fixed.
+
+    Parameters
+    ----------
+    study : with an objective
+    designs : (k, P) from its space
+    on_locus : None leaves it to ``optimise.variables``, and without that to whether [locus] fixes swing, stroke or phi0
+
+    Raises
+    ------
+    InputError
+        if the study has no objective, or nothing that can change.
+    """
+    if study.objective is None:
+        raise InputError("objective", None, "[objective] minimise = an output", str(study.path))
+    coordinates = (
+        LocusCoordinates(study.locus) if study.locus and (_wanted(study) if on_locus is None else on_locus) else None
+    )
+    follows, given = ((), ()) if coordinates is None else (coordinates.made, coordinates.given)
+    chosen = listed(study)
+    bounds = {
+        name: None if name in chosen else _bounds(study, name, designs)
+        for name in (*study.family.parameter_names, *given)
+    }
+    varied = {name: ends for name, ends in bounds.items() if ends is not None and name not in follows}
+    held = {name: ends[0] for name, ends in varied.items() if ends[0] == ends[1]}
+    names = tuple(name for name in varied if name not in held)
+    own = [name for name in (*study.family.parameter_names, *given) if name not in follows]
+    fixed = {name: abs(x) if name in given else x for name, x in study.space.fixed.items() if name in own}
+    limits = [limit for limit in study.output_limits if limit.output not in given]
+    limits += [limit for limit in study.parameter_limits if limit.output in (*follows, *chosen)]
+    if not names:
+        allowed = "a parameter that changes steadily beside the listed ones; the sweep has tried them all"
+        raise InputError("optimise", ", ".join(chosen), allowed, str(study.path))
+    return Problem(
+        study.family, names, np.array([varied[n][0] for n in names]), np.array([varied[n][1] for n in names]),
+        fixed | held, study.objective.output, tuple(limits), study.window, study.accuracy, coordinates,
+    )  # fmt: skip
+
+
+def _wanted(study: Study) -> bool:
+    """Return whether the search goes along the locus: as the study says, or where that spares it an equation."""
+    if study.optimise is not None and study.optimise.variables is not None:
+        return study.optimise.variables == "locus"
+    return any(limit.output in study.prescribed and limit.minimum == limit.maximum for limit in study.limits)
+
+
+def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | None:
+    """Return the bounds between which a parameter or a prescribed output may vary;
+    None where it is given, or a sign.
+    """
+    names = study.family.parameter_names
+    parameter = next(p for p in (*study.family.parameters, *_prescribed(study)) if p.name == name)
+    if parameter.choices is not None:
+        return None
+    ends = _limited(study, name)
+    if name in study.rescaled and ends is not None:
+        return ends
+    if name in (*study.made, *study.rescaled):
+        low, high = (float(end) for end in np.percentile(designs[:, names.index(name)], TAILS))
+        reach = 0.5 * max(abs(low), abs(high)) if parameter.unit == "length" else 0.5
+        low, high = (0.2 * low if parameter.positive else low - reach), high + reach
+    elif name in study.space.bounds:
+        low, high = study.space.bounds[name]
+        if name not in names and not name.startswith("phi"):
+            low, high = sorted((abs(low), abs(high)))  # the branch tells the sign of swing and stroke
+        elif parameter.unit == "angle" and high - low >= WHOLE_TURN:
+            low, high = low - np.pi, high + np.pi
+    else:
+        return None
+    for limit in study.parameter_limits:
+        if limit.output == name:
+            low = low if limit.minimum is None else max(low, limit.minimum)
+            high = high if limit.maximum is None else min(high, limit.maximum)
+    return low, high
+
+
+def _limited(study: Study, name: str) -> tuple[float, float] | None:
+    """Return ends of a length of a guide whose proportions are searched globally:
+    its limits, not what the sweep reached.
+    """
+    limits = [x for x in study.parameter_limits if x.output == name and x.maximum is not None]
+    if not _globally(study) or not limits:
+        return None
+    high = min(x.maximum for x in limits if x.maximum is not None)
+    return max((x.minimum for x in limits if x.minimum is not None), default=SHORTEST * high), high
+
+
+def _prescribed(study: Study) -> tuple[Parameter, ...]:
+    return () if study.locus is None else study.locus.prescribed
+
+
+def problem_and_starts(
+    study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1, say: Say = unsaid
+) -> tuple[OptimiseSettings, Begun]:
+    """Return settings, problem and starts: the diverse best of the dataset, filled up from samples if too few.
+
+    On the locus half of the starts come from samples in any case.  Where no row of the dataset is feasible, the first
+    starts are the best of random designs.  The mechanisms that do the study's [task] come before all others.  With
+    ``optimise.global = "proportions"`` five of six starts come from the search over proportions instead, in ``jobs``
+    processes; ``stop`` ends it early.
+    """
+    settings, begun = _problem_and_starts(study, folder, stop, jobs, say)
+    first = of_task(study, settings.starts, settings.seed)
+    count = max(len(begun.starts), len(first))
+    origins = None if begun.origins is None else ((-1,) * len(first) + begun.origins)[:count]
+    return settings, begun._replace(starts=np.concatenate([first, begun.starts])[:count], origins=origins)
+
+
+def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
+    """Return the problem of a study whose search is done, without searching for starts anew.
+
+    Parameters
+    ----------
+    study : with an objective
+    folder : its dataset
+    found : designs (k, P) that the search found, which the bounds hold where they follow from such designs
+
+    Raises
+    ------
+    InputError
+        if nothing can change, or neither rows nor a sample give a design.
+    """
+    if study.objective is None:
+        raise InputError("objective", None, "[objective] minimise = an output", str(study.path))
+    designs, _ = best_rows(study.family, study.objective.output, folder)
+    if not len(designs) and study.optimise is not None:
+        designs = drawn(study, study.optimise.starts, study.optimise.seed)
+    if not len(designs):
+        raise _nothing(study)
+    problem = problem_of(study, designs)
+    return holding(study, problem, found) if _globally(study) else problem
+
+
+def _globally(study: Study) -> bool:
+    return study.optimise is not None and study.optimise.globally == "proportions"
+
+
+def _nothing(study: Study) -> InputError:
+    allowed = "at least one design that [locus] and [fit] can make"
+    return InputError("design space", study.space.count, allowed, str(study.path))
+
+
+def _problem_and_starts(
+    study: Study, folder: Path, stop: Callable[[], bool], jobs: int, say: Say
+) -> tuple[OptimiseSettings, Begun]:
+    if study.optimise is None or study.objective is None:
+        raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
+    settings = study.optimise
+    count, seed = settings.starts, settings.seed
+    designs, merit = best_rows(study.family, study.objective.output, folder)
+    if _globally(study):
+        known = designs if len(designs) else drawn(study, count, seed)
+        return settings, from_populations(study, settings, problem_of(study, known), known, merit, stop, jobs, say)
+    if len(designs):
+        problem = problem_of(study, designs)
+        # On the locus samples cost next to nothing, and reach the bounds, where a sweep may have no design at all.
+        sampled = count // 2 if problem.coordinates is not None and study.fit is None else 0
+        own = diverse(problem, designs, merit, count - sampled, ALIKE)
+        starts = filled(study, problem, own, count, seed)
+        if len(starts) < count:
+            starts = apart(problem, starts, diverse(problem, designs, merit, count, ALIKE), count)
+        return settings, Begun(problem, starts)
+    designs = drawn(study, count, seed)
+    if not len(designs):
+        raise _nothing(study)
+    problem = problem_of(study, designs)
+    # Half of them from the space itself: a sample of the problem's variables may miss what [locus] or [fit] makes.
+    own = diverse(problem, designs, ranking(problem, designs), -(-count // 2), ALIKE)
+    return settings, Begun(problem, filled(study, problem, own, count, seed))

@@ -1,0 +1,181 @@
+"""Proportions as places between 0 and 1, and what they are worth once their linear part is eliminated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sweep.evaluation.summaries import design_outputs
+from sweep.families.base import Accuracy, Array
+from sweep.families.chain import Chain, stages_of
+from sweep.families.names import stem
+from sweep.optimise.problem.statement import Problem
+from sweep.optimise.starts.linear import POSES, Elimination
+from sweep.quantities.limits import compared
+
+if TYPE_CHECKING:
+    from sweep.study import Limit
+
+SHORT = 0.15  # shortest length of a guide that the strategies begin with, against the longest its crank may have
+MIDDLE = Accuracy(target=1e-3)
+
+
+class Proportions:
+    """Places between 0 and 1 for what is not linear, and the designs that belong to them.
+
+    Lengths of the guide stand on a logarithmic scale against its crank, which is the unit.  Instead of the offset
+    between the stages the middle of the guide's input angles is varied, so that it stays while stage 1 changes.  With
+    ``grown`` the lengths of stage 1 that cannot vanish stand on such a scale too.
+    """
+
+    def __init__(self, linear: Elimination, signs: dict[str, float], grown: bool = False) -> None:
+        problem = linear.problem
+        self.linear, names = linear, problem.family.parameter_names
+        number = linear.last
+        self.base = problem.rows(problem.lower + 0.5 * problem.span, **signs)[0]
+        at = [problem.variables.index(name) for name in linear.free]
+        self.low, self.high = problem.lower[at].astype(np.float64), problem.upper[at].astype(np.float64)
+        units = {p.name: p for p in problem.family.parameters}
+        unit = problem.variables.index(linear.links[0])
+        self.log = np.zeros(len(linear.free), dtype=np.bool_)
+        for k, name in enumerate(linear.free):
+            if units[name].unit == "angle" and self.high[k] - self.low[k] >= 2.0 * math.pi:
+                self.low[k], self.high[k] = -math.pi, math.pi
+            # A frame to the other side is the same guide, turned by half a turn.
+            if name in linear.links:
+                shortest = max(self.low[k], problem.upper[unit] * SHORT)
+                self.low[k] = shortest / problem.upper[unit]
+                self.high[k] /= max(problem.lower[unit], problem.upper[unit] * SHORT)
+                self.log[k] = True
+            elif grown and units[name].unit == "length" and self.low[k] > 0.0:
+                self.log[k] = True
+        self.columns = [names.index(name) for name in linear.free]
+        self.base[names.index(linear.links[0])] = 1.0
+        self.offset = names.index(f"offset{number}") if f"offset{number}" in linear.free else -1
+        self.driver = stages_of(problem.family)[0].family
+
+    def designs(self, places: Array) -> Array:
+        """Designs (k, P) at places (k, n), with the point, line and scale still to be found."""
+        designs = self.placed(places)
+        if self.offset >= 0:
+            designs[:, self.offset] -= self.middles(designs)
+        return designs
+
+    def placed(self, places: Array) -> Array:
+        """Return the same with the offset between the stages itself at its place."""
+        values: Array = self.low + places * (self.high - self.low)
+        low, wide = self.low[self.log], np.array([math.log(x) for x in self.high[self.log] / self.low[self.log]])
+        # numpy's exponential depends on the processor, that of the C library does not
+        grown = [math.exp(x) for x in (places[:, self.log] * wide).ravel()]
+        values[:, self.log] = low * np.reshape(grown, (len(places), len(wide)))
+        designs = np.repeat(self.base[None, :], len(places), axis=0)
+        designs[:, self.columns] = values
+        return designs
+
+    def middles(self, designs: Array) -> Array:
+        """Middle of the guide's input angles (k,) for an offset of zero, which only stage 1 decides; 0 without one."""
+        return self._driven(designs)[0]
+
+    def swings(self, designs: Array) -> Array:
+        """Return the range (k,) of the guide's input angles; 0 where stage 1 does not turn."""
+        return self._driven(designs)[1]
+
+    def _driven(self, designs: Array) -> tuple[Array, Array]:
+        upstream = np.ascontiguousarray(designs[:, : len(self.driver.parameters)])
+        found = design_outputs(self.driver, upstream, ("psi_ext", "swing"), MIDDLE)
+        swing = np.asarray(found["swing"], np.float64)
+        middle = np.asarray(found["psi_ext"], np.float64) + 0.5 * swing
+        return np.nan_to_num(middle), np.nan_to_num(np.abs(swing))
+
+    def merit(self, places: Array) -> Array:
+        """Judge proportions by their least objective plus what missed limits cost (k,)."""
+        return merit(self.linear, self.designs(places))[1]
+
+
+def turned_into(problem: Problem, designs: Array) -> Array:
+    """Return the designs whose angles lie within their bounds, by whole turns."""
+    out = designs.copy()
+    for k, name in enumerate(problem.variables):
+        column = problem.family.parameter_names.index(name)
+        if problem.family.parameters[column].unit == "angle" and problem.span[k] >= 2.0 * math.pi:
+            middle = problem.lower[k] + 0.5 * problem.span[k]
+            out[:, column] -= 2.0 * math.pi * np.round((out[:, column] - middle) / (2.0 * math.pi))
+    return out
+
+
+def widened(problem: Problem, designs: Array, names: Sequence[str]) -> Problem:
+    """Return the problem with the bounds of some variables widened so
+    that the designs lie half their size within them.
+    """
+    lower, upper = problem.lower.astype(np.float64), problem.upper.astype(np.float64)
+    for k, name in enumerate(problem.variables):
+        if name in names and len(designs):
+            values = designs[:, problem.family.parameter_names.index(name)]
+            reach = 0.5 * np.abs(values)
+            lower[k] = min(lower[k], float((values - reach).min()))
+            upper[k] = max(upper[k], float((values + reach).max()))
+    return replace(problem, lower=lower, upper=upper)
+
+
+ACCURACY = Accuracy(samples=POSES)  # of what is not linear: pressure angles, the box of the coupler point
+BEFORE = ("max_pressure_angle", "swing", "margin")  # of a stage: they do not change with point, line and scale
+WEIGHT = 3.0  # price of a limit missed by its own size, in strokes
+STUCK = 1e6  # above every objective: does not turn
+
+
+def merit(linear: Elimination, designs: Array) -> tuple[Array, Array]:
+    """Return finished designs (n, P), and the objective plus what missed limits cost (n,), the smaller the better.
+
+    Designs that do not turn are not finished (nan) and rank by their margin behind all that do.
+    """
+    problem = linear.problem
+    family, names = problem.family, problem.family.parameter_names
+    limits = [x for x in problem.limits if not x.output.startswith(("rotatable", "stroke", "max_abs_dev"))]
+    margins = [f"margin{stage.number}" for stage in family.stages] if isinstance(family, Chain) else []
+    first = [x for x in limits if stem(x.output) in BEFORE]
+    wanted = list(dict.fromkeys([*margins, *(x.output for x in first)]))
+    columns = design_outputs(family, designs, wanted, ACCURACY, problem.window)
+    margin = np.min([np.nan_to_num(columns[name], nan=-1e3) for name in margins], axis=0)
+    worth = STUCK * (2.0 - margin)
+    turns = np.flatnonzero(margin > 0.0)
+    missed = np.zeros(len(designs))
+    for limit in first:
+        missed += _missed(limit, compared(limit.output, np.asarray(columns[limit.output], np.float64)))
+    finished, least, solved = linear.solve(designs[turns])
+    own = missed[turns]
+    rest = [x for x in limits if x not in first]
+    columns = {n: finished[:, k] for k, n in enumerate(names)}
+    outputs = [x.output for x in rest if x.output not in names]
+    if outputs:
+        columns |= design_outputs(family, finished, outputs, ACCURACY, problem.window)
+    for limit in rest:
+        own = own + _missed(limit, compared(limit.output, np.asarray(columns[limit.output], np.float64)))
+    out = np.full(designs.shape, np.nan)
+    out[turns] = finished
+    own = own + _outside(linear, finished)
+    worth[turns] = np.where(solved, np.nan_to_num(least) + WEIGHT * linear.stroke * own, STUCK)
+    return out, worth
+
+
+def _outside(linear: Elimination, designs: Array) -> Array:
+    """Return how far lengths of the guide lie outside their bounds, relative to them (n,)."""
+    missed = np.zeros(len(designs))
+    problem = linear.problem
+    for name in linear.links:
+        if name in problem.variables:
+            k = problem.variables.index(name)
+            values, high = designs[:, problem.family.parameter_names.index(name)], problem.upper[k]
+            missed += np.maximum(values - high, 0.0) / abs(high)
+            missed += np.maximum(problem.lower[k] - values, 0.0) / max(abs(problem.lower[k]), 1e-9)
+    return missed
+
+
+def _missed(limit: Limit, value: Array) -> Array:
+    size = max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)) or 1.0
+    low = -math.inf if limit.minimum is None else limit.minimum
+    high = math.inf if limit.maximum is None else limit.maximum
+    return np.nan_to_num(np.maximum(np.maximum(low - value, value - high), 0.0) / size, nan=1e3)

@@ -1,0 +1,145 @@
+"""The box of a mechanism: how far its joints, moving and fixed, reach along x, y and z over one turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from sweep.families.base import Family, Output, of_family
+from sweep.families.capabilities import Coordinates, Fixed, Points, Skeleton
+from sweep.families.chain import Chain
+from sweep.families.domain import March
+from sweep.families.machines import Machine
+from sweep.families.parts import AXES, TIP, Member
+from sweep.quantities.dimensions import Piece
+
+NAMES = tuple(f"box_{axis}" for axis in AXES)
+ROUNDING = 2.0**-53
+
+
+@dataclass(frozen=True)
+class Box:
+    """The extent of a mechanism along one axis: the largest minus the smallest coordinate of all its joints.
+
+    Parameters
+    ----------
+    output : name, unit, definition
+    curves : pose outputs that are this coordinate of the moving joints
+    reductions : names of the largest and the smallest value of each curve
+    still : this coordinate of what stands still, from designs
+    """
+
+    output: Output
+    curves: tuple[str, ...]
+    reductions: tuple[tuple[str, str], ...]
+    still: tuple[Piece, ...]
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """The design outputs that it is made of."""
+        return tuple(name for pair in self.reductions for name in pair)
+
+
+@of_family
+def boxes(family: Family) -> dict[str, Box]:
+    """Return the boxes of a family by name:
+    its own, of a chain every stage's, of a machine the whole and every member's.
+
+    The stages of a chain share an axis, but the angle between their frames is nobody's parameter: only a machine, whose
+    members are placed, has a box of several of them.
+    """
+    if isinstance(family.domain, March):
+        return {}
+    if isinstance(family, Machine):
+        whole = [box for k in range(3) if (box := _whole(family, k)) is not None]
+        members = [_of_member(m, box) for m in family.members for box in boxes(m.family).values()]
+        return {box.output.name: box for box in (*whole, *members)}
+    parts = [(s.family, str(s.number), s.columns) for s in family.stages] if isinstance(family, Chain) else []
+    found = [_own(*part, k) for part in parts or [(family, "", slice(None))] for k in range(3)]
+    return {box.output.name: box for box in found if box is not None}
+
+
+def _own(family: Family, stage: str, columns: slice, axis: int) -> Box | None:
+    """Return the box of a family that stands alone, in its own frame."""
+    at = {name: points[axis] for name, points in _moving(family).items()}
+    curves = tuple(dict.fromkeys(f"{name}{stage}" for name in at.values() if name is not None))
+    if not curves:
+        return None
+    still: list[Piece] = [partial(_coordinate, fixed, axis, columns) for fixed in _standing(family)]
+    if None in at.values():
+        still.append(_nothing)
+    where = f"stage {stage}: " if stage else ""
+    text = f"{where}extent along {AXES[axis]} of all joints over one turn, fixed ones too, in the frame of the {{}}"
+    text = text.format("stage" if stage else "mechanism")
+    name = f"box_{AXES[axis]}{stage}"
+    pairs = tuple((f"max_{curve}", f"min_{curve}") for curve in curves)
+    return Box(Output(name, "length", text), curves, pairs, tuple(still))
+
+
+def _of_member(m: Member, found: Box) -> Box:
+    """Return a member's own box under the machine's names."""
+    output = Output(f"{m.name}.{found.output.name}", "length", f"{m.name}: {found.output.text}")
+    pairs = tuple((f"{m.name}.{most}", f"{m.name}.{least}") for most, least in found.reductions)
+    still = tuple(partial(_of_columns, piece, m.columns) for piece in found.still)
+    return Box(output, tuple(f"{m.name}.{curve}" for curve in found.curves), pairs, still)
+
+
+def _whole(machine: Machine, axis: int) -> Box | None:
+    """Return the box of all members in the machine's frame; of a chain its last stage, which is what stands there."""
+    curves, pairs, still = [], [], list[Piece]()
+    for m in machine.members:
+        last = m.family.stages[-1].family if isinstance(m.family, Chain) else m.family
+        joints = (*_moving(last), *((TIP,) if m.tip is not None else ()))
+        if not _moving(last):
+            return None
+        for point in joints:
+            curves.append(f"{m.name}.{point}_{AXES[axis]}")
+            pairs.append((f"{m.name}.max_{point}_{AXES[axis]}", f"{m.name}.min_{point}_{AXES[axis]}"))
+        stage = m.family.stages[-1] if isinstance(m.family, Chain) else None
+        columns = stage.columns if stage else slice(0, m.columns.stop - m.columns.start)
+        own = slice(m.columns.start + columns.start, m.columns.start + columns.stop)
+        still += [partial(_placed, m, fixed, axis, own) for fixed in _standing(last)]
+    text = (
+        f"extent along {AXES[axis]} of the joints of all members over one turn of the shaft, fixed ones too, in the "
+        "machine's frame; of a chain those of its last stage"
+    )
+    return Box(Output(f"box_{AXES[axis]}", "length", text), tuple(curves), tuple(pairs), tuple(still))
+
+
+def _moving(family: Family) -> Mapping[str, Coordinates]:
+    """Return the moving joints of all links;
+    none where one of them is no pose output, so that its place is not known.
+    """
+    at = {name: points for found in family.every(Points) for name, points in found.at.items()}
+    for skeleton in family.every(Skeleton):
+        joints = [joint for link in skeleton.links for joint in link.joints if joint not in skeleton.fixed]
+        return {joint: at[joint] for joint in joints} if joints and set(joints) <= at.keys() else {}
+    return {}
+
+
+def _standing(family: Family) -> Iterator[Fixed]:
+    """Yield bearings and points of the frame; a line along which something slides is no joint."""
+    for skeleton in family.every(Skeleton):
+        yield from (fixed for fixed in skeleton.fixed.values() if fixed.kind != "slide")
+
+
+def _coordinate(fixed: Fixed, axis: int, columns: slice, designs: Any) -> Any:
+    return fixed.at(designs[:, columns])[:, axis]
+
+
+def _nothing(designs: Any) -> Any:
+    return 0.0 * designs[:, 0]
+
+
+def _of_columns(piece: Piece, columns: slice, designs: Any) -> Any:
+    return piece(designs[:, columns])
+
+
+def _placed(m: Member, fixed: Fixed, axis: int, columns: slice, designs: Any) -> Any:
+    """Return a coordinate in the machine's frame of a point that stands still in the member's."""
+    start = m.columns.stop + 1
+    return designs[:, start + axis] + np.asarray(fixed.at(designs[:, columns])) @ m.place.rotation[axis]

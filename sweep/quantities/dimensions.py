@@ -1,0 +1,236 @@
+"""Sizes that a designer always asks about: least link, ratio of links, arm of a coupler point, distance of pivots.
+
+They follow from the dimensions alone, without a pose.  Each is the least or the largest of smooth *pieces*, so that
+limits on it have exact gradients: every piece stays on its side of a bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations, permutations
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.costs import nanoseconds
+from sweep.effects import input_names
+from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work, of_family
+from sweep.families.capabilities import Dimensions, Skeleton
+from sweep.families.chain import Chain
+from sweep.families.machines import Machine
+
+Piece: TypeAlias = Callable[[Any], Any]
+"""Designs (n, P), real or complex, to one number each."""
+
+LEAST_LINK = Output("least_link", "length", "length of the shortest moving link")
+LINK_RATIO = Output("link_ratio", "1", "length of the shortest moving link over that of the longest")
+ARM_RATIO = Output(
+    "arm_ratio", "1",
+    "largest distance of a point that a link carries from a joint of that link, over the distance of its two joints",
+)  # fmt: skip
+PIVOT_DISTANCE = Output("pivot_distance", "length", "least distance between the centres of two bearings in the frame")
+SIZE = Output("size", "length", "largest length of the mechanism, offsets by magnitude")
+ALL = (LEAST_LINK, LINK_RATIO, ARM_RATIO, PIVOT_DISTANCE)
+
+ROUNDINGS = 16.0 * 2.0**-53  # a few products, a sum and a root
+
+
+@dataclass(frozen=True)
+class Size:
+    """A size of a family: the least or the largest of its pieces, which are squares of what they stand for if so said.
+
+    Squares are smooth where a length vanishes.
+    """
+
+    output: Output
+    least: bool
+    squared: bool
+    pieces: tuple[Piece, ...]
+
+    def values(self, family: Family, designs: Array) -> Array:
+        """Return the size of every design, (n,);
+        lengths are brought near 1 by a power of two first: nothing overflows.
+        """
+        lengths = [k for k, p in enumerate(family.parameters) if p.unit == "length"]
+        _, exponent = np.frexp(np.abs(designs[:, lengths]).max(axis=1))
+        scaled = designs.copy()
+        scaled[:, lengths] = np.ldexp(designs[:, lengths], -exponent[:, None])
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            each = np.stack([piece(scaled) for piece in self.pieces])
+        found = each.min(axis=0) if self.least else each.max(axis=0)
+        found = np.sqrt(found) if self.squared else found
+        return np.asarray(np.ldexp(found, exponent) if self.output.unit == "length" else found, np.float64)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A family that stands alone in a chain or a machine: where its parameters are, what its names are called there."""
+
+    family: Family
+    columns: NDArray[np.intp]
+    member: str = ""
+    stage: str = ""
+
+    def of(self, piece: Piece) -> Piece:
+        """Return a piece of the part as one of the whole."""
+        return partial(_of_columns, piece, self.columns)
+
+
+def _of_columns(piece: Piece, columns: NDArray[np.intp], designs: Any) -> Any:
+    return piece(designs[:, columns])
+
+
+@of_family
+def sizes(family: Family) -> dict[str, Size]:
+    """Return all sizes of a family by name: of the whole, of every member, and of every stage."""
+    groups: dict[tuple[str, str], list[_Part]] = {}
+    for part in _parts(family):
+        for key in dict.fromkeys((("", ""), (part.member, ""), (part.member, part.stage))):
+            groups.setdefault(key, []).append(part)
+    return {
+        size.output.name: size
+        for (member, stage), parts in groups.items()
+        for of in ALL
+        if (size := _size(of, member, stage, parts)) is not None
+    }
+
+
+def dimension_step(family: Family) -> Step | None:
+    """Return the route to all sizes; None where a family has none."""
+    found = sizes(family)
+    if not found:
+        return None
+
+    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+        columns: Columns = {"status": np.zeros(len(designs), np.uint8)}
+        for name in wanted & found.keys():
+            values = found[name].values(family, designs)
+            exact = not found[name].squared and found[name].output.unit == "length"
+            columns |= {name: values, f"err_{name}": values * (0.0 if exact else ROUNDINGS)}
+        return columns
+
+    provides = tuple(one.output for one in found.values())
+    return Step("sizes", provides, run, work=Work.PARAMETERS, cost=lambda accuracy: nanoseconds("work", "size"))
+
+
+def lengths(family: Family) -> tuple[str, ...]:
+    """Return parameters that are lengths of the mechanism itself, not of bodies and bearings that effects ask for."""
+    others = set(input_names(family))
+    if isinstance(family, Machine):
+        others |= {p.name for relation in family.relations for p in relation.parameters}
+    return tuple(p.name for p in family.parameters if p.unit == "length" and p.name not in others)
+
+
+def size_step(family: Family) -> Step | None:
+    """Return the route to ``size``; None where a family has ratios of lengths only."""
+    names = lengths(family)
+    if not names:
+        return None
+    columns = [family.parameter_names.index(name) for name in names]
+
+    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+        n = len(designs)
+        found: Columns = {name: np.abs(designs[:, columns]).max(axis=1) for name in wanted & {SIZE.name}}
+        return found | {f"err_{SIZE.name}": np.zeros(n), "status": np.zeros(n, np.uint8)}
+
+    return Step("size", (SIZE,), run, work=Work.PARAMETERS, cost=lambda accuracy: nanoseconds("work", "size"))
+
+
+def _parts(family: Family) -> Iterator[_Part]:
+    if isinstance(family, Machine):
+        for m in family.members:
+            first = m.columns.start
+            for part in _parts(m.family):
+                yield _Part(part.family, part.columns + first, f"{m.name}.", part.stage)
+    elif isinstance(family, Chain):
+        for stage in family.stages:
+            columns = np.arange(stage.columns.start, stage.columns.stop)
+            for part in _parts(stage.family):
+                yield _Part(part.family, columns, stage=str(stage.number))
+    elif any(p.unit == "length" for p in family.parameters):  # ratios of lengths only have no size
+        yield _Part(family, np.arange(len(family.parameters)))
+
+
+def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> Size | None:
+    """Return the size of some parts together; several stages or members give the least or the largest of all."""
+    pieces = tuple(part.of(piece) for part in parts for piece in _PIECES[of.name](part.family))
+    if not pieces:
+        return None
+    where = (f"{member.rstrip('.')}: " if member else "") + (f"stage {stage}: " if stage else "")
+    named = Output(f"{member}{of.name}{stage}", of.unit, f"{where}{of.text}")
+    squared = of in (ARM_RATIO, PIVOT_DISTANCE)
+    return Size(named, of is not ARM_RATIO, squared, pieces)
+
+
+def _links(family: Family) -> list[Piece]:
+    """Return the lengths of the moving links; one that is not there (length 0) counts as the longest of the others."""
+    found: list[Piece] = []
+    for dimensions in family.every(Dimensions):
+        always = [partial(_length, _columns(family, names)) for names in dimensions.links]
+        found += always
+        found += [partial(_present, _columns(family, (name,)), tuple(always)) for name in dimensions.optional]
+    return found
+
+
+def _ratios(family: Family) -> list[Piece]:
+    return [partial(_quotient, one, other) for one, other in permutations(_links(family), 2)]
+
+
+def _arms(family: Family) -> list[Piece]:
+    """Return squares of the distances of a carried point from both joints of its link, over that of the joints."""
+    return [
+        partial(_arm, _columns(family, arm.point), _columns(family, arm.link), share)
+        for dimensions in family.every(Dimensions)
+        for arm in dimensions.arms
+        for share in (0.0, 1.0)
+    ]
+
+
+def _pivots(family: Family) -> list[Piece]:
+    """Return squares of the distances between the centres of all bearings of links that turn about a fixed axis."""
+    return [
+        partial(_apart, one.at, other.at)
+        for skeleton in family.every(Skeleton)
+        for one, other in combinations([f for f in skeleton.fixed.values() if f.kind == "axis"], 2)
+    ]
+
+
+_PIECES: dict[str, Callable[[Family], list[Piece]]] = {
+    LEAST_LINK.name: _links, LINK_RATIO.name: _ratios, ARM_RATIO.name: _arms, PIVOT_DISTANCE.name: _pivots,
+}  # fmt: skip
+
+
+def _columns(family: Family, names: tuple[str, ...]) -> tuple[int, ...]:
+    return tuple(family.parameter_names.index(name) for name in names)
+
+
+def _length(columns: tuple[int, ...], designs: Any) -> Any:
+    if len(columns) == 1:
+        found = designs[:, columns[0]]
+        return np.where(found.real < 0.0, -found, found)
+    return np.sqrt(sum(designs[:, k] ** 2 for k in columns))
+
+
+def _present(columns: tuple[int, ...], others: tuple[Piece, ...], designs: Any) -> Any:
+    found = _length(columns, designs)
+    there = np.stack([other(designs) for other in others])
+    longest = np.take_along_axis(there, there.real.argmax(axis=0)[None, :], axis=0)[0]
+    return np.where(found.real == 0.0, longest, found)
+
+
+def _quotient(one: Piece, other: Piece, designs: Any) -> Any:
+    return one(designs) / other(designs)
+
+
+def _arm(point: tuple[int, ...], link: tuple[int, ...], share: float, designs: Any) -> Any:
+    size = sum(designs[:, k] ** 2 for k in link)
+    others = (*link, *[None] * (len(point) - len(link)))
+    apart = [designs[:, p] - (0.0 if k is None else share * designs[:, k]) for p, k in zip(point, others, strict=True)]
+    return sum(x**2 for x in apart) / size
+
+
+def _apart(one: Piece, other: Piece, designs: Any) -> Any:
+    return ((one(designs) - other(designs)) ** 2).sum(axis=1)

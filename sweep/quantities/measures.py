@@ -1,0 +1,227 @@
+"""What each design output is along the turn: which extrema of which pose outputs make it, and how.
+
+The optimiser works with *inner* values that are smooth and sums of pose outputs at single crank angles.  Most outputs
+are their own inner value; the pressure angle becomes -cos^2 of itself, the stroke ratio the angle phi0, and both rise
+with what they replace, so minima, maxima and limits carry over.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, cast
+
+from sweep.errors import InputError
+from sweep.families.base import Family
+from sweep.families.capabilities import Assembly
+from sweep.families.domain import Turn
+from sweep.families.names import parts, stem, without_minus
+from sweep.families.relations import Reading, Timing
+from sweep.quantities.dimensions import Piece
+from sweep.quantities.kinds import (
+    Dimension,
+    EventPlace,
+    Extent,
+    LargestLength,
+    LimitPosition,
+    Margin,
+    Negative,
+    OwnOutput,
+    Quantity,
+    Reduced,
+    TimingOf,
+)  # fmt: skip
+from sweep.quantities.resolve import find, resolve
+
+# A crank that turns must keep this much of Delta/b^2 at its worst pose: cos^2 of 89.94 degrees.
+ROTATABLE_MARGIN = 1e-6
+
+Kind: TypeAlias = Literal[
+    "max_abs", "max", "min", "range", "phi_max_abs", "phi_max", "phi_min", "ext", "fold", "phi_ext", "phi_fold", "phi0",
+    "phi_event", "difference", "scalar", "lengths", "least", "most", "box", "minus",
+]  # fmt: skip
+Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable", "square", "transmission"]
+
+# What the optimiser follows of the two limit positions: which end, or the difference of both.
+LIMIT_KINDS: dict[str, Kind] = {
+    "swing": "range", "stroke": "range", "phi0": "phi0", "stroke_ratio": "phi0", "phi_ext": "phi_ext",
+    "phi_fold": "phi_fold", "ext": "ext", "fold": "fold",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Series:
+    """A curve over the turn whose extrema are followed.
+
+    ``output`` is the pose output; with ``pressure`` it is a discriminant and the curve is Delta/b^2 = cos^2 of that
+    pressure angle (the ratio of both does not depend on the crank angle, and the discriminant goes on below zero).
+    ``window`` limits it to a part of the stroke.  ``wrapped`` curves are angles that jump by a full turn.  With
+    ``passes``, a level and +1 upwards or -1 downwards, not its extrema are followed but where it passes that level.
+    """
+
+    output: str
+    pressure: str = ""
+    window: tuple[float, float] | None = None
+    wrapped: bool = False
+    passes: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A design output as ``sign`` * (reduction ``kind`` of its series), read back through ``inner``.
+
+    ``parts`` are the two angles of a "difference", the second minus the first; of "minus" what it is the negative of;
+    of a "scalar" that is the pose output ``of`` where an event happens, that event.
+    ``numbers`` are plain numbers instead of series: the output itself ("scalar"), parameters of which it is the largest
+    magnitude ("lengths"), or the pieces of which it is the "least" or the "most".  ``pieces`` computes the latter.
+    """
+
+    name: str
+    kind: Kind
+    series: tuple[Series, ...]
+    inner: Inner = "same"
+    sign: float = 1.0
+    numbers: tuple[str, ...] = ()
+    parts: tuple[Measure, ...] = ()
+    pieces: tuple[Piece, ...] = ()
+    of: str = ""
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether it is made of crank angles at which something happens."""
+        if self.kind == "minus":
+            return self.parts[0].is_angle
+        return self.kind.startswith("phi") or self.kind == "difference"
+
+    @property
+    def follows_angles(self) -> bool:
+        """Whether its slopes need those of crank angles."""
+        return self.is_angle or any(part.follows_angles for part in self.parts)
+
+    def to_inner(self, value: float) -> float:
+        """Return the inner value that stands for a value of the output."""
+        if self.kind == "minus":
+            return -self.parts[0].to_inner(-value)
+        if self.inner == "pressure":
+            return -(math.cos(value) ** 2)
+        if self.inner == "transmission":
+            return math.sin(value) ** 2
+        if self.inner == "ratio":
+            return 2.0 * math.pi * value / (1.0 + value)
+        if self.inner == "rotatable":
+            return ROTATABLE_MARGIN * value
+        if self.inner == "square":
+            return math.copysign(value * value, value)  # a negative limit stays one that always holds, or never
+        return value
+
+    def from_inner(self, value: float) -> float:
+        """Return the value of the output for an inner value;
+        nan where there is none (a mechanism that does not turn).
+        """
+        if self.kind == "minus":
+            return -self.parts[0].from_inner(-value)
+        if self.inner == "pressure":
+            # 1 - cos^2 may come out as -1e-16 where coupler force and velocity are in line.
+            return math.atan2(math.sqrt(max(1.0 + value, 0.0)), math.sqrt(-value)) if value <= 0.0 else math.nan
+        if self.inner == "transmission":
+            return math.atan2(math.sqrt(value), math.sqrt(max(1.0 - value, 0.0))) if value >= 0.0 else math.nan
+        if self.inner == "ratio":
+            return value / (2.0 * math.pi - value)
+        if self.inner == "rotatable":
+            return 1.0 if value > 0.0 else 0.0
+        if self.inner == "square":
+            return math.copysign(math.sqrt(abs(value)), value)
+        return value
+
+
+def curve(family: Family, output: str, window: tuple[float, float] | None = None) -> Series:
+    """Return the series of a plain pose output."""
+    return Series(output, window=window, wrapped=family.pose_output[output].wraps)
+
+
+def margins(family: Family, stage: str = "") -> tuple[Series, ...]:
+    """Return Delta/b^2 of the stage of that number; without a number of every stage. Empty where nothing can lock.
+
+    In a machine "needle.2" is a stage, "needle." every stage of the member.
+    """
+    of_member = stage.endswith(".")
+    loops = [o for o in family.every(Assembly) if o.stage == stage or (of_member and o.stage.startswith(stage))]
+    found = loops if stage else family.every(Assembly)
+    return tuple(Series(o.discriminant, pressure=o.pressure_angle) for o in found)
+
+
+def measure(family: Family, name: str, window: tuple[float, float] | None = None) -> Measure:
+    """Give the form in which the optimiser follows a design output.
+
+    Parameters
+    ----------
+    family : whose output it is
+    name : any design output.  Means, parameters, and what only a step of the family computes, are taken as numbers
+        without inner structure
+    window : see :class:`sweep.optimise.problem.statement.Problem`
+
+    Raises
+    ------
+    InputError
+        for a name that is no design output and no parameter.
+    """
+    if name in family.parameter_names and find(family, name) is None:
+        return Measure(name, "scalar", (), numbers=(name,))
+    if stem(name) == "rotatable" and not without_minus(name) and not margins(family, parts(name).stage):
+        return _of_margin(name, "rotatable", ())  # what never locks turns always
+    return _measure(family, name, resolve(family, name), window)
+
+
+def _measure(family: Family, name: str, asked: Quantity, window: tuple[float, float] | None) -> Measure:
+    match asked:
+        case Negative(inner=of):
+            inner = measure(family, of.output.name, window)
+            return Measure(name, "minus", inner.series, inner.inner, 1.0, inner.numbers, (inner,), inner.pieces)
+        case TimingOf(timing=timing):
+            return _of_timing(family, timing, window)
+        case EventPlace(event=event) if isinstance(family.domain, Turn) and not family.pose_output[asked.of].wraps:
+            return Measure(name, "phi_event", (Series(event.of, passes=(event.level, 1.0 if event.rising else -1.0)),))
+        case Margin(kind=kind):
+            return _of_margin(name, kind, margins(family, asked.stage))
+        case LimitPosition(kind=kind):
+            ratio: Inner = "ratio" if kind == "stroke_ratio" else "same"
+            return Measure(name, LIMIT_KINDS[kind], (curve(family, asked.of),), ratio)
+        case Reduced(reduction=reduction, extreme=True):
+            inside = window if family.pose_output[asked.of].windowed and reduction.modes == (0,) else None
+            return Measure(name, cast(Kind, reduction.kind), (curve(family, asked.of, inside),))
+        case Extent(box=box):
+            numbers = tuple(f"{name}, still {k}" for k in range(len(box.still)))
+            curves = tuple(curve(family, of) for of in box.curves)
+            return Measure(name, "box", curves, numbers=numbers, pieces=box.still)
+        case Dimension(size=size):
+            numbers = tuple(f"{name}, piece {k}" for k in range(len(size.pieces)))
+            side: Kind = "least" if size.least else "most"
+            return Measure(name, side, (), "square" if size.squared else "same", numbers=numbers, pieces=size.pieces)
+        case LargestLength(lengths=lengths):
+            return Measure(name, "lengths", (), numbers=lengths)
+        case OwnOutput(of_part=True):
+            raise InputError("output", name, "an output that changes steadily", f"design outputs of {family.name}")
+        case _:
+            # Means, counts, stays, own outputs; the passage of an angle that jumps, and one on the way out of an
+            # interval, are found anew for every design.
+            return Measure(name, "scalar", (), numbers=(name,))
+
+
+def _of_timing(family: Family, timing: Timing | Reading, window: tuple[float, float] | None) -> Measure:
+    ends = tuple(measure(family, place, window) for place in timing.places)
+    if isinstance(timing, Reading):
+        # The angle of a passage has an exact slope; that of an extremum no better one than differences have.
+        at = ends if ends[0].kind == "phi_event" else ()
+        series = ends[0].series if at else ()
+        return Measure(timing.name, "scalar", series, numbers=(timing.name,), parts=at, of=timing.of.name)
+    if not all(end.is_angle for end in ends):
+        return Measure(timing.name, "scalar", (), numbers=(timing.name,))
+    return Measure(timing.name, "difference", tuple(s for end in ends for s in end.series), parts=ends)
+
+
+def _of_margin(name: str, kind: str, series: tuple[Series, ...]) -> Measure:
+    if kind == "max_pressure_angle":
+        return Measure(name, "min", series, "pressure", sign=-1.0)
+    if kind == "least_transmission_angle":
+        return Measure(name, "min", series, "transmission")
+    return Measure(name, "min", series, "rotatable" if kind == "rotatable" else "same")

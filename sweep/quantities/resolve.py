@@ -1,0 +1,314 @@
+"""What the name of a design output means, decided here and nowhere else: ``resolve`` gives a typed quantity."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sweep.effects import elsewhere, offered
+from sweep.errors import InputError, nearest
+from sweep.families.base import Event, Family, Output, of_family
+from sweep.families.capabilities import Assembly
+from sweep.families.chain import Chain
+from sweep.families.domain import Interval, Turn
+from sweep.families.machines import Machine
+from sweep.families.names import at_stage, parts, without_minus
+from sweep.families.parts import Member
+from sweep.families.reduction import prefixes, reduction_of, split
+from sweep.quantities.box import NAMES as BOXES
+from sweep.quantities.box import boxes
+from sweep.quantities.dimensions import SIZE, lengths, sizes
+from sweep.quantities.kinds import (
+    PLACES,
+    Dimension,
+    EventCount,
+    EventPlace,
+    Extent,
+    LargestLength,
+    LimitPosition,
+    Margin,
+    Negative,
+    OwnOutput,
+    Quantity,
+    Reduced,
+    TimingOf,
+    WindowAngle,
+)  # fmt: skip
+
+MARGIN_TEXTS = {
+    "rotatable": ("1", "whether the links reach over the whole turn"),
+    "margin": ("1", "smallest cos^2(pressure angle) over one turn; negative if the crank does not turn fully"),
+    "max_pressure_angle": ("rad", "largest pressure angle over one turn"),
+    "least_transmission_angle": ("rad", "least transmission angle over one turn: 90 degrees less the pressure angle"),
+}
+
+STAY = Output("window_angle", "rad", "crank angle over which the position lies in the window of the stroke: its dwell")
+
+
+def resolve(family: Family, name: str) -> Quantity:
+    """Tell what the name of a design output means for a family, a chain or a machine.
+
+    Raises
+    ------
+    InputError
+        if there is no such output; the message gives the nearest name.
+    """
+    known = _resolved(family)
+    if name not in known:
+        found = find(family, name)
+        if found is None:
+            raise _unknown(family, name)
+        known[name] = found
+    return known[name]
+
+
+@of_family
+def _resolved(family: Family) -> dict[str, Quantity]:
+    """Remember what names of a family mean: it is asked the same for every chunk of a sweep."""
+    return {}
+
+
+def output(family: Family, name: str) -> Output:
+    """Name, unit and definition of a design output; an unknown one is refused as by `resolve`."""
+    return resolve(family, name).output
+
+
+def find(family: Family, name: str) -> Quantity | None:
+    """Tell what a name means as `resolve` does; None where it means nothing."""
+    of = without_minus(name)
+    if of:
+        inner = find(family, of)
+        if inner is None:
+            return None
+        text = f"negative of {of}: {inner.output.text}"
+        return Negative(replace(inner.output, name=name, text=text), inner)
+    if isinstance(family, Machine):
+        found = _of_machine(family, name)
+    else:
+        found = _window_angle(family, name) or _from_poses(family, name) or _from_dimensions(family, name)
+    own = _own(family, name)
+    if own is None or found is None:
+        return found or own
+    return replace(found, output=own.output)  # the family knows best what it gives
+
+
+def _own(family: Family, name: str) -> OwnOutput | None:
+    """Find the output that a step of the family provides, or one of a chain's first stage, which turns alone."""
+    for step in family.steps:
+        for o in step.provides:
+            if o.name == name:
+                return OwnOutput(o)
+    if isinstance(family, Chain) and (own := at_stage(name, "1")):
+        stage = family.stages[0]
+        for step in stage.family.steps:
+            for o in step.provides:
+                if o.name == own:
+                    return OwnOutput(o.of_stage(stage.number), of_part=True)
+    return None
+
+
+def _window_angle(family: Family, name: str) -> WindowAngle | None:
+    if name == STAY.name and isinstance(family.domain, Turn):
+        return WindowAngle(STAY, of=family.position)
+    return None
+
+
+def _from_poses(family: Family, name: str) -> Quantity | None:
+    return _margin(family, name) or _limit(family, name) or _event(family, name) or _reduction(family, name)
+
+
+def _from_dimensions(family: Family, name: str) -> Quantity | None:
+    box = boxes(family).get(name)
+    if box is not None:
+        return Extent(box.output, box)
+    size = sizes(family).get(name)
+    if size is not None:
+        return Dimension(size.output, size)
+    if name == SIZE.name and lengths(family):
+        return LargestLength(SIZE, lengths(family))
+    return None
+
+
+def _of_machine(machine: Machine, name: str) -> Quantity | None:
+    member = machine.split(name)
+    if member is not None:
+        return _of_member(machine, name, *member)
+    timing = next((t for t in machine.timings if t.name == name), None)
+    if timing is not None:
+        return TimingOf(timing.output, timing)
+    # A machine has no limit positions of its own: those are its members'.
+    found = _margin(machine, name) or _event(machine, name) or _reduction(machine, name)
+    return found or _from_dimensions(machine, name)
+
+
+def _of_member(machine: Machine, name: str, member: Member, own: str) -> Quantity | None:
+    """Find what a dotted name means, in the machine's terms."""
+    point, found = _of_point(machine, member, own), find(member.family, own)
+    if found is None:
+        return point
+    named = replace(found.output, name=name, text=f"{member.name}: {found.output.text}")
+    named = point.output if point else named
+    match found:
+        case Margin() | LimitPosition() | WindowAngle() | Reduced() | EventPlace() | EventCount():
+            of = found.of and f"{member.name}.{found.of}"
+            return replace(found, output=named, of=of, stage=f"{member.name}.{found.stage}")
+        case Extent() | Dimension():
+            whole = _from_dimensions(machine, name)
+            return replace(whole, output=named) if whole is not None else OwnOutput(named, of_part=True)
+        case _:
+            return point or OwnOutput(named, of_part=True)
+
+
+def _of_point(machine: Machine, member: Member, own: str) -> Reduced | None:
+    """Find a reduction of a pose output of the machine, such as a coordinate in its frame, under a member's name."""
+    for reduction, rest in split(own, machine.domain):
+        pose = machine.pose_output.get(f"{member.name}.{rest}")
+        if pose is not None:
+            named = replace(reduction.output(pose, machine.domain), name=f"{member.name}.{own}")
+            return Reduced(named, reduction, of=pose.name)
+    return None
+
+
+def event_names(family: Family, event: Event) -> tuple[str, str]:
+    """Name the design outputs of an event: where it happens first, and how often."""
+    return f"{family.domain.name}_{event.name}", f"count_{event.name}"
+
+
+def _event(family: Family, name: str) -> EventPlace | EventCount | None:
+    for event in family.events:
+        place, count = event_names(family, event)
+        of = family.pose_output[event.of]
+        if name == place:
+            text = f"{family.domain.text} at which {event.text}"
+            return EventPlace(Output(name, family.domain.unit, text, of.equation), event, of=event.of)
+        if name == count:
+            text = f"how often {event.text}"
+            return EventCount(Output(name, "1", text, of.equation, jumps=True), event, of=event.of)
+    return None
+
+
+def limit_names(family: Family, position: str, stage: str) -> dict[str, str]:
+    """Return names made of the two limit positions of a follower, and what each is."""
+    pose = family.pose_output.get(position)
+    if pose is None:
+        return {}
+    amplitude = "swing" if pose.wraps else "stroke"
+    kinds: tuple[str, ...] = ("ext", "fold", amplitude, *PLACES)
+    if not isinstance(family.domain, Turn):
+        kinds = (amplitude,)  # an interval has no extended position, and no angle between the limits
+    return {f"{pose.base}_{kind}{stage}" if kind in ("ext", "fold") else f"{kind}{stage}": kind for kind in kinds}
+
+
+def _margin(family: Family, name: str) -> Margin | None:
+    _, base, stage = parts(name)
+    loops = family.every(Assembly)
+    if base not in MARGIN_TEXTS or not loops or (stage and stage not in [loop.stage for loop in loops]):
+        return None
+    unit, text = MARGIN_TEXTS[base]
+    if stage:
+        text = f"stage {stage}: {text}"
+    elif len(loops) > 1:
+        text = f"{text}; of the stage where it is worst"
+    return Margin(Output(name, unit, text), base, stage=stage)
+
+
+def _limit(family: Family, name: str) -> LimitPosition | None:
+    for position, stage in family.positions.items():
+        kind = limit_names(family, position, stage).get(name)
+        if kind is None:
+            continue
+        unit = family.pose_output[position].unit
+        over = f"the whole range of {family.domain.name}" if isinstance(family.domain, Interval) else "one turn"
+        units = {"phi_ext": "rad", "phi_fold": "rad", "phi0": "rad", "stroke_ratio": "1"}
+        first, second = limit_order(family, position)
+        texts = {
+            "ext": f"{position} in the extended position: the {first}",
+            "fold": f"{position} in the folded position: the {second}",
+            "phi_ext": f"crank angle of the extended position, where {position} is {first}",
+            "phi_fold": f"crank angle of the folded position, where {position} is {second}",
+            "phi0": "crank angle from the extended to the folded position, in [0, 2 pi)",
+            "stroke_ratio": "phi0/(2 pi - phi0)",
+            "swing": f"{position} at the folded minus the extended position, where it is {first}",
+            "stroke": f"largest minus smallest {position} over {over}",
+        }
+        found = Output(name, units.get(kind, unit), texts[kind])
+        return LimitPosition(found, kind, of=position, stage=stage)
+    return None
+
+
+def limit_order(family: Family, position: str) -> tuple[str, str]:
+    """Return how the extended and the folded position are told apart, in words."""
+    sign = family.outward_sign(position)
+    if sign:
+        return f"largest (smallest if {sign} = -1)", f"smallest (largest if {sign} = -1)"
+    return "largest", "smallest"
+
+
+def _reduction(family: Family, name: str) -> Reduced | None:
+    found = reduction_of(family, name)
+    if found is None:
+        return None
+    reduction, pose = found
+    if family.domain.kind not in reduction.domains:
+        raise InputError(
+            "output", name, f"no {reduction.name} over an {family.domain.kind} of the {family.domain.text}",
+            f"design outputs of {family.name}",
+        )  # fmt: skip
+    return Reduced(reduction.output(pose, family.domain), reduction, of=pose.name, stage=pose.stage)
+
+
+def output_names(family: Family) -> tuple[str, ...]:
+    """Return all design outputs worth listing:
+    the family's own, margins, limit positions, reductions of every pose output.
+    """
+    if isinstance(family, Machine):
+        dotted = [f"{m.name}.{name}" for m in family.members for name in output_names(m.family)]
+        own = [o.name for relation in family.relations for o in relation.outputs]
+        reductions = [f"{prefix}{name}" for name in own for prefix in prefixes(family.domain)]
+        events = [name for event in family.events for name in event_names(family, event)]
+        whole = [name for name in (*sizes(family), *boxes(family)) if "." not in name]
+        return (*dotted, *MARGIN_TEXTS, *whole, *(t.name for t in family.timings), *events, *reductions)
+    names = [o.name for step in family.steps for o in step.provides]
+    assemblies = family.every(Assembly)
+    if assemblies:
+        names += MARGIN_TEXTS
+    if isinstance(family, Chain):
+        names += [f"{o.name}1" for step in family.stages[0].family.steps for o in step.provides]
+        names += [f"{base}{loop.stage}" for loop in assemblies for base in MARGIN_TEXTS]
+    names += [name for position, stage in family.positions.items() for name in limit_names(family, position, stage)]
+    names += [name for event in family.events for name in event_names(family, event)]
+    names += [STAY.name] if isinstance(family.domain, Turn) else []
+    names += [SIZE.name] if lengths(family) else []
+    names += [*sizes(family), *boxes(family)]
+    names += [f"{prefix}{pose}" for pose in family.pose_names for prefix in prefixes(family.domain)]
+    return tuple(dict.fromkeys(names))
+
+
+def _unknown(family: Family, name: str) -> InputError:
+    """Make the error for a name that means nothing; a member's family speaks for its own names."""
+    of = without_minus(name)
+    if of:
+        return _unknown(family, of)
+    member = family.split(name) if isinstance(family, Machine) else None
+    if member is not None:
+        return _unknown(member[0].family, member[1])
+    return InputError("output", name, _known(family, name), f"design outputs of {family.name}")
+
+
+def _known(family: Family, name: str) -> str:
+    """Return words for an unknown name: what there is, and the nearest."""
+    names = output_names(family)
+    grammar = prefixes(family.domain)
+    special = ", ".join(n for n in names if not n.startswith(grammar))
+    words = f"{', '.join(f'{prefix}x' for prefix in grammar)} of a pose output x, or one of {special}"
+    of_effects = [o.name for o in offered(family)]
+    near = nearest(name, [*names, *of_effects, *(f"{prefix}{x}" for x in of_effects for prefix in grammar)])
+    if name in family.pose_names:
+        near = f"; {name} is one of a single pose, ask `evaluate`"
+    if name in BOXES and isinstance(family, Chain):
+        near = (
+            f"; {name} is one of a stage, as {name}1: the frames of several stages stand to each other in no known way"
+        )
+        near += ", of a machine's members they do"
+    if of_effects:
+        words += ", and those of effects (sweep effects)"
+    return words + (elsewhere(family, name) or near)

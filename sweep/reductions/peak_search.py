@@ -1,0 +1,350 @@
+"""The search behind `true_extrema`: samples, candidates, refinement and the best of them, block by block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels import status as st
+from kernels.curves import samples as scan
+from sweep.families.base import Array, Family
+from sweep.families.curve_features import Singular
+from sweep.numerics.singularities import Singularities
+from sweep.quantities.kinds import Request
+from sweep.reductions.breaks import jumps, level, near_jumps, search
+from sweep.reductions.refine import (
+    EPS,
+    SHRINK,
+    VARIES,
+    Peaks,
+    Sampler,
+    attained,
+    confirmed,
+    first_of_equals,
+    first_peaks,
+    polished,
+    sharpen,
+)
+from sweep.reductions.resolution import MATTERS, broken, denser, nearest
+from sweep.reductions.rounding import measure_constants, order_of, rounding_share, shaken, singular_share, tells
+from sweep.reductions.sampling import (
+    DESIGN_STATUS,
+    TWO_PI,
+    Extremum,
+    Index,
+    Mask,
+    Status,
+    discriminants,
+    pose_columns,
+    sample_turn,
+)
+from sweep.reductions.window import Window, edges
+
+START = 32  # samples of the first look
+LIMIT = 32768  # samples beyond which a design is given up as NOT_CONVERGED
+SHARE = 0.6  # a peak below this share of the best sample is not refined
+ROUGH = 0.1  # fourth difference of samples against their size, above which they do not resolve the curve
+PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
+BREAKING = 512  # samples from which on what is still rough may be a jump
+DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
+RIVALS = 1e-3  # peaks lower than the best by no more of its size may turn out the highest
+NEVER = 2**40  # more samples than are ever needed
+CLOSE = 0.1  # distance of a singularity [rad] from which on it is measured what rounding does
+TIE = 1e-10  # to which peaks are told apart where their places are wanted
+
+
+class Candidates(NamedTuple):
+    """Samples next to a possible extremum, each (k,): request, row of the block, column, sign that makes it large."""
+
+    request: Index
+    row: Index
+    column: Index
+    sign: Array
+
+    def only(self, which: Index | Mask) -> Candidates:
+        """Return some of them."""
+        return Candidates(self.request[which], self.row[which], self.column[which], self.sign[which])
+
+
+@dataclass
+class Search:
+    """The state of one search: what is found so far, and how many samples each design still needs."""
+
+    family: Family
+    designs: Array
+    requests: tuple[Request, ...]
+    target: float
+    locate: bool
+    anywhere: bool
+    window: Window | None
+    found: dict[Request, Extremum] = field(init=False)
+    status: Status = field(init=False)
+    undone: Index = field(init=False)
+    names: list[str] = field(init=False)
+    guards: list[str] = field(init=False)
+    near: Singularities | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.designs)
+        self.found = {request: Extremum.unknown(n) for request in self.requests}
+        self.status = np.zeros(n, np.uint8)
+        # Samples that each request still needs of each design; 0 once it is found.
+        self.near = nearest(self.family, self.designs, MATTERS) if self.family.every(Singular) else None
+        fewest = (START * denser(self.family, self.designs, self.near)).astype(np.int64)
+        self.undone = np.tile(fewest, (len(self.requests), 1))
+        if self.near is not None and not self.anywhere:
+            broken(self.family, self.designs, self.near, self.status)
+            self.undone[:, self.status != st.OK] = 0
+        # A discriminant is a smooth function whatever its sign; the motion is not where it vanishes.
+        self.guards = [] if self.anywhere else list(discriminants(self.family))
+        position = [self.family.position] if self.window is not None else []
+        self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
+
+    def needed(self, rows: Index) -> Index:
+        """Return the fewest samples that a request of these designs still needs, 0 where all are found."""
+        left = np.where(self.undone[:, rows] > 0, self.undone[:, rows], NEVER).min(axis=0, initial=NEVER)
+        fewest: Index = np.where(left < NEVER, left, 0)
+        return fewest
+
+    def places(self, number: Index) -> Mask:
+        """Return whether the crank angles of these requests are wanted."""
+        wanted: Mask = np.array([self.locate or request.place for request in self.requests], np.bool_)[number]
+        return wanted
+
+    def block(self, rows: Index, samples: int) -> None:
+        """Sample some designs, and refine those that the samples resolve."""
+        columns, worst, winds = sample_turn(self.family, self.designs[rows], samples, self.names)
+        if self.anywhere:
+            good = np.logical_and.reduce([np.isfinite(columns[name]).all(axis=1) for name in self.names])
+            self.status[rows] = np.where(good, st.OK, DESIGN_STATUS[worst])
+        else:
+            self.status[rows] = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst])
+            good = self.status[rows] == st.OK
+        self.undone[:, rows[~good]] = 0
+        if not good.all():
+            rows, columns = rows[good], {name: values[good] for name, values in columns.items()}
+        if not rows.size:
+            return
+        looked = (self.undone[:, rows] > 0) & (self.undone[:, rows] <= samples)
+        candidates, scales, needed, breaks = self._candidates(rows, columns, samples)
+        needed = np.maximum(needed, self._samples_by_singularity(columns, samples, rows.size))
+        resolved = looked & ((needed <= samples) | (samples == LIMIT))
+        candidates = candidates.only(resolved[candidates.request, candidates.row])
+        peaks = self._refine(rows, columns, samples, candidates, scales)
+        for number, request in enumerate(self.requests):
+            mine = candidates.request == number
+            row, found = candidates.row[mine], peaks.only(mine)
+            if self.window is not None and request.windowed:
+                row, found = self._within_window(rows, columns, request, row, found, resolved[number])
+            elif request in breaks:
+                floor = level(columns[request.pose], request.mode, SHARE)
+                between = breaks[request] & resolved[number][:, None]
+                row, found = self._beside_jumps(rows, samples, request, row, found, between, floor)
+            moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[request]
+            again = moved & resolved[number]
+            needed[number, again] = np.maximum(needed[number, again], 2 * samples)
+        # Everything is looked at with LIMIT samples before it is given up.
+        needed = np.minimum(needed, LIMIT if samples < LIMIT else 2 * LIMIT)
+        now = np.where(needed > samples, needed, 0)
+        self.undone[:, rows] = np.where(looked, now, self.undone[:, rows])
+
+    def _candidates(
+        self, rows: Index, columns: dict[str, Array], samples: int
+    ) -> tuple[Candidates, dict[Request, Array], Index, dict[Request, Mask]]:
+        """Return candidates of all requests, sizes and jumps of their curves,
+        samples needed by the look of the curves.
+        """
+        needed, pieces, scales, breaks = np.full((len(self.requests), rows.size), START), [], {}, {}
+        for number, request in enumerate(self.requests):
+            values = columns[request.pose]
+            allowed = None
+            if self.window is not None and request.windowed:
+                allowed = self.window.holds(rows, columns[self.family.position])
+                needed[number, self.window.grazed(rows, columns[self.family.position])] = 2 * samples
+            scale, rough = np.empty(rows.size), np.empty(rows.size)
+            row, column = (np.empty(rows.size * (samples // 2 + 1), np.int64) for _ in range(2))
+            count = scan.peaks(values, request.mode, SHARE, allowed, scale, rough, row, column)
+            row, column = row[:count], column[:count]
+            if request.mode != 0:
+                measure_constants(values, scale, rough)
+            if samples >= BREAKING and allowed is None and (rough > ROUGH).any():
+                between, smooth = jumps(values, scale, ROUGH)
+                between[~smooth] = False
+                rough[smooth] = 0.0
+                breaks[request] = between
+                away = ~near_jumps(between, row, column)
+                row, column, count = row[away], column[away], int(away.sum())
+            sign = np.sign(values[row, column]) if request.mode == 0 else np.full(count, float(request.mode))
+            pieces.append(Candidates(np.full(count, number), row, column, sign))
+            scales[request] = scale
+            needed[number, rough > ROUGH] = 2 * samples
+        joined = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
+        return Candidates(*joined), scales, needed, breaks
+
+    def _samples_by_singularity(self, columns: dict[str, Array], samples: int, count: int) -> Index:
+        distance = np.full(count, np.inf)
+        for name in self.guards:
+            one, largest = np.empty(count), columns[name].max(axis=1)
+            scan.nearest_singularity(columns[name], one)
+            distance = np.where(tells(largest), np.minimum(distance, one), distance)
+        # The first looks see a near zero only roughly: at most eight times as many samples at once.
+        wanted = np.minimum(PER_SINGULARITY / np.maximum(distance, 1e-300), 8.0 * samples)
+        samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
+        return samples_needed
+
+    def _refine(
+        self, rows: Index, columns: dict[str, Array], samples: int, candidates: Candidates, scales: dict[Request, Array]
+    ) -> Peaks:
+        number, row, column, sign = candidates
+        near = (column[:, None] + np.arange(-3, 4)) % samples
+        around, size = np.empty((row.size, 7)), np.empty(row.size)
+        for k, request in enumerate(self.requests):
+            mine = number == k
+            around[mine] = sign[mine, None] * columns[request.pose][row[mine, None], near[mine]]
+            size[mine] = scales[request][row[mine]]
+        spacing = TWO_PI / samples
+        # A quarter of what is allowed: the rest is for what precise poses may find.
+        tolerance: Array = 0.25 * self.target * size
+        centre = np.multiply(column, spacing, dtype=np.float64)
+        first = first_peaks(centre, np.full(row.size, spacing), around)
+        sample = self._sampler(self.family, rows, candidates, sign * around[:, 3])
+        place = np.where(self.places(number), self.target, np.inf)
+        peaks = sharpen(sample, first, tolerance, place)
+        share = self._rounding(rows, columns, candidates, self.guards)
+        if self.near is not None:
+            share += singular_share(self.near.only(rows[row]), peaks.phi, self._orders(candidates))
+        peaks = peaks._replace(err_height=peaks.err_height + share * np.abs(peaks.height))
+        if self.family.precise_poses is None:
+            # A quartic may say less than nothing of what touches zero; a value at a pose is one that there is.
+            return attained(sample, peaks, np.arange(row.size))
+        self._confirm(rows, columns, candidates, peaks, size, share)
+        return peaks
+
+    def _confirm(
+        self, rows: Index, columns: dict[str, Array], candidates: Candidates, peaks: Peaks, size: Array, share: Array
+    ) -> None:
+        """Replace the peaks that may be the highest by what the family's precise poses say of them.
+
+        ``share`` of a height is what rounding may have changed.
+        """
+        number, row, _, sign = candidates
+        windowed = np.array([request.windowed for request in self.requests])[number]  # which of them count, shows later
+        group, doubt = number * rows.size + row, peaks.err_height + RIVALS * size
+        lowest = np.full(len(self.requests) * rows.size, -np.inf)
+        np.maximum.at(lowest, group, peaks.height - doubt)
+        rivals = np.flatnonzero((peaks.height + doubt >= lowest[group]) | windowed)
+        group, tolerance = group[rivals], self.target * size[rivals]
+        # Which of several is the highest decides on the place.
+        located = self.places(number[rivals])
+        tied = (np.bincount(group, minlength=lowest.size)[group] > 1) & located
+        tolerance = np.where(tied, np.minimum(tolerance, TIE * size[rivals]), tolerance)
+        mine, peak = candidates.only(rivals), peaks.only(rivals)
+        sample = self._sampler(self.family.precise(), rows, mine, sign[rivals] * peak.height)
+        locate = np.full(rivals.size, np.inf)
+        # Without a derivative to polish it by, a place is no better than the rounding of the heights: precise ones.
+        bare = np.array([request.pose not in self.family.derivative_of for request in self.requests])[mine.request]
+        bare &= located
+        locate[bare] = self.target
+        peak.err_phi[bare] = np.maximum(peak.step, SHRINK**3 * peak.spacing)[bare]
+        peak = confirmed(sample, peak, tolerance, locate, share[rivals] * np.abs(peak.height))
+        # The first stage of a chain is given its exact input, those behind it a rounded one.
+        rounding = self._rounding(rows, columns, mine, self.guards[1:]) * np.abs(peak.height)
+        for column, found in zip(peaks, peak._replace(err_height=peak.err_height + rounding), strict=True):
+            column[rivals] = found
+
+    def _sampler(self, family: Family, rows: Index, candidates: Candidates, middle: Array) -> Sampler:
+        """Return measured values of candidates by the poses of ``family``,
+        angles continuous with the values ``middle``.
+        """
+        number, row, _, sign = candidates
+
+        def sample(active: Index, phi: Array) -> Array:
+            designs = rows[row[active]]
+            poses, status = pose_columns(family, self.designs[designs], phi, self.names)
+            if not self.anywhere:
+                bad = status != st.OK
+                hit = bad.any(axis=1)
+                self.status[designs[hit]] = DESIGN_STATUS[status[hit, bad[hit].argmax(axis=1)]]
+            out = np.empty(phi.shape)
+            for k, request in enumerate(self.requests):
+                mine = number[active] == k
+                values = poses[request.pose][mine]
+                if self.family.pose_output[request.pose].wraps:
+                    values = values + TWO_PI * np.rint((middle[active][mine, None] - values) / TWO_PI)
+                out[mine] = sign[active][mine, None] * values
+            return out
+
+        return sample
+
+    def _rounding(self, rows: Index, columns: dict[str, Array], candidates: Candidates, guards: list[str]) -> Array:
+        """Return the share of a value that rounding may have changed alike at neighbouring poses."""
+        given = self.designs[rows], columns, candidates.row, candidates.column
+        return rounding_share(self.family, *given, guards, self._orders(candidates))
+
+    def _orders(self, candidates: Candidates) -> Index:
+        """Return of which derivative each candidate is."""
+        orders = np.array([order_of(self.family, request.pose) for request in self.requests])
+        found: Index = orders[candidates.request]
+        return found
+
+    def _within_window(
+        self, rows: Index, columns: dict[str, Array], request: Request, row: Index, peaks: Peaks, resolved: Mask
+    ) -> tuple[Index, Peaks]:
+        """Drop the peaks outside the window; its edges are candidates too."""
+        assert self.window is not None
+        poses, _ = pose_columns(self.family, self.designs[rows[row]], peaks.phi[:, None], self.names)
+        inside = self.window.holds(rows[row], poses[self.family.position])[:, 0]
+        edge = edges(self.family, self.designs, rows, self.window, columns, request.pose)
+        edge = edge.only(resolved[edge.row])
+        height = np.abs(edge.values) if request.mode == 0 else request.mode * edge.values
+        none = np.zeros(edge.row.size)
+        added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height, none, none)
+        return np.concatenate([row[inside], edge.row]), peaks.only(inside).joined(added)
+
+    def _beside_jumps(
+        self, rows: Index, samples: int, request: Request, row: Index, peaks: Peaks, between: Mask, floor: Array
+    ) -> tuple[Index, Peaks]:
+        """Add the highest points of the arcs that end at a jump."""
+        at, column = np.nonzero(between)
+        if not at.size:
+            return row, peaks
+
+        def curve(phi: Array, which: Index) -> Array:
+            designs = self.designs[rows[at[which]]]
+            return pose_columns(self.family, designs, phi[:, None], [request.pose])[0][request.pose][:, 0]
+
+        def measured(phi: Array, which: Index) -> Array:
+            return np.abs(curve(phi, which)) if request.mode == 0 else request.mode * curve(phi, which)
+
+        arcs = search(curve, measured, column, samples, floor[at])
+        wide, none = np.full(arcs.phi.size, TWO_PI / samples), np.zeros(arcs.phi.size)
+        added = Peaks(arcs.phi, arcs.value, wide, arcs.err, arcs.value, none, none)
+        return np.concatenate([row, at, at]), peaks.joined(added)
+
+    def _keep_best(self, rows: Index, request: Request, row: Index, peaks: Peaks) -> Array:
+        """Store the best candidate of each row; by how much refinement moved it from the guess (0 where none)."""
+        best, which = np.full(rows.size, -np.inf), np.full(rows.size, -1)
+        scan.best_candidate(row, peaks.height, best, which)
+        has, found = which >= 0, self.found[request]
+        chosen = which[has]
+        found.value[rows[has]] = peaks.height[chosen] * (-1.0 if request.mode == -1 else 1.0)
+        err = peaks.err_height[chosen]
+        if self.near is not None and self.family.precise_poses is None:
+            close = np.flatnonzero(self.near.only(rows[has]).distance(peaks.phi[chosen]) < CLOSE)
+            if close.size:
+                designs, phi = self.designs[rows[has][close]], peaks.phi[chosen[close]]
+                err[close] += VARIES * shaken(self.family, designs, phi, request.pose)
+        found.err[rows[has]] = err
+        moved = np.zeros(rows.size)
+        moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
+        if self.family.precise_poses is None and (self.locate or request.place):
+            chosen = first_of_equals(row, peaks, chosen)
+        phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
+        slope = self.family.derivative_of.get(request.pose)
+        if (self.locate or request.place) and slope is not None and not request.windowed:
+            phi, err_phi = polished(self.family, self.designs[rows[has]], slope, phi, err_phi)
+        found.phi[rows[has]] = np.mod(phi, TWO_PI)
+        found.err_phi[rows[has]] = err_phi
+        return moved

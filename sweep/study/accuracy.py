@@ -1,0 +1,66 @@
+"""[accuracy]: a relative error of the extrema, or a grid of crank angles; and what is to be proven."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import Field, PlainValidator
+
+from sweep.errors import InputError
+from sweep.families.base import Accuracy, Family
+from sweep.reductions.steps import check_certifiable, proofs
+from sweep.study.file import Faults
+from sweep.study.section import Section
+
+DEFAULT_TARGET = 1e-8
+
+
+def _proofs(value: object) -> object:
+    # Not by the type: of a union of types pydantic reports each one's complaint.
+    if isinstance(value, bool) or (isinstance(value, list) and all(isinstance(name, str) for name in value)):
+        return value
+    raise ValueError("neither a truth value nor names")
+
+
+class AccuracySection(Section):
+    """Table [accuracy]."""
+
+    target: Annotated[float, Field(ge=1e-14, le=0.1)] | None = Field(None, description="a relative error, 1e-14 to 0.1")
+    samples: Annotated[int, Field(ge=8, le=2**20)] | None = Field(
+        None, description="a whole number of crank angles, 8 to 1048576"
+    )
+    certify: Annotated[bool | list[str], PlainValidator(_proofs, json_schema_input_type=bool | list[str])] = Field(
+        False, description="true or false, or a list of the wanted maxima to prove"
+    )
+
+
+def read_accuracy(section: AccuracySection, faults: Faults) -> Accuracy:
+    """Read how exact the extrema are to be."""
+    if section.target is not None and section.samples is not None:
+        faults.value(("accuracy", "samples"), section.samples, "either target or samples, not both")
+    if section.samples is not None:
+        if section.certify:
+            faults.value(("accuracy", "certify"), True, "false where samples is given: a grid proves nothing")
+        return Accuracy(samples=section.samples)
+    prove, proven = proofs(section.certify)
+    return Accuracy(target=DEFAULT_TARGET if section.target is None else section.target, certify=prove, proven=proven)
+
+
+def check_proofs(accuracy: Accuracy, family: Family, want: tuple[str, ...], *, window: bool, faults: Faults) -> None:
+    """Report wanted maxima that cannot be proven, in a study that has no other fault."""
+    if not accuracy.certify or faults.lines:
+        return
+    try:
+        check_certifiable(family, want, accuracy, window)
+    except InputError as error:
+        faults.value(("accuracy", "certify"), error.value, error.allowed)
+
+
+def accuracy_table(accuracy: Accuracy) -> dict[str, Any]:
+    """Write [accuracy] as a study file has it."""
+    table = {
+        "target": accuracy.target,
+        "samples": accuracy.samples,
+        "certify": list(accuracy.proven) or accuracy.certify,
+    }
+    return {key: value for key, value in table.items() if value is not None and value is not False}

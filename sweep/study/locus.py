@@ -1,0 +1,109 @@
+"""[locus]: limit positions of the first stage, from which its links follow, each given once, in its unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sweep.families.base import Family, Parameter
+from sweep.families.capabilities import LimitLocus
+from sweep.families.chain import Chain, stages_of
+from sweep.quantities.limits import Limit
+from sweep.study.file import Faults, StudyFile
+from sweep.study.parameter import Entry, missing_parameter, read_entry
+from sweep.study.space import Axis
+from sweep.synthesis import LOCI
+from sweep.synthesis.prescription import OnLocus
+
+WHOLE_TURN = 2.0 * np.pi * (1.0 - 1e-12)
+
+
+def read_locus(file: StudyFile, bare: Family) -> tuple[OnLocus | None, dict[str, Entry]]:
+    """Find the stage that [locus] is about, and its prescribed outputs as fixed values or axes."""
+    raw = file.free_table("locus")
+    locus = None if raw is None else _stage(bare, file.faults)
+    if raw is None or locus is None:
+        return None, {}
+    sampled = "sample" in (file.free_table("design") or {})
+    return locus, _prescribed(locus, raw, file.faults, sampled)
+
+
+def _stage(family: Family, faults: Faults) -> OnLocus | None:
+    first = stages_of(family)[0].family
+    if first.find(LimitLocus) is None:
+        known = tuple(dict.fromkeys(way.family for way in LOCI))
+        faults.value(("locus",), first.name, f"a mechanism that is or begins with {' or '.join(known)}")
+        return None
+    return OnLocus(first.name, "1" if isinstance(family, Chain) else "")
+
+
+def _prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled: bool) -> dict[str, Entry]:
+    """Read the prescribed outputs as fixed values or axes; faulty ones are reported and left out."""
+    known = [p.name for p in locus.prescribed]
+    ratio, phi0 = f"time_ratio{locus.number}", f"phi0{locus.number}"
+    known.insert(known.index(phi0) + 1, ratio)
+    for name in raw:
+        if name not in known:
+            told = {phi0, ratio} if {phi0, ratio} & set(raw) else set()  # one of both says it
+            faults.unknown(("locus", name), [k for k in known if k not in raw and k not in told] or known)
+    found: dict[str, Entry] = {}
+    for p in locus.prescribed:
+        if p.name == phi0 and ratio in raw:
+            angle = _angle_of_ratio(phi0, raw, ratio, faults, sampled)
+            found |= {} if angle is None else {phi0: angle}
+            continue
+        if p.name not in raw:
+            instead = ratio if p.name == phi0 else ""
+            other = f"; or {ratio}, the time there over the time back, as 1.1" if instead else ""
+            faults.missing(("locus", p.name), missing_parameter(p) + other, instead=instead)
+            continue
+        entry = read_entry(p, raw[p.name], ("locus", p.name), faults, sampled)
+        if entry is None:
+            continue
+        wrong = locus.allowed(p.name, _values(entry))
+        if wrong is not None:
+            faults.value(("locus", p.name), raw[p.name], wrong)
+        found[p.name] = entry
+    return found
+
+
+def _angle_of_ratio(phi0: str, raw: Mapping[str, Any], ratio: str, faults: Faults, sampled: bool) -> Entry | None:
+    """Read phi0 from the ratio of the times of both strokes, phi0/(2 pi - phi0), the crank turning evenly."""
+    key = ("locus", ratio)
+    if phi0 in raw:
+        faults.value(key, raw[ratio], f"{phi0} or {ratio}, not both: they say the same")
+        return None
+    text = "time from the extended to the folded position over the time back"
+    entry = read_entry(Parameter(ratio, "ratio", text, positive=True), raw[ratio], key, faults, sampled)
+    if entry is None or not isinstance(entry, Axis):
+        return None if entry is None else float(_angle(entry))
+    if entry.values is None:
+        return Axis.sampled(phi0, (float(_angle(entry.low)), float(_angle(entry.high))), "rad")
+    return Axis.listed(phi0, _angle(entry.values), "rad")
+
+
+def _angle(ratio: Any) -> Any:
+    return 2.0 * np.pi * ratio / (1.0 + ratio)
+
+
+def prescribed_limits(entries: Mapping[str, Entry]) -> tuple[Limit, ...]:
+    """Give what is prescribed as limits: values as equations, axes as bounds.
+
+    What is swept over a whole turn has none.
+    """
+    found = []
+    for name, entry in entries.items():
+        ends = _values(entry)
+        if isinstance(entry, Axis) and float(np.ptp(ends)) >= WHOLE_TURN:
+            continue
+        sizes = np.abs(ends)
+        found.append(Limit(name, float(sizes.min()), float(sizes.max())))
+    return tuple(found)
+
+
+def _values(entry: Entry) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    if not isinstance(entry, Axis):
+        return np.array([entry])
+    return np.array([entry.low, entry.high]) if entry.values is None else np.asarray(entry.values)

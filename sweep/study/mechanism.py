@@ -1,0 +1,236 @@
+"""[mechanism], or [machine] and [relations]: what the study is about, and what its members are to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from sweep.errors import InputError, closest, nearest
+from sweep.families import NAMES
+from sweep.families import family as find_family
+from sweep.families.base import Family
+from sweep.families.specification import Specification, specification
+from sweep.study import units
+from sweep.study.file import Faults, Key, StudyFile
+from sweep.study.section import Number, Section, read_section
+
+Names = Annotated[list[str], Field(min_length=1)]
+Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
+ThreeTexts = Annotated[list[str], Field(min_length=3, max_length=3)]
+
+# Tables in which a member's own entries may stand in a table of the member's name.
+BY_MEMBER = (("design",), ("bodies",), ("loads",), ("limits",), ("reference", "design"))
+
+
+class MechanismSection(Section):
+    """Table [mechanism]."""
+
+    family: str | None = Field(None, description="the name of a family")
+    chain: Annotated[list[str], Field(min_length=1)] | None = Field(None, description="a list of names of families")
+
+
+class PlaceTable(Section):
+    """Table ``machine.<member>.place``."""
+
+    at: ThreeTexts | None = Field(None, description='three lengths, as ["0 mm", "30 mm", "12 mm"]')
+    axis: Three | None = Field(None, description="a direction [x, y, z]: the member's z")
+    zero: Three | None = Field(None, description="a direction [x, y, z]: the member's x")
+
+
+class MemberSection(Section):
+    """Table ``machine.<member>``."""
+
+    family: str | None = Field(None, description="the name of a family")
+    chain: Names | None = Field(None, description="a list of names of families")
+    ratio: int | None = Field(None, description="a whole number of turns of its crank for one of what drives it, not 0")
+    offset: str | None = Field(None, description='an angle with its unit, as "180 deg"')
+    driver: str | None = Field(None, description='"shaft", or an angle of an earlier member, as "needle.psi1"')
+    place: PlaceTable | None = Field(None, description="{ at = [...], axis = [...], zero = [...] }")
+    tip: ThreeTexts | None = Field(
+        None, description='three lengths along, across, along the axis, as ["30 mm", "0 mm", "2 mm"]'
+    )
+    eye: ThreeTexts | None = Field(
+        None, description='three lengths along the coupler, across it, along its axes, as ["30 mm", "0 mm", "0 mm"]'
+    )
+
+
+class RelationSection(Section):
+    """Table ``relations.<name>``."""
+
+    distance: Names | None = Field(None, description='two points, as ["needle.point", "looper.tip"]')
+    timing: Names | None = Field(None, description='two crank angles, as ["needle.phi_ext", "phi_min_clearance"]')
+    speed: Names | None = Field(None, description='one or two points, as ["looper.tip"]')
+    event: str | None = Field(None, description='a pose output, as "clearance" or "looper.tip_x"')
+    level: str | Number | None = Field(None, description='what it passes, in its unit, as "1 mm"; 0 if left out')
+    rising: bool | None = Field(None, description="true or false: whether it passes upwards; true if left out")
+    value: Names | None = Field(None, description='a pose output and a crank angle, as ["pace", "phi_arrive"]')
+    torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
+    shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
+
+
+def flattened(data: Mapping[str, Any], members: object) -> dict[str, Any]:
+    """Put the members' entries under dotted names: ``[design.needle] a1`` becomes ``design."needle.a1"``."""
+    result = dict(data)
+    if not isinstance(members, dict):
+        return result
+    for key in BY_MEMBER:
+        _flatten(result, key, members)
+    return result
+
+
+def _flatten(data: dict[str, Any], key: tuple[str, ...], members: Mapping[str, Any]) -> None:
+    table = data.get(key[0])
+    if not isinstance(table, dict):
+        return
+    if len(key) > 1:
+        data[key[0]] = dict(table)
+        _flatten(data[key[0]], key[1:], members)
+        return
+    flat: dict[str, Any] = {}
+    for name, entry in table.items():
+        if name in members and isinstance(entry, dict):
+            flat |= {f"{name}.{own}": value for own, value in entry.items()}
+        else:
+            flat[name] = entry
+    data[key[0]] = flat
+
+
+def read_mechanism(
+    section: MechanismSection, file: StudyFile, threads: Mapping[str, dict[str, Any]]
+) -> tuple[tuple[str, ...] | Specification, Family] | None:
+    """Read the mechanism as the study names it, and its family without effects; None with its faults.
+
+    Parameters
+    ----------
+    section : [mechanism]
+    threads : of a machine, as relations
+    """
+    data, faults = file.data, file.faults
+    if "machine" not in file:
+        if "mechanism" not in file:
+            faults.missing(("mechanism",), "a table [mechanism]")
+        if "relations" in file:
+            faults.value(("relations",), data["relations"], "nothing here: relations are those of a [machine]")
+        names = _families(section, data, faults)
+        family = _family(names, data, faults)
+        return None if family is None else (names, family)
+    if "mechanism" in file:
+        faults.value(("mechanism",), data["mechanism"], "either [mechanism] or [machine.NAME], not both")
+    for table in ("locus", "fit"):
+        if table in file:
+            faults.value((table,), data[table], "nothing here: it finishes the links of a [mechanism] alone")
+    return _machine(data, faults, threads)
+
+
+def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults) -> tuple[str, ...]:
+    raw = data.get("mechanism")
+    if isinstance(raw, dict) and "family" in raw and "chain" in raw:
+        faults.value(("mechanism", "chain"), raw["chain"], "either family or chain, not both")
+    if isinstance(raw, dict) and "family" not in raw and "chain" not in raw:
+        faults.missing(("mechanism", "family"), f"one of {', '.join(NAMES)}; or chain, a list of them", instead="chain")
+    if section.family is not None:
+        return (section.family,)
+    return tuple(section.chain or ())
+
+
+def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> Family | None:
+    """Return the mechanism, or None with a fault for each unknown name, or for a chain that cannot be.
+
+    A misspelt family is a fault, but the rest is checked against the nearest one, so that no second round is needed.
+    """
+    single = "family" in data.get("mechanism", {}) if names else False
+    unknown = [k for k, name in enumerate(names) if name not in NAMES]
+    for k in unknown:
+        key: Key = ("mechanism", "family") if single else ("mechanism", "chain", k)
+        faults.value(key, names[k], f"one of {', '.join(NAMES)}{nearest(names[k], NAMES)}")
+    guessed = tuple(closest(name, NAMES) if name not in NAMES else name for name in names)
+    if not guessed or None in guessed:
+        return None
+    try:
+        return find_family([name for name in guessed if name is not None])
+    except InputError as error:
+        faults.value(("mechanism", "chain"), list(names), error.allowed)
+        return None
+
+
+def _machine(
+    data: Mapping[str, Any], faults: Faults, threads: Mapping[str, dict[str, Any]]
+) -> tuple[Specification, Family] | None:
+    """Read the machine of a file with its threads, or None with its faults."""
+    before = len(faults.lines)
+    tables = _tables(data, "machine", faults)
+    members = {name: _member(name, raw, faults) for name, raw in tables.items()}
+    relations = {}
+    for name, raw in _tables(data, "relations", faults).items():
+        section = read_section(RelationSection, raw, ("relations", name), faults)
+        relations[name] = section.model_dump(exclude_none=True)
+    for name, thread in threads.items():
+        if name in relations:
+            faults.value(("thread", name), thread, "a name that no relation has")
+        relations[name] = thread
+    if len(faults.lines) > before:
+        return None
+    try:
+        plain = {name: table for name, table in relations.items() if not {"event", "value"} & set(table)}
+        outputs = find_family(specification(members, plain)).pose_output if len(plain) < len(relations) else {}
+        for name, table in relations.items():
+            if "level" in table and (of := outputs.get(table.get("event", ""))) is not None:
+                table["level"] = _level(table["level"], units.internal_unit(of.unit), name, faults)
+        if len(faults.lines) > before:
+            return None
+        given = specification(members, relations)
+        return given, find_family(given)
+    except InputError as error:
+        place: Key = tuple(error.place.removeprefix("machine.").split(".")) if error.place != "machine" else ()
+        if place[:1] == ("relations",) and place[1:] and place[1] in threads:
+            faults.value(("thread", place[1], _key_of_thread(error)), error.value, error.allowed)
+            return None
+        key: Key = place if place[:1] == ("relations",) else ("machine", *place)
+        faults.value(key if place[:1] == ("relations",) else (*key, error.name), error.value, error.allowed)
+        return None
+
+
+def _key_of_thread(error: InputError) -> str:
+    """Report a fault of the path as one of its key in the file."""
+    return "path" if error.name == "thread" or error.place.endswith(".thread") else error.name
+
+
+def _level(given: str | float, internal: str, name: str, faults: Faults) -> float:
+    """Return the level of an event in the internal unit of its output; a bare number only where there is no unit."""
+    key: Key = ("relations", name, "level")
+    if isinstance(given, str):
+        return faults.number(given, internal, key) or 0.0
+    if internal != "1":
+        faults.value(key, given, f"a text with number and unit: {units.example(internal)}")
+    return given
+
+
+def _tables(data: Mapping[str, Any], name: str, faults: Faults) -> dict[str, Any]:
+    raw = data.get(name, {})
+    if not isinstance(raw, dict):
+        faults.value((name,), raw, f"tables [{name}.NAME]")
+        return {}
+    return raw
+
+
+def _member(name: str, raw: object, faults: Faults) -> dict[str, Any]:
+    key: Key = ("machine", name)
+    section = read_section(MemberSection, raw, key, faults)
+    found: dict[str, Any] = section.model_dump(exclude_none=True, exclude={"offset", "place", "tip", "eye"})
+    if section.offset is not None:
+        found["offset"] = faults.number(section.offset, "rad", (*key, "offset")) or 0.0
+    for name, texts in (("tip", section.tip), ("eye", section.eye)):
+        if texts is not None:
+            found[name] = _lengths(texts, (*key, name), faults)
+    if section.place is not None:
+        place: dict[str, Any] = section.place.model_dump(exclude_none=True, exclude={"at"})
+        if section.place.at is not None:
+            place["at"] = _lengths(section.place.at, (*key, "place", "at"), faults)
+        found["place"] = place
+    return found
+
+
+def _lengths(texts: list[str], key: Key, faults: Faults) -> list[float]:
+    return [faults.number(text, "mm", (*key, k)) or 0.0 for k, text in enumerate(texts)]

@@ -1,0 +1,189 @@
+"""One parameter as a study file writes it: a value, a list of values or a range, in its unit and within its range."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import Field
+
+from sweep.families.base import Parameter
+from sweep.study import units
+from sweep.study.file import Faults, Key
+from sweep.study.section import Count, Number, Section, read_section
+from sweep.study.space import Axis
+
+Entry: TypeAlias = Axis | float
+
+
+class RangeEntry(Section):
+    """Entry ``design.x = { from, to, count, unit, scale }``."""
+
+    required = ("from", "to")
+    low: Number | None = Field(None, alias="from", description="a finite number, its unit in the key unit")
+    high: Number | None = Field(None, alias="to", description="a finite number, its unit in the key unit")
+    count: Count | None = Field(None, description="a whole number, 1 to 1000000")
+    unit: str | None = Field(None, description='a unit as a text, as "mm"')
+    scale: Literal["linear", "log"] = Field("linear", description='"linear" or "log"')
+
+
+class ListEntry(Section):
+    """Entry ``design.x = { values, unit }``."""
+
+    values: Annotated[list[Number], Field(min_length=1, max_length=1_000_000)] | None = Field(
+        None, description="a list of 1 to 1000000 finite numbers, their unit in the key unit"
+    )
+    unit: str | None = Field(None, description='a unit as a text, as "mm"')
+
+
+class FixedEntry(Section):
+    """Entry ``design.x = { value, unit }``."""
+
+    value: Number | None = Field(None, description="a finite number, its unit in the key unit")
+    unit: str | None = Field(None, description='a unit as a text, as "mm"')
+
+
+@dataclass(frozen=True)
+class _Written:
+    """Read a parameter as written: its unit and the factor to the internal one."""
+
+    unit: str
+    factor: float
+
+
+def missing_parameter(p: Parameter) -> str:
+    """Say what is needed where a parameter is missing: its meaning and the right ways to write it."""
+    return f"{p.text}: {forms(p)}, or an axis {_axis_form(p)}"
+
+
+def read_entry(p: Parameter, raw: object, key: Key, faults: Faults, sampled: bool) -> Entry | None:
+    """Read a parameter as written: a value [mm, rad], an axis, or None if it is faulty."""
+    before = len(faults.lines)
+    entry: Entry | None
+    if not isinstance(raw, dict):
+        entry = _read_plain(p, raw, key, faults)
+    elif "values" in raw:
+        entry = _read_list(p, raw, key, faults)
+    elif "value" in raw:
+        entry = _read_fixed(p, raw, key, faults)
+    else:
+        entry = _read_range(p, raw, key, faults, sampled)
+    return entry if len(faults.lines) == before else None
+
+
+def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | None:
+    internal = units.internal_unit(p.unit)
+    if isinstance(raw, str) and internal != "1":
+        value = faults.number(raw, internal, key)
+        return None if value is None else _checked(p, units.split(raw, internal)[0], value, key, faults)
+    if isinstance(raw, list):
+        faults.value(key, raw, _list_form(p))
+        return None
+    bare = raw if isinstance(raw, (int, float)) and not isinstance(raw, bool) else None
+    if bare is None or internal != "1":
+        # A whole number may have more digits than a float has room for.
+        shown = bare if bare is not None and abs(bare) <= units.LARGEST else None
+        faults.value(key, raw, forms(p, shown))
+        return None
+    return _read_fixed(p, {"value": raw}, key, faults)
+
+
+def _read_fixed(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -> float | None:
+    entry = read_section(FixedEntry, raw, key, faults)
+    written = _unit(p, entry.unit, raw, key, faults)
+    if entry.value is None or written is None:
+        return None
+    return _checked(p, entry.value, entry.value * written.factor, key, faults)
+
+
+def _read_list(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -> Axis | None:
+    entry = read_section(ListEntry, raw, key, faults)
+    written = _unit(p, entry.unit, raw, key, faults)
+    if entry.values is None:
+        return None
+    seen: set[float] = set()
+    for k, value in enumerate(entry.values):
+        _checked(p, value, value, (*key, "values", k), faults)
+        if value in seen:
+            faults.value((*key, "values", k), value, "every value once")
+        seen.add(value)
+    if written is None:
+        return None
+    return Axis.listed(p.name, entry.values, written.unit, written.factor)
+
+
+def _read_range(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults, sampled: bool) -> Axis | None:
+    if p.choices is not None:
+        faults.value(key, raw, forms(p))
+        return None
+    before = len(faults.lines)
+    entry = read_section(RangeEntry, raw, key, faults)
+    written = _unit(p, entry.unit, raw, key, faults)
+    low, high = entry.low, entry.high
+    if sampled and "count" in raw:
+        faults.value((*key, "count"), raw["count"], "no count beside design.sample, which draws from the range")
+    if not sampled and "count" not in raw:
+        faults.missing((*key, "count"), "a whole number of values, 1 or greater (or design.sample)")
+    if low is not None:
+        _checked(p, low, low, (*key, "from"), faults)
+        if entry.scale == "log" and low <= 0.0:
+            faults.value((*key, "from"), low, 'a positive number on a scale = "log"')
+    if low is not None and high is not None and not low < high:
+        faults.value((*key, "to"), high, f"a number greater than from = {low:g}")
+    if len(faults.lines) > before or low is None or high is None or written is None:
+        return None
+    if sampled:
+        return Axis.sampled(p.name, (low, high), written.unit, written.factor, entry.scale)
+    return Axis.lattice(p.name, (low, high), entry.count or 1, written.unit, written.factor, entry.scale)
+
+
+def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faults: Faults) -> _Written | None:
+    internal = units.internal_unit(p.unit)
+    if unit is None:
+        if internal == "1":
+            return _Written("1", 1.0)
+        if "unit" not in raw:
+            faults.missing((*key, "unit"), f'{units.example(internal)}, as unit = "{_usual(internal)}"')
+        return None
+    factor = faults.factor(unit, internal, (*key, "unit"))
+    return None if factor is None else _Written(unit, factor)
+
+
+def _checked(p: Parameter, written: float, value: float, key: Key, faults: Faults) -> float:
+    if p.sign and (math.isnan(value) or p.wrong_sign(value)):
+        faults.value(key, written, f"a {p.sign} {p.unit} ({p.text})")
+    if p.choices is not None and value not in p.choices:
+        faults.value(key, written, p.choice)
+    return float(value)
+
+
+def _usual(internal: str) -> str:
+    """Name the unit a designer writes where the internal one is given."""
+    return {"rad": "deg", "t": "kg", "t*mm^2": "kg*mm^2", "rad/s": "rpm", "N*mm*s": "N*m/rpm"}.get(internal, internal)
+
+
+def forms(p: Parameter, number: object = None) -> str:
+    """Show the right ways to write a fixed value of this parameter."""
+    if p.choices is not None:
+        return f"{p.choice}, or {{ values = {[int(c) for c in p.choices]} }}"
+    internal = units.internal_unit(p.unit)
+    if internal == "1":
+        return "a number"
+    shown = 40.0 if number is None else number
+    usual = _usual(internal)
+    article = "an" if p.unit == "angle" else "a"
+    return f'{article} {p.unit} with its unit, as "{shown} {usual}" or {{ value = {shown}, unit = "{usual}" }}'
+
+
+def _list_form(p: Parameter) -> str:
+    """Show the right way to write several values of this parameter."""
+    internal = units.internal_unit(p.unit)
+    return "{ values = [...] }" if internal == "1" else f'{{ values = [...], unit = "{_usual(internal)}" }}'
+
+
+def _axis_form(p: Parameter) -> str:
+    internal = units.internal_unit(p.unit)
+    unit = "" if internal == "1" else f', unit = "{_usual(internal)}"'
+    return f"{{ from = ..., to = ..., count = ...{unit} }}"

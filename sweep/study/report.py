@@ -1,0 +1,77 @@
+"""[study] and [report]: name, title and question of the study, and figures and curves of its report."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Annotated
+
+from pydantic import Field
+
+from sweep.errors import nearest
+from sweep.families.base import Family
+from sweep.study.file import StudyFile
+from sweep.study.section import Number, Section, missing_keys
+
+
+class StudySection(Section):
+    """Table [study]."""
+
+    required = ("name",)
+    name: str | None = Field(
+        None, pattern="^[a-z0-9][a-z0-9-]*$", max_length=64, description="a plain word of a-z, 0-9 and '-'"
+    )
+    title: str = Field("", description="a text")
+    question: str = Field("", description="a text")
+
+
+class CurveTable(Section):
+    """Table ``report.curves``."""
+
+    required = ("label", "x", "y", "points")
+    label: str | None = Field(None, description="a text")
+    x: str | None = Field(None, description="the name of a swept parameter")
+    y: str | None = Field(None, description="the name of a swept parameter")
+    points: Annotated[list[Annotated[list[Number], Field(min_length=2, max_length=2)]], Field(min_length=2)] | None = (
+        Field(None, description="a list of two or more points [x, y] in the units of the two axes")
+    )
+
+
+class FigureTable(Section):
+    """Table ``report.figures``."""
+
+    required = ("file", "title", "caption")
+    file: str | None = Field(None, description="the name of an SVG file without a folder")
+    title: str | None = Field(None, description="a text")
+    caption: str | None = Field(None, description="a text")
+
+
+class ReportSection(Section):
+    """Table [report]."""
+
+    curves: list[CurveTable] = Field(
+        [], description='a list of { label = "...", x = "k", y = "a", points = [[1, 1], [9, 9]] }'
+    )
+    figures: list[FigureTable] = Field(
+        [], description='a list of { file = "atlas.svg", title = "...", caption = "..." }'
+    )
+
+
+def check_report(report: ReportSection, file: StudyFile, family: Family, prescribed: Iterable[str]) -> None:
+    """Report incomplete figures, and curves over other parameters than those of the study.
+
+    ``prescribed`` are the outputs that [locus] prescribes.
+    """
+    faults, known = file.faults, family.parameter_names
+    given = [name for table in ("design", "bodies", "loads") for name in file.free_table(table) or ()]
+    parameters = [*prescribed, *(name for name in given if name in known)]
+    for k, figure in enumerate(report.figures):
+        missing_keys(FigureTable, figure.model_fields_set, ("report", "figures", k), faults)
+        if figure.file is not None and not re.fullmatch(r"[\w-]+\.svg", figure.file):
+            faults.value(("report", "figures", k, "file"), figure.file, "letters, digits, - and _, ending in .svg")
+    for k, curve in enumerate(report.curves):
+        missing_keys(CurveTable, curve.model_fields_set, ("report", "curves", k), faults)
+        for key, axis in (("x", curve.x), ("y", curve.y)):
+            if axis is not None and axis not in parameters:
+                allowed = f"one of {', '.join(parameters)}{nearest(axis, parameters)}"
+                faults.value(("report", "curves", k, key), axis, allowed)

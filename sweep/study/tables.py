@@ -1,0 +1,105 @@
+"""The tables of a study file: what each is about, and the models of those whose keys are fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sweep.study.accuracy import AccuracySection
+from sweep.study.design import ReferenceSection
+from sweep.study.file import StudyFile
+from sweep.study.fit import FitSection
+from sweep.study.loads import CurveSection
+from sweep.study.mechanism import MechanismSection, MemberSection, RelationSection
+from sweep.study.objective import ObjectiveSection
+from sweep.study.optimise import OptimiseSection
+from sweep.study.output import BudgetSection, OutputSection
+from sweep.study.pareto import ParetoSection
+from sweep.study.report import ReportSection, StudySection
+from sweep.study.scene import SceneSection
+from sweep.study.section import Section, read_table
+from sweep.study.thread import ThreadSection
+from sweep.study.tolerance import ToleranceSection
+
+REQUIRED_TABLES = ("study", "design")
+
+
+@dataclass(frozen=True)
+class Table:
+    """What a table is about, its model, and the model of what stands under each name in it."""
+
+    about: str
+    model: type[Section] | None = None
+    each: type[Section] | None = None
+
+
+MACHINE = "Members on one main shaft, and what they are to each other."
+DESIGNS = "The designs of the study, and one design to compare them with."
+INPUTS = "What the effects of a scene ask for besides the mechanism, and loads over the turn."
+COSTS = "What is stored, and what a run may cost."
+
+# In the order in which messages and the schema list them.
+TABLES: Mapping[str, Table] = {
+    "study": Table("Name, title and question.", StudySection),
+    "mechanism": Table("What the study is about.", MechanismSection),
+    "machine": Table(MACHINE, each=MemberSection),
+    "relations": Table(MACHINE, each=RelationSection),
+    "thread": Table(
+        "The threads of a machine, each from its tensioner over points and take-ups to the stitch.", each=ThreadSection
+    ),
+    "scene": Table("Speed, wanted design outputs and the window of the stroke.", SceneSection),
+    "design": Table(DESIGNS),
+    "bodies": Table(INPUTS),
+    "loads": Table(INPUTS, each=CurveSection),
+    "locus": Table("Limit positions of the first stage, from which its links follow."),
+    "fit": Table("The line that a guided point is fitted to.", FitSection),
+    "limits": Table("Bounds of design outputs and of parameters."),
+    "objective": Table("The design output to be made small, or large.", ObjectiveSection),
+    "accuracy": Table(
+        "A relative error of the extrema, or a grid of crank angles; and what is to be proven.", AccuracySection
+    ),
+    "optimise": Table("How the optimiser searches.", OptimiseSection),
+    "task": Table("A task of the engineering method, whose mechanisms are where the study's search begins."),
+    "pareto": Table("A second output and the bounds on it, each given once, in its unit.", ParetoSection),
+    "tolerance": Table("How far the lengths and angles of a mechanism that is made may be off.", ToleranceSection),
+    "reference": Table(DESIGNS, ReferenceSection),
+    "output": Table(COSTS, OutputSection),
+    "budget": Table(COSTS, BudgetSection),
+    "report": Table("Figures and curves of the report.", ReportSection),
+}
+
+
+@dataclass(frozen=True)
+class Sections:
+    """The tables of a file as their models read them; of a table that it does not have all defaults."""
+
+    study: StudySection
+    mechanism: MechanismSection
+    scene: SceneSection
+    fit: FitSection
+    objective: ObjectiveSection
+    accuracy: AccuracySection
+    optimise: OptimiseSection
+    pareto: ParetoSection
+    tolerance: ToleranceSection
+    reference: ReferenceSection
+    output: OutputSection
+    budget: BudgetSection
+    report: ReportSection
+
+
+def read_sections(file: StudyFile) -> Sections:
+    """Read the shape of every table; unknown and missing tables, unknown keys and wrong values are reported."""
+    for name in file.data:
+        if name not in TABLES:
+            file.faults.unknown((name,), [table for table in TABLES if table not in file], "table")
+    for name in REQUIRED_TABLES:
+        if name not in file:
+            file.faults.missing((name,), f"a table [{name}]")
+    for name in ("design", "bodies", "loads", "locus", "limits"):
+        file.free_table(name)
+    read: dict[str, Any] = {
+        name: read_table(table.model, name, file) for name, table in TABLES.items() if table.model is not None
+    }
+    return Sections(**read)

@@ -1,0 +1,107 @@
+"""[thread]: the threads of a machine, each from its tensioner over points and take-ups to the stitch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, PlainValidator
+
+from sweep.study.file import Faults, Key, StudyFile
+from sweep.study.section import Number, Section, missing_keys, read_section
+
+PLACES = 'a list of places, as ["lever", ["10 mm", "0 mm", "40 mm"], "needle.point"]'
+
+
+def _places(value: object) -> object:
+    if isinstance(value, list) and all(isinstance(x, str) or _is_point(x) for x in value):
+        return value
+    raise ValueError("no places")
+
+
+def _is_point(value: object) -> bool:
+    return isinstance(value, list) and len(value) == 3 and all(isinstance(x, str) for x in value)
+
+
+def _texts(value: object) -> object:
+    if isinstance(value, str) or (isinstance(value, list) and all(isinstance(x, str) for x in value)):
+        return value
+    raise ValueError("no texts")
+
+
+class AllowedTable(Section):
+    """Table ``thread.<name>.allowed``."""
+
+    required = ("phi", "values", "unit")
+    phi: Annotated[list[Number], Field(min_length=2)] | None = Field(
+        None, description="a list of rising angles of the main shaft within one turn, in the unit of angle"
+    )
+    angle: str = Field("deg", description='the unit of the angles, as "deg"')
+    values: Annotated[list[Number], Field(min_length=2)] | None = Field(
+        None, description="a list of numbers: the most surplus at each angle"
+    )
+    unit: str | None = Field(None, description='a unit as a text, as "mm"')
+
+
+class ThreadSection(Section):
+    """Table ``thread.<name>``."""
+
+    required = ("path",)
+    path: Annotated[list[Any], PlainValidator(_places)] | None = Field(None, description=PLACES)
+    stock: str | None = Field(None, description='a length as a text, as "120 mm"')
+    tension: str | None = Field(None, description='a force as a text, as "20 gf" or "0.2 N"')
+    stiffness: str | None = Field(None, description='a force over a length as a text, as "50 gf/mm" or "0.5 N/mm"')
+    radius: Annotated[str | list[str], PlainValidator(_texts)] | None = Field(
+        None, description='a length as a text, as "0.5 mm", or a list of one for each bend'
+    )
+    allowed: AllowedTable | None = Field(None, description='{ phi = [...], values = [...], unit = "mm" }')
+
+
+def read_threads(file: StudyFile) -> dict[str, dict[str, Any]]:
+    """Read the threads as relations of the machine, in internal units."""
+    faults, raw = file.faults, file.data.get("thread", {})
+    found: dict[str, dict[str, Any]] = {}
+    if raw and "machine" not in file:
+        faults.value(("thread",), raw, "nothing here: it needs a [machine], over whose members the thread runs")
+    elif not isinstance(raw, dict):
+        faults.value(("thread",), raw, "tables [thread.NAME]")
+    else:
+        for name, table in raw.items():
+            before = len(faults.lines)
+            section = read_section(ThreadSection, table, ("thread", name), faults)
+            relation = _relation(section, ("thread", name), faults)
+            if len(faults.lines) == before:
+                found[name] = relation
+    return found
+
+
+def _relation(section: ThreadSection, key: Key, faults: Faults) -> dict[str, Any]:
+    found: dict[str, Any] = {"thread": [_place(x, (*key, "path", k), faults) for k, x in enumerate(section.path or [])]}
+    for name, internal in (("stock", "mm"), ("tension", "N"), ("stiffness", "N/mm")):
+        text = getattr(section, name)
+        if text is not None:
+            found[name] = faults.number(text, internal, (*key, name)) or 0.0
+    radius = section.radius
+    if radius is not None:
+        each = [radius] if isinstance(radius, str) else radius
+        numbers = [faults.number(text, "mm", (*key, "radius")) or 0.0 for text in each]
+        found["radius"] = numbers[0] if isinstance(radius, str) else numbers
+    if section.allowed is not None:
+        found["allowed"] = _allowed(section.allowed, (*key, "allowed"), faults)
+    return found
+
+
+def _allowed(table: AllowedTable, key: Key, faults: Faults) -> dict[str, list[float]]:
+    missing_keys(AllowedTable, table.model_fields_set, key, faults)
+    columns = {}
+    for name, unit, internal in (("phi", table.angle, "rad"), ("values", table.unit or "mm", "mm")):
+        factor = faults.factor(unit, internal, (*key, "angle" if name == "phi" else "unit"))
+        columns[name] = ((factor or 1.0) * np.array(getattr(table, name) or (), np.float64)).tolist()
+    return columns
+
+
+def _place(given: str | Sequence[str], key: Key, faults: Faults) -> str | list[float]:
+    if isinstance(given, str):
+        return given
+    return [faults.number(text, "mm", (*key, k)) or 0.0 for k, text in enumerate(given)]

@@ -1,0 +1,94 @@
+"""Largest known errors of the oracle tables, by table, quantity and kind of row: ``python -m tests.bench.factors``.
+
+Writes docs/accuracy/factors.md; tests/families/test_hard_oracle.py holds every figure to what its sheet allows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from studies.accuracy.tables import pipe_table, prose
+from studies.accuracy.tables import significant as sig
+from tests.support.oracle_factors import factors
+from tests.support.sixty_digits import ORDERS
+
+ROOT = Path(__file__).resolve().parents[2]
+ORACLE = ROOT / "tests" / "oracle"
+PAGE = ROOT / "docs" / "accuracy" / "factors.md"
+
+
+def main() -> None:
+    """Judge every table and write the page."""
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.factors", description=__doc__)
+    parser.add_argument("--out", type=Path, default=PAGE, help="the page")
+    out: Path = parser.parse_args().out
+    found = pd.DataFrame([worst.__dict__ for worst in factors(ORACLE)])
+    worst = pd.DataFrame(json.loads((ORACLE / "worst_found.json").read_text())["rows"])
+    out.write_text("\n".join(page(found, worst)) + "\n", encoding="utf-8")
+
+
+def page(found: pd.DataFrame, worst: pd.DataFrame) -> list[str]:
+    """One line per table, then by quantity and kind of row, then what the search found."""
+    beyond = int((~(found["factor"] <= found["allowed"])).sum())
+    rows = int(found.groupby(["table", "kind"])["rows"].max().sum())
+    lines = [
+        "# Largest known errors",
+        "",
+        *prose(
+            "Every row of the 25-digit tables, in units of 2^-53 max(cond, abs y); for the geared dwell drive,",
+            "whose table has no cond, of abs y, its lower derivatives and what one rounding of phi does; for the",
+            "largest pressure angle of a rounding of one radian; for joint loads of the tabulated sensitivity, with",
+            "friction of the largest force. Back to [what the next digit costs](../accuracy.md).",
+        ),
+        "",
+        f"Beyond the factor of their sheet: {beyond} of {len(found)} quantities and kinds, over {rows} rows;",
+        f"rows declared undecidable: {int(found['undecidable'].sum())}.",
+        "",
+    ]
+    tables = found.groupby("table", sort=False)
+    lines += pipe_table(
+        ["table", "rows", "allowed", "largest known", "of", "among"], [_summary(*one) for one in tables]
+    )
+    for table, part in tables:
+        quantities = list(dict.fromkeys(part["quantity"]))
+        lines += ["", f"### {table}, allowed {part['allowed'].iloc[0]:g}", ""]
+        kinds = [_kind(str(kind), cells, quantities) for kind, cells in part.groupby("kind", sort=False)]
+        lines += pipe_table(["kind of rows", "rows", *quantities], kinds)
+    searched = [
+        [str(poses), str(region), *(sig(part.loc[part["output"] == name, "factor"].max()) for name in ORDERS)]
+        for (poses, region), part in worst.groupby(["poses", "region"])
+    ]
+    return [
+        *lines,
+        "",
+        "### Largest found by search",
+        "",
+        *prose(
+            "Crank-rockers outside the tables: `make search-worse` looks for poses with larger factors than any",
+            "known; the tests replay them.",
+        ),
+        "",
+        *pipe_table(["poses of", "region", *ORDERS], searched),
+    ]
+
+
+def _summary(table: object, part: pd.DataFrame) -> list[str]:
+    top = part.sort_values("factor").iloc[-1]
+    count = f"{part.groupby('quantity')['rows'].sum().max()}"
+    kind = str(top["kind"]).replace("_", " ")
+    return [str(table), count, f"{top['allowed']:g}", sig(top["factor"]), top["quantity"], kind]
+
+
+def _kind(kind: str, cells: pd.DataFrame, quantities: list[str]) -> list[str]:
+    known = dict(zip(cells["quantity"], cells["factor"], strict=True))
+    count = str(int(cells["rows"].max()))
+    return [kind.replace("_", " "), count, *(sig(known.get(quantity, np.nan)) for quantity in quantities)]
+
+
+if __name__ == "__main__":
+    main()

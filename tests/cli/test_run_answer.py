@@ -1,0 +1,88 @@
+"""The end of `sweep run`: the answer in the terminal, exit codes for no feasible design and for the emergency brake."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner
+
+from sweep.cli import main
+from sweep.report import write_report
+from sweep.report.terminal import held_back
+from tests.optimise.test_study import STUDY
+
+
+def run(folder: Path, text: str) -> tuple[int, str]:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "study.toml").write_text(text)
+    found = CliRunner().invoke(main, ["run", str(folder), "--out", str(folder / "designs"), "--jobs", "1"])
+    return found.exit_code, found.output
+
+
+def test_answer_names_the_optimum_what_holds_it_back_and_the_next_command(tmp_path: Path) -> None:
+    code, text = run(tmp_path, STUDY.format(swing=40))
+    assert code == 0
+    best = pq.read_table(tmp_path / "_optimum.parquet").to_pydict()
+    assert "small: 4096 designs, " in text and " within all limits, the best with largest acceleration " in text
+    assert f"optimum: largest acceleration {best['max_abs_d2psi'][0]:.5g} rad/rad²" in text
+    assert "held back by: " in text and "swing (at least 40°)" in text
+    assert "search: 3 starts, " in text and "estimated unseen" in text
+    assert f"next: sweep report {tmp_path / 'designs'}" in text
+
+
+def test_an_optimum_is_in_the_open_only_if_its_search_has_settled() -> None:
+    assert held_back([], "converged") == "nothing: an optimum in the open"
+    assert held_back(["swing"], "converged") == "swing"
+    assert held_back([], "looks") == "the number of looks, which ended its search"
+    assert held_back(["swing"], "looks") == "swing; the number of looks, which ended its search"
+
+
+def test_no_feasible_design_ends_with_4_and_says_which_limit_gives_way(tmp_path: Path) -> None:
+    code, text = run(tmp_path, STUDY.format(swing=150))
+    assert code == 4
+    assert "no design keeps all limits" in text and "must give way by" in text
+    best = pq.read_table(tmp_path / "_optimum.parquet").to_pydict()
+    assert best["status"][0] == 5
+    page = write_report(tmp_path / "designs", tmp_path / "report").read_text(encoding="utf-8")
+    assert "No design was found that keeps all limits" in page
+
+
+def test_sweep_without_optimiser_and_without_survivors_names_the_nearest_miss(tmp_path: Path) -> None:
+    text = STUDY.format(swing=150).replace("[optimise]\nstarts = 3\nseed = 1\n", "")
+    code, said = run(tmp_path, text)
+    assert code == 4
+    assert "the nearest of" in said and "swing must give way by" in said and "instead of at least 150°" in said
+
+
+def test_brake_is_told_everywhere_and_the_next_run_searches_again(tmp_path: Path) -> None:
+    braked = STUDY.format(swing=40).replace("starts = 3\n", 'starts = 30\ntime_budget = "0.001 s"\n')
+    code, text = run(tmp_path, braked)
+    assert code == 124
+    words = "time ran out: 0 of 30 starts"
+    assert f"warning: {words}" in text
+    about = pq.read_schema(tmp_path / "_optimum.parquet").metadata
+    assert words in about[b"summary"].decode() and json.loads(about[b"search"])["ended"] == "time"
+    page = write_report(tmp_path / "designs", tmp_path / "report").read_text(encoding="utf-8")
+    assert words in page.replace("T", "t")
+    code, text = run(tmp_path, STUDY.format(swing=40).replace("starts = 3\n", "starts = 30\n"))
+    assert code == 0 and "time ran out" not in text
+
+
+def test_front_cut_short_ends_with_124_and_goes_on(tmp_path: Path) -> None:
+    table = '[pareto]\noutput = "max_pressure_angle"\nat_most = { from = 30, to = 50, count = 3, unit = "deg" }\n'
+    code, text = run(tmp_path, STUDY.format(swing=40) + table + 'time_budget = "0.001 s"\n')
+    assert code == 124 and "steps of the front" in text
+    page = write_report(tmp_path / "designs", tmp_path / "report").read_text(encoding="utf-8")
+    assert "Time ran out: " in page
+    code, text = run(tmp_path, STUDY.format(swing=40) + table)
+    assert code == 0
+    assert pq.read_schema(tmp_path / "_pareto.parquet").metadata[b"complete"] == b"true"
+
+
+@pytest.mark.parametrize("unseen", ["0 %", "100 %", "2", "2 mm"])
+def test_unseen_share_that_cannot_be_is_refused(tmp_path: Path, unseen: str) -> None:
+    code, text = run(tmp_path, STUDY.format(swing=40).replace("seed = 1\n", f'seed = 1\nunseen = "{unseen}"\n'))
+    assert code == 2 and "optimise.unseen" in text

@@ -1,0 +1,108 @@
+"""Signals to the command line: whatever it is doing, it leaves within two seconds, and nobody stays behind."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sweep.dataset.files import OPTIMUM
+from tests.support.engine_study import ROOT, write_study
+
+SECONDS = 2.0
+# A machine that has other things to do, too, needs longer for the same: so much is allowed beyond.
+SLACK = 1.0
+OPTIMISE = '\n[objective]\nminimise = "max_abs_d2psi"\n[optimise]\nstarts = 300\nseed = 1\nunseen = "0.001 %"\n'
+
+
+def begun(study: Path, out: Path, cache: Path | None = None, *options: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "sweep", "run", str(study), "--out", str(out), *options]
+    environment = os.environ | ({} if cache is None else {"XDG_CACHE_HOME": str(cache)})
+    return subprocess.Popen(
+        command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+
+
+def others_of(session: int) -> list[int]:
+    """Processes of a session that still run."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (entry / "stat").read_text().rpartition(")")[2].split()
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if int(fields[3]) == session and fields[0] != "Z":
+            found.append(int(entry.name))
+    return found
+
+
+def told(process: subprocess.Popen[str], number: int, group: bool) -> tuple[float, str]:
+    """Send a signal; how long it takes to leave, and what it says."""
+    (os.killpg if group else os.kill)(process.pid, number)
+    begin = time.monotonic()
+    _, errors = process.communicate(timeout=60)
+    left = time.monotonic() - begin
+    deadline = time.monotonic() + 5.0
+    while others_of(process.pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not others_of(process.pid), "somebody stays behind"
+    return left, errors
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_it_leaves_while_it_compiles(tmp_path: Path, number: int, code: int) -> None:
+    """An empty cache: the first seconds are imports and compiling."""
+    study = write_study(tmp_path / "study")
+    process = begun(study, tmp_path / "out", tmp_path / "cache")
+    while not list((tmp_path).glob("cache/**/*.nbi")):
+        assert process.poll() is None
+        time.sleep(0.01)
+    time.sleep(random.Random(number).uniform(0.0, 2.0))
+    left, errors = told(process, number, group=False)
+    assert process.returncode == code, errors
+    assert left < SECONDS + SLACK and "Traceback" not in errors
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("group", [True, False])
+def test_it_leaves_while_it_optimises_with_the_best_so_far(tmp_path: Path, number: int, code: int, group: bool) -> None:
+    study = write_study(tmp_path / "study", keep="feasible", count=20)
+    study.write_text(study.read_text() + OPTIMISE)
+    process = begun(study, tmp_path / "designs", None, "--jobs", "2")
+    while not list((tmp_path / "designs").glob("part-*")) or len(others_of(process.pid)) < 3:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.02)
+    time.sleep(1.0)
+    left, errors = told(process, number, group)
+    assert process.returncode == code, errors
+    assert left < SECONDS + SLACK and "Traceback" not in errors
+    best = pd.read_parquet(tmp_path / OPTIMUM)
+    assert best["role"].iloc[0] == "optimum" and best["max_abs_d2psi"].iloc[0] > 0.0
+
+
+def test_a_folder_that_is_not_there_any_more_is_said(tmp_path: Path) -> None:
+    (tmp_path / "gone").mkdir()
+    program = "import os; os.rmdir(os.getcwd()); from sweep.__main__ import main; main()"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", program, "run", str(ROOT / "studies" / "geared-dwell"), "--smoke"],
+        cwd=tmp_path / "gone", env=environment, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 74 and "Traceback" not in done.stderr, done.stderr
+    assert "not there any more" in done.stderr or "No such file" in done.stderr
+
+
+def test_so_many_workers_are_refused(tmp_path: Path) -> None:
+    study = write_study(tmp_path / "study")
+    for jobs in ("100000000", "1025"):
+        process = begun(study, tmp_path / "out", None, "--jobs", jobs)
+        _, errors = process.communicate(timeout=60)
+        assert process.returncode == 2 and "a whole number from 1 to 1024" in errors and "Traceback" not in errors

@@ -1,0 +1,76 @@
+"""docs/frames.md: every family with its picture and all its joints; the equivalences it states hold."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.exchange.scene import over
+from sweep.families import NAMES, family
+from sweep.report.figures import new_figure
+from sweep.report.mechanisms import draw_frame, is_spatial, projection
+
+DOCS = Path(__file__).parents[2] / "docs"
+PHI = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
+PLANAR = {
+    "guide", "four_bar", "slider_crank", "inverted_slider_crank", "geared_dwell", "epicyclic_dwell", "cam", "cam_lever",
+    "feed", "feed_triad", "foot", "feed_foot", "heddle", "backrest", "backrest_tension", "backrest_closure",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_family_has_its_picture_and_all_joints_in_the_page(name):
+    page = (DOCS / "frames.md").read_text()
+    section = re.search(rf"### [^\n]*\(`{name}`\)\n(.*?)(?=\n##)", page, flags=re.DOTALL)
+    assert section
+    assert (DOCS / "figures" / f"frame-{name}.svg").stat().st_size > 4000
+    assert f"figures/frame-{name}.svg" in section[1]
+    (part,) = over(name, dict(family(name).example), 0.0, 12)
+    named = {word for row in re.findall(r"^\| ([^|]+) \|", section[1], flags=re.M) for word in row.split(", ")}
+    assert {j.upper() if len(j) < 3 else j for j in part.joints} == named - {"joint"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_picture_has_a_line_for_each_link_and_a_label_for_each_joint(name):
+    found = over(name, dict(family(name).example), 0.9, 12)
+    assert is_spatial(found) == (name not in PLANAR)
+    axes = new_figure(4.0, 4.0).subplots()
+    draw_frame(axes, found, projection("space" if is_spatial(found) else "xy"))
+    labels = {text.get_text().lower() for text in axes.texts}
+    assert set(found[0].joints) <= labels
+    drawn = {line.get_label() for line in axes.lines}
+    assert {link.name for link in found[0].links if len(link.joints) > 1} <= drawn
+
+
+def moved(name, design, phi, rotation):
+    table = sweep.joints(name, design, phi)
+    return {joint: rows[["x", "y", "z"]].to_numpy() @ rotation for joint, rows in table.groupby("joint")}
+
+
+@pytest.mark.parametrize(
+    ("name", "alpha", "turn"),
+    [
+        ("rssr", 0.0, (-1, -1, 1)),
+        ("slotted", 0.0, (-1, -1, 1)),
+        ("five_link", 0.0, (-1, -1, 1)),
+        ("rssp", math.pi, (-1, 1, -1)),
+    ],
+)
+def test_reversed_common_perpendicular_is_the_same_mechanism(name, alpha, turn):
+    design = dict(family(name).example)
+    other = design | {"e": -design["e"], "alpha": alpha - design["alpha"]}
+    first = moved(name, design, PHI, np.eye(3))
+    second = moved(name, other, PHI + math.pi, np.diag(turn))
+    for joint, path in first.items():
+        np.testing.assert_allclose(second[joint], path, atol=1e-13)
+
+
+def test_parallel_axes_know_only_the_difference_of_the_offsets():
+    design = dict(family("rssr").example) | {"alpha": 0.0, "f": 0.3, "g": 0.1}
+    psi = [sweep.evaluate("rssr", design | x, "psi", phi=PHI)["psi"] for x in ({}, {"f": 1.3, "g": 1.1})]
+    np.testing.assert_allclose(psi[0], psi[1], atol=1e-14)

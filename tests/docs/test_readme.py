@@ -1,0 +1,55 @@
+"""What the README shows is run: its Python example, its Parquet one-liner, its make targets and the pages it names."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import sweep
+from sweep.study import load_study, study_from_data
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "README.md").read_text()
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
+
+
+def run(code, folder):
+    return subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, timeout=300, check=False
+    )
+
+
+def test_python_example_prints_a_row_per_design_and_no_warning(tmp_path):
+    (code,) = blocks("python")
+    done = run(code, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert "err_max_abs_d2psi" in done.stdout
+    assert done.stdout.count("\n") >= 6 + 5
+
+
+def test_parquet_one_liner_reads_the_folder_of_the_study(tmp_path):
+    (command,) = [line for block in blocks("sh") for line in block.splitlines() if "read_parquet" in line]
+    code = re.search(r'-c "(.*)"', command)[1]
+    study = load_study(ROOT / "studies" / "needle208", smoke=True)
+    data = {key: value for key, value in study.data.items() if key not in ("optimise", "tolerance")}
+    data["design"] = data["design"] | {"sample": data["design"]["sample"] | {"n": 16384}}
+    sweep.run(study_from_data(data, study.path), out=tmp_path / "results" / "needle208" / "designs")
+    done = run(code, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "max_abs_d2s" in done.stdout
+
+
+def test_make_targets_and_pages_exist():
+    makefile = (ROOT / "Makefile").read_text()
+    for target in re.findall(r"`?make ([a-z0-9-]+)", TEXT):
+        study = target.removeprefix("study-")
+        known = re.search(rf"^{re.escape(target)}:", makefile, flags=re.MULTILINE)
+        assert known or (ROOT / "studies" / study / "study.toml").exists(), target
+    for page in re.findall(r"docs/[\w-]+\.(?:md|svg|png)", TEXT):
+        assert (ROOT / page).exists(), page

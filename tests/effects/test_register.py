@@ -1,0 +1,111 @@
+"""The register itself: complete, printed, and its page current."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from sweep.cli import main
+from sweep.cli.effects import page
+from sweep.effects import NAMES, applicable, effect, extended, offered
+from sweep.effects.advice import closure, findings
+from sweep.effects.base import Placed
+from sweep.effects.costs import designs
+from sweep.families import NAMES as FAMILIES
+from sweep.families import family
+from sweep.families.capabilities import JointRecords, ThreadPath
+from sweep.families.link_tree import LinkTree
+from sweep.study.units import factor, internal_unit
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_the_page_is_current():
+    """`make docs` writes it; after a change of the register it must be run."""
+    assert (ROOT / "docs" / "effects.md").read_text() == page()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_entry_is_complete(name):
+    entry = effect(name)
+    assert entry.name == name
+    assert entry.title and entry.formulas and entry.called_for and entry.negligible
+    assert entry.ns_per_pose > 0.0 or entry.design_result is not None
+    outputs = Placed(entry).outputs
+    for o in outputs:
+        assert o.text and o.equation, o.name
+    for item in (*outputs, *entry.inputs):
+        assert factor(internal_unit(item.unit), internal_unit(item.unit)) == 1.0
+    for needed in entry.needs:
+        assert needed in NAMES
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_no_two_outputs_of_a_family_share_a_name(name):
+    found = family(name)
+    names = [*found.pose_names, *found.parameter_names, *(o.name for step in found.steps for o in step.provides)]
+    of_effects = [o.name for o in offered(found)]
+    assert len(set(of_effects)) == len(of_effects)
+    assert not set(of_effects) & set(names)
+    kinds = (JointRecords, LinkTree, ThreadPath)
+    assert all(found.find(kind) is None for kind in kinds) == (not of_effects)
+
+
+def test_an_effect_comes_after_what_it_needs():
+    order = [entry.name for entry in closure([effect("bearing_life"), effect("dynamic_elasticity")])]
+    assert order == ["coupler", "kinetostatics", "bearing_life", "pressure", "elasticity", "dynamic_elasticity"]
+
+
+@pytest.mark.parametrize(("stiffness", "wanted", "verdict"), [
+    (1e3, ["max_lag"], "dynamic_elasticity: not wanted, but will matter"),
+    (1e8, ["max_lag"], "dynamic_elasticity: rightly left out"),
+    (1e8, ["max_lag", "floquet"], "dynamic_elasticity: wanted, but will not matter"),
+    (1e3, ["max_lag", "floquet"], "dynamic_elasticity: matters"),
+])  # fmt: skip
+def test_a_rule_says_whether_an_effect_matters_here(stiffness, wanted, verdict):
+    """The rule of section 9 for E2, estimated from the designs: max|lag''/nu^2|/max|lag| against 1/300."""
+    bare = family("rssr")
+    full = extended(bare, wanted)
+    matrix = designs(full, 4)
+    matrix[:, full.parameter_names.index("stiffness")] = stiffness
+    words = [finding.words for finding in findings(bare, full, matrix, wanted)]
+    assert any(line.startswith(verdict) for line in words), words
+
+
+def test_every_rule_of_negligibility_that_has_a_number_is_applied():
+    """Where a scene has all inputs, each effect but those without a rule in section 9 is judged."""
+    for name in ("rssr", "rssp", "guide"):
+        bare = family(name)
+        every = [o.name for placed in applicable(bare) for o in placed.outputs]
+        full = extended(bare, every)
+        judged = {finding.name for finding in findings(bare, full, designs(full, 4), every)}
+        without = {
+            "tool",
+            "tip_tool",
+            "shaking",
+            "pressure_extrema",
+            "sliding_bearings",
+            "rolling_bearings",
+            "bearing_life",
+        }
+        assert judged == {placed.name for placed in applicable(bare)} - without
+
+
+def test_the_command_lists_and_explains():
+    listing = CliRunner().invoke(main, ["effects"])
+    assert listing.exit_code == 0
+    assert all(name in listing.output for name in NAMES)
+    one = CliRunner().invoke(main, ["effects", "friction"])
+    assert "rho(L)" in one.output and "mu_a" in one.output and "kinetostatics" in one.output
+    wrong = CliRunner().invoke(main, ["effects", "frction"])
+    assert wrong.exit_code == 2
+    assert "did you mean 'friction'?" in wrong.output
+
+
+def test_an_effect_says_the_unit_of_all_it_takes_and_gives():
+    words = CliRunner().invoke(main, ["effects", "friction"]).output
+    for name, unit in (("m_crank", "t"), ("j_rocker_xy", r"t\*mm\^2"), ("mu_b", "1"), ("load_support_d1", "N")):
+        assert re.search(rf"^  {name} +{unit} ", words, re.MULTILINE), name

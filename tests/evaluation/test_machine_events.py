@@ -1,0 +1,223 @@
+"""Events, residence and speeds between the members of a machine, against dense grids and differences.
+
+A dense grid finds a passage to its step squared where the slope is steady; central differences of step 1e-5 are right
+to 1e-9 of a length of some 100.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.errors import StudyError
+from sweep.study import study_from_data
+from tests.evaluation.test_machines import LOOPER, TABLE, two
+
+MEMBERS = {
+    "needle": ["rssr", "guide"],
+    "looper": {
+        "family": "rssr", "tip": [30.0, 1.0, -2.0], "offset": 0.3,
+        "place": {"at": [-80.0, 60.0, 4.0], "axis": [0.6, 0.8, 0.0], "zero": [0.0, 0.0, 1.0]},
+    },
+}  # fmt: skip
+RELATIONS = {
+    "clearance": {"distance": ["needle.point", "looper.tip"]},
+    "pace": {"speed": ["looper.tip"]},
+    "arrive": {"event": "clearance", "level": 35.0, "rising": False},
+    "leave": {"event": "clearance", "level": 35.0},
+    "plane": {"event": "looper.tip_z", "level": 30.0},
+    "stay": {"timing": ["phi_arrive", "phi_leave"]},
+}
+
+
+def grid(machine: object, name: str) -> tuple[np.ndarray, np.ndarray]:
+    phi = np.linspace(0.0, 2.0 * np.pi, 20001)
+    return phi, sweep.evaluate(machine, TABLE, [name], phi=phi)[name].to_numpy()
+
+
+def passages(values: np.ndarray, phi: np.ndarray, level: float, rising: bool) -> np.ndarray:
+    off = (values - level) if rising else (level - values)
+    k = np.flatnonzero((off[:-1] < 0.0) & (off[1:] >= 0.0))
+    return np.asarray(phi[k] - off[k] * (phi[k + 1] - phi[k]) / (off[k + 1] - off[k]))
+
+
+@pytest.mark.parametrize(
+    ("event", "output", "level", "rising"),
+    [("arrive", "clearance", 35.0, False), ("leave", "clearance", 35.0, True), ("plane", "looper.tip_z", 30.0, True)],
+)
+def test_event_is_where_a_dense_grid_passes_the_level(event: str, output: str, level: float, rising: bool) -> None:
+    machine = sweep.machine(MEMBERS, RELATIONS)
+    found = sweep.summarise(machine, TABLE, [f"phi_{event}", f"count_{event}"], accuracy=1e-8)
+    phi, values = grid(machine, output)
+    places = passages(values, phi, level, rising)
+    assert len(places) > 0
+    assert found[f"count_{event}"][0] == len(places)
+    assert found[f"phi_{event}"][0] == pytest.approx(places[0], abs=1e-6)
+    at = sweep.evaluate(machine, TABLE, [output], phi=[found[f"phi_{event}"][0]])[output][0]
+    assert at == pytest.approx(level, abs=1e-11)
+
+
+def test_residence_below_a_level_is_the_timing_of_two_events() -> None:
+    machine = sweep.machine(MEMBERS, RELATIONS)
+    found = sweep.summarise(machine, TABLE, ["stay", "phi_arrive", "phi_leave"], accuracy=1e-8)
+    phi, values = grid(machine, "clearance")
+    inside = np.mean(values[:-1] < 35.0) * 2.0 * np.pi
+    assert np.remainder(found["stay"][0], 2.0 * np.pi) == pytest.approx(inside, abs=2.0 * phi[1])
+
+
+def test_event_that_never_happens_has_its_status_and_no_value() -> None:
+    machine = sweep.machine(MEMBERS, {"far": {"event": "looper.tip_z", "level": 1e4}})
+    found = sweep.summarise(machine, TABLE, ["phi_far", "count_far"], accuracy=1e-8)
+    assert np.isnan(found["phi_far"][0]) and found["count_far"][0] == 0 and found["status"][0] != 0
+
+
+def test_speed_of_a_point_is_the_difference_of_its_places() -> None:
+    for members in (MEMBERS, MEMBERS | {"looper": MEMBERS["looper"] | {"ratio": 2}}):
+        machine = sweep.machine(members, RELATIONS)
+        phi, h = np.linspace(0.1, 6.0, 7), 1e-5
+        names = [f"looper.tip_{axis}" for axis in "xyz"]
+        ends = [sweep.evaluate(machine, TABLE, names, phi=phi + sign * h)[names].to_numpy() for sign in (1.0, -1.0)]
+        slope = (ends[0] - ends[1]) / (2.0 * h)
+        found = sweep.evaluate(machine, TABLE, ["pace", *(f"looper.dtip_{axis}" for axis in "xyz")], phi=phi)
+        np.testing.assert_allclose(found[[f"looper.dtip_{axis}" for axis in "xyz"]], slope, atol=1e-7)
+        np.testing.assert_allclose(found["pace"], np.linalg.norm(slope, axis=1), atol=1e-7)
+
+
+def test_value_at_an_event_is_that_of_the_pose_there() -> None:
+    relations = RELATIONS | {
+        "nearing": {"speed": ["needle.point", "looper.tip"]},
+        "hit": {"value": ["nearing", "phi_arrive"]},
+        "nearest": {"value": ["pace", "phi_min_clearance"]},
+    }
+    machine = sweep.machine(MEMBERS, relations)
+    names = ["hit", "nearest", "phi_arrive", "phi_min_clearance"]
+    found = sweep.summarise(machine, TABLE, names, accuracy=1e-10)
+    for name, of, place in (("hit", "nearing", "phi_arrive"), ("nearest", "pace", "phi_min_clearance")):
+        at = sweep.evaluate(machine, TABLE, [of], phi=[found[place][0]])[of][0]
+        assert found[name][0] == pytest.approx(at, rel=1e-13)
+        assert 0.0 <= found[f"err_{name}"][0] < 1e-6
+    # the tip comes nearer by what it moves towards the needle, so no faster than it moves against it
+    phi, clearance = grid(machine, "clearance")
+    k = np.searchsorted(phi, found["phi_arrive"][0])
+    assert abs(np.diff(clearance)[k] / phi[1]) <= found["hit"][0]
+    never = sweep.machine(
+        MEMBERS, RELATIONS | {"far": {"event": "clearance", "level": 1e4}, "x": {"value": ["pace", "phi_far"]}}
+    )
+    assert np.isnan(sweep.summarise(never, TABLE, ["x"])["x"][0])
+
+
+def test_guided_point_moves_at_the_rate_of_its_places() -> None:
+    machine = sweep.machine(MEMBERS, {"pace": {"speed": ["needle.point"]}})
+    phi, h = np.linspace(0.1, 6.0, 7), 1e-5
+    names = [f"needle.point_{axis}" for axis in "xyz"]
+    ends = [sweep.evaluate(machine, TABLE, names, phi=phi + sign * h)[names].to_numpy() for sign in (1.0, -1.0)]
+    slope = (ends[0] - ends[1]) / (2.0 * h)
+    found = sweep.evaluate(machine, TABLE, ["pace", *(f"needle.dpoint_{axis}" for axis in "xyz")], phi=phi)
+    np.testing.assert_allclose(found[[f"needle.dpoint_{axis}" for axis in "xyz"]], slope, atol=1e-6)
+    np.testing.assert_allclose(found["pace"], np.linalg.norm(slope, axis=1), atol=1e-6)
+    alone = sweep.evaluate("guide", sweep.families.family("guide").example, ["dx_m", "d2x_m", "ds", "ddev"], phi=phi)
+    lam = sweep.families.family("guide").example["lam"]
+    np.testing.assert_allclose(alone.dx_m, alone.ds * np.cos(lam) - alone.ddev * np.sin(lam), rtol=1e-14, atol=1e-14)
+
+
+def test_speed_of_a_tip_is_radius_times_rate() -> None:
+    found = sweep.evaluate(two(), TABLE, ["looper.dpsi", "looper.dtip_x", "looper.dtip_y", "looper.dtip_z"], phi=[1.0])
+    size = np.linalg.norm(found[["looper.dtip_x", "looper.dtip_y", "looper.dtip_z"]].to_numpy()[0])
+    assert size == pytest.approx(np.hypot(30.0, 1.0) * abs(found["looper.dpsi"][0]), rel=1e-14)
+
+
+def test_speed_relative_to_a_point_that_moves_alike_is_zero() -> None:
+    members = {"one": {"family": "rssr", "tip": [9.0, 0.0, 0.0]}, "two": {"family": "rssr", "tip": [9.0, 0.0, 0.0]}}
+    machine = sweep.machine(members, {"apart": {"speed": ["one.tip", "two.tip"]}, "own": {"speed": ["two.tip"]}})
+    table = {f"{m}.{name}": value for m in members for name, value in LOOPER.items()}
+    found = sweep.evaluate(machine, table, ["apart", "own"], phi=[0.2, 2.0])
+    assert (found["apart"] == 0.0).all() and (found["own"] > 0.0).all()
+
+
+def test_slopes_of_a_residence_are_those_of_differences() -> None:
+    import pandas as pd
+
+    from sweep.optimise.manufacture.tolerance import sensitivities
+
+    machine = sweep.machine(MEMBERS, RELATIONS)
+    names = list(machine.parameter_names)
+    design = np.array([TABLE.iloc[0].get(n, p.default) for n, p in zip(names, machine.parameters, strict=True)], float)
+    rows = pd.DataFrame(sensitivities(machine, design, ["stay"]))
+    for name in ("looper.a", "looper.x_at"):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = design.copy()
+            moved[names.index(name)] += sign * 1e-3
+            ends.append(
+                sweep.summarise(machine, dict(zip(names, moved, strict=True)), ["stay"], accuracy=1e-12)["stay"][0]
+            )
+        own = rows[(rows["parameter"] == name) & (rows["output"] == "stay")]["growing"].iloc[0]
+        # Both are differences: of step 1e-3 here, whose square counts, and of the optimiser's own there.
+        assert own == pytest.approx((ends[0] - ends[1]) / 2e-3, rel=1e-3, abs=1e-6), name
+
+
+@pytest.mark.parametrize(
+    ("relations", "word"),
+    [
+        ({"x": {"event": "looper.tip_q"}}, "did you mean 'looper.tip_"),
+        ({"x": {"event": "looper.psi", "levle": 1.0}}, "did you mean 'level'"),
+        ({"x": {"event": "looper.psi", "level": "1 rad"}}, "a number"),
+        ({"x": {"event": "looper.psi", "rising": 1}}, "true or false"),
+        ({"x": {"speed": ["needle.b"]}}, "needle.point"),
+        ({"x": {"value": ["pacr", "phi_arrive"]}}, "a pose output of the machine"),
+        ({"x": {"value": ["looper.tip_x"]}}, "a crank angle"),
+        ({"x": {"speed": ["looper.tip", "looper.tip", "looper.tip"]}}, "two"),
+    ],
+)
+def test_what_is_no_event_or_speed_is_refused_with_the_remedy(relations: dict, word: str) -> None:
+    with pytest.raises(sweep.InputError, match=word):
+        sweep.machine(MEMBERS, relations)
+
+
+def study_with(**event: object) -> object:
+    fixed = {
+        name: (f"{value} {'rad' if name.startswith(('alpha', 'offset')) else 'mm'}") for name, value in LOOPER.items()
+    }
+    data = {
+        "study": {"name": "x"},
+        "machine": {"looper": {"family": "rssr", "tip": ["30 mm", "0 mm", "0 mm"]}},
+        "relations": {"arrive": event},
+        "scene": {"want": ["phi_arrive"]},
+        "design": {"looper": {k: v for k, v in fixed.items() if k != "branch"}},
+    }
+    return study_from_data(data, "x")
+
+
+def test_study_file_gives_the_level_in_its_unit() -> None:
+    assert study_with(event="looper.tip_y", level="2 cm").family.events[0].level == 20.0
+    assert study_with(event="looper.psi", level="90 deg", rising=False).family.events[0].level == np.pi / 2
+    assert study_with(event="looper.dpsi", level=0.5).family.events[0].level == 0.5
+
+
+@pytest.mark.parametrize("level", ["2 deg", 3.0, "3"])
+def test_study_file_with_a_level_of_another_unit_is_refused(level: object) -> None:
+    with pytest.raises(StudyError, match="a length"):
+        study_with(event="looper.tip_y", level=level)
+
+
+def test_pressure_angle_of_a_member_with_two_stages_can_be_searched() -> None:
+    import pandas as pd
+
+    from sweep.optimise.manufacture.tolerance import sensitivities
+
+    machine = two()
+    names = list(machine.parameter_names)
+    design = np.array([TABLE.iloc[0].get(n, p.default) for n, p in zip(names, machine.parameters, strict=True)], float)
+    rows = pd.DataFrame(sensitivities(machine, design, ["needle.max_pressure_angle"]))
+    alone = pd.DataFrame(
+        sensitivities(
+            sweep.families.family(["rssr", "guide"]),
+            machine.members[0].designs(design[None, :])[0],
+            ["max_pressure_angle"],
+        )
+    )
+    own = rows[rows["parameter"].str.startswith("needle.")].assign(parameter=lambda r: r["parameter"].str[7:])
+    both = own.merge(alone, on="parameter")
+    assert len(both) == len(alone) > 10
+    np.testing.assert_allclose(both["growing_x"], both["growing_y"], rtol=1e-9, atol=1e-12)

@@ -1,0 +1,91 @@
+"""Cams with translating and swinging followers: printed coefficients, pressure angles, as first stage of a chain."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from mpmath import mp
+
+import sweep
+from kernels import status as st
+from sweep.families import family
+from sweep.families.base import Angles
+from tests.reference import plain_linkages as naive
+from tests.support.plain_designs import DESIGNS, PHI, evaluated
+
+
+def test_cam_laws_have_their_printed_extremes():
+    table = {"lift": 1.0, "r0": 5.0, "rise": 1.0, "fall": 1.0, "dwell": 1.0, "law": [1.0, 2.0, 3.0]}
+    frame = sweep.summarise("cam", table, ["max_abs_ds", "max_abs_d2s", "max_abs_d3s", "stroke"], accuracy=1e-9)
+    # velocity, acceleration and jerk coefficients of the handbooks
+    np.testing.assert_allclose(frame.max_abs_ds, [1.875, 4.0 * math.pi / (4.0 + math.pi), 2.0], rtol=1e-9)
+    modified = 4.0 * math.pi**2 / (4.0 + math.pi)
+    np.testing.assert_allclose(frame.max_abs_d2s, [10.0 / math.sqrt(3.0), modified, 2.0 * math.pi], rtol=1e-9)
+    np.testing.assert_allclose(frame.max_abs_d3s, [60.0, 4.0 * math.pi * modified, 4.0 * math.pi**2], rtol=1e-7)
+    np.testing.assert_allclose(frame.stroke, 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["cam", "cam_lever"])
+def test_cam_pressure_angle_is_that_of_the_pitch_curve(name):
+    for k, design in enumerate(DESIGNS[name]):
+        phi = PHI[k % len(PHI)]
+        row = evaluated(name, design, ["pressure_angle", "x_p", "y_p", family(name).position], phi)
+        curves = getattr(naive, name)
+
+        def pitch(x, design=design, curves=curves):
+            numbers = {key: mp.mpf(value) for key, value in design.items()}
+            value = next(iter(curves(numbers, x).values()))
+            if name == "cam":
+                base = mp.sqrt(numbers["r0"] ** 2 - numbers["e"] ** 2)
+                return mp.mpc(base + value, -numbers["e"]) * mp.expj(-x)
+            return (numbers["e"] + numbers["c"] * mp.expj(value)) * mp.expj(-x)
+
+        centre = complex(row.x_p, row.y_p) * complex(math.cos(phi), math.sin(phi))
+        velocity = 1.0 if name == "cam" else 1j * complex(math.cos(row.psi), math.sin(row.psi))
+        assert row.pressure_angle == pytest.approx(naive.contact_pressure(pitch, centre, velocity, phi), abs=1e-9), (
+            design
+        )
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"rise": 4.0, "fall": 3.0},
+        {"law": 2.5},
+        {"rise": 0.0},
+        {"dwell": -0.1},
+        {"r0": 0.0},
+        {"e": 40.0},
+        {"c3": math.nan},
+    ],
+)
+def test_cam_that_means_nothing_is_invalid(change):
+    mechanism = family("cam")
+    design = {"lift": 5.0, "r0": 30.0} | change
+    values = [design.get(p.name, p.default if p.default is not None else 0.0) for p in mechanism.parameters]
+    columns = mechanism.poses(np.array([values]), Angles.of(np.array([[0.4]])), frozenset({"s", "pressure_angle"}))
+    assert columns["status"][0, 0] == st.INVALID_INPUT
+    assert np.isnan(columns["s"][0, 0]) and np.isnan(columns["pressure_angle"][0, 0])
+
+
+def test_cam_drives_a_linkage_as_the_first_stage_of_a_chain():
+    table = {"lift1": 0.5, "r01": 30.0, "c1": 50.0, "e1": 60.0, "law1": 2.0}
+    table |= {"a2": 2.0, "b2": 3.0, "e2": 0.5, "f2": 0.0, "alpha2": 0.0, "offset2": 0.4}
+    phi = np.linspace(0.0, 6.2, 9)
+    frame = sweep.evaluate(["cam_lever", "rssp"], table, ["s", "ds"], phi)
+    lever = sweep.evaluate(
+        "cam_lever", {"lift": 0.5, "r0": 30.0, "c": 50.0, "e": 60.0, "law": 2.0}, ["psi", "dpsi"], phi
+    )
+    rod = {"a": 2.0, "b": 3.0, "e": 0.5, "f": 0.0, "alpha": 0.0, "phi": lever.psi + 0.4}
+    alone = sweep.evaluate("rssp", rod, ["s", "ds"])
+    np.testing.assert_allclose(frame.s, alone.s, atol=1e-14)
+    np.testing.assert_allclose(frame.ds, alone.ds * lever.dpsi, atol=1e-13)
+
+
+def test_negative_control_cycloidal_curve_is_not_the_modified_sine():
+    row = evaluated("cam", {"lift": 1.0, "r0": 5.0, "law": 3.0}, ["s"], 0.5)
+    with mp.workdps(30):
+        other = naive.rise(2, mp.mpf(0.5) / (mp.pi / 2))
+    assert abs(float(other) - row.s) > 1e-3

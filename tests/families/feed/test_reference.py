@@ -1,0 +1,338 @@
+"""Feed mechanism: the 25-digit table through the public functions, points and circles, events, triad, refinement."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as some
+from mpmath import mp, mpf
+
+import sweep
+from kernels import status as st
+from kernels.families import feed
+from kernels.families.feed.motion import OUTPUTS
+from sweep.errors import InputError
+from sweep.families import family
+from sweep.families.base import Angles
+from sweep.synthesis import feed as refinement
+from tests.reference import feed as naive
+
+ROWS = [r for r in json.loads((Path(__file__).parents[2] / "oracle" / "feed_open.json").read_text())["rows"]
+        if r["kind"] == "rack"]  # fmt: skip
+FIELDS = feed.Design._fields
+RACK = {
+    "h_a": 0.4, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "h_f": 0.0, "h_g": 0.0, "h_alpha": 0.0, "rh": 1.2, "dh": -0.3,
+    "xE": 5.6, "yE": 0.7, "rE": 0.18, "dE": 0.8, "q": 2.6, "fx": -1.7, "fy": 0.6, "tx": -0.3, "ty": 0.9, "tooth": 0.0,
+    "pitch": 0.0, "y_plate": 0.0, "h_sigma": -1.0, "bar_branch": -1.0,
+}  # fmt: skip
+
+
+def exact(p):
+    return {name: mpf(p.get(name, 0.0)) for name in FIELDS}
+
+
+def pair(frame, letter, prefix=""):
+    return [frame[f"{prefix}x_{letter}"], frame[f"{prefix}y_{letter}"]]
+
+
+def conditions(p, phi):
+    """Sum of |input d(output)/d(input)| for every point and angle: what one rounding of each input can do."""
+    values = exact(p) | {"phi": mpf(phi)}
+    step = mpf(10) ** -18
+    base = naive.points(values, values["phi"])
+    sums = dict.fromkeys(base, mpf(0))
+    for k, v in values.items():
+        if v != 0 and k not in ("h_sigma", "bar_branch"):
+            moved = values | {k: v * (1 + step)}
+            moved = naive.points(moved, moved["phi"])
+            sums = {name: total + abs(moved[name] - base[name]) / step for name, total in sums.items()}
+    return sums
+
+
+def test_feed_matches_oracle_on_every_rack_row():
+    for row in ROWS:
+        p, expected = row["inputs"], row["expected"]
+        got = sweep.evaluate("feed", p, list(OUTPUTS)).iloc[0]
+        assert got.status == st.OK
+        with mp.workdps(40):
+            sizes = conditions(p, p["phi"])
+            for letter in "HEFT":
+                for value, y in zip(pair(got, letter.lower()), expected[letter], strict=True):
+                    # 8 roundings of each input
+                    assert abs(mpf(float(value)) - mpf(y)) <= 8 * mpf(2) ** -53 * sizes[letter]
+            for name in ("psi_plus_dh", "chi"):
+                error = (mpf(float(got[name])) - mpf(expected[name]) + mp.pi) % (2 * mp.pi) - mp.pi
+                assert abs(error) <= 8 * mpf(2) ** -53 * max(sizes[name], abs(mpf(expected[name])))
+        for prefix, name in (("d", "dT"), ("d2", "d2T")):
+            for value, y in zip(pair(got, "t", prefix), expected[name], strict=True):
+                # derivatives lose the sines of both triangles, at least 0.05 in the table, once and twice
+                assert abs(float(value) - float(y)) <= 1e-13
+
+
+def test_feed_weighted_difference_matches_oracle():
+    for row in ROWS:
+        p = row["inputs"]
+        phi = np.array([[p["phi"]]])
+        chi = sweep.evaluate("feed", p, "chi").chi.to_numpy()[:, None] + 2.0**-10
+        status, dq = np.empty((1, 1), np.uint8), np.empty((1, 1))
+        matrix = np.array([[p.get(name, 0.0) for name in FIELDS]])
+        feed.differences(matrix, np.cos(phi), np.sin(phi), chi, status, dq)
+        expected = float(row["expected"]["dq_at_chi_plus_2m10"])
+        # a difference of squares of lengths up to 10, known to the rounding of chi
+        assert status[0, 0] == st.OK
+        assert abs(dq[0, 0] - expected) <= 64.0 * 2.0**-53 * p["q"] * (p["q"] + abs(p["fx"]) + abs(p["fy"]))
+
+
+@settings(deadline=None, max_examples=15)
+@given(
+    some.fixed_dictionaries({
+        "h_a": some.floats(0.2, 0.6), "h_f": some.floats(-0.5, 0.5), "h_g": some.floats(-0.5, 0.5),
+        "h_alpha": some.floats(-0.6, 0.6), "h_sigma": some.sampled_from([-1.0, 1.0]),
+        "bar_branch": some.sampled_from([-1.0, 1.0]), "tooth": some.integers(0, 5).map(float),
+        "pitch": some.floats(0.0, 0.4), "rE": some.floats(0.0, 0.4),
+    }),
+    some.floats(-3.0, 9.0),
+)  # fmt: skip
+def test_feed_equals_points_and_circles_with_a_spatial_chain_too(changes, phi):
+    p = RACK | changes
+    got = sweep.evaluate("feed", p | {"phi": phi}, list(OUTPUTS)).iloc[0]
+    assume(got.status == st.OK)
+    with mp.workdps(40):
+        values = exact(p)
+        place = naive.points(values, mpf(phi))
+        triangle = abs(mp.sin(mp.arg((place["F"] - place["E"]) / (place["F"] - place["H"]))))
+        assume(triangle > 0.05)
+        for letter in "HEFT":
+            assert abs(complex(*pair(got, letter.lower())) - complex(place[letter])) < 1e-12
+        slopes = mp.taylor(lambda x: naive.tooth(values, x), mpf(phi), 2)
+        for order, prefix in ((1, "d"), (2, "d2")):
+            expected = complex(slopes[order] * mp.factorial(order))
+            assert abs(complex(*pair(got, "t", prefix)) - expected) < 1e-10 * max(1.0, abs(expected))
+
+
+def test_feed_events_equal_plain_root_finding_and_quadrature():
+    path = sweep.evaluate("feed", RACK, ["y_t"], phi=np.linspace(0.0, 6.28, 200)).y_t
+    p = RACK | {"y_plate": float(path.min() + 0.6 * (path.max() - path.min()))}
+    names = ["phi_entry", "phi_leave", "feed_angle", "entry_speed", "leave_speed", "stitch_length", "rise", "flatness"]
+    got = sweep.summarise("feed", p, names, accuracy=1e-9).iloc[0]
+    assert got.status == st.OK
+    expected = naive.feeding(exact(p), got.phi_entry, got.phi_leave)
+    for name in names:
+        assert abs(float(got[name]) - float(expected[name])) <= got[f"err_{name}"], name
+
+
+def test_feed_speed_at_entry_and_way_between_agree_with_poses():
+    p = RACK | {"y_plate": 1.7}
+    path = sweep.evaluate("feed", RACK, ["y_t"], phi=np.linspace(0.0, 6.28, 200)).y_t
+    p["y_plate"] = float(path.mean())
+    got = sweep.summarise("feed", p, ["phi_entry", "phi_leave", "entry_speed", "stitch_length"], samples=64).iloc[0]
+    at = sweep.evaluate("feed", p, ["x_t", "y_t", "dy_t"], phi=[got.phi_entry, got.phi_leave])
+    np.testing.assert_allclose(at.y_t, p["y_plate"], rtol=0, atol=1e-14)
+    assert at.dy_t[0] == pytest.approx(got.entry_speed, rel=1e-12) and at.dy_t[0] > 0.0 > at.dy_t[1]
+    assert at.x_t[1] - at.x_t[0] == pytest.approx(got.stitch_length, rel=1e-12)
+
+
+def test_feed_without_entry_says_so():
+    for plate in (-10.0, 10.0):
+        got = sweep.summarise("feed", RACK | {"y_plate": plate}, ["phi_entry", "rise"], samples=64).iloc[0]
+        assert got.status == st.NO_EVENT and math.isnan(got.phi_entry)
+    long = sweep.summarise("feed", RACK | {"h_a": 3.0}, ["phi_entry"], samples=64).iloc[0]
+    assert long.status == st.NOT_ASSEMBLED
+
+
+def test_feed_teeth_stand_in_a_row_on_the_rack():
+    teeth = sweep.evaluate(
+        "feed", RACK | {"tooth": [0.0, 1.0, 5.0], "pitch": 0.2}, ["x_t", "y_t", "chi"], phi=[0.0, 2.0]
+    )
+    first = teeth[teeth.design == 0].reset_index()
+    for number, row in ((1.0, 1), (5.0, 2)):
+        other = teeth[teeth.design == row].reset_index()
+        np.testing.assert_allclose(other.x_t - first.x_t, 0.2 * number * np.cos(first.chi), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(other.y_t - first.y_t, 0.2 * number * np.sin(first.chi), rtol=0, atol=1e-15)
+
+
+def test_feed_without_eccentricity_turns_the_rack_on_a_fixed_pivot():
+    at = sweep.evaluate("feed", RACK | {"rE": 0.0}, ["x_e", "y_e", "x_f", "y_f"], phi=np.linspace(0.0, 6.0, 7))
+    np.testing.assert_array_equal(at.x_e, RACK["xE"])
+    np.testing.assert_allclose(np.hypot(at.x_f - at.x_e, at.y_f - at.y_e), RACK["q"], rtol=1e-14)
+
+
+@pytest.mark.parametrize("exponent", [-100, -20, 20, 100])
+def test_feed_scaled_by_a_power_of_two_keeps_every_bit(exponent):
+    lengths = [q.name for q in family("feed").parameters if q.unit == "length"]
+    scaled = RACK | {k: math.ldexp(RACK[k], exponent) for k in lengths}
+    plain, large = (sweep.evaluate("feed", p, ["chi", "x_t", "d2y_t"], phi=[0.3, 2.0]) for p in (RACK, scaled))
+    np.testing.assert_array_equal(plain.chi, large.chi)
+    for name in ("x_t", "d2y_t"):
+        np.testing.assert_array_equal(np.ldexp(plain[name], exponent), large[name])
+
+
+def test_feed_toggles_are_named():
+    base = RACK | {"rE": 0.0, "phi": 0.7}
+    at = sweep.evaluate("feed", base, ["x_h", "y_h", "x_e", "y_e"]).iloc[0]
+    w = math.hypot(at.x_h - at.x_e, at.y_h - at.y_e)
+    f = math.hypot(RACK["fx"], RACK["fy"])
+    codes = [
+        sweep.evaluate("feed", base | {"q": q}, ["chi", "dchi"]).iloc[0] for q in (w + f, (w + f) * 1.001, abs(w - f))
+    ]
+    assert [c.status for c in codes] == [st.DEAD_POINT, st.NOT_ASSEMBLED, st.DEAD_POINT]
+    assert math.isfinite(codes[0].chi) and math.isnan(codes[0].dchi) and math.isnan(codes[1].chi)
+    assert sweep.evaluate("feed", base | {"fx": 0.0, "fy": 0.0}, "chi").status[0] == st.SINGULAR
+
+
+def test_feed_jitted_equals_plain():
+    rng = np.random.default_rng(1)
+    matrix = np.array([[r["inputs"].get(name, 0.0) for name in FIELDS] for r in ROWS[:3]])
+    phi = rng.uniform(-3.0, 3.0, (3, 4))
+
+    def run(function, dtype):
+        designs = matrix.astype(dtype)
+        if dtype is np.complex128:
+            designs[:, :21] += 1e-100j
+        status, out = np.empty((3, 4), np.uint8), np.empty((18, 3, 4), dtype)
+        with np.errstate(all="ignore"):
+            function(designs, np.cos(phi), np.sin(phi), status, out)
+        return [status, out]
+
+    for dtype in (np.float64, np.complex128):
+        for one, two in zip(run(feed.poses, dtype), run(feed.poses.py_func, dtype), strict=True):
+            np.testing.assert_array_equal(one, two)
+    heights = matrix.copy()
+    heights[:, FIELDS.index("y_plate")] = run(feed.poses, np.float64)[1][13, :, 0]
+    results = []
+    for function in (feed.feeding, feed.feeding.py_func):
+        status, out = np.empty(3, np.uint8), np.empty((9, 3))
+        function(heights, status, out)
+        results.append((status, out))
+    np.testing.assert_array_equal(results[0][0], results[1][0])
+    np.testing.assert_allclose(results[0][1], results[1][1], rtol=1e-12)
+
+
+def test_feed_complex_step_gives_exact_gradients():
+    matrix = np.array([[RACK[name] for name in FIELDS]], complex)
+    phi = np.array([[1.3]])
+    for name in ("h_a", "h_b", "rh", "dh", "rE", "dE", "q", "fx", "ty"):
+        turned = matrix.copy()
+        turned[0, FIELDS.index(name)] += 1e-100j
+        got = family("feed").poses(turned, Angles.of(phi), frozenset({"x_t", "y_t", "chi"}))
+
+        def place(x, name=name):
+            return naive.tooth(exact(RACK) | {name: x}, mpf("1.3"))
+
+        with mp.workdps(40):
+            slope = complex(mp.diff(place, mpf(RACK[name])))
+        assert abs(complex(got["x_t"][0, 0].imag, got["y_t"][0, 0].imag) * 1e100 - slope) < 1e-11, name
+
+
+TRIAD = {
+    "h_a": 0.5, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "rh": 1.2, "xE2": 2.0, "yE2": -2.5, "rE2": 0.15, "dE2": 0.3,
+    "xE3": 5.5, "yE3": -2.5, "rE3": 0.15, "dE3": 0.5, "f1x": -1.0, "f1y": -0.5, "f2x": -0.8, "f2y": -0.6, "f3x": 1.2,
+    "f3y": -0.6, "q1": 1.5, "q2": 2.5, "q3": 2.5, "x0": 4.0, "y0": 1.0, "chi0": 0.0, "h_sigma": -1.0,
+}  # fmt: skip
+
+
+def test_triad_equals_plain_root_finding():
+    names = ["x_t", "y_t", "chi", "dx_t", "dy_t", "dchi", "d2x_t", "d2y_t", "d2chi"]
+    phi = np.array([0.0, 1.1, 2.5, 4.0, -1.0, 7.3])
+    got = sweep.evaluate("feed_triad", TRIAD, names, phi=phi)
+    assert (got.status == st.OK).all()
+    with mp.workdps(60):
+        p = {name: mpf(TRIAD.get(name, 0.0)) for name in feed.TriadDesign._fields}
+        for k, angle in enumerate(phi):
+            start = tuple(got.loc[k, ["x_t", "y_t", "chi"]])
+            found = naive.triad(p, mpf(angle), start)
+            np.testing.assert_allclose(list(start), [float(x) for x in found], rtol=0, atol=2e-14)
+            step = mpf(10) ** -8
+            before, after = (naive.triad(p, angle + s * step, start) for s in (-1, 1))
+            for m, name in enumerate(("x_t", "y_t", "chi")):
+                slope, bend = (after[m] - before[m]) / (2 * step), (after[m] - 2 * found[m] + before[m]) / step**2
+                # differences of 1e-8 are good to 1e-15
+                assert abs(got[f"d{name}"][k] - float(slope)) < 1e-12
+                assert abs(got[f"d2{name}"][k] - float(bend)) < 1e-11
+    closed = sweep.evaluate("feed_triad", TRIAD, names[:3], phi=[0.0, 2.0 * math.pi])
+    np.testing.assert_allclose(closed.loc[0, names[:3]], closed.loc[1, names[:3]], rtol=0, atol=1e-14)
+
+
+def test_triad_with_a_link_of_the_dyad_repeats_the_dyad():
+    # a lead pinned to H by a tiny link and the lift coupler as the second; the third only follows the tooth
+    dyad = sweep.evaluate("feed", RACK, ["x_t", "y_t", "chi", "x_h", "y_h"], phi=[0.0, 1.0])
+    tiny = 1e-7
+    start = dyad.iloc[0]
+    f1 = (-RACK["tx"], -RACK["ty"])
+    f2 = (RACK["fx"] - RACK["tx"], RACK["fy"] - RACK["ty"])
+    far = (start.x_t + 50.0, start.y_t)
+    given_values = {k: RACK[k] for k in ("h_a", "h_b", "h_c", "h_e", "rh", "dh", "h_sigma")} | {
+        "xE2": RACK["xE"], "yE2": RACK["yE"], "rE2": RACK["rE"], "dE2": RACK["dE"], "q2": RACK["q"],
+        "xE3": far[0], "yE3": far[1], "rE3": 0.0, "dE3": 0.0, "q3": 50.0, "f3x": 0.0, "f3y": 0.0,
+        "f1x": f1[0], "f1y": f1[1], "f2x": f2[0], "f2y": f2[1], "q1": tiny,
+        "x0": start.x_t + tiny, "y0": start.y_t, "chi0": start.chi,
+    }  # fmt: skip
+    got = sweep.evaluate("feed_triad", given_values, ["x_t", "y_t", "chi"], phi=[0.0])
+    assert got.status[0] == st.OK
+    for name in ("x_t", "y_t", "chi"):
+        assert got[name][0] == pytest.approx(start[name], abs=5.0 * tiny)
+
+
+def test_triad_that_locks_or_has_no_assembly_says_so():
+    parallel = TRIAD | {"f2x": -1.0, "f3x": -1.0, "f2y": -0.5, "f3y": -0.5, "f1x": -1.0}
+    assert set(sweep.evaluate("feed_triad", parallel, "x_t", phi=[0.0, 3.0]).status) <= {st.SINGULAR, st.NOT_CONVERGED}
+    short = sweep.evaluate("feed_triad", TRIAD | {"q2": 0.01, "q3": 0.01}, "x_t", phi=[1.0])
+    assert short.status[0] in (st.SINGULAR, st.NOT_CONVERGED) and math.isnan(short.x_t[0])
+    assert sweep.evaluate("feed_triad", TRIAD | {"h_a": 4.0}, "x_t", phi=[3.0]).status[0] == st.NOT_ASSEMBLED
+
+
+def test_triad_jitted_equals_plain():
+    matrix = np.array([[TRIAD.get(name, 0.0) for name in feed.TriadDesign._fields]] * 2)
+    matrix[1, 24] = 0.01
+    phi = np.array([[0.0, 2.0]])
+    results = []
+    for function in (feed.triad_poses, feed.triad_poses.py_func):
+        status, out = np.empty((2, 2), np.uint8), np.empty((10, 2, 2))
+        with np.errstate(all="ignore"):
+            function(matrix, phi, status, out)
+        results.append((status, out))
+    for one, two in zip(*results, strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+def test_lift_chain_recovers_the_dimensions_that_made_the_motion():
+    p = ROWS[4]["inputs"]
+    phi = np.linspace(0.0, 6.0, 9)
+    motion = sweep.evaluate("feed", {k: v for k, v in p.items() if k != "phi"}, ["chi", "y_t"], phi=phi)
+    for norm in ("squares", "largest"):
+        found = refinement.lift_chain(p, phi, motion.chi, norm=norm)
+        # nearly dependent columns: the rack turns by a few hundredths of a radian
+        np.testing.assert_allclose([found.fx, found.fy, found.q], [p["fx"], p["fy"], p["q"]], rtol=1e-10)
+        assert found.bar_branch == p["bar_branch"]
+        assert np.abs(found.difference).max() < 1e-13
+    sides = [refinement.rack_angles(p, phi, motion.y_t, side) for side in (1, -1)]
+    assert min(np.abs(side - motion.chi).max() for side in sides) < 1e-13
+
+
+def test_lift_chain_minimax_levels_the_largest_difference_and_squares_their_sum():
+    p = ROWS[4]["inputs"]
+    phi = np.linspace(0.0, 6.0, 12)
+    chi = sweep.evaluate("feed", {k: v for k, v in p.items() if k != "phi"}, "chi", phi=phi).chi
+    wanted = chi + 1e-3 * np.sin(3.0 * phi)
+    level, least = (refinement.lift_chain(p, phi, wanted, norm=norm) for norm in ("largest", "squares"))
+    weighted = np.sort(np.abs(level.difference * level.q))
+    # three unknowns: the largest weighted difference is met at four poses
+    np.testing.assert_allclose(weighted[-4:], weighted[-1], rtol=1e-6)
+    assert weighted[-1] < np.abs(least.difference * least.q).max()
+    assert np.sum((least.difference * least.q) ** 2) < np.sum((level.difference * level.q) ** 2)
+
+
+def test_lift_chain_refuses_what_does_not_fix_the_dimensions():
+    p = ROWS[4]["inputs"]
+    with pytest.raises(InputError, match="at least 3"):
+        refinement.lift_chain(p, [0.0, 1.0], [0.0, 0.1])
+    with pytest.raises(InputError, match="three poses"):
+        refinement.lift_chain(p, [0.0, 0.0, 0.0], [0.1, 0.1, 0.1])
+    with pytest.raises(InputError, match="phi"):
+        refinement.lift_chain(p | {"h_a": 9.0}, [0.0, 1.0, 2.0], [0.1, 0.2, 0.1])
+    assert np.isnan(refinement.rack_angles(p, [0.0], [1e3])).all()

@@ -1,0 +1,229 @@
+"""Presser foot: the 25-digit table through the public functions, stepping through time, scaling, limits, controls."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from mpmath import mp, mpf
+
+import sweep
+from kernels import status as st
+from kernels.effects import foot as effect
+from kernels.families import foot
+from sweep.families.foot import NODES, TURNS, path_of
+from tests.reference import foot as naive
+
+ROWS = [r for r in json.loads((Path(__file__).parents[2] / "oracle" / "feed_open.json").read_text())["rows"]
+        if r["kind"] == "foot"]  # fmt: skip
+TABLE = pd.DataFrame([r["inputs"] for r in ROWS])
+HEAVY = {"m": 0.05, "k": 3000.0, "F0": 6.0, "omega": 400.0, "Y": 1.5e-3, "p": 0.5e-3, "restitution": 0.0, "X": 1e-3}
+
+
+def test_foot_matches_oracle_on_every_row():
+    names = list(ROWS[0]["expected"])
+    got = sweep.summarise("foot", TABLE, names)
+    assert got.status.tolist() == [st.OK if "t_recontact" in row["expected"] else st.NO_EVENT for row in ROWS]
+    for k, row in enumerate(ROWS):
+        for name, expected in row["expected"].items():
+            # N at entry and at the top are differences of forces of the size of m omega^2 Y: 8 roundings of that
+            i = row["inputs"]
+            size = i["m"] * i["omega"] ** 2 * i["Y"] + i["F0"] if name.startswith("N_") else 0.0
+            assert abs(mpf(float(got[name][k])) - mpf(expected)) <= 16 * mpf(2) ** -53 * max(size, abs(mpf(expected)))
+    assert got.t_recontact.notna().tolist() == ["t_recontact" in row["expected"] for row in ROWS]
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.2, 0.45])
+@pytest.mark.parametrize("omega", [150.0, 260.0, 330.0, 400.0])
+def test_foot_flies_and_lands_where_steps_through_time_say(omega, restitution):
+    p = HEAVY | {"omega": omega, "restitution": restitution}
+    got = sweep.summarise("foot", p, ["flights", "phi_loss", "phi_land", "impact_speed", "settled"]).iloc[0]
+    assert got.status == (st.OK if got.flights else st.NO_EVENT)
+    start = -0.5 * math.pi
+    steps = naive.flights(p, TURNS, 2000)
+    last = [f for f in steps if f[0] >= start + (TURNS - 1) * 2.0 * math.pi]
+    big = [f for f in last if f[1] - f[0] > 1e-3]
+    if not big:
+        assert got.flights == 0.0 and math.isnan(got.phi_loss)
+        return
+    if got.settled:
+        # both find the same events by halving; bounces feed rounding back, so some 1e-9 rad remain of 1e-15
+        assert got.phi_loss == pytest.approx(big[0][0] % (2.0 * math.pi), abs=1e-9)
+        assert got.phi_land == pytest.approx(big[0][1] % (2.0 * math.pi), abs=1e-9)
+
+
+def test_foot_first_landing_of_the_march_is_the_time_of_the_closed_form():
+    for row in (r for r in ROWS if r["case"] == "rebound"):
+        table = {name: [row["inputs"].get(name, 0.0)] for name in foot.Design._fields}
+        designs = np.array([[table[name][0] for name in foot.Design._fields]])
+        path, outputs, status = path_of(designs, NODES), np.empty((11, 1)), np.empty(1, np.uint8)
+        room = [np.empty((1, NODES)) for _ in range(2)]
+        effect.march(path, designs[:, [0, 1, 2, 3, 6]].copy(), 1, status, outputs, *room)
+        events = dict(zip(effect.OUTPUTS, outputs[:, 0], strict=True))
+        flight = (events["phi_land"] - events["phi_loss"]) % (2.0 * math.pi)
+        if float(row["expected"]["t_recontact"]) * row["inputs"]["omega"] < math.pi:
+            assert flight / row["inputs"]["omega"] == pytest.approx(float(row["expected"]["t_recontact"]), rel=1e-11)
+        assert events["phi_loss"] == pytest.approx(float(row["expected"]["x0"]), rel=1e-12)
+
+
+def test_foot_that_keeps_contact_follows_the_rack():
+    p = HEAVY | {"omega": 100.0}
+    phi = np.arange(24) * (2.0 * math.pi / 24)
+    at = sweep.evaluate("foot", p, ["y_rack", "y_foot", "force"], phi=phi)
+    height = p["Y"] * np.sin(phi) - p["p"]
+    np.testing.assert_allclose(at.y_rack, height, rtol=0, atol=1e-17)
+    np.testing.assert_allclose(at.y_foot, np.maximum(height, 0.0), rtol=0, atol=1e-17)
+    above = height > 0.0
+    bend = -(p["omega"] ** 2) * p["Y"] * np.sin(phi)
+    np.testing.assert_allclose(at.force[above], (p["F0"] + p["k"] * height + p["m"] * bend)[above], rtol=1e-13)
+    np.testing.assert_allclose(at.force[~above], p["F0"], rtol=1e-15)
+    whole = sweep.summarise("foot", p, ["flights", "lost_angle", "stitch_error", "least_force"]).iloc[0]
+    assert (whole.flights, whole.lost_angle, whole.stitch_error) == (0.0, 0.0, 0.0)
+    assert whole.least_force > 0.0
+
+
+def test_foot_keeps_contact_exactly_from_the_preload_and_spring_of_the_closed_forms():
+    need = sweep.summarise("foot", HEAVY, ["F0_min_contact"]).F0_min_contact[0]
+    assert need == pytest.approx(HEAVY["m"] * HEAVY["omega"] ** 2 * HEAVY["p"], rel=1e-15)
+    for preload in (1.001 * need, 2.0 * need):
+        p = HEAVY | {"F0": preload}
+        spring = sweep.summarise("foot", p, ["k_min_contact"]).k_min_contact[0]
+        flights = [
+            sweep.summarise("foot", p | {"k": x}, ["flights"]).flights[0] for x in (1.001 * spring, 0.999 * spring)
+        ]
+        assert flights[0] == 0.0 < flights[1]
+    entry = sweep.summarise("foot", HEAVY | {"F0": 0.999 * need, "k": 1e5}, ["flights", "phi_loss", "x0"]).iloc[0]
+    assert entry.flights > 0.0 and entry.phi_loss == pytest.approx(entry.x0, rel=1e-9)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0, 4.0])
+def test_foot_at_another_speed_needs_spring_and_preload_with_its_square(factor):
+    names = ["flights", "phi_loss", "phi_land", "lost_angle", "stitch_error"]
+    p = HEAVY | {"restitution": 0.2}
+    faster = p | {"omega": factor * p["omega"], "k": factor**2 * p["k"], "F0": factor**2 * p["F0"]}
+    one, two = (sweep.summarise("foot", x, [*names, "k_min_contact", "impulse"]) for x in (p, faster))
+    # a power of two: not a bit changes
+    pd.testing.assert_frame_equal(one[names], two[names], check_exact=True)
+    assert two.impulse[0] == factor * one.impulse[0]
+
+
+def test_foot_without_spring_falls_with_constant_acceleration():
+    p = HEAVY | {"k": 0.0, "F0": 3.0, "omega": 300.0}
+    phi = np.arange(720) * (2.0 * math.pi / 720)
+    at = sweep.evaluate("foot", p, ["y_foot", "force"], phi=phi)
+    flying = np.flatnonzero(
+        (at.force[:-2] == 0.0).to_numpy() & (at.force[1:-1] == 0.0).to_numpy() & (at.force[2:] == 0.0).to_numpy()
+    )
+    assert flying.size > 20
+    y = at.y_foot.to_numpy()
+    bend = (y[flying] - 2.0 * y[flying + 1] + y[flying + 2]) / (2.0 * math.pi / 720 / p["omega"]) ** 2
+    np.testing.assert_allclose(bend, -p["F0"] / p["m"], rtol=1e-6)
+    soft = sweep.summarise("foot", p | {"k": 1e-6}, ["jump_height_free", "flight_time_free", "phi_land"]).iloc[0]
+    none = sweep.summarise("foot", p, ["jump_height_free", "flight_time_free", "phi_land"]).iloc[0]
+    np.testing.assert_allclose(soft.to_numpy(float), none.to_numpy(float), rtol=1e-6)
+
+
+def test_foot_energy_of_a_flight_is_kept():
+    p = HEAVY | {"restitution": 0.2}
+    phi = np.arange(720) * (2.0 * math.pi / 720)
+    at = sweep.evaluate("foot", p, ["y_foot", "force"], phi=phi)
+    y, dt = at.y_foot.to_numpy(), 2.0 * math.pi / 720 / p["omega"]
+    inside = np.flatnonzero([all(at.force[k - 2 : k + 3] == 0.0) for k in range(2, 718)]) + 2
+    v = (y[inside - 2] - 8.0 * y[inside - 1] + 8.0 * y[inside + 1] - y[inside + 2]) / (12.0 * dt)
+    energy = 0.5 * p["m"] * v * v + 0.5 * p["k"] * y[inside] ** 2 + p["F0"] * y[inside]
+    # a bounce between two nodes changes the energy: pieces between bounces
+    pieces = np.split(energy, np.flatnonzero(np.abs(np.diff(energy)) > 1e-4 * energy[:-1]) + 1)
+    longest = max(pieces, key=len)
+    assert len(longest) > 20
+    np.testing.assert_allclose(longest, longest[0], rtol=1e-6)
+
+
+def test_foot_says_what_it_cannot_do():
+    never = sweep.summarise("foot", HEAVY | {"p": 2e-3}, ["x0", "v_entry"]).iloc[0]
+    assert never.status == st.NO_EVENT and math.isnan(never.x0)
+    buried = sweep.summarise("foot", HEAVY | {"p": -2e-3}, ["flights"]).iloc[0]
+    assert buried.status == st.NO_EVENT and math.isnan(buried.flights)
+    under = sweep.summarise("foot", HEAVY | {"p": 2e-3}, ["flights", "lost_angle"]).iloc[0]
+    assert (under.flights, under.lost_angle, under.status) == (0.0, 0.0, st.OK)
+    elastic = sweep.summarise("foot", HEAVY | {"restitution": 1.0}, ["flights"]).iloc[0]
+    assert elastic.status == st.INVALID_INPUT
+
+
+RACK = {
+    "h_a": 0.4, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "rh": 1.2, "dh": -0.3, "xE": 5.6, "yE": 0.7, "rE": 0.18, "dE": 0.8,
+    "q": 2.6, "fx": -1.7, "fy": 0.6, "tx": -0.3, "ty": 0.9, "h_sigma": -1.0, "bar_branch": -1.0,
+}  # fmt: skip
+
+
+def test_foot_on_the_rack_of_a_feed_mechanism_loses_contact_where_the_force_vanishes():
+    phi = np.linspace(0.0, 2.0 * math.pi, 721)[:-1]
+    path = sweep.evaluate("feed", RACK, ["y_t", "d2y_t", "x_t"], phi=phi)
+    plate = float(path.y_t.mean())
+    p = RACK | {"y_plate": plate, "m": 0.05, "k": 50.0, "F0": 4.0}
+    force = p["F0"] + p["k"] * (path.y_t - plate) + p["m"] * path.d2y_t
+    above = path.y_t > plate
+    slope = p["m"] * path.d2y_t
+    # the speed at which the least force over the plate is zero, at the nodes
+    limit = math.sqrt(float(((p["F0"] + p["k"] * (path.y_t - plate))[above] / -slope[above].where(slope < 0)).min()))
+    table = p | {"omega": [0.5 * limit, 0.999 * limit, 1.02 * limit, 1.5 * limit]}
+    got = sweep.summarise("feed_foot", table, ["flights", "lost_angle", "stitch_error", "least_force", "phi_loss"])
+    assert got.status.tolist() == [st.NO_EVENT, st.NO_EVENT, st.OK, st.OK]
+    assert (got.flights[:2] == 0.0).all() and (got.flights[2:] > 0.0).all()
+    assert got.stitch_error[:2].tolist() == [0.0, 0.0] and 0.0 < got.stitch_error[2] < got.stitch_error[3]
+    assert force[above].min() > 0.0
+    at = sweep.evaluate("feed", p | {"phi": got.phi_loss[2]}, ["y_t", "d2y_t"]).iloc[0]
+    left = p["F0"] + p["k"] * (at.y_t - plate) + p["m"] * table["omega"][2] ** 2 * at.d2y_t
+    # between nodes the curvature is interpolated: 1e-8 of the preload
+    assert abs(left) < 1e-7 * p["F0"]
+
+
+def test_foot_on_a_rack_that_is_not_assembled_reports_the_linkage():
+    p = RACK | {"h_a": 3.0, "y_plate": 0.0, "m": 0.05, "k": 50.0, "F0": 4.0, "omega": 1.0}
+    got = sweep.summarise("feed_foot", p, ["flights"]).iloc[0]
+    assert got.status == st.NOT_ASSEMBLED and math.isnan(got.flights)
+
+
+def test_foot_jitted_equals_plain():
+    designs = np.array([[r["inputs"].get(name, 1e-3) for name in foot.Design._fields] for r in ROWS[:3]])
+    results = []
+    for plain in (False, True):
+
+        def call(function, plain=plain):
+            return function.py_func if plain else function
+
+        status, closed, path = np.empty(3, np.uint8), np.empty((10, 3)), np.empty((3, 6, 96))
+        call(foot.closed_forms)(designs, status, closed)
+        call(foot.rack_path)(designs, path)
+        events, heights, forces = np.empty((11, 3)), np.empty((3, 96)), np.empty((3, 96))
+        call(effect.march)(path, designs[:, [0, 1, 2, 3, 6]].copy(), 2, status, events, heights, forces)
+        results.append((closed, path, events, heights, forces, status))
+    for one, two in zip(*results, strict=True):
+        np.testing.assert_allclose(one, two, rtol=1e-12)
+
+
+def test_negative_control_launch_without_restitution_fails_the_oracle():
+    row = next(r for r in ROWS if r["case"] == "rebound")
+    p = {name: row["inputs"][name] for name in row["inputs"]} | {"restitution": 0.0}
+    got = sweep.summarise("foot", p, ["jump_height_free"]).jump_height_free[0]
+    with mp.workdps(20):
+        assert abs(float(mpf(row["expected"]["jump_height_free"]) / mpf(float(got)) - 1)) > 0.1
+
+
+def test_foot_on_a_feed_rack_keeps_contact_from_the_softest_spring_and_the_least_preload():
+    p = RACK | {"y_plate": 1.55, "m": 0.05, "k": 0.0, "F0": 4.0, "omega": 20.0}
+    need = sweep.summarise("feed_foot", p, ["F0_min_contact"]).F0_min_contact[0]
+    assert need > 0.0
+    preload = 1.02 * need
+    found = sweep.summarise("feed_foot", p | {"F0": preload}, ["k_min_contact"]).iloc[0]
+    assert found.status == st.OK and found.k_min_contact > 0.0
+    springs = np.array([0.999, 1.001]) * found.k_min_contact
+    got = sweep.summarise("feed_foot", p | {"F0": preload, "k": springs}, ["flights"])
+    assert got.flights[0] > 0.0 and got.flights[1] == 0.0
+    short = sweep.summarise("feed_foot", p | {"F0": 0.98 * need}, ["k_min_contact"]).iloc[0]
+    assert math.isnan(short.k_min_contact) and short.status == st.NO_EVENT
+    plenty = sweep.summarise("feed_foot", p | {"F0": 50.0 * need}, ["k_min_contact"]).iloc[0]
+    assert plenty.k_min_contact == 0.0 and plenty.status == st.OK

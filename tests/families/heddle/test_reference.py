@@ -1,0 +1,254 @@
+"""Heddle drive at kernel level: the 25-digit table, points and circles in 50 digits, symmetries, limits."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+from mpmath import mp, mpf
+
+from kernels import status as st
+from kernels.families import heddle
+from tests.reference import heddle as naive
+
+ROWS = json.loads((Path(__file__).parents[2] / "oracle" / "heddle_open.json").read_text())["rows"]
+CHAIN = [row for row in ROWS if row["kind"] == "chain"]
+NAMES = ("chi", "dchi", "d2chi", "d3chi", "y", "dy", "d2y", "d3y")
+TABLED = ("chi", "dchi", "d2chi", "y", "dy", "d2y")
+# 8 roundings of each input: the closure adds a handful of roundings of the size of one in an input.
+FACTOR = 8.0
+
+
+def design(**given_values):
+    values = dict.fromkeys(heddle.Design._fields, 0.0) | {"side_F": 1.0, "side_C": 1.0}
+    return tuple((values | given_values)[name] for name in heddle.Design._fields)
+
+
+def moved(designs, theta, dtype=np.float64, plain=False):
+    """Outputs by name, places, and status of designs (n, 14) at angles (n, m)."""
+    matrix, theta = np.atleast_2d(np.asarray(designs, dtype)), np.atleast_2d(theta)
+    shape = (len(matrix), theta.shape[1])
+    status = np.empty(shape, np.uint8)
+    outs = [np.empty(shape, dtype) for _ in range(9)] + [np.empty((7, *shape), dtype)]
+    function = heddle.poses.py_func if plain else heddle.poses
+    with np.errstate(all="ignore"):
+        function(matrix, np.cos(theta), np.sin(theta), status, heddle.Outputs(*outs[:-1]), outs[-1])
+    return dict(zip((*NAMES, "discriminant", "places"), outs, strict=True)) | {"status": status}
+
+
+def of_row(row):
+    given_values = {k: v for k, v in row["in"].items() if k in heddle.Design._fields}
+    return design(**given_values), row["in"]["theta"]
+
+
+@pytest.mark.parametrize("name", TABLED)
+def test_heddle_matches_oracle_on_every_chain_row(name):
+    worst = 0.0
+    for row in CHAIN:
+        one, theta = of_row(row)
+        got = moved([one], [[theta]])
+        assert got["status"][0, 0] == st.OK
+        size = max(abs(mpf(row["out"][name])), naive.condition(one, theta, name))
+        worst = max(worst, float(abs(mpf(float(got[name][0, 0])) - mpf(row["out"][name])) / (size * mpf(2) ** -53)))
+    assert worst <= FACTOR
+
+
+def test_heddle_transmission_angle_matches_oracle():
+    for row in CHAIN:
+        one, theta = of_row(row)
+        got = moved([one], [[theta]])
+        # the sine is a root of the discriminant: its error grows with its inverse
+        error = abs(float(got["places"][0, 0, 0]) - float(row["out"]["sin_transmission"]))
+        assert error <= 16.0 * 2.0**-53 * max(1.0, 1.0 / abs(float(row["out"]["sin_transmission"])))
+
+
+LINKED = some.builds(
+    design,
+    O2B=some.floats(60.0, 110.0),
+    BC=some.floats(180.0, 260.0),
+    O3C=some.floats(110.0, 160.0),
+    O2O3=some.floats(150.0, 250.0),
+    O4E=some.floats(80.0, 160.0),
+    chi_mid=some.floats(0.9, 1.5),
+    O3D=some.floats(60.0, 150.0),
+    O4F=some.floats(90.0, 160.0),
+    O3O4=some.floats(500.0, 900.0),
+    DF=some.just(700.0),
+    EG=some.floats(300.0, 600.0),
+    x_s=some.floats(-20.0, 100.0),
+    side_F=some.sampled_from([-1.0, 1.0]),
+    side_C=some.sampled_from([-1.0, 1.0]),
+)
+
+
+@settings(deadline=None, max_examples=15)
+@given(LINKED, some.floats(-3.0, 3.0))
+def test_heddle_with_a_general_link_and_a_short_rod_equals_points_and_circles(one, theta):
+    got = moved([one], [[theta]])
+    if got["status"][0, 0] != st.OK:
+        return
+    expected = naive.outputs(one, theta)
+    near = min(abs(float(expected["sin_transmission"])), 1.0)
+    for name in NAMES:
+        order = NAMES.index(name) % 4
+        # Each derivative loses two more powers of the distance from the toggle than the one before.
+        size = max(1.0, abs(float(expected[name])), 100.0 if name.endswith("y") else 1.0)
+        error = abs(float(got[name][0, 0]) - float(expected[name]))
+        assert error <= 1e-11 * size / near ** (2 * order + 1) * _link_room(one, theta) ** -(2 * order + 1), name
+
+
+def _link_room(one, theta):
+    """Sine of the angle between the link DF and the shaft lever, at least 1e-3: the second toggle."""
+    p = dict(zip(naive.NAMES, one, strict=True))
+    at = naive.positions(one, theta)
+    chi = float(at["chi"]) - p["chi_mid"]
+    d = p["O3D"] * p["side_F"] * 1j * complex(math.cos(chi), math.sin(chi))
+    reach = abs(p["O3O4"] - d)
+    cos = (reach**2 - p["DF"] ** 2 - p["O4F"] ** 2) / (2.0 * p["DF"] * p["O4F"])
+    slide = p["EG"] ** 2 - (float(mp.re(p["O4E"] * mp.expj(at["lam"]))) - p["x_s"]) ** 2
+    return max(1e-3, min(math.sqrt(max(1.0 - cos * cos, 0.0)), math.sqrt(max(slide, 0.0)) / p["EG"]))
+
+
+SOURCE = design(O2B=192.5, BC=225.0, O3C=138.5, O2O3=160.0, O4E=138.5, chi_mid=math.radians(65.0))
+
+
+def test_heddle_equal_arms_and_link_as_long_as_the_frame_turn_the_levers_alike():
+    theta = np.linspace(1.4, 1.7, 7)[None, :]
+    parallel = moved([SOURCE], theta)
+    near = design(**(dict(zip(heddle.Design._fields, SOURCE, strict=True)) | {
+        "O3D": 138.5, "O4F": 138.5, "O3O4": 900.0, "DF": 900.0 * (1.0 + 2.0**-52)}))  # fmt: skip
+    general = moved([near], theta)
+    for name in NAMES:
+        np.testing.assert_allclose(general[name], parallel[name], rtol=1e-12, atol=1e-12)
+    chi = parallel["chi"]
+    np.testing.assert_allclose(parallel["y"], 138.5 * np.sin(chi - SOURCE[5]), rtol=0, atol=1e-13)
+
+
+def test_heddle_long_rods_lift_like_none():
+    theta = np.linspace(1.4, 1.7, 7)[None, :]
+    plain = moved([SOURCE], theta)
+    long = moved([design(**(dict(zip(heddle.Design._fields, SOURCE, strict=True)) | {"EG": 1e9}))], theta)
+    # the rod's tilt changes the lift by E's path across it, below 138.5^2/1e9 mm
+    np.testing.assert_allclose(long["dy"], plain["dy"], rtol=0, atol=1e-4)
+
+
+def test_heddle_mirrors_in_the_line_of_axes():
+    p = dict(zip(heddle.Design._fields, SOURCE, strict=True))
+    other = design(**(p | {"chi_mid": -p["chi_mid"], "side_C": -p["side_C"]}))
+    one, two = moved([SOURCE], [[1.5]]), moved([other], [[-1.5]])
+    for k, name in enumerate(NAMES):
+        sign = 1.0 if k % 2 else -1.0
+        assert two[name][0, 0] == sign * one[name][0, 0]
+
+
+@pytest.mark.parametrize("exponent", [-330, -40, 40, 330])
+def test_heddle_scaled_by_a_power_of_two_keeps_every_bit(exponent):
+    lengths = [k for k, name in enumerate(heddle.Design._fields) if name not in ("chi_mid", "side_F", "side_C")]
+    one = design(O2B=80.0, BC=220.0, O3C=130.0, O2O3=200.0, O4E=120.0, chi_mid=1.1, O3D=90.0, O4F=110.0,
+                 O3O4=700.0, DF=701.0, EG=400.0, x_s=30.0)  # fmt: skip
+    scaled = np.array(one)
+    scaled[lengths] = np.ldexp(scaled[lengths], exponent)
+    plain, large = moved([one], [[0.4]]), moved([scaled], [[0.4]])
+    assert plain["status"][0, 0] == st.OK
+    for name in NAMES:
+        factor = exponent if name.endswith("y") else 0
+        assert math.ldexp(plain[name][0, 0], factor) == large[name][0, 0]
+
+
+def test_heddle_toggles_are_named_and_never_invented():
+    # B on the line through O3 at the distance BC + O3C, BC - O3C, and half a unit beyond
+    base = {"O2B": 100.0, "O3C": 60.0, "O2O3": 300.0, "O4E": 100.0, "chi_mid": 0.0}
+    codes = {}
+    for name, rod in (("stretched", 140.0), ("beyond", 139.5), ("folded", 260.0), ("free", 200.0)):
+        got = moved([design(BC=rod, **base)], [[0.0]])
+        codes[name] = got["status"][0, 0]
+        if name in ("stretched", "folded"):
+            assert np.isfinite(got["chi"][0, 0]) and np.isnan(got["dchi"][0, 0])
+        if name == "beyond":
+            assert np.isnan(got["chi"][0, 0]) and np.isnan(got["y"][0, 0])
+    assert codes == {"stretched": st.DEAD_POINT, "beyond": st.NOT_ASSEMBLED, "folded": st.DEAD_POINT, "free": st.OK}
+    on_pivot = moved([design(O2B=300.0, BC=60.0, O3C=60.0, O2O3=300.0, O4E=1.0, chi_mid=0.0)], [[0.0]])
+    assert on_pivot["status"][0, 0] == st.SINGULAR
+    short_rod = moved([design(**(dict(zip(heddle.Design._fields, SOURCE, strict=True)) | {"EG": 5.0}))], [[1.5]])
+    assert short_rod["status"][0, 0] == st.NOT_ASSEMBLED
+    assert moved([design(**(base | {"O3C": -60.0, "BC": 200.0}))], [[0.0]])["status"][0, 0] == st.INVALID_INPUT
+
+
+def test_heddle_jitted_equals_plain():
+    rng = np.random.default_rng(5)
+    designs = np.array([of_row(row)[0] for row in CHAIN[:8]])
+    designs[4:, 6:12] = [90.0, 110.0, 700.0, 701.0, 400.0, 30.0]
+    theta = np.array([of_row(row)[1] for row in CHAIN[:8]])[:, None] + np.array([[0.0, 0.05, 2.0]])
+    for dtype in (np.float64, np.complex128):
+        matrix = designs.astype(dtype)
+        if dtype is np.complex128:
+            matrix[:, :6] += 1e-30j * rng.normal(size=(8, 6))
+        one, two = moved(matrix, theta, dtype), moved(matrix, theta, dtype, plain=True)
+        for name, values in one.items():
+            np.testing.assert_array_equal(values, two[name])
+    assert {st.OK, st.NOT_ASSEMBLED} <= set(one["status"].ravel())
+
+
+def test_heddle_complex_step_gives_exact_gradients():
+    one = design(O2B=80.0, BC=220.0, O3C=130.0, O2O3=200.0, O4E=120.0, chi_mid=1.1, O3D=90.0, O4F=110.0,
+                 O3O4=700.0, DF=701.0, EG=400.0, x_s=30.0)  # fmt: skip
+    for k in range(12):
+        matrix = np.array([one], complex)
+        matrix[0, k] += 1e-100j
+        got = moved(matrix, [[0.4]], np.complex128)
+        for name in ("chi", "dchi", "y", "d2y"):
+
+            def output(x, k=k, name=name):
+                values = [mpf(v) for v in one]
+                values[k] = x
+                order, letter = {"chi": (0, "chi"), "dchi": (1, "chi"), "y": (0, "y"), "d2y": (2, "y")}[name]
+                return mp.diff(lambda t: naive.positions(tuple(values), t)[letter], mpf("0.4"), order)
+
+            with mp.workdps(50):
+                slope = float(mp.diff(output, mpf(one[k]), h=mpf(10) ** -12))
+            assert got[name][0, 0].imag * 1e100 == pytest.approx(slope, rel=1e-9, abs=1e-12), (k, name)
+
+
+def test_negative_control_other_side_fails_the_oracle():
+    row = CHAIN[0]
+    one, theta = of_row(row)
+    got = moved([(*one[:-1], -one[-1])], [[theta]])
+    assert abs(float(got["chi"][0, 0]) - float(row["out"]["chi"])) > 1e-3
+
+
+@pytest.mark.parametrize("lacking", ["O3C", "BC", "O4F", "O3D", "DF", "O2B"])
+def test_heddle_with_a_link_of_no_length_is_invalid_with_complex_numbers_too(lacking):
+    values = {"O2B": 90.0, "BC": 225.0, "O3C": 138.5, "O2O3": 160.0, "O4E": 138.5, "chi_mid": 1.13,
+              "O3D": 120.0, "O4F": 138.5, "O3O4": 900.0, "DF": 900.2}  # fmt: skip
+    for dtype in (np.float64, np.complex128):
+        got = moved([design(**values | {lacking: 0.0})], [[1.5]], dtype)
+        assert got["status"][0, 0] == st.INVALID_INPUT
+        assert np.isnan(got["y"][0, 0].real)
+
+
+@pytest.mark.parametrize("arm", [1e2, 1e4, 4.5e5])
+def test_heddle_of_long_arms_keeps_its_discriminant_and_its_speed(arm):
+    """Bell crank and frame of 10^2 to 10^4 cam levers, alike but for 85: the difference of their squares lost 9 digits.
+
+    The product loses none but those of its factors, a handful of roundings; the speed those of a c - e c/a as well.
+    """
+    long = design(O2B=30.0, BC=160.0, O3C=arm, O2O3=arm + 85.0, O4E=140.0, chi_mid=1.9)
+    theta = np.linspace(0.1, 6.2, 25)
+    got = moved(long, theta)
+    assert (got["status"] == st.OK).all()
+    with mp.workdps(50):
+        a, b, c, e = (mpf(long[k]) for k in range(4))
+        for k, angle in enumerate(theta):
+            u, v = mpf(math.cos(angle)), mpf(math.sin(angle))
+            x, y, w = e - a * u, -a * v, ((c - b) * (c + b) + a * a + e * e) / (2 * c) - a * e * u / c
+            delta = x * x + y * y - w * w
+            assert abs(got["discriminant"][0, k] - delta) <= 16.0 * 2.0**-53 * delta * float(b / mp.sqrt(delta)) ** 2
+            root = mp.sqrt(delta)
+            cos, sin = -(x * w + y * root) / (x * x + y * y), (x * root - y * w) / (x * x + y * y)
+            rate = (a * (v * cos - u * sin) + a * e * v / c) / root
+            assert abs(got["dchi"][0, k] - rate) <= 64.0 * 2.0**-53 * a / root

@@ -1,0 +1,123 @@
+"""Swivel linkage against its points, plain Python, exact gradients, its planar form and its place in a chain."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from mpmath import mp
+
+import sweep
+from kernels import status as st
+from kernels.families import swivel
+from sweep.families import family
+from tests.reference import swivel as naive
+from tests.support.family_checks import (
+    assert_compiled_equals_plain,
+    assert_gradients_are_those_of_the_reference,
+    factors,
+)
+
+NAMES = swivel.Design._fields
+DESIGN = (1.0, 2.6, 0.7, -0.4, 0.6, 5.0)
+ALL = [o.name for o in family("swivel").pose_outputs]
+POINT = ["x_p", "y_p", "z_p"]
+
+
+def evaluated(design, phi, want):
+    return sweep.evaluate("swivel", dict(zip(NAMES, design, strict=True)), want, phi=np.atleast_1d(phi))
+
+
+def test_swivel_equals_point_geometry():
+    # The inputs are rounded once and the closed form adds a few roundings of the same size: 16 is asked, 2 measured.
+    generator = np.random.default_rng(1)
+    for _ in range(40):
+        design = (1.0, *generator.uniform(-3.0, 3.0, 5))
+        phi = generator.uniform(0.0, 6.0)
+        expected = naive.outputs(design, phi)
+        found = factors("swivel", design, phi, expected, evaluated(design, phi, ALL).iloc[0])
+        assert max(found.values()) <= 16.0, (design, phi, found)
+
+
+def test_swivel_point_stays_on_the_rod_through_the_block():
+    frame = evaluated(DESIGN, np.linspace(0.0, 6.0, 25), ALL)
+    pin, point, n = (frame[[f"{x}_{name}" for x in "xyz"]].to_numpy() for name in ("b", "p", "n"))
+    block = np.array([DESIGN[1], 0.0, DESIGN[3]])
+    np.testing.assert_allclose(np.linalg.norm(n, axis=1), 1.0, rtol=4e-16)
+    np.testing.assert_allclose(pin + frame.rho.to_numpy()[:, None] * n, np.tile(block, (25, 1)), atol=4e-15)
+    np.testing.assert_allclose(point - pin, DESIGN[5] * n, atol=4e-15)
+
+
+def test_swivel_first_derivatives_are_those_of_the_vector_formulas():
+    """rho' = -n.B' and n' = (n (n.B') - B')/rho, with B' of the crank."""
+    phi = np.linspace(0.0, 6.0, 25)
+    frame = evaluated(DESIGN, phi, ALL)
+    sa, ca = math.sin(DESIGN[4]), math.cos(DESIGN[4])
+    b1 = np.stack([-np.sin(phi), ca * np.cos(phi), -sa * np.cos(phi)], axis=1)
+    n, rho = frame[["x_n", "y_n", "z_n"]].to_numpy(), frame.rho.to_numpy()[:, None]
+    along = (n * b1).sum(axis=1)[:, None]
+    np.testing.assert_allclose(frame.drho, -along[:, 0], atol=4e-15)
+    velocity = b1 + DESIGN[5] * (n * along - b1) / rho
+    np.testing.assert_allclose(frame[["dx_p", "dy_p", "dz_p"]], velocity, atol=8e-15)
+
+
+def test_swivel_planar_form_is_the_looper_with_a_swinging_block():
+    """Axes parallel, all in one plane: the rod's angle is atan2, the tip runs round the crank's circle through it."""
+    phi = np.linspace(0.0, 6.0, 13)
+    frame = sweep.evaluate("swivel", {"a": 1.0, "e": 3.0, "Lw": 7.0}, [*POINT, "rho"], phi=phi)
+    angle = np.arctan2(-np.sin(phi), 3.0 - np.cos(phi))
+    np.testing.assert_allclose(frame.x_p, np.cos(phi) + 7.0 * np.cos(angle), atol=8e-15)
+    np.testing.assert_allclose(frame.y_p, np.sin(phi) + 7.0 * np.sin(angle), atol=8e-15)
+    np.testing.assert_array_equal(frame.z_p, 0.0)
+    np.testing.assert_allclose(frame.rho, np.sqrt(10.0 - 6.0 * np.cos(phi)), rtol=1e-15)
+
+
+def test_swivel_driven_by_a_crank_rocker_has_the_derivatives_of_the_whole():
+    """Chain rule against a difference in 120 digits of the composition of both references."""
+    from tests.reference.rssr import Linkage
+
+    first = {"a1": 1.0, "b1": 4.1, "c1": 3.2, "e1": 2.9, "f1": 0.6, "g1": -0.4, "alpha1": 0.7, "branch1": -1.0}
+    second = {"a2": 1.5, "e2": 3.0, "f2": 0.2, "g2": -0.1, "alpha2": 0.4, "Lw2": 6.0, "kappa2": -1.0, "offset2": 0.3}
+    want = ["x_p", "dx_p", "d2x_p", "d3x_p", "rho", "drho"]
+    row = sweep.evaluate(["rssr", "swivel"], first | second, want, phi=[1.2]).iloc[0]
+    with mp.workdps(120):
+        linkage = Linkage(*first.values())
+        numbers = [mp.mpf(x) for x in list(second.values())[:6]]
+
+        def whole(phi, start):
+            psi = linkage.psi(phi, start)
+            return psi, naive.position(numbers, -psi + mp.mpf(0.3))
+
+        start, pose = whole(mp.mpf(1.2), None)
+        taylor = mp.taylor(lambda x: whole(x, start)[1]["x_p"], mp.mpf(1.2), 3, h=mp.mpf(10) ** -20)
+        exact = [taylor[k] * mp.factorial(k) for k in range(4)]
+        assert abs(row.rho - pose["rho"]) < 1e-14
+    # two stages with pressure angles below 60 degrees: a few hundred roundings at most
+    for name, value in zip(want[:4], exact, strict=True):
+        assert row[name] == pytest.approx(float(value), rel=1e-13, abs=1e-13)
+
+
+def test_swivel_jitted_equals_plain():
+    designs = np.array([DESIGN, (1.0, 1.0, 0.0, 0.0, 0.0, 2.0), (0.3, -2.0, 1.0, 5.0, 2.0, -1.0)])
+    phi = np.random.default_rng(3).uniform(-4.0, 4.0, (3, 5))
+    phi[1, 0] = 0.0
+    assert_compiled_equals_plain(swivel.poses, designs, phi, [(4,), (3,), (3,), (3,), (3,), (6,)])
+
+
+def test_swivel_complex_step_gives_exact_gradients():
+    def reference(numbers, phi):
+        h = mp.mpf(10) ** -25
+        pose = naive.position(numbers, phi)
+        return pose | {"dx_p": (naive.position(numbers, phi + h)["x_p"] - pose["x_p"]) / h}
+
+    assert_gradients_are_those_of_the_reference("swivel", DESIGN, 2.3, reference, ["rho", *POINT, "dx_p"])
+
+
+@pytest.mark.parametrize(
+    ("change", "status"), [({}, st.OK), ({"e": 1.0}, st.SINGULAR), ({"a": 1e-310, "e": 1e200}, st.INVALID_INPUT)]
+)
+def test_swivel_status_explains_every_nan(change, status):
+    row = sweep.evaluate("swivel", {"a": 1.0, "e": 2.0, "Lw": 3.0} | change, ALL, phi=[0.0]).iloc[0]
+    assert row.status == status
+    assert row[ALL].isna().all() == (status != st.OK)

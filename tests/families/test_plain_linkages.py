@@ -1,0 +1,245 @@
+"""Slider-crank, four-bar, inverted slider-crank, epicyclic dwell against points and printed numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import sweep
+from kernels import status as st
+from kernels.families import epicyclic_dwell, inverted_slider_crank
+from kernels.families.cam import swinging, translating
+from sweep.families import family
+from sweep.families.base import Angles
+from tests.reference import plain_linkages as naive
+from tests.support.plain_designs import DESIGNS, PHI, evaluated
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+def test_plain_linkage_equals_its_points_and_their_derivatives(name):
+    known = set(family(name).pose_names)
+    for k, design in enumerate(DESIGNS[name]):
+        phi = PHI[k % len(PHI)]
+        expected = naive.derivatives(getattr(naive, name), design, phi, 3)
+        want = [key for key in expected if key in known]
+        row = evaluated(name, design, want, phi)
+        assert row.status == st.OK
+        size = max(1.0, *(abs(float(expected[key])) for key in want))
+        for key in want:
+            # a few roundings, times sensitivities that these proportions keep below 1000
+            assert float(abs(row[key] - expected[key])) < 1000.0 * 2.0**-52 * size, (key, design, phi)
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+def test_plain_linkage_complex_step_gives_the_next_derivative(name):
+    mechanism = family(name)
+    ladder = mechanism.derivative_of
+    for k, design in enumerate(DESIGNS[name]):
+        values = [design.get(p.name, p.default if p.default is not None else 0.0) for p in mechanism.parameters]
+        phi = np.array([[PHI[k % len(PHI)]]])
+        wanted = frozenset([*ladder, *ladder.values()])
+        real = mechanism.poses(np.array([values]), Angles.of(phi), wanted)
+        turned = mechanism.poses(np.array([values]) + 0.0j, Angles.of(phi + 1e-100j), wanted)
+        for lower, upper in ladder.items():
+            size = max(1.0, *(abs(real[key][0, 0]) for key in ladder.values()))
+            assert turned[lower][0, 0].imag / 1e-100 == pytest.approx(real[upper][0, 0], abs=1e-12 * size), (lower, k)
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+def test_plain_linkage_complex_step_gives_slopes_with_respect_to_every_parameter(name):
+    mechanism = family(name)
+    position = mechanism.position
+    for k, design in enumerate(DESIGNS[name][-2:]):
+        values = np.array(
+            [design.get(p.name, p.default if p.default is not None else 0.0) for p in mechanism.parameters]
+        )
+        phi = Angles.of(np.array([[PHI[k]]]))
+        for column, parameter in enumerate(mechanism.parameters):
+            if parameter.choices is not None:
+                continue
+            direction = np.eye(values.size)[column]
+            exact = mechanism.poses(np.array([values + 1e-100j * direction]), phi, frozenset({position}))
+            slope = exact[position][0, 0].imag / 1e-100
+            step = 1e-5 * max(1.0, abs(values[column]))
+            ends = [
+                mechanism.poses(np.array([values + d * direction]), phi, frozenset({position}))[position][0, 0]
+                for d in (-step, step)
+            ]
+            # second order in the step
+            assert slope == pytest.approx((ends[1] - ends[0]) / (2.0 * step), rel=1e-7, abs=1e-7), parameter.name
+
+
+def matrix_of(name):
+    mechanism = family(name)
+    rows = [
+        [d.get(p.name, p.default if p.default is not None else 0.0) for p in mechanism.parameters]
+        for d in DESIGNS[name]
+    ]
+    return np.array(rows, dtype=float)
+
+
+@pytest.mark.parametrize(
+    ("name", "function", "outputs", "places"),
+    [
+        ("inverted_slider_crank", inverted_slider_crank.poses, 9, 2),
+        ("epicyclic_dwell", epicyclic_dwell.poses, 8, 0),
+        ("cam", translating.poses, 7, 0),
+        ("cam_lever", swinging.poses, 7, 0),
+    ],
+)
+def test_plain_linkage_kernel_jitted_equals_plain_python(name, function, outputs, places):
+    designs, phi = matrix_of(name), np.linspace(0.0, 6.2, 23)[None, :]
+    modules = {"inverted_slider_crank": inverted_slider_crank, "epicyclic_dwell": epicyclic_dwell, "cam": translating}
+    modules["cam_lever"] = swinging
+    angles = (phi,) if name.startswith("cam") else (np.cos(phi), np.sin(phi))
+    results = []
+    for run in (function, function.py_func):
+        shape = (len(designs), phi.size)
+        status, out = np.empty(shape, np.uint8), [np.empty(shape) for _ in range(outputs)]
+        room = [np.empty((places, *shape))] if places else []
+        run(designs, *angles, status, modules[name].Outputs(*out), *room)
+        results.append([status, *out, *room])
+    for compiled, plain in zip(*results, strict=True):
+        # the same arithmetic; sine and cosine come from two libraries that may differ by a rounding
+        np.testing.assert_allclose(compiled, plain, rtol=1e-13, atol=1e-12)
+
+
+def test_slider_crank_has_the_printed_limits_and_acceleration():
+    frame = sweep.summarise(
+        "slider_crank",
+        {"a": 1.0, "b": 3.0, "e": [0.0, 0.5]},
+        ["stroke", "phi_ext", "max_abs_d2s", "margin"],
+        accuracy=1e-9,
+    )
+    assert frame.stroke[0] == pytest.approx(2.0, rel=1e-14)
+    assert frame.stroke[1] == pytest.approx(math.sqrt(16.0 - 0.25) - math.sqrt(4.0 - 0.25), rel=1e-14)
+    assert frame.phi_ext[0] % (2.0 * math.pi) == pytest.approx(0.0, abs=1e-14)
+    assert frame.phi_ext[1] == pytest.approx(math.asin(0.5 / 4.0), abs=1e-14)
+    assert frame.max_abs_d2s[0] == pytest.approx(1.0 + 1.0 / 3.0, rel=1e-9)
+    assert frame.margin[1] == pytest.approx(1.0 - (1.5 / 3.0) ** 2, rel=1e-14)
+
+
+def test_slider_crank_published_spatial_example_has_its_planar_strokes():
+    # sqrt(b^2 - (e +- a)^2): the limits of the benchmark with the slide line through the crank axis's normal
+    row = sweep.summarise("slider_crank", {"a": 0.08, "b": 0.3}, ["s_ext", "s_fold"], accuracy=1e-10).iloc[0]
+    assert (row.s_ext, row.s_fold) == pytest.approx((0.38, 0.22), rel=1e-14)
+
+
+def test_four_bar_matches_the_textbook_positions():
+    # Norton, position problem, row a: ground 6, crank 2, coupler 7, rocker 9, crank at 30 deg
+    frame = sweep.evaluate(
+        "four_bar", {"a": 2.0, "b": 7.0, "c": 9.0, "e": 6.0, "branch": [1.0, -1.0]}, ["psi"], phi=[math.pi / 6]
+    )
+    assert sorted(np.degrees(frame.psi).round(2)) == [-143.66, 117.29]
+
+
+def test_four_bar_is_the_crank_rocker_and_the_guide_to_the_last_bit():
+    phi = np.linspace(0.0, 6.2, 13)
+    links = {"a": 1.0, "b": 3.0, "c": 2.5, "e": 3.0, "branch": [1.0, -1.0]}
+    own = sweep.evaluate("four_bar", links | {"xi": 1.2, "eta": -0.4}, ["psi", "d3psi", "x_m", "d2y_m"], phi)
+    rocker = sweep.evaluate("rssr", links | {"f": 0.0, "g": 0.0, "alpha": 0.0}, ["psi", "d3psi"], phi)
+    point = sweep.evaluate("guide", links | {"xi": 1.2, "eta": -0.4, "lam": 0.0, "h": 0.0}, ["s", "d2dev"], phi)
+    np.testing.assert_array_equal(own[["psi", "d3psi"]], rocker[["psi", "d3psi"]])
+    np.testing.assert_array_equal(own[["x_m", "d2y_m"]], point[["s", "d2dev"]])
+
+
+def test_inverted_slider_crank_swings_by_the_tangents_to_the_crank_circle():
+    frame = sweep.summarise(
+        "inverted_slider_crank", {"a": 1.0, "e": 2.0, "h": [0.0, 0.3]},
+        ["swing", "phi0", "margin", "rotatable", "max_dpsi", "min_dpsi"], accuracy=1e-10,
+    )  # fmt: skip
+    assert frame.rotatable.all()
+    assert abs(frame.swing[0]) == pytest.approx(2.0 * math.asin(0.5), rel=1e-9)
+    assert frame.phi0[0] == pytest.approx(2.0 * math.acos(0.5), rel=1e-9)
+    assert frame.max_dpsi[0] == pytest.approx(1.0 / 3.0, rel=1e-9)
+    assert frame.min_dpsi[0] == pytest.approx(-1.0, rel=1e-9)
+    assert frame.margin[1] == pytest.approx(1.0 - 0.3**2, rel=1e-9)  # the pin passes the rocker pivot at 1
+
+
+def test_inverted_slider_crank_with_a_long_crank_turns_fully():
+    # Whitworth's quick return: the rocker makes full turns and has no limit positions
+    table = {"a": 1.0, "e": 0.5, "h": 0.0}
+    assert sweep.summarise("inverted_slider_crank", table, ["swing"], accuracy=1e-8).status[0] == st.NOT_OSCILLATING
+    row = sweep.summarise("inverted_slider_crank", table, ["max_dpsi", "min_dpsi"], accuracy=1e-9).iloc[0]
+    assert (row.max_dpsi, row.min_dpsi) == pytest.approx((2.0, 2.0 / 3.0), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "status"),
+    [
+        ({}, st.OK),
+        ({"h": 1.5}, st.NOT_ASSEMBLED),
+        ({"h": 1.0}, st.DEAD_POINT),
+        ({"e": 1.0}, st.SINGULAR),
+        ({"a": 0.0}, st.INVALID_INPUT),
+        ({"h": math.inf}, st.INVALID_INPUT),
+        ({"branch": 0.5}, st.INVALID_INPUT),
+    ],
+)
+def test_inverted_slider_crank_status_explains_every_nan(change, status):
+    mechanism = family("inverted_slider_crank")
+    design = {"a": 1.0, "e": 2.0, "h": 0.2, "branch": 1.0} | change
+    columns = mechanism.poses(
+        np.array([list(design.values())]), Angles.of(np.array([[0.0]])), frozenset(mechanism.pose_names)
+    )
+    assert columns["status"][0, 0] == status
+    if status == st.OK:
+        assert all(np.isfinite(columns[name][0, 0]) for name in mechanism.pose_names)
+    elif status == st.DEAD_POINT:
+        assert columns["psi"][0, 0] == pytest.approx(0.5 * math.pi) and np.isnan(columns["dpsi"][0, 0])
+    else:
+        assert all(np.isnan(columns[name][0, 0]) for name in ("psi", "dpsi", "d3psi", "s", "pressure_angle"))
+
+
+def test_epicyclic_dwell_with_equal_gears_is_the_geared_dwell_drive():
+    phi = np.linspace(0.0, 6.2, 41)
+    table = {"k": [1.05, 1.3, 1.7, 0.8], "a": [0.3, 1.2, 0.4, 0.2]}
+    names = ["dpsi", "d2psi", "d3psi", "sin_psi", "cos_psi", "x_b", "y_b"]
+    own, other = (sweep.evaluate(f, table, names, phi) for f in ("epicyclic_dwell", "geared_dwell"))
+    # differences of plain and of stable forms: no pin of these comes nearer than 0.2 to the axis
+    np.testing.assert_allclose(own[names], other[names], atol=1e-11)
+    measures = ["dwell_angle", "dwell_deviation", "dwell_band"]
+    own, other = (sweep.summarise(f, table, measures, accuracy=1e-9) for f in ("epicyclic_dwell", "geared_dwell"))
+    np.testing.assert_allclose(own[measures], other[measures], rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize(("n", "mesh"), [(2.0, 1.0), (3.0, 1.0), (4.0, -1.0), (9.0, -1.0)])
+def test_epicyclic_dwell_without_offset_dwells_n_times_a_turn(n, mesh):
+    phi = np.linspace(0.0, 0.6, 7)
+    frame = [
+        sweep.evaluate("epicyclic_dwell", {"k": 1.2, "a": 0.0, "n": n, "mesh": mesh}, ["psi", "d2psi"], p)
+        for p in (phi, phi + 2.0 * math.pi / n)
+    ]
+    turned = np.exp(1j * (frame[1].psi - frame[0].psi - 2.0 * math.pi / n))
+    np.testing.assert_allclose(turned, 1.0, atol=1e-13)
+    np.testing.assert_allclose(frame[0].d2psi, frame[1].d2psi, atol=1e-11)
+
+
+def test_epicyclic_dwell_measures_are_what_the_curve_shows():
+    table = {"k": [1.2, 1.2], "a": [0.3, 0.1], "n": [3.0, 4.0], "mesh": [1.0, -1.0]}
+    measures = sweep.summarise(
+        "epicyclic_dwell", table, ["dwell_angle", "dwell_deviation", "dwell_band"], accuracy=1e-9
+    )
+    for k in range(2):
+        design = {name: values[k] for name, values in table.items()}
+        half, band = 0.5 * measures.dwell_angle[k], 0.5 * measures.dwell_band[k]
+        phi = np.linspace(0.0, half, 20001)
+        psi = sweep.evaluate("epicyclic_dwell", design, ["psi"], phi).psi
+        assert abs(psi.iloc[-1]) < 1e-12 and psi[1:-1].max() < 0.0
+        assert -psi.min() == pytest.approx(measures.dwell_deviation[k], rel=1e-7)  # of the grid: half a cell squared
+        end = sweep.evaluate("epicyclic_dwell", design, ["psi"], [band]).psi[0]
+        assert end == pytest.approx(measures.dwell_deviation[k], rel=1e-12)
+
+
+def test_epicyclic_cross_slide_has_the_published_dwell():
+    # N. D. Thang: a ring of 4 planet radii, tracer at 11/30 of one: a square whose corners lie at phi = 0, 90 deg ...
+    phi = np.linspace(-0.25 * math.pi, 0.75 * math.pi, 200001)
+    design = {"k": 11.0 / 30.0, "a": 0.0, "n": 4.0, "mesh": -1.0}
+    frame = sweep.evaluate("epicyclic_dwell", design, ["x_b", "y_b"], phi)
+    across = (frame.x_b + frame.y_b).to_numpy() / math.sqrt(2.0)  # a slide square to the side at 45 deg
+    stroke = 2.0 * across.max()
+    for part, degrees in ((0.01, 63.23), (0.001, 43.18)):
+        inside = phi[across > across.max() - part * stroke]
+        assert math.degrees(inside.max() - inside.min()) == pytest.approx(degrees, abs=0.01)

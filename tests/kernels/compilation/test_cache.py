@@ -1,0 +1,342 @@
+"""Compiled kernels on disk: never those of other sources, whatever is edited when, whoever else compiles."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+SOURCES = Path(__file__).resolve().parents[3] / "kernels"
+HELPER = """
+from kernels.jit import inline
+
+STEP = {step}
+
+
+@inline
+def shifted(x: float) -> float:
+    return x + STEP
+"""
+KERNEL = """
+from kernels.jit import kernel
+from kernels.helper import shifted
+
+
+@kernel
+def run(x):
+    return shifted(x)
+"""
+REPORT = "from kernels.loop import run; print(run(1.0), len(run.stats.cache_hits), type(run._cache).__name__)"
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """A package of two kernels around the house's decorators, with a cache folder of its own."""
+    package = tmp_path / "tree" / "kernels"
+    package.mkdir(parents=True)
+    for path in (SOURCES / "__init__.py", *(SOURCES / name for name in ("jit.py", "cache.py", "cache_folder.py"))):
+        (package / path.name).write_text(path.read_text())
+    (package / "loop.py").write_text(KERNEL)
+    (package / "helper.py").write_text(HELPER.format(step=1))
+    return package
+
+
+def process(tree: Path, program: str, errors: int | None = None, **environment: str) -> subprocess.Popen[str]:
+    known = os.environ | {"XDG_CACHE_HOME": str(tree.parents[1] / "cache"), "PYTHONPATH": str(tree.parent)}
+    known |= {"PYTHONDONTWRITEBYTECODE": "", "NUMBA_DISABLE_JIT": "0"}
+    return subprocess.Popen([sys.executable, "-c", textwrap.dedent(program)], cwd=tree.parents[1],
+                            env=known | environment, stdout=subprocess.PIPE, stderr=errors, text=True)  # fmt: skip
+
+
+def report(tree: Path, program: str = REPORT, **environment: str) -> list[str]:
+    with process(tree, program, **environment) as running:
+        found, _ = running.communicate(timeout=60)
+    assert running.returncode == 0
+    return found.split()
+
+
+def edit(tree: Path, step: int, same_time: bool = False) -> None:
+    """Write the helper anew; a step of two digits changes its size, so Python sees it within the same second too."""
+    helper = tree / "helper.py"
+    before = helper.stat()
+    helper.write_text(HELPER.format(step=step))
+    if same_time:
+        os.utime(helper, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+def test_code_is_compiled_once_and_found_again(tree: Path) -> None:
+    assert report(tree) == ["2.0", "0", "KernelCache"]
+    assert report(tree) == ["2.0", "1", "KernelCache"]
+
+
+def test_files_that_end_too_soon_are_made_anew(tree: Path) -> None:
+    report(tree)
+    for kind, length in (("nbc", 100), ("nbi", 0)):
+        for file in (tree.parents[1] / "cache").rglob(f"*.{kind}"):
+            file.write_bytes(file.read_bytes()[:length])
+        assert report(tree) == ["2.0", "0", "KernelCache"]
+    assert report(tree) == ["2.0", "1", "KernelCache"]
+
+
+def test_an_index_that_names_what_only_its_writer_knew_is_made_anew(tree: Path) -> None:
+    """A named tuple of a module that is not there any more is the type of an argument."""
+    foreign = tree.parent / "foreign.py"
+    foreign.write_text("from typing import NamedTuple\nclass Pair(NamedTuple):\n    low: float\n    high: float\n")
+    (tree / "loop.py").write_text(KERNEL.replace("shifted(x)", "shifted(x[0])"))
+    program = "from kernels.loop import run; from foreign import Pair; print(run(Pair(1.0, 2.0)))"
+    assert report(tree, program) == ["2.0"]
+    foreign.unlink()
+    program = "from kernels.loop import run; print(run((1.0, 2.0)), len(run.stats.cache_hits))"
+    assert report(tree, program) == ["2.0", "0"]
+    assert report(tree, program) == ["2.0", "1"]
+
+
+@pytest.mark.parametrize("kind", ["nbc", "nbi"])
+def test_a_changed_bit_anywhere_in_a_file_is_found_and_the_code_made_anew(tree: Path, kind: str) -> None:
+    report(tree)
+    (file,) = (tree.parents[1] / "cache").rglob(f"*run-*.{kind}")
+    data = bytearray(file.read_bytes())
+    for place in (0, len(data) // 2, len(data) - 1):
+        file.write_bytes(data[:place] + bytes([data[place] ^ 16]) + data[place + 1 :])
+        assert report(tree) == ["2.0", "0", "KernelCache"]
+        assert report(tree) == ["2.0", "1", "KernelCache"]
+
+
+def test_the_code_of_another_kernel_is_not_loaded_though_its_file_is_whole(tree: Path) -> None:
+    report(tree)
+    (run,) = (tree.parents[1] / "cache").rglob("*run-*.nbc")
+    (helper,) = (tree.parents[1] / "cache").rglob("*shifted-*.nbc")
+    run.write_bytes(helper.read_bytes())
+    assert report(tree) == ["2.0", "0", "KernelCache"]
+
+
+def test_without_compiling_a_kernel_is_its_python_source(tree: Path) -> None:
+    program = "from kernels.loop import run; print(run(1.0), type(run).__name__)"
+    assert report(tree, program, NUMBA_DISABLE_JIT="1") == ["2.0", "function"]
+
+
+def test_a_numba_with_another_cache_keeps_code_in_its_own_way_and_says_so_once(tree: Path) -> None:
+    program = """
+    import kernels.cache
+    def changed(self, function):
+        raise TypeError("other arguments")
+    kernels.cache.KernelCache.__init__ = changed
+    from kernels.loop import run
+    print(run(1.0), type(run._cache).__name__)
+    """
+    with process(tree, program, subprocess.PIPE) as running:
+        found, said = running.communicate(timeout=60)
+    assert found.split() == ["2.0", "FunctionCache"], said
+    assert said.count("in another way") == 1
+
+
+def test_a_kernel_outside_of_the_package_is_compiled_and_not_kept(tree: Path) -> None:
+    (tree.parent / "bench.py").write_text(KERNEL)
+    program = "from bench import run; print(run(1.0), len(run.stats.cache_hits), type(run._cache).__name__)"
+    for _ in range(2):
+        assert report(tree, program) == ["2.0", "0", "NullCache"]
+
+
+def test_an_edit_of_a_helper_gives_its_new_result_and_back_again_the_old(tree: Path) -> None:
+    assert report(tree)[0] == "2.0"
+    edit(tree, 55)
+    assert report(tree)[:2] == ["56.0", "0"]
+    edit(tree, 1)
+    assert report(tree)[:2] == ["2.0", "1"]
+
+
+def test_an_edit_that_python_itself_overlooks_leaves_no_trace(tree: Path) -> None:
+    """Same size, same second: Python runs the old .pyc, which is its affair; the cache must not keep it as the new."""
+    assert report(tree)[0] == "2.0"
+    edit(tree, 7, same_time=True)
+    assert report(tree)[2] == "NullCache", "old code under the new sources' name"
+    assert report(tree, PYTHONPYCACHEPREFIX=str(tree.parent / "none"))[:2] == ["8.0", "0"]
+
+
+def test_a_pyc_that_python_does_not_take_is_no_reason_for_doubt(tree: Path) -> None:
+    """Edited where no .pyc may be written: the old ones stay behind and are older than their sources."""
+    report(tree)
+    edit(tree, 55)
+    assert report(tree, PYTHONDONTWRITEBYTECODE="1") == ["56.0", "0", "KernelCache"]
+    assert report(tree, PYTHONDONTWRITEBYTECODE="1") == ["56.0", "1", "KernelCache"]
+
+
+def test_sources_edited_while_they_are_imported_are_not_kept(tree: Path) -> None:
+    """The helper changes between the hash and its import; then it changes back."""
+    during = f"""
+    import kernels.jit
+    from pathlib import Path
+    Path({str(tree / "helper.py")!r}).write_text({HELPER.format(step=55)!r})
+    {REPORT}
+    """
+    assert report(tree, during) == ["56.0", "0", "NullCache"]
+    edit(tree, 1)
+    assert report(tree)[:2] == ["2.0", "0"]
+
+
+def test_an_edit_after_the_import_changes_nothing_for_this_process(tree: Path) -> None:
+    after = f"""
+    from kernels.loop import run
+    from pathlib import Path
+    Path({str(tree / "helper.py")!r}).write_text({HELPER.format(step=55)!r})
+    {REPORT}
+    """
+    assert report(tree, after) == ["2.0", "0", "KernelCache"]
+    assert report(tree)[:2] == ["56.0", "0"]
+
+
+def test_copies_of_the_same_sources_share_their_code(tree: Path, tmp_path: Path) -> None:
+    report(tree)
+    copy = tmp_path / "copy" / "kernels"
+    copy.parent.mkdir()
+    subprocess.run(["cp", "-r", str(tree), str(copy)], check=True)
+    assert report(copy)[:2] == ["2.0", "1"]
+
+
+def test_processes_that_compile_at_the_same_time_do_not_mix_their_signatures(tree: Path) -> None:
+    """A slow disk between looking for a free name and taking it; afterwards each signature loads its own code."""
+    slow = """
+    import numpy, time
+    from kernels.cache import _CheckedFile as File
+    from kernels.loop import run
+    save = File._save_index
+    File._save_index = lambda *given: (time.sleep(2), save(*given))
+    run({value})
+    """
+    both = [process(tree, slow.format(value=value)) for value in ("numpy.float64(1)", "numpy.complex128(1)")]
+    for running in both:
+        with running:
+            assert running.wait(60) == 0
+    again = "import numpy; from kernels.loop import run; print(run(numpy.float64(1)), run(numpy.complex128(1)))"
+    assert report(tree, f"{again}; print(len(run.stats.cache_hits))") == ["2.0", "(2+0j)", "2"]
+
+
+def test_where_nothing_can_be_written_kernels_run_all_the_same(tree: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert report(tree, XDG_CACHE_HOME=str(tmp_path / "file")) == ["2.0", "0", "NullCache"]
+
+
+PAYLOAD = """
+import hashlib, pathlib, pickle, sys
+
+class Planted:
+    def __reduce__(self):
+        return exec, ("import pathlib; pathlib.Path({mark!r}).touch()",)
+
+(root,) = (pathlib.Path({cache!r}) / "linksweep" / "kernels").iterdir()
+for path in root.rglob("*.nb[ic]"):
+    data = pickle.dumps(Planted())
+    path.write_bytes(hashlib.sha256(path.relative_to(root).as_posix().encode() + bytes(1) + data).digest() + data)
+"""
+
+
+def planted(tree: Path) -> tuple[Path, Path]:
+    """A cache whose files do something when they are loaded; the folder, and what they leave behind."""
+    report(tree)
+    cache, mark = tree.parents[1] / "cache", tree.parents[1] / "ran"
+    subprocess.run([sys.executable, "-c", PAYLOAD.format(mark=str(mark), cache=str(cache))], check=True)
+    return cache / "linksweep" / "kernels", mark
+
+
+def test_cache_folders_are_closed_to_others(tree: Path) -> None:
+    report(tree, REPORT)
+    root = tree.parents[1] / "cache" / "linksweep" / "kernels"
+    (version,) = root.iterdir()
+    assert all(folder.stat().st_mode & 0o777 == 0o700 for folder in (version, root, root.parent, root.parent.parent))
+
+
+def test_what_lies_in_a_cache_is_run(tree: Path) -> None:
+    """The reason for the tests below: a planted file in a folder that is trusted does what it likes."""
+    _, mark = planted(tree)
+    with process(tree, REPORT, PYTHONWARNINGS="ignore") as running:
+        running.communicate(timeout=60)
+    assert mark.exists()
+
+
+@pytest.mark.parametrize("level", ["kernels", "linksweep", "cache"])
+def test_a_cache_that_others_may_write_to_is_not_used(tree: Path, tmp_path: Path, level: str) -> None:
+    root, mark = planted(tree)
+    {"kernels": root, "linksweep": root.parent, "cache": root.parent.parent}[level].chmod(0o777)
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    for hits in ("0", "1"):  # the private one in its place is kept and found again
+        with process(tree, REPORT, TMPDIR=str(temporary), errors=subprocess.PIPE) as running:
+            found, said = running.communicate(timeout=60)
+        assert running.returncode == 0 and found.split() == ["2.0", hits, "KernelCache"]
+        assert not mark.exists(), "planted code ran"
+        (line,) = said.splitlines()
+        assert "others may write to" in line and str(temporary) in line
+    (private,) = temporary.iterdir()
+    assert private.stat().st_mode & 0o777 == 0o700
+
+
+def test_a_cache_of_another_user_is_not_used(tree: Path, tmp_path: Path) -> None:
+    """To whom the folder belongs cannot be changed by everybody who runs the tests, but who asks can."""
+    _, mark = planted(tree)
+    program = f"""
+    import os
+    uid = os.getuid()
+    os.getuid = lambda: uid + 12345
+    {REPORT}
+    """
+    with process(tree, program, TMPDIR=str(tmp_path), errors=subprocess.PIPE) as running:
+        found, said = running.communicate(timeout=60)
+    assert found.split() == ["2.0", "0", "KernelCache"] and not mark.exists()
+    assert "belongs to another user" in said
+
+
+def test_a_private_folder_that_somebody_took_is_not_used_either(tree: Path, tmp_path: Path) -> None:
+    root, _ = planted(tree)
+    root.chmod(0o777)
+    taken = tmp_path / f"linksweep-{os.getuid()}"
+    taken.mkdir()
+    taken.chmod(0o777)
+    with process(tree, REPORT, TMPDIR=str(tmp_path), errors=subprocess.PIPE) as running:
+        found, said = running.communicate(timeout=60)
+    assert found.split() == ["2.0", "0", "KernelCache"] and not list(taken.iterdir()), said
+
+
+def test_where_there_are_no_locks_it_is_said_once_and_nothing_is_kept(tree: Path) -> None:
+    program = f"""
+    import errno, fcntl
+    def missing(*_):
+        raise OSError(errno.ENOSYS, "Function not implemented")
+    fcntl.flock = missing
+    {REPORT}
+    """
+    with process(tree, program, errors=subprocess.PIPE) as running:
+        found, said = running.communicate(timeout=60)
+    assert running.returncode == 0 and found.split()[0] == "2.0"
+    assert len(said.splitlines()) == 1 and "has no locks" in said
+    assert report(tree)[1] == "0"
+
+
+MADE = """
+from kernels.jit import generated, generated_inline
+
+
+def adder(step):
+    def shift(x):
+        return x + step
+
+    shifted = generated_inline(f"shift_{step}", shift)
+
+    def run(x):
+        return shifted(x)
+
+    return generated(f"run_{step}", run)
+"""
+
+
+def test_generated_kernels_are_kept_under_their_names_with_what_they_close_over(tree: Path) -> None:
+    (tree / "made.py").write_text(MADE)
+    program = (
+        "from kernels.made import adder; a, b = adder(1), adder(2); "
+        "print(a(1.0), b(1.0), len(a.stats.cache_hits), len(b.stats.cache_hits))"
+    )
+    assert report(tree, program) == ["2.0", "3.0", "0", "0"]
+    assert report(tree, program) == ["2.0", "3.0", "1", "1"]

@@ -1,0 +1,147 @@
+"""Nights that nothing in their folder can stop: earlier plans, pipes, broken studies, wrong records, lost locks."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sweep.dataset import store
+from sweep.errors import LockedError
+from sweep.nights import folders
+from sweep.nights.page import write_page
+from sweep.nights.records import HISTORY, NIGHT, read_history, read_night
+from sweep.nights.studies import chosen
+from tests.nights.test_nightly import night, written
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A study and the folder of its first night."""
+    place = tmp_path_factory.mktemp("first")
+    study, into = written(place / "one"), place / "nights"
+    record, _ = night(into, [study])
+    assert record.exit_code == 0
+    return study, into
+
+
+@pytest.fixture
+def after_one(first: tuple[Path, Path], tmp_path: Path) -> tuple[Path, Path]:
+    shutil.copytree(first[1], tmp_path / "nights", symlinks=True)
+    return first[0], tmp_path / "nights"
+
+
+@pytest.mark.parametrize("change", [{"chunks": "1"}, {"columns": 5}, {"designs": "x"}, {"data": []}])
+def test_a_bad_plan_of_an_earlier_night_stops_no_night(after_one: tuple[Path, Path], change: dict[str, Any]) -> None:
+    study, into = after_one
+    path = folders.nights(into)[0] / "tiny" / store.PLAN
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    record, _ = night(into, [study])
+    own = record.studies["tiny"]
+    assert (own.state, own.linked, record.exit_code) == ("complete", 0, 0)
+    assert read_night(into / record.name) == record
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir, lambda path: path.symlink_to("nowhere")])
+def test_what_stands_in_place_of_a_chunk_is_computed_anew(
+    after_one: tuple[Path, Path], make: Callable[[Path], object]
+) -> None:
+    study, into = after_one
+    (part,) = store.parts(folders.nights(into)[0] / "tiny" / "designs")
+    part.path.unlink()
+    make(part.path)
+    record, _ = night(into, [study])
+    assert (record.studies["tiny"].state, record.studies["tiny"].computed, record.exit_code) == ("complete", 1, 0)
+
+
+def test_broken_studies_fail_by_themselves(tmp_path: Path) -> None:
+    sound = written(tmp_path / "sound", name="broken")
+    places = [tmp_path / "broken", tmp_path / "more"]
+    for place in places:
+        place.mkdir()
+        (place / "study.toml").write_text("[study")
+    (places[1] / "other.toml").write_bytes(b"\xff")
+    lost = tmp_path / "lost"
+    lost.mkdir()
+    (lost / "study.toml").symlink_to("nowhere.toml")
+    found = chosen([places[0], sound, places[1], places[1] / "other.toml", lost], smoke=False)
+    assert [(one.name, one.study is not None) for one in found] == [
+        ("broken-2", False), ("broken", True), ("more", False), ("other", False), ("lost", False)
+    ]  # fmt: skip
+    assert all(one.fault for one in found if one.study is None)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"studies": 5},
+        {"studies": {"tiny": 5}},
+        {"studies": {"tiny": {"state": "complete", "figures": 5}}},
+        {"studies": {"tiny": {"state": "well"}}},
+        {"studies": {"tiny": {"state": "complete", "changed": "x"}}},
+        {"name": 5},
+        {"seconds": None},
+    ],
+)
+def test_records_of_wrong_types_are_left_out_and_said(after_one: tuple[Path, Path], change: dict[str, Any]) -> None:
+    study, into = after_one
+    line = json.loads((into / HISTORY).read_text())
+    with (into / HISTORY).open("a") as file:
+        file.write(json.dumps(line | change) + "\n")
+    last = folders.nights(into)[0]
+    (last / NIGHT).write_text(json.dumps(line | change))
+    assert read_night(last) is None and len(read_history(into)) == 1
+    record, said = night(into, [study])
+    assert record.studies["tiny"].state == "complete"
+    assert any("line 2 cannot be read" in words for words in said)
+
+
+def test_a_deleted_lock_lets_no_second_night_in(tmp_path: Path) -> None:
+    into = tmp_path / "nights"
+    with folders.one_at_a_time(into):
+        (into / folders.LOCK).unlink()
+        with pytest.raises(LockedError, match="another night"), folders.one_at_a_time(into):
+            pass
+
+
+def test_an_interrupted_night_says_what_it_kept(
+    after_one: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, into = after_one
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sweep.nights.night.call", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        night(
+            into, [study, written(tmp_path / "two", name="two", e=91), written(tmp_path / "three", name="three", e=92)]
+        )
+    last = folders.nights(into)[-1]
+    record = read_night(last)
+    assert record is not None and record.exit_code == 130
+    assert {name: own.state for name, own in record.studies.items()} == {
+        "tiny": "complete", "two": "cut", "three": "waiting"
+    }  # fmt: skip
+    assert "interrupted at two: tiny kept" in (last / "log.txt").read_text()
+    assert last.name in (into / "index.html").read_text()
+
+
+def test_a_study_with_a_program_for_figures_has_them_drawn(tmp_path: Path) -> None:
+    study = written(tmp_path / "one")
+    (study / "figure.py").write_text("import sys, pathlib\npathlib.Path(sys.argv[1], 'drawn').write_text('')\n")
+    record, _ = night(tmp_path / "nights", [study])
+    assert (tmp_path / "nights" / record.name / "tiny" / "drawn").is_file()
+
+
+def test_the_page_speaks_of_a_first_night_of_labels_and_per_cent(first: tuple[Path, Path]) -> None:
+    page = write_page(first[1]).read_text()
+    assert "<h1>Nights of 1 study</h1>" in page
+    assert "no change" not in page and "first night" in page
+    assert "100\u00a0%" in page
+    assert "max_abs_dP" not in page and "mm" in page

@@ -1,0 +1,85 @@
+"""Events as the optimiser follows them: their places, their gradients, and what keeps them from jumping."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import sweep
+from sweep.families.base import Accuracy
+from sweep.optimise.extrema.scanned import PASSING, first_passage, passages
+from sweep.optimise.local.model import Model
+from sweep.optimise.manufacture.tolerance import sensitivities
+from sweep.optimise.problem.program import Program
+from sweep.optimise.problem.statement import Problem
+from sweep.study.study import Limit
+from tests.evaluation.test_machine_events import MEMBERS, RELATIONS, TABLE
+
+MACHINE = sweep.machine(MEMBERS, RELATIONS | {"hit": {"value": ["pace", "phi_arrive"]}})
+NAMES = list(MACHINE.parameter_names)
+DESIGN = np.array([TABLE.iloc[0].get(n, p.default) for n, p in zip(NAMES, MACHINE.parameters, strict=True)], np.float64)
+
+
+def summarised(design: np.ndarray, output: str) -> float:
+    table = dict(zip(NAMES, design, strict=True))
+    return float(sweep.summarise(MACHINE, table, [output], accuracy=1e-12)[output][0])
+
+
+@pytest.mark.parametrize("output", ["phi_arrive", "phi_plane", "stay", "hit"])
+def test_slopes_of_events_are_exact(output: str) -> None:
+    rows = pd.DataFrame(sensitivities(MACHINE, DESIGN, [output])).set_index("parameter")
+    assert rows["value"].iloc[0] == pytest.approx(summarised(DESIGN, output), abs=1e-13)
+    for name, step in (("looper.a", 1e-2), ("looper.x_at", 2e-2), ("looper.offset", 1e-3)):
+        ends = []
+        for k in (-2.0, -1.0, 1.0, 2.0):
+            moved = DESIGN.copy()
+            moved[NAMES.index(name)] += k * step
+            ends.append(summarised(moved, output))
+        slope = (ends[0] - 8.0 * ends[1] + 8.0 * ends[2] - ends[3]) / (12.0 * step)
+        # What the five points leave out is of fourth order in a thousandth of the dimension; roots carry 1e-14/step.
+        assert rows.loc[name, "growing"] == pytest.approx(slope, rel=1e-7, abs=1e-10), name
+        assert rows.loc[name, "growing"] == rows.loc[name, "shrinking"]
+
+
+def model(limit: Limit) -> Model:
+    free = ("looper.a", "looper.x_at")
+    place = DESIGN[[NAMES.index(name) for name in free]]
+    fixed = {n: float(x) for n, x in zip(NAMES, DESIGN, strict=True) if n not in free}
+    problem = Problem(
+        MACHINE, free, place - 1.0, place + 1.0, fixed, "looper.max_abs_d2psi", (limit,), None, Accuracy(target=1e-9)
+    )
+    return Model(problem, Program(problem), DESIGN, lambda: False)
+
+
+def test_passage_stays_on_its_level_while_the_design_changes() -> None:
+    start = model(Limit("stay", 0.1, None))
+    state = start.state(np.array([0.5, 0.5]))
+    points, _ = start.moved(np.array([0.7, 0.35]), state.form, state.form.points)
+    own = points.how == PASSING
+    assert own.sum() >= 2
+    there = start.curves.values(start.design(np.array([0.7, 0.35]))[None, :], points)[0]
+    # one Newton step beyond 3e-6 rad leaves 1e-11 of the slope, which is some 30 mm/rad here
+    np.testing.assert_allclose(there[own], points.level[own], atol=1e-9)
+
+
+def test_bump_before_the_event_is_kept_below_its_level() -> None:
+    phi = np.arange(256) * (math.tau / 256)
+    bump = 0.9 * np.exp(-8.0 * (phi - 1.0) ** 2) + 2.0 * np.exp(-8.0 * (phi - 3.0) ** 2)
+    rows = passages(0, phi, bump, 1.0, 1.0)
+    places, how = np.array([row[1] for row in rows]), np.array([row[3] for row in rows])
+    first, before = first_passage(places, how, range(len(rows)))
+    assert first is not None and 2.0 < places[first] < 3.0
+    assert [round(float(places[k]), 1) for k in before] == [1.0]
+    after = passages(0, phi, np.roll(bump, -81), 1.0, 1.0)  # the passage comes before the bump
+    places, how = np.array([row[1] for row in after]), np.array([row[3] for row in after])
+    assert first_passage(places, how, range(len(after)))[1] == []
+
+
+def test_curve_that_never_passes_has_no_event() -> None:
+    phi = np.arange(64) * (math.tau / 64)
+    rows = passages(0, phi, np.cos(phi), 2.0, 1.0)
+    assert [row[3] for row in rows] == [0]
+    assert first_passage(np.array([0.0]), np.array([0]), [0]) == (None, [0])

@@ -1,0 +1,144 @@
+"""Sensitivities against differences of ``design_outputs``, at a corner against a closed form; tolerances by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from sweep.dataset.files import beside
+from sweep.engine.run import run
+from sweep.errors import StudyError
+from sweep.evaluation.summaries import design_outputs
+from sweep.families import family
+from sweep.families.base import Accuracy
+from sweep.optimise import Problem
+from sweep.optimise.manufacture.robust import yields
+from sweep.optimise.manufacture.tolerance import deviating, sensitivities, tolerance_rows
+from sweep.study import Limit, Tolerance, load_study
+from tests.optimise.test_study import STUDY
+
+RSSR = family("rssr")
+DESIGN = np.array([25.0, 100.0, 60.0, 100.0, 5.0, 10.0, 0.35, 1.0])
+OUTPUTS = ("max_abs_d2psi", "max_pressure_angle", "swing", "phi0", "stroke_ratio", "margin", "min_dpsi")
+
+
+def test_sensitivities_are_the_slopes_of_design_outputs() -> None:
+    table = pd.DataFrame(sensitivities(RSSR, DESIGN, OUTPUTS))
+    assert (table.growing == table.shrinking).all()  # nothing is shared here
+    for k, parameter in enumerate(RSSR.parameter_names[:7]):
+        h = 1e-3 * max(1.0, abs(DESIGN[k])) if k < 6 else 1e-4
+        moved = np.repeat(DESIGN[None, :], 4, axis=0)
+        moved[:, k] += h * np.array([-2.0, -1.0, 1.0, 2.0])
+        columns = design_outputs(RSSR, moved, OUTPUTS, Accuracy(target=1e-12))
+        for output in OUTPUTS:
+            x = np.abs(columns[output]) if output == "swing" else np.asarray(columns[output], np.float64)
+            slope = (x[0] - 8.0 * x[1] + 8.0 * x[2] - x[3]) / (12.0 * h)
+            found = table[(table.parameter == parameter) & (table.output == output)].growing.item()
+            # The refined extrema are good to 1e-12 relative at best, over steps of 1e-3.
+            assert found == pytest.approx(slope, rel=1e-6, abs=1e-8 * np.abs(x).max()), (parameter, output)
+
+
+def test_planar_mechanism_has_its_alpha_and_offsets_in_second_order_only() -> None:
+    planar = np.array([25.0, 100.0, 60.0, 100.0, 0.0, 0.0, 0.0, 1.0])
+    table = pd.DataFrame(sensitivities(RSSR, planar, ("max_abs_d2psi", "swing")))
+    flat = table[table.parameter.isin(["alpha", "f", "g"])]
+    assert np.abs(flat.growing).max() < 1e-12
+    assert table[table.parameter == "a"].growing.min() > 1e-3
+
+
+def test_output_that_does_not_exist_has_no_slope() -> None:
+    stuck = np.array([80.0, 30.0, 40.0, 100.0, 0.0, 0.0, 0.0, 1.0])
+    table = pd.DataFrame(sensitivities(RSSR, stuck, ("max_abs_d2psi",)))
+    assert table.value.isna().all() and table.growing.isna().all()
+
+
+def test_deviating_designs_have_the_tolerance_as_three_standard_deviations() -> None:
+    designs = deviating(RSSR, DESIGN, Tolerance(0.03, 0.0), seed=1)
+    assert designs.shape == (2048, 8) and (designs[:, 6:] == DESIGN[6:]).all()
+    off = (designs - DESIGN)[:, :6] / 0.01
+    for column in off.T:
+        assert stats.kstest(column, "norm").pvalue > 1e-3
+    assert np.abs(np.corrcoef(off.T) - np.eye(6)).max() < 0.05
+    np.testing.assert_array_equal(designs, deviating(RSSR, DESIGN, Tolerance(0.03, 0.0), seed=1))
+
+
+def test_small_tolerances_give_the_band_of_the_sensitivities() -> None:
+    tolerance = Tolerance(0.003, 0.0001)
+    names = ("max_abs_d2psi", "max_pressure_angle")
+    rows = pd.DataFrame(tolerance_rows(RSSR, DESIGN, names, (), tolerance, 3, Accuracy(target=1e-9))).set_index(
+        "output"
+    )
+    table = pd.DataFrame(sensitivities(RSSR, DESIGN, names))
+    for name in names:
+        slopes = table[table.output == name].growing.to_numpy()
+        sigma = math.hypot(*(slopes * np.array([0.001] * 6 + [0.0001 / 3])))
+        row = rows.loc[name]
+        # 2048 samples of a scrambled Sobol sequence: the quantiles are good to some percent of sigma.
+        assert row["mean"] == pytest.approx(row.nominal, abs=0.05 * sigma)
+        assert row.high - row.low == pytest.approx(2 * 1.959964 * sigma, rel=0.05)
+        assert row.missing == 0.0 and math.isnan(row.within)
+
+
+def test_share_within_a_limit_at_the_nominal_value_is_half() -> None:
+    nominal = design_outputs(RSSR, DESIGN[None, :], ["max_pressure_angle"], Accuracy(target=1e-9))["max_pressure_angle"]
+    limits = (Limit("max_pressure_angle", None, float(nominal[0])), Limit("swing", 0.0, None))
+    rows = tolerance_rows(
+        RSSR, DESIGN, ("max_pressure_angle", "swing"), limits, Tolerance(0.003), 3, Accuracy(target=1e-9)
+    )
+    assert rows["output"] == ["max_pressure_angle", "swing", "all limits"]
+    assert rows["within"][0] == pytest.approx(0.5, abs=0.03)
+    assert rows["within"][1] == 1.0 and rows["within"][2] == rows["within"][0]
+
+
+def test_equations_are_no_limits_of_what_is_made() -> None:
+    names, tolerance = ("max_pressure_angle", "swing"), Tolerance(0.003)
+    at = {k: float(x[0]) for k, x in design_outputs(RSSR, DESIGN[None, :], names, Accuracy(target=1e-9)).items()}
+    held = Limit("swing", abs(at["swing"]), abs(at["swing"]))
+    limits = (Limit("max_pressure_angle", None, at["max_pressure_angle"]), held)
+    rows = tolerance_rows(RSSR, DESIGN, names, limits, tolerance, 3, Accuracy(target=1e-9))
+    # Nothing that is made has a prescribed swing to the last digit: it would be 0 % of everything.
+    assert math.isnan(rows["within"][1])
+    assert rows["within"][2] == rows["within"][0] == pytest.approx(0.5, abs=0.03)
+    lower, upper = DESIGN[:7] - 0.5, DESIGN[:7] + 0.5
+    problem = Problem(RSSR, RSSR.parameter_names[:7], lower, upper, {}, "max_abs_d2psi", limits)
+    assert yields(problem, DESIGN[None, :], tolerance, 3)[0] == pytest.approx(0.5, abs=0.03)
+    band = replace(held, minimum=0.5 * abs(at["swing"]), maximum=abs(at["swing"]))
+    assert yields(replace(problem, limits=(band,)), DESIGN[None, :], tolerance, 3)[0] == pytest.approx(0.5, abs=0.05)
+
+
+def test_study_writes_both_tables(tmp_path: Path) -> None:
+    text = STUDY.format(swing=40.0).replace("count = 8", "count = 4").replace("starts = 3", "starts = 1")
+    (tmp_path / "study.toml").write_text(text + '[tolerance]\nlengths = "0.02 mm"\nangles = "0.05 deg"\n')
+    study = load_study(tmp_path)
+    assert study.tolerance == Tolerance(0.02, pytest.approx(math.radians(0.05), rel=1e-15))
+    folder = run(study, tmp_path / "out", jobs=1)
+    slopes, bands = (pd.read_parquet(beside(folder) / f"_{name}.parquet") for name in ("sensitivity", "tolerance"))
+    assert set(slopes.role) == set(bands.role) == {"optimum", "reference"}
+    assert set(slopes.parameter) == {"a", "b", "c", "e", "f", "g", "alpha"}
+    best = bands[bands.role == "optimum"].set_index("output")
+    assert best.loc["max_abs_d2psi"].low < best.loc["max_abs_d2psi"].nominal < best.loc["max_abs_d2psi"].high
+    assert 0.0 < best.loc["all limits"].within < 0.9  # an active limit is missed by half of what is made
+    (tmp_path / "study.toml").write_text(text)
+    run(load_study(tmp_path), folder, jobs=1)
+    assert not (beside(folder) / "_tolerance.parquet").exists()
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("[tolerance]\n", "tolerance.lengths"),
+        ('[tolerance]\nlengths = "0.02 deg"\n', "tolerance.lengths"),
+        ('[tolerance]\nangles = "-1 deg"\n', "positive"),
+        ('[tolerance]\nlenghts = "0.02 mm"\n', "lengths"),
+    ],
+)
+def test_bad_tolerances_are_named(tmp_path: Path, table: str, message: str) -> None:
+    (tmp_path / "study.toml").write_text(STUDY.format(swing=40.0) + table)
+    with pytest.raises(StudyError, match=message):
+        load_study(tmp_path)

@@ -1,0 +1,175 @@
+"""Pictures as axes: what is drawn where, and the verb that saves them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+import sweep
+from sweep.cli import main
+from sweep.dataset import store
+from sweep.families import family
+from sweep.report import write_report
+from sweep.report.figures import house_style, save
+from tests.support.report_dataset import study_data, write_dataset, write_table
+
+RSSR = dict(family("rssr").example)
+LOADS = {"m_crank": 1e-4, "m_coupler": 2e-4, "m_rocker": 1.5e-4, "speed": 100.0}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    data = study_data(tolerance={"lengths": "0.02 mm"})
+    place = write_dataset(tmp_path_factory.mktemp("plot") / "designs", data, optimum={})
+    spread = {"role": "optimum", "output": ["max_abs_d2s", "stroke"], "nominal": [8.0, 24.5], "mean": [8.1, 24.5],
+              "low": [7.6, 24.4], "high": [8.8, 24.6], "within": [math.nan, 0.9]}  # fmt: skip
+    write_table(store.beside(place) / store.TOLERANCE, pd.DataFrame(spread), {})
+    slopes = {"role": "optimum", "output": "max_abs_d2s", "parameter": ["a1", "b1"], "value": 8.0,
+              "growing": [4.0, -16.0], "shrinking": [4.0, -16.0]}  # fmt: skip
+    write_table(store.beside(place) / store.SENSITIVITY, pd.DataFrame(slopes), {})
+    return place
+
+
+def test_motion_has_a_panel_for_each_curve_and_draws_it():
+    axes = sweep.plot.motion("rssr", RSSR, "dpsi, d2psi")
+    assert len(axes) == 2
+    found = sweep.evaluate("rssr", RSSR, "dpsi", phi=np.arange(720) * (2.0 * math.pi / 720))["dpsi"]
+    line = axes[0].lines[0].get_ydata()
+    assert line.max() == pytest.approx(found.max(), abs=1e-12)
+    assert len(sweep.plot.motion("rssr", RSSR)) == 5  # psi, three derivatives, pressure angle
+    with pytest.raises(sweep.InputError, match="did you mean 'd2psi'"):
+        sweep.plot.motion("rssr", RSSR, ["d2psy"])
+    with pytest.raises(sweep.InputError, match="one design"):
+        sweep.plot.motion("rssr", RSSR | {"a": [1.0, 1.1]})
+
+
+def test_mechanism_has_a_panel_for_each_frame_and_every_joint_in_it():
+    (axes,) = sweep.plot.mechanism("rssr", RSSR, 0.4, view="xy")
+    assert {"A", "B", "C", "D", "x", "y"} <= {text.get_text() for text in axes.texts}
+    coupler = next(line for line in axes.lines if line.get_label() == "coupler")
+    joints = sweep.joints("rssr", RSSR, 0.4).set_index("joint")
+    np.testing.assert_allclose(coupler.get_xydata(), joints.loc[["b", "c"], ["x", "y"]], atol=1e-14)
+    assert axes.get_xlabel() == "x [mm]"
+    guide = family("guide").example
+    design = {f"{k}1": v for k, v in RSSR.items()} | {f"{k}2": v for k, v in guide.items()}
+    assert [a.get_title(loc="left") for a in sweep.plot.mechanism(["rssr", "guide"], design)] == ["stage 1", "stage 2"]
+    with pytest.raises(sweep.InputError, match="space, xy"):
+        sweep.plot.mechanism("rssr", RSSR, view="front")
+
+
+def test_polar_load_is_the_force_square_to_the_axis():
+    axes = sweep.plot.polar_load("rssr", RSSR | LOADS, "d")
+    angle, radius = axes.lines[0].get_data()
+    names = ["force_d_x", "force_d_y", "force_d_z"]
+    force = sweep.evaluate("rssr", RSSR | LOADS, names, phi=[0.0])[names].to_numpy()[0]
+    # The rocker axis is z: the diagram is the force in the plane x, y.
+    assert radius[0] == pytest.approx(math.hypot(force[0], force[1]), rel=1e-12)
+    assert angle[0] == pytest.approx(math.atan2(force[1], force[0]), abs=1e-12)
+    assert radius[0] == radius[-1]
+    with pytest.raises(sweep.InputError, match="a joint with an axis: a, d"):
+        sweep.plot.polar_load("rssr", RSSR | LOADS, "b")
+    with pytest.raises(sweep.InputError, match="m_crank"):
+        sweep.plot.polar_load("rssr", RSSR)
+
+
+def test_map_and_front_are_those_of_the_report(folder):
+    best, share = sweep.plot.map(folder)
+    assert best.get_xlabel() and share.get_xlabel() == best.get_xlabel()
+    chosen = sweep.plot.map(folder, "xi2", "a1")
+    assert "xi2" in chosen[0].get_xlabel() + chosen[0].get_ylabel()
+    with pytest.raises(sweep.InputError, match="two of a1, alpha1, xi2"):
+        sweep.plot.map(folder, "b1", "a1")
+    labels = sweep.plot.front(folder).get_legend_handles_labels()[1]
+    assert "feasible designs of the sweep" in labels and "optimum" in labels
+
+
+def test_tolerance_shows_the_spread_in_percent_of_the_nominal_value(folder):
+    axes = sweep.plot.tolerance(folder)
+    low, high = axes.lines[0].get_xdata()
+    assert (low, high) == (pytest.approx(-5.0), pytest.approx(10.0))
+    assert "0.02" in axes.get_title(loc="left")
+
+
+def test_report_shows_the_pictures_of_the_functions(folder, tmp_path):
+    """Same figure, same bytes: the page carries what ``sweep.plot`` draws."""
+    out = write_report(folder, tmp_path / "report").parent / "figures"
+    for name in ("tolerance", "sensitivity"):
+        figure = getattr(sweep.plot, name)(folder).figure
+        with house_style():
+            assert save(figure, tmp_path / f"{name}.svg").path.read_bytes() == (out / f"{name}.svg").read_bytes()
+
+
+def test_mechanism_is_drawn_in_as_many_positions_as_asked():
+    one, several = (sweep.plot.mechanism("rssr", RSSR, positions=n)[0] for n in (1, 8))
+    assert len(several.lines) - len(one.lines) == 7 * 3  # crank, coupler, rocker
+
+
+def test_sensitivity_has_the_most_telling_dimension_first(folder):
+    axes = sweep.plot.sensitivity(folder)
+    assert [text.get_text().split(",")[0] for text in axes.get_yticklabels()] == ["b1", "a1"]
+    assert axes.patches[0].get_width() == pytest.approx(-100.0 * 0.1 * 16.0 / 8.0)
+
+
+def test_dataset_without_tolerances_is_refused(tmp_path):
+    place = write_dataset(tmp_path / "designs", optimum={})
+    with pytest.raises(sweep.InputError, match="tolerance"):
+        sweep.plot.tolerance(place)
+    with pytest.raises(sweep.InputError, match="sensitivities"):
+        sweep.plot.sensitivity(place)
+
+
+@pytest.mark.parametrize("what", ["map", "front", "tolerance", "sensitivity", "motion", "mechanism"])
+def test_verb_draws_a_folder(what, folder, tmp_path):
+    out = tmp_path / f"{what}.svg"
+    done = CliRunner().invoke(main, ["draw", what, str(folder), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    assert out.read_text().count("<path") > 10
+
+
+def test_verb_draws_a_row_of_a_table(tmp_path):
+    table = tmp_path / "designs.csv"
+    pd.DataFrame([RSSR | LOADS, RSSR | LOADS | {"a": 0.9}]).to_csv(table, index=False)
+    for what, more in (("motion", ["--want", "psi,dpsi"]), ("mechanism", ["--view", "zy"]), ("polar_load", [])):
+        out = tmp_path / f"{what}.png"
+        done = CliRunner().invoke(main, ["draw", what, "rssr", str(table), "--row", "1", "--out", str(out), *more])
+        assert done.exit_code == 0, done.output
+        assert out.stat().st_size > 5000
+    for arguments in (
+        ["draw", "motion", "rssr", str(table), "--row", "2", "--out", "x.png"],
+        ["draw", "motion", "rssr", "--out", "x.png"],
+        ["draw", "map", "rssr", str(table), "--out", "x.png"],
+        ["draw", "motion", "rssr", str(table), "--out", "x.bmp"],
+    ):
+        assert CliRunner().invoke(main, arguments).exit_code == 2
+
+
+@pytest.mark.parametrize("kind", ["csv", "glb", "dxf", "mjcf", "law"])
+def test_export_verb_takes_the_optimum_or_a_row_of_a_folder(kind, tmp_path):
+    design = {f"{k}1": v * (20.0 if k in "abcefg" else 1.0) for k, v in RSSR.items()}
+    design |= {f"{k}2": v * (1.0 if k in ("lam", "branch") else 20.0) for k, v in family("guide").example.items()}
+    place = write_dataset(tmp_path / "designs", optimum=design)
+    done = CliRunner().invoke(main, ["export", str(place), "--format", kind, "--design", "optimum"])
+    assert done.exit_code == 0, done.output
+    file = Path(done.output.split(": ")[1].strip())
+    assert file.parent == store.beside(place) / "export" and file.stat().st_size > 200
+    out = tmp_path / "row.csv"
+    done = CliRunner().invoke(main, ["export", str(place), "--format", "csv", "--design", "3", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    row = sweep.load(place).iloc[3]
+    points = pd.read_csv(out).set_index(["stage", "name"])
+    assert points.loc[(1, "B"), "x"] == pytest.approx(row["a1"], abs=1e-12)  # the crank at phi = 0
+    wrong = CliRunner().invoke(main, ["export", str(place), "--format", "csv", "--design", "worst"])
+    assert wrong.exit_code == 2 and "optimum, reference, best" in wrong.output
+
+
+def test_motion_of_what_does_not_turn_is_refused_and_its_mechanism_is_drawn():
+    design = dict(family("backrest").example)
+    with pytest.raises(sweep.InputError, match="over an interval"):
+        sweep.plot.motion("backrest", design)
+    (axes,) = sweep.plot.mechanism("backrest", design)
+    assert {"bracket", "warp 1"} <= {line.get_label() for line in axes.lines}

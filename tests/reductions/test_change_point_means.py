@@ -1,0 +1,58 @@
+"""Root mean squares of crank-rockers near change points, whose peaks no coarse grid sees, against crowded sums."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sweep
+from kernels import status as st
+from sweep.families.base import Angles
+from tests.support.near_change_points import RSSR, crowded_angles, near_change_points
+
+# At a margin of 2e-9 two coarse grids agree on 0.3043, neither of which sees the peak.
+SHARP = (
+    0.276336336001507, 2.0919398127969067, 1.0124840763424654, -1.3453910659259398, 0.02132801057111333,
+    -0.1888516574413175, -0.3426740771991339,
+)  # fmt: skip
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+
+
+def dense(designs: np.ndarray, output: str) -> np.ndarray:
+    """Root mean squares by Gauss rules between poses that crowd about the deepest dip of the discriminant."""
+    edges = np.sort(np.mod(crowded_angles(designs), 2.0 * np.pi), axis=1)
+    edges = np.concatenate([edges, edges[:, :1] + 2.0 * np.pi], axis=1)
+    half = 0.5 * np.diff(edges, axis=1)
+    total = np.zeros(len(designs))
+    for node, weight in zip(NODES, WEIGHTS, strict=True):
+        phi = edges[:, :-1] + half * (1.0 + node)
+        values = RSSR.precise().poses(designs, Angles.of(phi), frozenset([output]))[output]
+        total += weight * (values * values * half).sum(axis=1)
+    return np.sqrt(total / (2.0 * np.pi))
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize("branch", [1.0, -1.0])
+def test_root_mean_square_sees_a_peak_that_falls_between_coarse_poses(accuracy: float, branch: float) -> None:
+    design = np.array([[*SHARP, branch]])
+    table = dict(zip(RSSR.parameter_names, design[0], strict=True))
+    names = [f"rms_{output}" for output in ("dpsi", "d2psi", "d3psi")]
+    found = sweep.summarise("rssr", table, names, accuracy=accuracy).iloc[0]
+    assert found["status"] == st.OK
+    for name in names:
+        exact = dense(design, name.removeprefix("rms_"))[0]
+        assert abs(found[name] - exact) <= found[f"err_{name}"] + 1e-11 * exact
+        assert found[f"err_{name}"] <= 1.1 * accuracy * exact
+
+
+@pytest.mark.parametrize("output", ["dpsi", "d2psi"])
+def test_root_mean_squares_near_change_points_are_dense_sums_within_their_errors(output: str) -> None:
+    designs = near_change_points(300, 12, 1.0)
+    exact = dense(designs, output)
+    for accuracy in (1e-4, 1e-8):
+        columns = dict(zip(RSSR.parameter_names, designs.T, strict=True))
+        found = sweep.summarise("rssr", columns, [f"rms_{output}"], accuracy=accuracy)
+        off = np.abs(found[f"rms_{output}"] - exact)
+        # Where the search is not sure its error still has to hold.
+        assert (off <= found[f"err_rms_{output}"] + 1e-10 * exact).all()
+        assert (found["status"] == st.OK).mean() > 0.9

@@ -1,0 +1,79 @@
+"""Outputs with jumps and kinks: friction where the follower reverses, angles that leap by pi, the larger load."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kernels import status as st
+from sweep.effects import extended
+from sweep.effects.costs import designs
+from sweep.evaluation.summaries import design_outputs
+from sweep.families import family
+from sweep.families.base import Accuracy, Angles
+from tests.support.optimise_family import FAMILY as WAVES
+
+DENSE = 100_000
+PHI = 2.0 * np.pi * (np.arange(DENSE) + 0.5) / DENSE
+
+
+def found_and_dense(name, output, count=5):
+    """Largest and least value by the search, the same on a dense grid, of linkages that turn."""
+    full = extended(family(name), [output])
+    matrix = designs(full, 3 * count)
+    turning = design_outputs(family(name), matrix[:, : len(family(name).parameters)], ["margin"], Accuracy(target=1e-6))
+    matrix = matrix[turning["status"] == st.OK][:count]
+    names = [f"max_{output}", f"min_{output}", f"rms_{output}"]
+    got = design_outputs(full, matrix, names, Accuracy(target=1e-8))
+    values = np.asarray(full.poses(matrix, Angles.of(PHI[None]), frozenset([output]))[output], np.float64)
+    return got, values
+
+
+@pytest.mark.parametrize(
+    ("name", "output"),
+    [
+        ("rssp", "drive_torque_friction"),
+        ("rssr", "shaft_torque_d"),
+        ("rssr", "theta3"),
+        ("rssr", "rolling_utilisation"),
+    ],
+)
+def test_extremes_beside_jumps_are_found(name, output):
+    got, values = found_and_dense(name, output)
+    size = np.abs(values).max(axis=1)
+    for which, dense in (("max", values.max(axis=1)), ("min", -((-values).max(axis=1)))):
+        sign = 1.0 if which == "max" else -1.0
+        value, err = got[f"{which}_{output}"], got[f"err_{which}_{output}"]
+        assert (sign * (value - dense) >= -err - 1e-12 * size).all(), "a grid sees no more than was found"
+        assert (sign * (value - dense) < 1e-3 * size).all(), "and a fine grid nearly as much"
+        assert (err < 1e-7 * size).all()
+
+
+def test_the_mean_of_a_curve_with_jumps_is_found_to_its_target():
+    """Where the follower reverses, friction jumps: panels close in on that."""
+    got, values = found_and_dense("rssp", "drive_torque_friction")
+    exact = np.sqrt((values**2).mean(axis=1))
+    assert (got["status"] == st.OK).all()
+    # The dense sum errs by a sample at each jump.
+    assert (np.abs(got["rms_drive_torque_friction"] - exact) <= 1e-4 * exact).all()
+    assert (got["err_rms_drive_torque_friction"] < 1.1e-8 * exact).all()
+    smooth, values = found_and_dense("rssp", "drive_torque")
+    assert (smooth["status"] == st.OK).all()
+    np.testing.assert_allclose(smooth["rms_drive_torque"], np.sqrt((values**2).mean(axis=1)), rtol=1e-8)
+
+
+def test_without_brackets_a_jump_is_never_resolved(monkeypatch):
+    """Negative control: it is the bracketing that ends the search."""
+    monkeypatch.setattr("sweep.reductions.peak_search.BREAKING", 10**9)
+    got, _ = found_and_dense("rssr", "theta3", count=1)
+    assert got["status"][0] == st.NOT_CONVERGED
+
+
+def test_a_smooth_curve_is_not_taken_for_one_that_jumps(monkeypatch):
+    """A made-up family without jumps: the search gives the same whether it may look for them or not."""
+    matrix = np.column_stack([np.linspace(-2.0, 2.0, 40), np.linspace(3.0, -3.0, 40), np.zeros(40), np.ones(40)])
+    with_brackets = design_outputs(WAVES, matrix, ["max_wave", "max_abs_dev"], Accuracy(target=1e-10))
+    monkeypatch.setattr("sweep.reductions.peak_search.BREAKING", 10**9)
+    without = design_outputs(WAVES, matrix, ["max_wave", "max_abs_dev"], Accuracy(target=1e-10))
+    for name, values in without.items():
+        assert np.array_equal(values, with_brackets[name]), name

@@ -1,0 +1,148 @@
+"""Extrema of loads with friction: jumps however small, bumps between two kinks, and errors that are told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kernels import status as st
+from sweep.evaluation.summaries import design_outputs
+from sweep.families.base import Accuracy, Array, Family, Output, Parameter
+from sweep.families.names import error_of
+from sweep.quantities.kinds import Request
+from sweep.reductions import panels
+from sweep.reductions.sampling import pose_columns
+from tests.support.frictional import FAMILIES, dense, frictional
+
+TARGET = 1e-6
+# A grid attains its values up to the rounding of two ways to one pose.
+ROUNDING = 1e-12
+
+
+def found(full, designs, wanted, target=TARGET):
+    return design_outputs(full, designs, wanted=wanted, accuracy=Accuracy(target=target))
+
+
+def exceeded(got, seen, wanted, target=TARGET):
+    """Outputs and designs whose status is OK and a pose higher than the error allows, or the error too large."""
+    sure = (got["status"] == st.OK) & (seen["status"] == st.OK)
+    assert sure.mean() > 0.5, "most designs turn and do not jam"
+    faults = []
+    for name in wanted:
+        value, err = got[name], got[error_of(name)]
+        high = ~(seen[name] - value <= err + ROUNDING * np.abs(seen[name]))
+        loose = err > target * np.abs(value) * (1.0 + 1e-9)
+        faults += [(name, int(k)) for k in np.flatnonzero(sure & (high | loose))]
+    return faults
+
+
+# Designs of which the search by samples said OK: too low behind a kink by up to 2 %, or an error of up to a tenth.
+@pytest.mark.parametrize(
+    ("name", "output", "rows"),
+    [
+        ("spherical_looper_friction", "load_support_a11", [6, 8]),
+        ("spherical_looper_friction", "load_support_a21", [4]),
+        ("swivel_friction", "load_support_a1", [1, 4, 9, 10]),
+        ("friction", "load_support_d2", [12, 19, 30, 32]),
+    ],
+)
+def test_maxima_beside_kinks_and_small_jumps_are_attained_and_exceeded_nowhere(name, output, rows):
+    full, _, designs = frictional(name, max(rows) + 1)
+    designs, largest = designs[rows], f"max_abs_{output}"
+    got = found(full, designs, (largest, f"phi_{largest}"))
+    assert (got["status"] == st.OK).all()
+    assert exceeded(got, dense(full, designs, (largest,), 20_000), (largest,)) == []
+    # Steps to both sides: at a jump the maximum is the limit from one of them.  The slope times the step is below 1e-6.
+    near = got[f"phi_{largest}"][:, None] + np.array([-1e-9, 0.0, 1e-9])
+    poses, _ = pose_columns(full.precise(), designs, near, [output])
+    attained = np.abs(poses[output]).max(axis=1)
+    np.testing.assert_allclose(attained, got[largest], rtol=1e-6)
+
+
+def test_the_search_by_samples_is_wrong_about_the_same_designs(monkeypatch):
+    """The control: without panels the faults are there, so the check sees them."""
+    full, _, designs = frictional("friction", 33)
+    wanted = ("max_abs_load_support_d2",)
+    monkeypatch.setattr(panels, "has_kinks", lambda family, request, jumps: False)
+    faults = exceeded(found(full, designs, wanted), dense(full, designs, wanted, 20_000), wanted)
+    assert {k for _, k in faults} >= {12, 19}
+
+
+@pytest.mark.parametrize("target", [1e-3, 1e-9])
+def test_no_pose_of_random_linkages_with_friction_exceeds_the_maximum_by_more_than_its_error(target):
+    full, wanted, designs = frictional("friction", 100)
+    assert exceeded(found(full, designs, wanted, target), dense(full, designs, wanted, 20_000), wanted, target) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", FAMILIES)
+def test_no_pose_of_100_random_designs_exceeds_the_maximum_by_more_than_its_error(name):
+    full, wanted, designs = frictional(name, 100)
+    assert exceeded(found(full, designs, wanted), dense(full, designs, wanted, 20_000), wanted) == []
+
+
+def test_an_extremum_does_not_depend_on_what_is_wanted_beside_it():
+    full, wanted, designs = frictional("friction", 5)
+    together = found(full, designs, wanted)
+    for name in ("max_abs_load_support_d2", "max_abs_drive_torque_friction"):
+        for key in (name, error_of(name)):
+            np.testing.assert_array_equal(found(full, designs[::-1], (name,))[key][::-1], together[key])
+
+
+def made(curve) -> Family:
+    """A mechanism whose one output is a given curve with kinks; its design shifts it along the turn."""
+
+    def poses(designs, angles, wanted):
+        values = np.asarray(curve(np.mod(angles.phi - designs[:, :1], 2.0 * np.pi)), np.float64)
+        return {"y": values, "status": np.zeros(values.shape, np.uint8)}
+
+    output = Output("y", "1", "a curve", kinks=True)
+    return Family(
+        name="curve", title="a curve", parameters=(Parameter("shift", "angle", "shift"),), pose_outputs=(output,),
+        poses=poses, position="y",
+    )  # fmt: skip
+
+
+def searched(curve, mode, target=1e-9) -> tuple[Array, Array, Array, Array]:
+    shifts = np.random.default_rng(2).uniform(0.0, 6.0, (40, 1))
+    request = Request("y", mode)
+    answers, status = panels.extrema(made(curve), shifts, [request], target, True)
+    answer = answers[request]
+    away = np.mod(answer.phi - shifts[:, 0] + 1.0, 2.0 * np.pi) - 1.0
+    return answer.value, answer.err, away, status
+
+
+@pytest.mark.parametrize("jump", [1.0, 1e-2, 1e-5, 1e-9])
+def test_the_limit_beside_a_jump_of_any_size_is_the_maximum(jump):
+    """Once the top lies before the jump, once it is the limit from the left."""
+
+    def curve(x):
+        return np.where(x < 4.0, np.cos(x - 3.6), np.cos(0.4) - jump + 0.2 * (4.0 - x))
+
+    def rising(x):
+        return np.where(x < 4.0, np.sin(0.3 * x), np.sin(1.2) - jump - 0.1 * (x - 4.0))
+
+    for shape, top, place in ((curve, 1.0, 3.6), (rising, np.sin(1.2), 4.0)):
+        value, err, away, status = searched(shape, 1)
+        assert (status == st.OK).all()
+        assert (np.abs(value - top) <= err).all()
+        assert (err <= 1e-9).all()
+        assert (np.abs(away - place) <= 1e-6).all()
+
+
+@pytest.mark.parametrize("mode", [0, 1, -1])
+def test_the_tip_of_a_kink_is_found_to_the_target(mode):
+    sign = -1.0 if mode == -1 else 1.0
+    value, err, away, status = searched(lambda x: sign * (1.0 - np.abs(np.sin(0.5 * (x - 2.0)))), mode)
+    assert (status == st.OK).all()
+    assert (np.abs(value - sign) <= err).all()
+    assert (err <= 1e-9).all()
+    assert (np.abs(away - 2.0) <= 1e-8).all()
+
+
+def test_a_curve_that_is_all_noise_is_not_converged_and_its_error_says_so():
+    """Noise of 1e-6 of the size: no halving makes it agree to 1e-9."""
+    value, err, _, status = searched(lambda x: np.cos(x) + 1e-6 * np.sin(1e9 * x), 0)
+    assert (status == st.NOT_CONVERGED).all()
+    assert (np.abs(value - 1.0) <= 1.1e-6).all()
+    assert ((err > 1e-9) & (err < 1e-4)).all()

@@ -1,0 +1,81 @@
+"""window_angle, the crank angle spent in a part of the stroke: closed forms, counting poses, complements, faults.
+
+Counting poses on a grid of N misses at most one step 2 pi/N at each of the two to four ends of the stay; the reported
+errors are those of the extrema the window hangs on, for a target of 1e-10 below 1e-4 where the stay ends at a grazing
+angle and far below elsewhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.errors import InputError
+from sweep.families import family
+from sweep.quantities.measures import measure
+
+ROCKERS = {
+    "a": [11.0, 20.0, 30.0, 8.0], "b": [36.5, 60.0, 90.0, 22.3], "c": [22.0, 70.0, 60.0, 23.9],
+    "e": [25.5, 80.0, -100.0, 28.2], "f": [29.0, 3.0, 0.0, 18.6], "g": [9.0, 3.0, 0.0, 16.3],
+    "alpha": [np.pi / 2, 0.4, 0.0, 1.1], "branch": [-1.0, 1.0, -1.0, 1.0],
+}  # fmt: skip
+POSES = 100_000
+WINDOWS = [(0.0, 0.01), (0.99, 1.0), (0.3, 0.6), (0.0, 0.6)]
+
+
+@pytest.mark.parametrize("window", WINDOWS)
+def test_is_the_share_of_poses_in_the_window(window):
+    found = sweep.summarise("rssr", ROCKERS, "window_angle", accuracy=1e-10, window=window)
+    assert (found.status == 0).all()
+    phi = np.arange(POSES) * (2.0 * np.pi / POSES)
+    psi = sweep.evaluate("rssr", ROCKERS, "psi", phi=phi).psi.to_numpy().reshape(-1, POSES)
+    psi = np.unwrap(psi)
+    share = (psi - psi.min(axis=1, keepdims=True)) / np.ptp(psi, axis=1, keepdims=True)
+    counted = ((share >= window[0]) & (share <= window[1])).mean(axis=1) * 2.0 * np.pi
+    np.testing.assert_allclose(found.window_angle, counted, atol=4.0 * 2.0 * np.pi / POSES)
+    assert (found.err_window_angle < 1e-4).all()
+
+
+def test_one_of_them_passes_the_cut_of_the_angle():
+    phi = np.linspace(0.0, 2.0 * np.pi, 721)
+    psi = sweep.evaluate("rssr", ROCKERS, "psi", phi=phi).psi.to_numpy().reshape(-1, phi.size)
+    assert (np.abs(np.diff(psi)).max(axis=1) > np.pi).any(), "the sample must contain a rocker that passes 180 degrees"
+
+
+def test_parts_of_the_stroke_add_up_to_a_turn():
+    parts = [(0.0, 0.2), (0.2, 0.7), (0.7, 1.0)]
+    angles = [
+        sweep.summarise("rssr", ROCKERS, "window_angle", accuracy=1e-10, window=part).window_angle for part in parts
+    ]
+    np.testing.assert_allclose(sum(angles), 2.0 * np.pi, atol=1e-7)
+    whole = sweep.summarise("rssr", ROCKERS, "window_angle", accuracy=1e-10, window=(0.0, 1.0))
+    np.testing.assert_allclose(whole.window_angle, 2.0 * np.pi, rtol=1e-15)
+
+
+def test_central_slider_crank_with_an_endless_coupler_is_a_sine():
+    # s = a sin(phi) + b - (a cos(phi))^2/(2 b) ...: with a/b = 1e-6 the sine is met to 1e-6 of the stroke.
+    table = {"a": 10.0, "b": 1e7, "e": 0.0, "f": 0.0, "alpha": 0.0}
+    found = sweep.summarise("rssp", table, "window_angle", accuracy=1e-10, window=(0.99, 1.0))
+    assert found.window_angle[0] == pytest.approx(2.0 * np.arccos(0.98), abs=1e-5)
+
+
+def test_grid_and_refined_agree():
+    refined = sweep.summarise("rssr", ROCKERS, "window_angle", accuracy=1e-10, window=(0.9, 1.0))
+    grid = sweep.summarise("rssr", ROCKERS, "window_angle", samples=4096, window=(0.9, 1.0))
+    np.testing.assert_allclose(grid.window_angle, refined.window_angle, atol=1e-4)
+
+
+def test_without_a_window_it_is_refused():
+    with pytest.raises(InputError, match="window_angle"):
+        sweep.summarise("rssr", ROCKERS, "window_angle")
+
+
+def test_design_that_does_not_turn_has_none():
+    table = {name: values[:1] for name, values in ROCKERS.items()} | {"a": [30.0]}
+    found = sweep.summarise("rssr", table, "window_angle", window=(0.9, 1.0))
+    assert found.status[0] != 0 and np.isnan(found.window_angle[0])
+
+
+def test_optimiser_takes_it_as_a_number():
+    assert measure(family("rssr"), "window_angle").kind == "scalar"

@@ -1,0 +1,79 @@
+"""What a report prints is in a designer's units, and nothing stands under a heading that it has no right to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from kernels import status as codes
+from sweep.report import write_report
+from sweep.report.dataset import gather
+from sweep.report.front import front_rows
+from sweep.report.maps import trade_off
+from sweep.report.quantities import quantity
+from sweep.report.scan import scan
+from sweep.study import study_from_data
+from tests.support.report_dataset import DATA, study_data, write_dataset
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "stored", "words"),
+    [
+        ("m_crank", "mass", 3e-5, "30\u00a0g"),
+        ("reduced_inertia", "inertia", 2e-6, "0.002\u00a0kg·mm²"),
+        ("max_reduced_inertia", "t*mm^2", 2e-6, "0.002\u00a0kg·mm²"),
+        ("life_d1", "time", 7.2e7, "20000\u00a0h"),
+        ("required_life", "s", 7.2e7, "20000\u00a0h"),
+    ],
+)
+def test_masses_inertias_and_lives_are_in_g_kg_mm2_and_hours(name, unit, stored, words) -> None:
+    assert quantity(name, unit).show(stored) == words
+
+
+def front_of(side: str, status: int = codes.OK) -> SimpleNamespace:
+    pareto = {"output": "max_pressure_angle1", side: {"values": [30.0, 40.0], "unit": "deg"}}
+    study = study_from_data(DATA | {"pareto": pareto}, "study.toml")
+    point = {"bound": np.radians(40.0), "max_abs_d2s": 8.0, "max_pressure_angle1": np.radians(40.0), "status": status}
+    point |= {"relaxation": "max_pressure_angle1 by 0.010098; stroke by 0.2", "active": "", "kkt_residual": 0.0}
+    units = {"max_pressure_angle1": "rad", "stroke": "mm", "max_abs_d2s": "mm"}
+    front = pd.DataFrame([point | {"ended": "converged"}])
+    return SimpleNamespace(study=study, front=front, optimum={"max_abs_d2s": 8.0}, units=units)
+
+
+def test_what_gives_way_is_said_in_the_unit_of_its_table() -> None:
+    (row,) = front_rows(front_of("at_most", codes.LIMIT_EXCEEDED))
+    assert row.held == "largest pressure angle of stage 1 by 0.579°; stroke by 0.2\u00a0mm"
+
+
+@pytest.mark.parametrize("larger", [False, True])
+def test_trade_off_keeps_the_points_of_the_sweep_whichever_is_better(tmp_path, larger) -> None:
+    rng = np.random.default_rng(3)
+    table = pd.DataFrame({"first": rng.random(400), "other": rng.random(400), "status": np.zeros(400, np.uint8)})
+    table.to_parquet(tmp_path / "part.parquet", index=False)
+    found = scan([tmp_path / "part.parquet"], [], "first", "other", larger)
+    np.testing.assert_array_equal(found.scatter, table[["first", "other"]].to_numpy())
+    beaten = [
+        not ((table["first"] <= a) & ((table["other"] >= b) if larger else (table["other"] <= b))
+             & ((table["first"] < a) | (table["other"] != b))).any()
+        for a, b in table[["first", "other"]].to_numpy()
+    ]  # fmt: skip
+    wanted = table[beaten].sort_values("first")[["first", "other"]].to_numpy()
+    np.testing.assert_array_equal(found.front, wanted)
+
+
+def test_trade_off_of_at_least_has_the_points_of_the_sweep(tmp_path) -> None:
+    data, _, _ = gather(write_dataset(tmp_path / "designs", optimum={}))
+    pareto = {"output": "stroke", "at_least": {"values": [24.4, 24.5], "unit": "mm"}, "starts": 0}
+    data = replace(data, study=study_from_data(study_data(pareto=pareto), "study.toml"))
+    assert data.second is None and data.against == "stroke"
+    found = scan(data.parts, [], "max_abs_d2s", data.against, larger=True)
+    assert len(found.scatter) > 10 and trade_off(data, found) is not None
+
+
+def test_page_without_tolerances_does_not_speak_of_what_is_made(tmp_path) -> None:
+    page = write_report(write_dataset(tmp_path / "designs", optimum={})).read_text(encoding="utf-8")
+    assert "As it is made" not in page and "Yield" not in page

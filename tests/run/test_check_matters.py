@@ -1,0 +1,64 @@
+"""What `sweep check` says matters is judged by designs that keep the limits, not by what nobody would build."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sweep.chunks.plan import feasible_designs, spread_designs
+from sweep.cli.plan import plan_lines
+from sweep.engine.estimate import estimate
+from sweep.evaluation.summaries import design_outputs
+from sweep.quantities.limits import meets
+from sweep.study import load_study, study_from_data
+
+STUDY = load_study(Path(__file__).parents[2] / "studies" / "joint-loads", smoke=True)
+
+
+def lines_of(study):
+    return plan_lines(study, estimate(study, 1), [])
+
+
+def number(lines, effect):
+    (line,) = [line for line in lines if line.strip().startswith(f"{effect}:")]
+    return float(re.search(r" ([\d.e+-]+), (?:not )?below", line)[1])
+
+
+def test_designs_that_are_looked_at_keep_all_limits() -> None:
+    designs, tried = feasible_designs(STUDY, 32)
+    assert 0 < len(designs) <= 32 <= tried
+    names = [limit.output for limit in STUDY.output_limits]
+    found = design_outputs(STUDY.family, designs, names, STUDY.accuracy, STUDY.window)
+    for limit in STUDY.output_limits:
+        assert meets(limit, found[limit.output]).all()
+    # Negative control: the space holds designs that miss them.
+    spread = spread_designs(STUDY, 64)
+    found = design_outputs(STUDY.family, spread, names, STUDY.accuracy, STUDY.window)
+    assert not all(meets(limit, found[limit.output]).all() for limit in STUDY.output_limits)
+
+
+def test_numbers_of_the_joint_loads_are_those_of_its_readme() -> None:
+    """An elastic lag of some mrad and a few percent of vibration; designs that hardly turn had 2.42 rad and 123."""
+    lines = lines_of(STUDY)
+    assert any("designs within all limits, of" in line for line in lines)
+    assert 1e-4 < number(lines, "elasticity") < 5e-3 and number(lines, "dynamic_elasticity") < 0.1
+
+
+@pytest.mark.parametrize("bound", [0.01])
+def test_limits_that_no_design_keeps_are_named(bound: float) -> None:
+    limits = STUDY.data["limits"] | {"max_pressure_angle": {"max": bound, "unit": "deg"}}
+    strict = study_from_data(STUDY.data | {"limits": limits}, STUDY.path)
+    designs, tried = feasible_designs(strict, 32)
+    assert len(designs) == 0 and tried == min(strict.space.count, 4096)
+    assert any(f"none of {tried} tried keeps all limits" in line for line in lines_of(strict))
+
+
+def test_few_designs_that_keep_the_limits_are_all_taken() -> None:
+    everything, _ = feasible_designs(STUDY, 10**6)
+    some, _ = feasible_designs(STUDY, 3)
+    assert len(some) == 3 < len(everything)
+    assert all((everything == row).all(axis=1).any() for row in some)
+    assert np.isfinite(everything).all()

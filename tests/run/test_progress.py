@@ -1,0 +1,136 @@
+"""Progress of long work: silent below two seconds, then lines with the remaining time, also for steps without parts."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from sweep.chunks.plan import pilot
+from sweep.engine.run import run
+from sweep.jobs.executors import Here
+from sweep.jobs.progress import Phases, Progress
+from sweep.jobs.signals import Stop
+from sweep.proof.question import question_of
+from sweep.proof.rounds import Cores, explored
+from sweep.report import write_report
+from sweep.study import load_study
+from tests.study.test_words import STUDY
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, seconds in (("FIRST_SECONDS", 0.05), ("LINE_SECONDS", 0.2), ("TICK_SECONDS", 0.01)):
+        monkeypatch.setattr(f"sweep.jobs.progress.{name}", seconds)
+
+
+def test_step_without_parts_is_told_while_it_lasts(quick: None) -> None:
+    stream = io.StringIO()
+    with Phases(True, stream) as phases:
+        phases.say("planning")
+        time.sleep(0.15)
+        assert stream.getvalue() == "planning: 0 s\n"
+    assert stream.getvalue() == "planning: 0 s\n" * 2  # and its end
+
+
+def test_short_work_is_not_told() -> None:
+    stream = io.StringIO()
+    with Phases(True, stream) as phases:
+        phases.say("compiling", 0, 3)
+        phases.say("compiling", 3, 3)
+        phases.say("planning")
+    assert stream.getvalue() == ""
+
+
+def test_remaining_time_is_that_of_this_run_after_a_resume(monkeypatch: pytest.MonkeyPatch) -> None:
+    """60 of 100 were there: 10 more took 20 s, so 30 take another 60 s."""
+    now = [1000.0]
+    monkeypatch.setattr("sweep.jobs.progress.time.monotonic", lambda: now[0])
+    stream = io.StringIO()
+    with Progress("x", 100, 60, True, stream) as shown:
+        now[0] += 20.0
+        shown.advance(10)
+        assert stream.getvalue().splitlines()[-1] == "x: 70 of 100 designs (70%), 20 s, 60 s left"
+
+
+def test_remaining_time_follows_what_is_expected_by_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hundred of a million in 10 s; then it turns out that two hundred are enough."""
+    now = [1000.0]
+    monkeypatch.setattr("sweep.jobs.progress.time.monotonic", lambda: now[0])
+    stream = io.StringIO()
+    with Phases(True, stream) as phases:
+        phases.say("proof", 0, 1_000_000, "boxes")
+        now[0] += 10.0
+        phases.say("proof", 100, 200, "boxes")
+        assert stream.getvalue().splitlines()[-1] == "proof: 100 of 200 boxes (50%), 10 s, 10 s left"
+
+
+def test_proof_expects_no_more_boxes_than_it_comes_to_need(tmp_path: Path) -> None:
+    """Of a space that is proven in the first round, later rounds are not expected."""
+    told: list[tuple[int, int]] = []
+    study = load_study(Path(__file__).parents[2] / "studies" / "crank-rocker-proof", smoke=True)
+    question = question_of(study)
+    asked = replace(study.optimise.prove, boxes=1_000_000)
+    least = question.in_kernel(1e-3)  # far below what any design reaches: proven soon
+    leaves, judged, cut, _ = explored(
+        question, least, asked, tmp_path, Cores(Here(), 1, Stop()), lambda *t: told.append(t)
+    )
+    assert not cut and not leaves.open.any()
+    assert told[-1] == (judged, judged)
+    assert max(expected for _, expected in told) < 100 * judged < asked.boxes
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+
+
+def test_pilot_of_planning_is_told_part_by_part() -> None:
+    told: list[tuple[int, int]] = []
+    study = load_study(Path(__file__).parents[2] / "studies" / "geared-dwell", smoke=True)
+    whole = pilot(study, lambda *t: told.append(t))
+    assert told == [(0, 4), (1, 4), (2, 4), (3, 4)]
+    assert whole == pilot(study)
+
+
+def test_every_part_of_a_run_is_told(tmp_path, quick, monkeypatch, capsys) -> None:
+    monkeypatch.setattr("sweep.jobs.progress.FIRST_SECONDS", -1.0)
+    monkeypatch.setattr("sweep.jobs.progress.LINE_SECONDS", -1.0)
+    (tmp_path / "study.toml").write_text(STUDY + '[tolerance]\nlengths = "0.02 mm"\n', encoding="utf-8")
+    folder = run(load_study(tmp_path), out=tmp_path / "out", jobs=1, progress=True)
+    with Phases(True) as phases:
+        write_report(folder, say=phases.say)
+    lines = capsys.readouterr().err.splitlines()
+    labels = list(dict.fromkeys(line.split(":")[0] for line in lines))
+    after = "yield, curves, sensitivities, tolerances"
+    assert labels == ["compiling", "planning", "reading what is there", "words", "optimum", after, "front", "report"]
+    for label, unit in (
+        ("compiling", "steps"),
+        (after, "tables"),
+        ("front", "steps"),
+        ("report", "steps"),
+    ):
+        counted = [line for line in lines if re.match(rf"{label}: \d+ of \d+ {unit} ", line)]
+        assert any(line.endswith(" left") for line in counted), (label, counted)
+    assert any(line.startswith("optimum: 3 of 3 starts (100%)") for line in lines)
+
+
+def test_progress_that_nobody_reads_any_more_does_not_stop_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("FIRST_SECONDS", "LINE_SECONDS"):
+        monkeypatch.setattr(f"sweep.jobs.progress.{name}", -1.0)
+    reading, writing = os.pipe()
+    stream = os.fdopen(writing, "w", buffering=1)
+    with Progress("x", 3, 0, True, stream) as shown:
+        shown.advance(1)
+        assert os.read(reading, 100).startswith(b"x: 1 of 3 designs (33%)")
+        os.close(reading)
+        shown.advance(1)
+        assert not shown.show
+        shown.advance(1)
+    with pytest.raises(BrokenPipeError):
+        stream.close()
+    monkeypatch.setattr(sys, "stderr", None)
+    with Progress("x", 1, 0, True) as shown:
+        shown.advance(1)

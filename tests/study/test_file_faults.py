@@ -1,0 +1,50 @@
+"""Faults of study files as files: TOML, encoding, a file that is missing, the one of two that a fault stands in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sweep.errors import StudyError
+from sweep.study import load_study
+from tests.study.test_faults import RIGHT, faults_of
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("[study]\nname = ", "(at line 2, column 8, the end of the file)"),
+        ('[study]\nname = "a"\nname = "b"\n', "line 3, column 11"),
+        ('[study\nname = "a"\n', "(at line 1, column 7)"),
+        ('[design]\na = "10 mm"\nb = 3 mm\n', "(at line 3, column 7)"),
+    ],
+)
+def test_toml_faults_name_line_and_column(text: str, place: str, tmp_path: Path) -> None:
+    (message,) = faults_of(text, tmp_path)
+    assert message.startswith("study.toml: ")
+    assert place in message
+
+
+def test_a_file_that_is_no_text(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_bytes(b"[study]\nname = '\xff'\n")
+    with pytest.raises(StudyError, match="line 2 is no UTF-8 text"):
+        load_study(tmp_path)
+
+
+def test_a_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match=r"study\.toml: cannot be read: No such file"):
+        load_study(tmp_path)
+    (tmp_path / "study.toml").write_text(RIGHT)
+    with pytest.raises(StudyError, match=r"smoke\.toml: cannot be read: No such file"):
+        load_study(tmp_path, smoke=True)
+
+
+def test_a_fault_is_told_of_the_file_it_stands_in(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(RIGHT.replace("starts = 10", "starts = 0"))
+    (tmp_path / "smoke.toml").write_text("[design]\nc = { count = 0 }\nh = 3\n")
+    with pytest.raises(StudyError) as caught:
+        load_study(tmp_path, smoke=True)
+    places = [" ".join(fault.split()[:2]).rstrip(":") for fault in caught.value.faults]
+    line = RIGHT.count("\n", 0, RIGHT.index("starts = 10")) + 1
+    assert places == [f"study.toml:{line}: optimise.starts", "smoke.toml:3: design.h", "smoke.toml:2: design.c.count"]

@@ -1,0 +1,68 @@
+"""Outputs that are constant in pieces: wanted beside an optimiser they are computed, aimed at they are refused."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+
+from sweep.dataset.files import OPTIMUM, SENSITIVITY, beside
+from sweep.engine.run import run
+from sweep.errors import StudyError
+from sweep.report import write_report
+from sweep.study import load_study
+
+STUDY = """
+[study]
+name = "jumps"
+[mechanism]
+family = "rssr"
+[scene]
+want = ["pressure_extrema", "swing"]
+[design]
+a = { from = 8, to = 12, count = 3, unit = "mm" }
+b = "30 mm"
+c = { from = 20, to = 30, count = 3, unit = "mm" }
+e = "35 mm"
+f = "5 mm"
+g = "0 mm"
+alpha = "20 deg"
+[limits]
+swing = ">= 20 deg"
+[objective]
+minimise = "max_abs_d2psi"
+[optimise]
+starts = 1
+"""
+
+
+def study_of(folder, text):
+    (folder / "study.toml").write_text(text)
+    return load_study(folder)
+
+
+def test_count_that_is_wanted_beside_an_optimiser_is_computed_without_slopes(tmp_path) -> None:
+    folder = run(study_of(tmp_path, STUDY), out=tmp_path / "out", jobs=1)
+    optimum = pd.read_parquet(beside(folder) / OPTIMUM)
+    assert optimum["pressure_extrema"].isin([0, 2, 4]).all()
+    slopes = pd.read_parquet(beside(folder) / SENSITIVITY)
+    assert set(slopes["output"]) == {"swing", "max_abs_d2psi"} and slopes["growing"].notna().all()
+    assert write_report(folder).is_file()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (('"max_abs_d2psi"', '"pressure_extrema"'), "objective.minimise = 'pressure_extrema'"),
+        (('minimise = "max_abs_d2psi"', 'maximise = "pressure_extrema"'), "objective.maximise = 'pressure_extrema'"),
+        (('swing = ">= 20 deg"', 'pressure_extrema = "<= 2"'), "limits.pressure_extrema = '<= 2'"),
+    ],
+)
+def test_count_that_is_aimed_at_is_refused_with_the_remedy(tmp_path, change, message) -> None:
+    with pytest.raises(StudyError) as caught:
+        study_of(tmp_path, STUDY.replace(*change))
+    assert message in str(caught.value) and "ask for it in scene.want, or leave out [optimise]" in str(caught.value)
+
+
+def test_count_limits_a_sweep_alone(tmp_path) -> None:
+    alone = STUDY.replace('swing = ">= 20 deg"', 'pressure_extrema = "<= 2"').replace("[optimise]\nstarts = 1\n", "")
+    assert study_of(tmp_path, alone).optimise is None

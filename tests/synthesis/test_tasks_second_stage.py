@@ -1,0 +1,117 @@
+"""Tasks 5 to 8, with a second stage: the chains are checked by the families, without the task's own formulas."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sweep
+from kernels import status as st
+from sweep.synthesis.tasks import (
+    Task7,
+    Task8,
+    solve,
+)
+from tests.support.task_cases import DRIVE, RSSR, TASK5, TASK6, TASK7, TASK8, Case, best, chain_columns, check_limits
+
+
+def test_task5_pin_goes_as_prescribed():
+    m = best(TASK5).mechanism
+    table = {name: [m[f"{name}1"]] for name in RSSR}
+    turn = check_limits(table, 0.8, 3.2, 1.2)
+    dphi = np.array([0.0, 1.0, 2.0, 3.2])
+    psi = sweep.evaluate("rssr", table, "psi", phi=turn["phi_ext"] + dphi)["psi"].to_numpy() - turn["psi_ext"]
+    angle = m["t1"] + m["kappa"] * psi
+    pin = m["a2"] * np.exp(1j * angle)  # the pin on the rocker and the pivot at distance e2
+    rho = np.abs(pin - m["e2"])
+    np.testing.assert_allclose(rho - rho[0], [0.0, 0.1, 0.38, 0.5], atol=1e-9)
+    grid = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
+    law = sweep.evaluate("rssr", table, "psi", phi=grid)["psi"].to_numpy() - turn["psi_ext"]
+    rho = np.abs(m["a2"] * np.exp(1j * (m["t1"] + m["kappa"] * law)) - m["e2"])
+    assert rho.max() - rho.min() == pytest.approx(0.5, abs=1e-4)  # no way back beyond the limits
+    second = (np.roll(rho, 1) - 2.0 * rho + np.roll(rho, -1)) / (grid[1] ** 2)
+    assert np.abs(second).max() == pytest.approx(best(TASK5).objective, rel=5e-3)
+
+
+def test_task6_point_goes_between_the_places_along_the_tangents():
+    solution = best(TASK6)
+    m = solution.mechanism
+    limits = sweep.summarise("rssr", DRIVE, ["phi_ext", "phi_fold"], accuracy=1e-12).iloc[0]
+    phi = np.array([limits["phi_ext"], limits["phi_fold"]])
+    near = np.concatenate([phi, phi + np.array([2e-3, -2e-3])])  # just after the start, just before the end
+    poses = sweep.evaluate(["rssr", "guide"], chain_columns(solution, "guide"), ["x_m", "y_m"], phi=near)
+    assert (poses["status"] == st.OK).all()
+    point = m["x0"] + 1j * m["y0"] + np.exp(1j * m["beta0"]) * (poses["x_m"] + 1j * poses["y_m"]).to_numpy()
+    assert abs(point[0]) < 1e-9
+    assert abs(point[1] - (1.0 + 0.2j)) < 1e-9
+    assert np.angle(point[2] - point[0]) == pytest.approx(0.5, abs=1e-4)
+    assert np.angle(point[1] - point[3]) == pytest.approx(-0.1, abs=1e-4)
+    turn = sweep.summarise(["rssr", "guide"], chain_columns(solution, "guide"), ["max_abs_d2s", "max_pressure_angle2"])
+    assert turn["status"][0] == st.OK
+    assert turn["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=5e-3)
+    assert turn["max_pressure_angle2"][0] < np.radians(60.5)
+
+
+def test_task7_stroke_and_accelerations_at_its_ends():
+    solution = best(TASK7)
+    columns = chain_columns(solution, "rssp")
+    limits = sweep.summarise("rssr", DRIVE, ["phi_ext", "phi_fold"], accuracy=1e-12).iloc[0]
+    ends = sweep.evaluate(
+        ["rssr", "rssp"], columns, ["s", "ds", "d2s"], phi=limits[["phi_ext", "phi_fold"]].to_numpy(float)
+    )
+    assert ends["s"][1] - ends["s"][0] == pytest.approx(1.0, abs=1e-9)
+    assert ends["ds"].abs().max() < 1e-9
+    assert ends["d2s"].tolist() == pytest.approx([0.6, -0.5], abs=1e-9)
+    turn = sweep.summarise(["rssr", "rssp"], columns, ["stroke", "max_abs_d2s"])
+    assert turn["stroke"][0] == pytest.approx(1.0, abs=1e-7)
+    # The whole turn is looked at, not only the ends.
+    assert turn["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=2e-3)
+    assert turn["max_abs_d2s"][0] >= 0.6 - 1e-9
+
+
+def test_task7_surplus_goes_to_the_pressure_angle():
+    smooth, easy = best(TASK7), best(Case(Task7, **TASK7.numbers, objective="pressure_angle"))
+    wanted = ["max_pressure_angle2", "max_abs_d2s"]
+    one, other = (sweep.summarise(["rssr", "rssp"], chain_columns(s, "rssp"), wanted).iloc[0] for s in (smooth, easy))
+    assert np.sin(other["max_pressure_angle2"]) == pytest.approx(easy.objective, rel=2e-3)
+    assert other["max_pressure_angle2"] < one["max_pressure_angle2"] - 0.01
+    assert other["max_abs_d2s"] > one["max_abs_d2s"]
+    assert max(abs(residual) for residual in easy.equations.values()) < 1e-9
+
+
+def test_task8_dwells_within_its_tolerance():
+    solution = best(TASK8)
+    columns = chain_columns(solution, "rssp")
+    table = {name: [solution.mechanism[f"{name}1"]] for name in RSSR}
+    turn = check_limits(table, 0.8, 3.2, np.radians(60.0))
+    phi = turn["phi_ext"] + np.linspace(-0.5, 0.5, 2001)
+    s = sweep.evaluate(["rssr", "rssp"], columns, "s", phi=phi)["s"].to_numpy()
+    deviation = np.abs(s - s[1000]).max()
+    assert deviation <= 0.004 * (1.0 + 1e-8)
+    assert deviation == pytest.approx(solution.mechanism["dwell_deviation"], rel=1e-6)
+    whole = sweep.summarise(["rssr", "rssp"], columns, ["stroke", "max_abs_d2s"])
+    assert whole["stroke"][0] == pytest.approx(1.0, abs=1e-7)
+    assert whole["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=2e-3)
+    # Fourth order: velocity to jerk vanish in the middle, and a tenth of the angle leaves a ten-thousandth.
+    middle = sweep.evaluate(["rssr", "rssp"], columns, ["ds", "d2s", "d3s"], phi=[turn["phi_ext"]]).iloc[0]
+    assert middle[["ds", "d2s", "d3s"]].abs().max() < 1e-7
+    tenth = np.abs(s[950:1051] - s[1000]).max()
+    assert tenth < 3e-4 * deviation
+    # Without its limit the dwell is missed: the tolerance is what shapes the mechanism.
+    free = solve(Task8(**(TASK8.numbers | {"tolerance": 1.0})), candidates=1024, starts=3)[0]
+    assert free.feasible
+    assert free.mechanism["dwell_deviation"] > 0.004
+    assert free.objective < solution.objective
+
+
+def test_task8_spatial_slider_dwells_too():
+    solution = best(Case(Task8, **TASK8.numbers, f2_ratio=0.4, alpha2=0.5))
+    columns = chain_columns(solution, "rssp")
+    assert columns["alpha2"] == [0.5] and columns["f2"][0] == pytest.approx(0.4 * columns["a2"][0], rel=1e-12)
+    turn = check_limits({name: [solution.mechanism[f"{name}1"]] for name in RSSR}, 0.8, 3.2, np.radians(60.0))
+    phi = turn["phi_ext"] + np.linspace(-0.5, 0.5, 2001)
+    s = sweep.evaluate(["rssr", "rssp"], columns, "s", phi=phi)["s"].to_numpy()
+    assert np.abs(s - s[1000]).max() <= 0.004 * (1.0 + 1e-8)
+    assert sweep.summarise(["rssr", "rssp"], columns, "stroke")["stroke"][0] == pytest.approx(1.0, abs=1e-7)
+    middle = sweep.evaluate(["rssr", "rssp"], columns, ["ds", "d2s", "d3s"], phi=[turn["phi_ext"]]).iloc[0]
+    assert middle[["ds", "d2s", "d3s"]].abs().max() < 1e-7
