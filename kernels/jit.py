@@ -24,7 +24,7 @@ from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core import event
+from numba.core.event import Listener, register
 from numba.extending import typeof_impl
 
 from kernels.cache import config, keep
@@ -138,7 +138,7 @@ def _named(name: str, function: F) -> F:
     return function
 
 
-class _PausedCollector(event.Listener):
+class _PausedCollector(Listener):
     """Keeps Python from looking for garbage while numba compiles.
 
     A compiler makes a million objects that refer to each other, and nearly all live until the process ends: looking
@@ -159,4 +159,4 @@ class _PausedCollector(event.Listener):
             gc.enable()
 
 
-event.register("numba:compile", _PausedCollector())  # type: ignore[no-untyped-call]
+register("numba:compile", _PausedCollector())  # type: ignore[no-untyped-call]

@@ -78,7 +78,7 @@ def test_extrema_with_room_are_those_of_the_curve_and_its_room_together() -> Non
     assert turns
     phi = np.linspace(0.0, 2.0 * np.pi, 20001)
     dev = GUIDE.poses(DESIGN[None, :], Angles.of(phi[None, :]), frozenset({"dev"}))["dev"][0]
-    room = own.rooms["dev"].at(DESIGN[None, :], phi)[0]
+    room = own.curve_margins["dev"].at(DESIGN[None, :], phi)[0]
     # A grid of 20 000 angles misses a maximum by half the curvature times 1.6e-4 squared.
     assert points.value[points.sense > 0].max() == pytest.approx((dev + room).max(), abs=1e-7)
     assert points.value[points.sense < 0].min() == pytest.approx((dev - room).min(), abs=1e-7)
