@@ -10,8 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.certified.jets import GUARD, NOISE, ORDER, TAIL
-from kernels.certified.lanes import LANES
+from kernels.certified.jets import GUARD, LANES, NOISE, ORDER, TAIL
 from kernels.jit import inline, kernel
 from kernels.types import EPS, TWO_PI, Array
 

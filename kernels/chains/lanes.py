@@ -7,7 +7,7 @@ which come as bits of one number.  What needs more samples :mod:`kernels.chains.
 
 from __future__ import annotations
 
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.chains.curves import Curve
 from kernels.chains.form import BLOCK, Helper
 from kernels.chains.halves import TOGETHER, handed_rows, keepers

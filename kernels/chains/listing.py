@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.arithmetic.bits import lowest_bit
+from kernels.arithmetic.intrinsics import lowest_bit
 from kernels.chains.chain import Chained
 from kernels.chains.curves import Curve
 from kernels.chains.form import BLOCK, Helper

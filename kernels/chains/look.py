@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.chains.curves import Curve
 from kernels.chains.form import Helper
 from kernels.chains.halves import TOGETHER, handed_rows, keepers

@@ -21,15 +21,6 @@ from kernels.types import EPS, Array, Numbers, Status
 MOST_TEETH = 64  # largest gear ratio; the pin then turns as often per turn of the carrier
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix, in planet radii: pin distance, offset, and the gear ratio with its kind of mesh."""
-
-    k: float
-    a: float
-    n: float
-    mesh: float  # +1: the planet runs outside the fixed gear, -1: inside a fixed ring
-
-
 @inline
 def power(u: Any, v: Any, times: int) -> tuple[Any, Any]:
     """Return the cosine and sine of ``times`` the angle, by products: each adds a rounding or two."""
@@ -67,7 +58,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 4) columns of :class:`Design`
+    designs : (n, 4) columns as `EPICYCLIC_PARAMETERS` of sweep/families/geared_dwell.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, SINGULAR (the pin is on the output axis within its rounding) or INVALID_INPUT
     psi ... y_b : (n, m) out, or None: what is None is neither computed nor compiled
@@ -167,7 +158,7 @@ def dwell_measures(designs: Array, status: Status, dwell_angle: Array, deviation
 
     Parameters
     ----------
-    designs : (n, 4) columns of :class:`kernels.families.epicyclic_dwell.Design`
+    designs : (n, 4) columns as `EPICYCLIC_PARAMETERS` of sweep/families/geared_dwell.py
     status : (n,) out; OK, NO_DWELL (the pin starts at or behind the output axis, or passes behind it within the dwell,
         or the angle does not leave the band before phi = pi) or INVALID_INPUT
     dwell_angle, deviation, band : (n,) out [rad]

@@ -18,23 +18,6 @@ from kernels.linkage.thread_path import bend, length, slope, wrap_angle
 from kernels.types import Array, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, angles in radians."""
-
-    a: float
-    e: float
-    f: float
-    alpha: float
-    Z1: float
-    Z2: float
-    phi_h: float
-    P_h: float
-    dX1: float
-    dY1: float
-    dX2: float
-    dY2: float
-
-
 class Reduced(NamedTuple):
     """Per-design numbers in units of ``unit``: guides, crank circle centre + a (cos t, ca sin t, -sa sin t)."""
 
@@ -116,7 +99,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 12) columns of :class:`Design`; complex128 for gradients by the complex step
+    designs : (n, 12) columns as `PARAMETERS` of sweep/families/eyelet.py; complex128 for gradients by the complex step
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, SINGULAR (the eyelet meets a guide) or INVALID_INPUT
     P, dP, d2P : (n, m) out or None; L - P_h and its derivatives with respect to phi [length]
@@ -158,7 +141,7 @@ def weighted_difference(
 
     Parameters
     ----------
-    designs : (n, 12) columns of :class:`kernels.families.eyelet.Design`, guides on the line x = e, y = 0
+    designs : (n, 12) columns as `PARAMETERS` of sweep/families/eyelet.py, guides on the line x = e, y = 0
     cos_phi, sin_phi : (n, m) or (1, m);  wanted : (n, m) or (1, m), wanted P [length]
     difference : (n, m) out, Dq [length^2];  weight : (n, m) out, dDq/dP at the design's own length [length]
     status : (n, m) out, as of :func:`kernels.families.eyelet.poses`; INVALID_INPUT also where P_h + P <= 0 or a
@@ -191,7 +174,7 @@ def length_sensitivities(designs: Array, cos_phi: Array, sin_phi: Array, jacobia
 
     Parameters
     ----------
-    designs : (n, 12) columns of :class:`kernels.families.eyelet.Design`
+    designs : (n, 12) columns as `PARAMETERS` of sweep/families/eyelet.py
     cos_phi, sin_phi : (n, m) or (1, m)
     jacobian : (7, n, m) out [1 or length/rad]; nan where the status is not OK
     status : (n, m) out, as of :func:`kernels.families.eyelet.poses`

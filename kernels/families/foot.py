@@ -6,7 +6,6 @@ The march over events is :mod:`kernels.effects.foot`.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from kernels import status as st
 from kernels.jit import inline, kernel
@@ -19,19 +18,6 @@ OUTPUTS = (
     "x0", "v_entry", "omega_n", "jump_height_free", "flight_time_free", "k_min_contact", "F0_min_contact", "N_at_entry",
     "N_at_top", "t_recontact",
 )  # fmt: skip
-
-
-class Design(NamedTuple):
-    """Columns of the design matrix in consistent units; omega in rad per time, X the rack's half travel."""
-
-    m: float
-    k: float
-    F0: float
-    omega: float
-    Y: float
-    p: float
-    restitution: float
-    X: float
 
 
 @inline
@@ -90,7 +76,7 @@ def closed_forms(designs: Array, status: Status, outputs: Array) -> None:
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`Design`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/foot.py, without its fabric
     status : (n,) out; OK, NO_EVENT (the rack does not pass the plate) or INVALID_INPUT
     outputs : (10, n) out in the order of :data:`OUTPUTS`; the time of first contact is nan without a rebound
     """
@@ -127,7 +113,8 @@ def rack_path(designs: Array, path: Array) -> None:
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`Design`;  path : (n, 6, N) out, for :func:`kernels.effects.foot.march`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/foot.py, without its fabric
+    path : (n, 6, N) out, for :func:`kernels.effects.foot.march`
     """
     step = TWO_PI / path.shape[2]
     for i in range(designs.shape[0]):

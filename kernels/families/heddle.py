@@ -19,25 +19,6 @@ from kernels.linkage.verdict import pose_status
 from kernels.types import EPS, Array, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, chi_mid in radians, sides +1 or -1."""
-
-    O2B: float
-    BC: float
-    O3C: float
-    O2O3: float
-    O4E: float
-    chi_mid: float
-    O3D: float
-    O4F: float
-    O3O4: float
-    DF: float
-    EG: float
-    x_s: float
-    side_F: float
-    side_C: float
-
-
 class FourBar(NamedTuple):
     """A four-bar in scaled lengths: driving arm a, coupler b, driven arm c, pivot distance e; W = k0 - k2 u,
     R^2 - c^2 = gap - 2 a e u for the distance R of the driving pin from the driven pivot.
@@ -234,7 +215,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 14) columns of :class:`Design`
+    designs : (n, 14) columns as `PARAMETERS` of sweep/families/heddle.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; of the cam lever's angle theta
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT (rod and bell crank in line), SINGULAR or INVALID_INPUT
     chi ... d3chi : (n, m) out [rad], or None: what is None is neither computed nor compiled

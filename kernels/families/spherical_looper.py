@@ -27,41 +27,9 @@ from kernels.linkage.bodies import (
     shaft,
     turned_about,
 )
-from kernels.linkage.driven_ball import Path, Swung, rotated, swing
-from kernels.linkage.looper_drive import Crank, pin_path, reduce_crank
+from kernels.linkage.driven_ball import Crank, Path, Swung, pin_path, reduce_crank, rotated, swing
 from kernels.linkage.outputs import has_point, put_angle, put_loop, put_point
 from kernels.types import Array, Numbers, Status
-
-
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, angles in radians, branches +1 or -1."""
-
-    a1: float
-    b1: float
-    c1: float
-    e1: float
-    f1: float
-    g1: float
-    alpha1: float
-    branch1: float
-    o: float
-    delta: float
-    gamma: float
-    c0x: float
-    c0y: float
-    c0z: float
-    p0x: float
-    p0y: float
-    p0z: float
-    a2: float
-    b2: float
-    x2: float
-    y2: float
-    z2: float
-    theta2: float
-    beta2: float
-    offset2: float
-    branch2: float
 
 
 class Reduced(NamedTuple):
@@ -196,7 +164,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 26) columns of :class:`Design`
+    designs : (n, 26) columns as `PARAMETERS` of sweep/families/spherical_looper.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, or that of the first loop that is not: NOT_ASSEMBLED, DEAD_POINT, SINGULAR (a driving ball
         on the axis it turns the link about, or the looper's ball on the looper's axis); INVALID_INPUT.  Where nothing

@@ -32,17 +32,6 @@ from kernels.linkage.outputs import put_block
 from kernels.types import EPS, Array, Numbers, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, alpha in radians."""
-
-    a: float
-    e: float
-    f: float
-    g: float
-    alpha: float
-    Lw: float
-
-
 class Reduced(NamedTuple):
     """Per-design numbers in units of ``unit``: B = (a u, y0 + ka v, lift - na v), Q = (e, 0, g)."""
 
@@ -99,7 +88,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 6) columns of :class:`Design`
+    designs : (n, 6) columns as `SWIVEL_PARAMETERS` of sweep/families/slotted.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, SINGULAR (the crank pin lies in the block's centre) or INVALID_INPUT
     rod : (4, n, m) out [length], distance of crank pin and block and its three derivatives, or None

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from kernels.arithmetic.bits import power_below
+from kernels.arithmetic.intrinsics import power_below
 from kernels.arithmetic.sincos import sincos
 from kernels.jit import inline
 from kernels.types import EPS

@@ -25,9 +25,9 @@ from sweep.families.capabilities import (
     Skeleton,
     ToolPoint,
 )
-from sweep.families.converted import of_matrix, step_of
 from sweep.families.hardpoints import FOUR_BAR_POINTS
 from sweep.families.outputs import angle_outputs, ladders
+from sweep.families.poses import of_matrix, step_of
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, links, standing
 
 PARAMETERS = (

@@ -29,10 +29,9 @@ from sweep.families.capabilities import (
     ToolPoint,
     constant,
 )
-from sweep.families.converted import of_matrix
 from sweep.families.hardpoints import GUIDE_POINTS
 from sweep.families.outputs import ladders, place_outputs
-from sweep.families.poses import filled_with_places, together
+from sweep.families.poses import filled_with_places, of_matrix, together
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
 
 PARAMETERS = (

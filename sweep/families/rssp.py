@@ -25,10 +25,9 @@ from sweep.families.capabilities import (
     Skeleton,
     constant,
 )
-from sweep.families.converted import move_records, step_of
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS, SLIDER_CRANK_POINTS
 from sweep.families.outputs import ladders, place_outputs
-from sweep.families.poses import filled_with_places
+from sweep.families.poses import filled_with_places, move_records, step_of
 from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, Y, crank_axis, standing
 
 PARAMETERS = (

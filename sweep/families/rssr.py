@@ -224,7 +224,7 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
     assert accuracy.target is not None
     n = len(designs)
     columns: Columns = {"status": np.zeros(n, np.uint8)}
-    for order, name in enumerate(("dpsi", "d2psi", "d3psi"), start=1):
+    for order, name in enumerate(("dpsi", "d2psi", "d3psi")):  # of the velocity
         most, phi = f"max_abs_{name}", f"phi_max_abs_{name}"
         if not wanted & {most, phi}:
             continue
@@ -232,7 +232,10 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
         status = searched["status"].astype(np.uint8)
         value, place = (np.array(searched[key], np.float64) for key in (most, phi))
         error, far = np.full(n, np.nan), np.asarray(searched[f"err_{phi}"], np.float64)
-        rssr.certify_maxima(designs, order, accuracy.target, MOST_CELLS, status, value, place, error, np.empty(n))
+        rssr.certify_maxima(
+            np.ascontiguousarray(designs)[None], np.empty((0, n, 2)), np.zeros((n, 8)), np.array([(2, order)]),
+            accuracy.target, MOST_CELLS, status[None], value[None], place[None], error[None], np.empty(n),
+        )  # fmt: skip
         # Where the proof found a higher peak it climbed it to a thousandth of the target.
         elsewhere = np.abs(place - np.asarray(searched[phi], np.float64)) > far
         far = np.where(elsewhere, np.maximum(far, np.sqrt(accuracy.target)), far)

@@ -13,13 +13,7 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Points, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
-from sweep.families.outputs import (
-    angle_outputs,
-    joint_outputs,
-    ladders,
-    magnitude_outputs,
-    point_outputs,
-)
+from sweep.families.outputs import angle_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.poses import filled_blocks
 from sweep.families.skeletons import crank_axis, links, parameter, standing
 

@@ -1,7 +1,11 @@
-"""Stopping on request: the first signal sets a flag, the second ends the process."""
+"""Stopping on request: the first signal sets a flag, the second ends the process.
+
+A deadline is one clock for all parts of a search, which looks at it where it may stop.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -194,3 +198,16 @@ def _end_with(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(WATCH_SECONDS)
     os._exit(1)
+
+
+class Deadline:
+    """Asked often; true once the budget [s] is used up or the caller wants to stop.  ``pulled`` remembers it."""
+
+    def __init__(self, budget: float | None, stop: Callable[[], bool] | None) -> None:
+        self.end = math.inf if budget is None else time.monotonic() + budget
+        self.stop, self.pulled = stop, False
+
+    def __call__(self) -> bool:
+        """Return whether to stop."""
+        self.pulled = self.pulled or time.monotonic() >= self.end or (self.stop is not None and self.stop())
+        return self.pulled

@@ -6,9 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from kernels.types import Array
 
 DENSE = 33  # places at which the highest point of a polynomial is looked for, its ends included
 PASSES = 8  # of Newton's method between two of them, or by halves: then a top is found to 1e-4 of a panel at least

@@ -7,13 +7,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+
+from kernels.types import TWO_PI, Array
 
 if TYPE_CHECKING:
     from scipy.interpolate import PchipInterpolator
 
-Array: TypeAlias = NDArray[np.float64]
-TWO_PI = 2.0 * np.pi
 AROUND = 3  # points of the next and the last turn: the slope at a point depends on its two neighbours alone
 
 

@@ -7,9 +7,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from sweep.numerics.quadrature import Array, Index, Mask
+from kernels.types import TWO_PI, Array
+from sweep.numerics.quadrature import Index, Mask
 
-TWO_PI = 2.0 * np.pi
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 SECTIONS = 12
 PARABOLAS = 4

@@ -11,9 +11,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from sweep.numerics.quadrature import Array, Index
-
-TWO_PI = 2.0 * np.pi
+from kernels.types import TWO_PI, Array
+from sweep.numerics.quadrature import Index
 
 Curve: TypeAlias = Callable[[Index, Array], Array]
 """``f(rows, phi)``: values of a discriminant of the designs ``rows`` (k,) at crank angles (k, m), or (1, m) for all."""

@@ -11,8 +11,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array
-from sweep.reductions.sampling import TWO_PI, Index, Mask
+from sweep.reductions.sampling import Index, Mask
 
 Curve: TypeAlias = Callable[[Array, Index], Array]
 """Values (j,) of some curves at angles (j,), one each; the curves by their numbers (j,)."""
@@ -24,7 +25,6 @@ BESIDE = 4  # samples on either side of a jump whose peaks are looked for up to 
 BISECTIONS = 48
 SECTIONS = 44
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-EPS = 2.0**-53
 
 
 class Arcs(NamedTuple):

@@ -8,16 +8,16 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Event, Family
 from sweep.families.domain import Interval
 from sweep.families.names import error_of
 from sweep.quantities.resolve import event_names
 from sweep.reductions.resolution import denser
-from sweep.reductions.sampling import DESIGN_STATUS, TWO_PI, Index, Status, blocks, pose_columns, sample_turn, variable
+from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn, variable
 
 START, LIMIT = 256, 16384  # samples of the first look, and those beyond which a design is given up
 PASSES = 80
-EPS = 2.0**-53
 
 
 def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:

@@ -13,13 +13,14 @@ import numpy as np
 from kernels import chains
 from kernels import status as st
 from kernels.chains.curves import MARGIN
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries
 from sweep.families.chain import Chain, stages_of
 from sweep.quantities.kinds import Request
 from sweep.reductions.peak_search import TIE
-from sweep.reductions.refine import EPS, SHRINK, Peaks, confirmed, polished
-from sweep.reductions.sampling import TWO_PI, Extremum, Index, Mask, Status, pose_columns, turn
+from sweep.reductions.refine import SHRINK, Peaks, confirmed, polished
+from sweep.reductions.sampling import Extremum, Index, Mask, pose_columns, turn
 
 sampling_tables = lru_cache(chains.sampling_tables)
 

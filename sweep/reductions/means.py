@@ -13,6 +13,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.curve_features import Singular, Switches, crossed, singular_curves
 from sweep.numerics.events import with_events
@@ -20,18 +21,8 @@ from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import Singularities, crowded, steps, turn_edges
 from sweep.reductions.peak_search import LIMIT, START
 from sweep.reductions.resolution import denser, ends, nearest
-from sweep.reductions.sampling import (
-    DESIGN_STATUS,
-    TWO_PI,
-    Index,
-    Status,
-    blocks,
-    discriminants,
-    pose_columns,
-    sample_turn,
-)
+from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, discriminants, pose_columns, sample_turn
 
-EPS = 2.0**-53
 KINKED = 1e-2  # relative change of a mean from which on its convergence tells kinks from smooth curves
 SHIFT = 0.37  # of their spacing: how far samples stand aside that tell whether two grids agree by chance
 NEAR = 0.3  # distance of a singularity [rad] as samples see it, from which on it is looked at closely

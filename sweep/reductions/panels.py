@@ -17,23 +17,14 @@ from numpy.polynomial import chebyshev
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Bends, Singular, bends
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
 from sweep.quantities.kinds import Request
 from sweep.reductions.resolution import MATTERS, ends, nearest
 from sweep.reductions.rounding import order_of, singular_share
-from sweep.reductions.sampling import (
-    DESIGN_STATUS,
-    TWO_PI,
-    Extremum,
-    Index,
-    Mask,
-    Status,
-    blocks,
-    discriminants,
-    pose_columns,
-)
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, discriminants, pose_columns
 
 PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
 TAIL = 4  # last coefficients that tell how wrong a polynomial may be; of a tent in the middle three nearly vanish ...
@@ -46,7 +37,6 @@ CROWD = 48  # panels of one curve beyond which rounding alone is halved
 ALLOWED = 1.0 / 32.0  # of the target: what two successive polynomials may differ by
 AGAIN = 8.0  # times that difference is claimed: poses see a kink between them as low as that
 SLOPE = 2.0 * (NODES - 1) ** 2  # of a polynomial bounded by 1 on a panel of width 1 (Markov)
-EPS = 2.0**-53
 
 
 class Panels(NamedTuple):

@@ -9,13 +9,13 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
 from sweep.reductions.breaks import jumps, level, near_jumps, search
 from sweep.reductions.refine import (
-    EPS,
     SHRINK,
     VARIES,
     Peaks,
@@ -29,17 +29,7 @@ from sweep.reductions.refine import (
 )
 from sweep.reductions.resolution import MATTERS, broken, denser, nearest
 from sweep.reductions.rounding import measure_constants, order_of, rounding_share, shaken, singular_share, tells
-from sweep.reductions.sampling import (
-    DESIGN_STATUS,
-    TWO_PI,
-    Extremum,
-    Index,
-    Mask,
-    Status,
-    discriminants,
-    pose_columns,
-    sample_turn,
-)
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, discriminants, pose_columns, sample_turn
 from sweep.reductions.window import Window, edges
 
 START = 32  # samples of the first look

@@ -8,8 +8,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array, Family
-from sweep.reductions.sampling import TWO_PI, Index, Mask, pose_columns
+from sweep.reductions.sampling import Index, Mask, pose_columns
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""
@@ -30,7 +31,6 @@ BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences against the large
 LEARNT = 0.8  # of the error before: what a narrower window about a kink leaves of it at most
 SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # of the spacing of the samples: steps of the last windows
 VARIES = 8.0  # times the rounding at one pose: what that of its neighbours may be
-EPS = 2.0**-53
 
 
 class Peaks(NamedTuple):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels import status as st
+from kernels.types import TWO_PI, Status
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import (
     Bends,
@@ -21,7 +22,7 @@ from sweep.families.curve_features import (
 )
 from sweep.numerics.events import near_zeros, sign_changes, with_events
 from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Curve, Singularities, crowded, singularities
-from sweep.reductions.sampling import DESIGN_STATUS, TWO_PI, Index, Status, blocks, pose_columns
+from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns
 
 PER_WAVE = 2.0  # waves that the fewest samples of any curve resolve
 SHARES = 16.0  # samples of a turn are a multiple of this over the shortest way between two switches

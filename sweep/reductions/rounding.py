@@ -6,12 +6,13 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.capabilities import Assembly
 from sweep.numerics.singularities import Singularities, crowded
-from sweep.reductions.refine import EPS, Peaks, confirmed, first_peaks, polish_places
+from sweep.reductions.refine import Peaks, confirmed, first_peaks, polish_places
 from sweep.reductions.resolution import nearest
-from sweep.reductions.sampling import TWO_PI, Index, Mask, blocks, pose_columns
+from sweep.reductions.sampling import Index, Mask, blocks, pose_columns
 
 TRIES = 3
 CONSTANT = 64.0 * EPS  # of its size: a curve that varies by no more tells nothing but rounding

@@ -12,17 +12,16 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import TWO_PI, Status
 from sweep.families.base import Angles, Array, Columns, Family, PoseFunction
 from sweep.families.capabilities import Assembly
 from sweep.families.domain import Interval
 
 Index: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.bool_]
-Status: TypeAlias = NDArray[np.uint8]
 
 BLOCK = 2**17  # samples handled at once: a few columns of that many stay in the cache
 FEW = 4  # columns from which on there are fewer samples at once
-TWO_PI = 2.0 * np.pi
 
 
 @lru_cache(maxsize=32)

@@ -83,7 +83,7 @@ def _proven(
     value = np.stack([found[request].value for request in requests])
     phi = np.stack([found[request].phi for request in requests])
     status, error = np.tile(searched, (len(names), 1)), np.full(value.shape, np.nan)
-    rssr.certify_point(
+    rssr.certify_maxima(
         np.stack(loops), joined, shares, np.array([known[name] for name in names], np.int64), accuracy.target,
         MOST_CELLS, status, value, phi, error, np.empty(n),
     )  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import TWO_PI, Status
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.quantities.kinds import LimitPosition, Margin, Quantity, Reduced, Request, WindowAngle, requests
@@ -16,17 +17,7 @@ from sweep.quantities.resolve import STAY, resolve
 from sweep.reductions.extrema import true_extrema
 from sweep.reductions.fused import sampled_maxima
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
-from sweep.reductions.sampling import (
-    DESIGN_STATUS,
-    TWO_PI,
-    Extremum,
-    Index,
-    Mask,
-    Status,
-    blocks,
-    sample_turn,
-    variable,
-)
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, sample_turn, variable
 from sweep.reductions.window import Window, window_angle
 
 Found: TypeAlias = dict[Request, Extremum]

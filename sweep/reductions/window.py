@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array, Family
-from sweep.reductions.refine import EPS
 from sweep.reductions.resolution import denser
-from sweep.reductions.sampling import TWO_PI, Index, Mask, blocks, pose_columns, sample_turn
+from sweep.reductions.sampling import Index, Mask, blocks, pose_columns, sample_turn
 
 PASSES = 60
 

@@ -10,8 +10,7 @@ from kernels import status as codes
 from sweep.dataset import store
 from sweep.optimise.local.start import DIFFERS
 from sweep.proof import read_proof
-from sweep.proof.study import EVENT
-from sweep.proof.words import proof_words
+from sweep.proof.study import EVENT, proof_words
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, Row
 from sweep.report.front import front_sentence

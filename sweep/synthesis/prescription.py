@@ -13,9 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
+from kernels.types import TWO_PI, Status
 from sweep.families import family as find_family
 from sweep.families.base import Array, Parameter
-from sweep.synthesis.locus import TWO_PI, Found, Locus, Status, locus
+from sweep.synthesis.locus import Found, Locus, locus
 
 # The synthesis calls the crank angle of the extended position phi1; as a design output it is phi_ext.
 _PLACE = ("phi1", "phi_ext")

@@ -21,34 +21,10 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.arithmetic.vectors import Vector
 from kernels.jit import inline, kernel
-from kernels.linkage.looper_drive import Crank, reduce_crank
+from kernels.linkage.driven_ball import Crank, reduce_crank
 from kernels.linkage.slider_closure import Reduced as Slider
 from kernels.linkage.slider_closure import reduce_scaled
 from kernels.types import Numbers
-
-
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, angles in radians, branches +1 or -1, slides 0 or 1."""
-
-    a1: float
-    b1: float
-    c1: float
-    e1: float
-    f1: float
-    g1: float
-    alpha1: float
-    branch1: float
-    a2: float
-    b2: float
-    e2: float
-    f2: float
-    alpha2: float
-    offset2: float
-    branch2: float
-    slides: float
-    p0x: float
-    p0y: float
-    p0z: float
 
 
 class Reduced(NamedTuple):

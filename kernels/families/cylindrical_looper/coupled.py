@@ -23,18 +23,6 @@ from kernels.linkage.outputs import put_angle, put_block, put_loop, put_point
 from kernels.types import EPS, Numbers, Status
 
 
-class Offset(NamedTuple):
-    """Columns of the design matrix after those of :class:`Design`: the second ball on the shaft, and crank 2's place.
-
-    ``mode`` 1 or 2 names one of several solutions of the same branches.
-    """
-
-    d2: float
-    beta2: float
-    gamma2: float
-    mode: float
-
-
 class Fixed(NamedTuple):
     """What the offset adds to the constants of a design, in units of the first crank's."""
 
@@ -229,7 +217,7 @@ def coupled_poses(
 
     Parameters
     ----------
-    designs : (n, 23) columns of :class:`kernels.families.cylindrical_looper.closure.Design` and :class:`Offset`
+    designs : (n, 23) columns as `PARAMETERS` of sweep/families/cylindrical_looper.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED (no solution on these branches), DEAD_POINT (the determinant of both loops
         vanishes), INVALID_INPUT

@@ -16,8 +16,7 @@ from kernels.arithmetic.vectors import add, cross, mix, scale
 from kernels.families.cylindrical_looper.closure import Reduced, reduce_design
 from kernels.jit import inline, kernel
 from kernels.linkage.bodies import FRAME, Links, Moving, put, put_ball, put_body, put_crank, put_line, put_rod, shaft
-from kernels.linkage.driven_ball import Path, Swung, rotated, swing
-from kernels.linkage.looper_drive import pin_path
+from kernels.linkage.driven_ball import Path, Swung, pin_path, rotated, swing
 from kernels.linkage.outputs import has_point, put_angle, put_block, put_loop, put_point
 from kernels.linkage.slider_closure import Reduced as Slider
 from kernels.linkage.slider_closure import derivatives, place, tolerance
@@ -93,7 +92,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 19) columns of :class:`Design`
+    designs : (n, 19) columns as `PARAMETERS` of sweep/families/cylindrical_looper.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, or that of the first loop that is not, the slider-crank's before the crank-rocker's:
         NOT_ASSEMBLED, DEAD_POINT, SINGULAR (crank pin 1 on the shaft's axis); INVALID_INPUT.  A loop that nothing

@@ -18,34 +18,6 @@ from kernels.linkage.verdict import follower_status, pose_status
 from kernels.types import EPS, Array
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, angles in radians, assembly modes +1 or -1."""
-
-    h_a: float
-    h_b: float
-    h_c: float
-    h_e: float
-    h_f: float
-    h_g: float
-    h_alpha: float
-    rh: float
-    dh: float
-    xE: float
-    yE: float
-    rE: float
-    dE: float
-    q: float
-    fx: float
-    fy: float
-    tx: float
-    ty: float
-    tooth: float
-    pitch: float
-    y_plate: float
-    h_sigma: float
-    bar_branch: float
-
-
 class Rocker(NamedTuple):
     """The four-bar of the horizontal chain in scaled lengths, spatial or planar."""
 

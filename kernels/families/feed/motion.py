@@ -59,7 +59,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, output
 
     Parameters
     ----------
-    designs : (n, 23) columns of :class:`kernels.families.feed.Design`
+    designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT, of the rocker or of the rack
     outputs : (18, n, m) out in the order of :data:`OUTPUTS` [rad, length]
@@ -96,7 +96,7 @@ def differences(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, stat
 
     Parameters
     ----------
-    designs : (n, 23) columns of :class:`kernels.families.feed.Design`
+    designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     chi : (n, m) prescribed angles of the rack [rad]
     status : (n, m) out, of the rocker alone;  dq : (n, m) out [length^2]; nan where the rocker is not assembled
@@ -127,7 +127,7 @@ def lift_rows(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status
 
     Parameters
     ----------
-    designs : (n, 23) columns of :class:`kernels.families.feed.Design`; q sets the scale only, fx, fy are not used
+    designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py; q sets the scale only, fx, fy are not used
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     chi : (n, m) prescribed angles of the rack [rad]
     status : (n, m) out, of the rocker alone;  rows : (5, n, m) out [length, length, length^2] and the pin H (x, y)
@@ -234,7 +234,7 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
 
     Parameters
     ----------
-    designs : (n, 23) columns of :class:`kernels.families.feed.Design`
+    designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
     status : (n,) out; OK, NO_EVENT (the tooth never passes the plate), that of the first pose that is not assembled
     outputs : (9, n) out in the order of :data:`EVENTS` [rad, length, length per rad]; nan where the status is not OK
 

@@ -12,7 +12,7 @@ on which depends on the rounding of the lengths.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -29,41 +29,6 @@ _SMALL = 1e-9  # steps of Newton's method from here on are quadratically short, 
 _MOST_IN_ALL, _MOST_OF_STAGE, _CLOSE, _LEAST_SHARE = 60, 12, 1e-3, 2.0**-8
 
 OUTPUTS = ("x_t", "y_t", "chi", "dx_t", "dy_t", "dchi", "d2x_t", "d2y_t", "d2chi", "determinant")
-
-
-class TriadDesign(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, angles in radians, assembly mode of the rocker +1 or -1."""
-
-    h_a: float
-    h_b: float
-    h_c: float
-    h_e: float
-    h_f: float
-    h_g: float
-    h_alpha: float
-    rh: float
-    dh: float
-    xE2: float
-    yE2: float
-    rE2: float
-    dE2: float
-    xE3: float
-    yE3: float
-    rE3: float
-    dE3: float
-    f1x: float
-    f1y: float
-    f2x: float
-    f2y: float
-    f3x: float
-    f3y: float
-    q1: float
-    q2: float
-    q3: float
-    x0: float
-    y0: float
-    chi0: float
-    h_sigma: float
 
 
 _LENGTHS = (0, 1, 2, 3, 4, 5, 7, 9, 10, 11, 13, 14, 15, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27)
@@ -250,7 +215,7 @@ def triad_poses(designs: Array, phi: Array, status: Status, outputs: Array) -> N
 
     Parameters
     ----------
-    designs : (n, 30) columns of :class:`TriadDesign`
+    designs : (n, 30) columns as `TRIAD_PARAMETERS` of sweep/families/feed.py
     phi : (n, m), or (1, m) shared by all designs [rad]
     status : (n, m) out; OK, NOT_ASSEMBLED or DEAD_POINT (rocker), SINGULAR (the leads lock here or before),
         NOT_CONVERGED (no assembly near the start) or INVALID_INPUT; where it is not OK all outputs are nan

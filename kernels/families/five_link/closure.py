@@ -25,22 +25,6 @@ from kernels.linkage.crank_closure import Reduced, axial_terms, reduce_scaled, u
 from kernels.types import EPS, Array, Numbers, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, alpha in radians, branch +1 or -1, mode 1, 2 or 3."""
-
-    a: float
-    b: float
-    c: float
-    e: float
-    f: float
-    g: float
-    alpha: float
-    h: float
-    s2: float
-    branch: float
-    mode: float
-
-
 class Joint(NamedTuple):
     """What the two revolutes in place of the driving ball add to the closure, in units of the crank.
 

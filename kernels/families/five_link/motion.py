@@ -167,7 +167,8 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 11) columns of :class:`Design`; complex128 for gradients by the complex step
+    designs : (n, 11) columns as `PARAMETERS` of sweep/families/five_link.py; complex128 for gradients by the
+        complex step
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; complex128 where they depend on the designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR (the coupler is parallel to the crank axis) or
         INVALID_INPUT

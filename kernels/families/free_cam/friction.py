@@ -152,7 +152,7 @@ def limit_points(
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`kernels.families.free_cam.motion.Design`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/free_cam.py
     friction : (n, 3), tension ratio T2/T1; coefficients of friction along the thread and across it (along the edge)
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, INVALID_INPUT, or NOT_CONVERGED where a limit point lies far outside (friction near 1)
@@ -234,7 +234,7 @@ def march(
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`kernels.families.free_cam.motion.Design`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/free_cam.py
     friction : (n, 3), tension ratio T2/T1; coefficients of friction along the thread and across it (along the edge)
     cos_phi, sin_phi : (n, m) or (1, m), angles of one turn in their order
     turns : how often the angles are gone through

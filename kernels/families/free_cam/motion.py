@@ -15,19 +15,6 @@ from kernels.linkage.thread_path import wrap_angle
 from kernels.types import Array, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix [length], a [1/length]."""
-
-    a: float
-    X1: float
-    Y1: float
-    Z1: float
-    X2: float
-    Y2: float
-    Z2: float
-    P_h: float
-
-
 @inline
 def by_angle(a: float, x: float, y: float, z: float, at: float) -> tuple[float, float, float]:
     """Return the distance of a guide: first and second derivative by phi at a fixed y, and the mixed one; (21)."""
@@ -80,7 +67,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`Design`; complex128 for gradients by the complex step
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/free_cam.py; complex128 for gradients by the complex step
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK or INVALID_INPUT (also where both guides are on one side of the cam)
     P, dP, d2P, L : (n, m) out or None; L - P_h, its derivatives with respect to phi, thread length [length]

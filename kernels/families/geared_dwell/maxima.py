@@ -8,7 +8,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves.polynomials import roots_up_to, value_and_slope
-from kernels.families.geared_dwell.closure import Reduced, pin, reduce_design, velocity
+from kernels.families.geared_dwell.motion import Reduced, pin, reduce_design, velocity
 from kernels.jit import inline, kernel
 from kernels.types import Array, Status
 
@@ -97,7 +97,7 @@ def turn_maxima(
 
     Parameters
     ----------
-    designs : (n, 2) columns of :class:`Design`
+    designs : (n, 2) columns as `PARAMETERS` of sweep/families/geared_dwell.py
     status : (n,) out; OK, SINGULAR (the pin passes through the output axis), NOT_CONVERGED or INVALID_INPUT
     max_abs_dpsi ... max_abs_d3psi : (n,) out, or None: not computed, not compiled
     phi_max_abs_d2psi : (n,) out, where |psi''| is largest, in [0, pi]; -phi is as good, psi'' being odd
@@ -205,7 +205,7 @@ def dwell_measures(
 
     Parameters
     ----------
-    designs : (n, 2) columns of :class:`Design`
+    designs : (n, 2) columns as `PARAMETERS` of sweep/families/geared_dwell.py
     status : (n,) out; OK, SINGULAR, NOT_CONVERGED, INVALID_INPUT, or where a dwell is wanted and the output does not
         turn once per turn of the carrier NO_DWELL
     turns ... dwell_band : (n,) out, or None: not computed, not compiled

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kernels.arithmetic.bits import power_below
+from kernels.arithmetic.intrinsics import power_below
 from kernels.jit import inline
 from kernels.types import EPS, Array
 

@@ -7,7 +7,6 @@ bit.  Designs may be complex128 (exact gradients by the complex step); decisions
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from kernels.jit import inline
 from kernels.linkage.slider_closure import Place as Place
@@ -18,17 +17,6 @@ from kernels.linkage.slider_closure import reduce_scaled
 from kernels.linkage.slider_closure import tolerance as tolerance
 from kernels.types import EPS as EPS
 from kernels.types import Array
-
-
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, alpha in radians, branch +1 or -1."""
-
-    a: float
-    b: float
-    e: float
-    f: float
-    alpha: float
-    branch: float
 
 
 @inline

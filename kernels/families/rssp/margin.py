@@ -72,7 +72,7 @@ def margin(
 
     Parameters
     ----------
-    designs : (n, 6) columns of :class:`Design`
+    designs : (n, 6) columns as `PARAMETERS` of sweep/families/rssp.py
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE (the least Q is zero within rounding) or INVALID_INPUT
     margin : (n,) out, least Q/b^2 = least cos^2(pressure angle) over the turn; negative if the crank does not turn
     rotatable : (n,) out, 1 or 0; nan where undecidable
@@ -189,7 +189,7 @@ def limits(
 
     Parameters
     ----------
-    designs : (n, 6) columns of :class:`Design`
+    designs : (n, 6) columns as `PARAMETERS` of sweep/families/rssp.py
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_OSCILLATING (the slider stands still: e = 0, alpha = 90 deg),
         SINGULAR (the slider ball reaches the crank axis), NOT_CONVERGED or INVALID_INPUT
     s_ext, s_fold : (n,) out [length], slider at the extended and the folded position

@@ -101,7 +101,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 6) columns of :class:`Design`
+    designs : (n, 6) columns as `PARAMETERS` of sweep/families/rssp.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT or INVALID_INPUT
     s ... pressure_angle : (n, m) out [length; rad], or None: what is None is neither computed nor compiled

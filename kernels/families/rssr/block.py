@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.curves.trigonometric_polynomials import approach, far_minimum, lowest_of_16, minimum, point, shortfall
 from kernels.families.rssr.closure import EPS, Array, closure_terms, reduce_scaled, unit_scale, within_unit_range
 from kernels.jit import inline

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from kernels.arithmetic.max_min import largest
+from kernels.arithmetic.intrinsics import largest
 from kernels.families.rssr.closure import EPS, closure_terms
 from kernels.families.rssr.derivatives import follower, order_pair
 from kernels.jit import inline, kernel

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.arithmetic.bits import lowest_bit
+from kernels.arithmetic.intrinsics import lowest_bit
 from kernels.curves.trigonometric_polynomials import minimum
 from kernels.families.rssr.block import (
     BLOCK,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from kernels import status as st
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.families.rssr.block import (
     BLOCK,
     COS,

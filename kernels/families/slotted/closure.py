@@ -18,20 +18,6 @@ from kernels.jit import inline, kernel
 from kernels.types import Numbers, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, alpha in radians, tau and branch +1 or -1."""
-
-    a: float
-    e: float
-    f: float
-    g: float
-    alpha: float
-    s: float
-    k: float
-    tau: float
-    branch: float
-
-
 class Reduced(NamedTuple):
     """Per-design numbers in units of ``unit``: x = a u - e, y = y0 + ka v, z = z0 - na v (ball from the point D)."""
 

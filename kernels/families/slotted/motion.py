@@ -108,7 +108,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 9) columns of :class:`Design`; k = 0 is the fork slot, k > 0 the bar
+    designs : (n, 9) columns as `PARAMETERS` of sweep/families/slotted.py; k = 0 is the fork slot, k > 0 the bar
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT
     psi ... cos_psi : (n, m) out [rad; 1], or None: what is None is neither computed nor compiled
