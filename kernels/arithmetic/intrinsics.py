@@ -100,7 +100,7 @@ _EXPONENT = 0x7FF0000000000000  # the bits of a float64 that hold its exponent
 
 
 def power_below(x: Any) -> Any:
-    """Return the largest power of two that is not above abs(x), for a float of 2^-1022 at least.
+    """Largest power of two that is not above abs(x), for a float of 2^-1022 at least.
 
     Below that it is 0, of what is not finite infinity.  In kernels it is vector code, which `math.frexp` is not.
     """

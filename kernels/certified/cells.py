@@ -129,7 +129,7 @@ def _bound(lanes: int, walk: Array, curve: Array) -> None:
 
 @inline
 def past_arc(marching: bool, edge: float, top: float, half: float) -> tuple[float, float]:
-    """Return the edge behind a closed arc that it has reached, and the arc's next copy; both as they were otherwise."""
+    """Edge behind a closed arc that it has reached, and the arc's next copy; both as they were otherwise."""
     past, end = marching & (edge >= top - half), top + half
     return (end if past & (end > edge) else edge), (top + TWO_PI if past else top)
 

@@ -234,7 +234,7 @@ def _bring_arcs_ahead(lane: int, curves: Array, j: int) -> None:
 
 @inline
 def _furthest_back(lane: int, curves: Array) -> float:
-    """Return the edge at which the next cell begins; infinite where all curves are given up."""
+    """Edge at which the next cell begins; infinite where all curves are given up."""
     start = math.inf
     for j in range(curves.shape[0]):
         start = min(start, curves[j, EDGE + lane])

@@ -60,7 +60,7 @@ def dense_maxima(chain: Chained) -> Helper:
 
 
 def _lower(stages: int, name: str) -> Helper:
-    """Return the smaller of two tuples, number by number."""
+    """Smaller of two tuples, number by number."""
     last = stages - 1
     if last == 0:
 

@@ -33,7 +33,7 @@ SPEED_COLUMNS = ("v_ref", "K", "n")
 
 @inline
 def thread_radius(count: float, density: float) -> float:
-    """Return the radius of a round thread of metric count N [m/g] and density gamma [g/cm^3], in mm; (2)."""
+    """Radius of a round thread of metric count N [m/g] and density gamma [g/cm^3], in mm; (2)."""
     return 1.0 / math.sqrt(math.pi * density * count)
 
 
@@ -104,7 +104,7 @@ def thread_contour(
 
 @inline
 def least_radius(alpha: float, beta: float, stiff: float, thick: float) -> float:
-    """Return the radius of least tension, (2 B beta/alpha)^(1/3) - r, not below 0; inf without adhesion; (4)."""
+    """Radius of least tension, (2 B beta/alpha)^(1/3) - r, not below 0; inf without adhesion; (4)."""
     # no adhesion: the tension falls with R without end, or does not depend on it
     if alpha == 0.0:
         return math.inf if stiff * beta > 0.0 else math.nan

@@ -23,7 +23,7 @@ MOST_TEETH = 64  # largest gear ratio; the pin then turns as often per turn of t
 
 @inline
 def power(u: Any, v: Any, times: int) -> tuple[Any, Any]:
-    """Return the cosine and sine of ``times`` the angle, by products: each adds a rounding or two."""
+    """Cosine and sine of ``times`` the angle, by products: each adds a rounding or two."""
     c, s = 1.0 + 0.0 * u, 0.0 * v
     while times > 0:
         if times % 2 == 1:
@@ -144,7 +144,7 @@ STEPS = 64  # per turn of the pin while the end of the band is looked for
 
 @inline
 def _output(k: float, a: float, arm: float, mesh: float, phi: float) -> tuple[float, float]:
-    """Return the output angle, and its velocity analogue times the squared distance of the pin from the output axis."""
+    """Output angle, and its velocity analogue times the squared distance of the pin from the output axis."""
     x = arm * math.cos(phi) - mesh * k * math.cos(arm * phi) + a
     y = arm * math.sin(phi) - k * math.sin(arm * phi)
     x1 = -arm * math.sin(phi) + mesh * k * arm * math.sin(arm * phi)
@@ -154,7 +154,7 @@ def _output(k: float, a: float, arm: float, mesh: float, phi: float) -> tuple[fl
 
 @kernel
 def dwell_measures(designs: Array, status: Status, dwell_angle: Array, deviation: Array, band: Array) -> None:
-    """Return dwell, largest deviation from mid-dwell and band dwell around phi = 0.
+    """Dwell, largest deviation from mid-dwell and band dwell around phi = 0.
 
     Parameters
     ----------

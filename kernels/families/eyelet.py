@@ -36,9 +36,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for a radius that is not positive
-    and for what is not finite.
-    """
+    """Constants of one design; ``valid`` is false for a radius that is not positive and for what is not finite."""
     size = abs(designs[i, 0].real) + abs(designs[i, 1].real) + abs(designs[i, 2].real)
     size += abs(designs[i, 4].real) + abs(designs[i, 5].real) + abs(designs[i, 7].real)
     offsets = abs(designs[i, 8].real) + abs(designs[i, 9].real) + abs(designs[i, 10].real) + abs(designs[i, 11].real)
@@ -59,13 +57,13 @@ def reduce_design(designs: Array, i: int) -> Reduced:
 
 @inline
 def on_circle(r: Reduced, c: float, s: float) -> Vector:
-    """Return the vector from the axis to the eyelet for cosine and sine of its crank angle."""
+    """Vector from the axis to the eyelet for cosine and sine of its crank angle."""
     return r.a * c, r.a * r.cos_alpha * s, -r.a * r.sin_alpha * s
 
 
 @inline
 def eyelet(r: Reduced, u: float, v: float) -> tuple[Vector, Vector, Vector]:
-    """Return the eyelet, its first and second derivative, for u = cos(phi), v = sin(phi); (5)."""
+    """Eyelet, its first and second derivative, for u = cos(phi), v = sin(phi); (5)."""
     # the angle phi_h + phi by the addition theorem: cosine and sine of phi_h are taken once per design
     c, s = r.cos_h * u - r.sin_h * v, r.sin_h * u + r.cos_h * v
     x, y, z = on_circle(r, c, s)
@@ -94,8 +92,7 @@ def poses(
     status: Status,
     out: Outputs,
 ) -> None:
-    """Compute the thread taken up, its derivatives, wrap angle and place of the eyelet;
-    (1) to (6) of docs/takeup.md.
+    """Thread taken up, its derivatives, wrap angle and place of the eyelet; (1) to (6) of docs/takeup.md.
 
     Parameters
     ----------

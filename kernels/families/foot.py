@@ -22,7 +22,7 @@ OUTPUTS = (
 
 @inline
 def _free(d: Array, i: int, v0: float, t: float) -> float:
-    """Return the height of the foot at the time t after it left the plate with the speed v0."""
+    """Height of the foot at the time t after it left the plate with the speed v0."""
     m, k, preload = d[i, 0], d[i, 1], d[i, 2]
     half = 0.5 * math.sqrt(k / m) * t
     sinc = math.sin(half) / half if half != 0.0 else 1.0
@@ -32,7 +32,7 @@ def _free(d: Array, i: int, v0: float, t: float) -> float:
 
 @inline
 def _gap(d: Array, i: int, x0: float, v0: float, t: float) -> float:
-    """Return the foot above the rack, or above the plate where the rack is below it."""
+    """Foot above the rack, or above the plate where the rack is below it."""
     rack = d[i, 4] * math.sin(x0 + d[i, 3] * t) - d[i, 5]
     gap: float = _free(d, i, v0, t) - max(rack, 0.0)
     return gap
@@ -40,9 +40,7 @@ def _gap(d: Array, i: int, x0: float, v0: float, t: float) -> float:
 
 @inline
 def _first_contact(d: Array, i: int, x0: float, v0: float, longest: float) -> float:
-    """Return the first time after the launch at which the foot meets rack or plate;
-    the plate is met after ``longest``.
-    """
+    """First time after the launch at which the foot meets rack or plate; the plate is met after ``longest``."""
     low = 0.0
     for j in range(1, _CELLS + 1):
         high = longest * (j / _CELLS)
@@ -71,8 +69,7 @@ def _first_contact(d: Array, i: int, x0: float, v0: float, longest: float) -> fl
 
 @kernel
 def closed_forms(designs: Array, status: Status, outputs: Array) -> None:
-    """Compute the entry, jump, limits of spring and preload, contact forces and first contact again;
-    (1)-(3), (6) of docs/foot.md.
+    """Entry, jump, limits of spring and preload, contact forces and first contact again; (1)-(3), (6) of docs/foot.md.
 
     Parameters
     ----------

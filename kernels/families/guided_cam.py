@@ -30,9 +30,7 @@ def displacement(thread: float, across_z: float, across_x: float) -> float:
 
 @inline
 def reaches(square: float, thread: float) -> int:
-    """Return the status of a squared displacement:
-    within the rounding of L^2/4 it is zero, the thread just as long as its way.
-    """
+    """Status of a squared displacement: within the rounding of L^2/4 it is zero, the thread just as long as its way."""
     code = pose_status(math.isfinite(square), square, EPS * thread * thread, None)
     return st.NOT_ASSEMBLED if code != st.INVALID_INPUT and not thread > 0.0 else code
 
@@ -46,8 +44,7 @@ def follow(s: float, thread: float, first: float, second: float) -> tuple[float,
 
 @kernel
 def follower(data: Array, status: Status, S: Array | None, dS: Array | None, d2S: Array | None) -> None:
-    """Compute the displacement of the follower and its derivatives from the length of thread;
-    (10) to (12) of docs/takeup.md.
+    """Displacement of the follower and its derivatives from the length of thread; (10) to (12) of docs/takeup.md.
 
     Parameters
     ----------
@@ -78,15 +75,14 @@ def follower(data: Array, status: Status, S: Array | None, dS: Array | None, d2S
 
 @inline
 def jam_angle(mu1: float, mu2: float) -> float:
-    """Return the pressure angle at which the follower jams: 90 deg - arctan mu1 - arctan mu2; (13)."""
+    """Pressure angle at which the follower jams: 90 deg - arctan mu1 - arctan mu2; (13)."""
     # one arctangent of the sum's tangent: it goes on below 0 where mu1 mu2 > 1 and subtracts nothing from 90 deg
     return arctan2(1.0 - mu1 * mu2, mu1 + mu2)  # type: ignore[no-any-return]
 
 
 @kernel
 def jam_angles(friction: Array, angle: Array, tan_half: Array) -> None:
-    """Compute the permissible pressure angle of the follower and the tangent of its half;
-    (13), (14) of docs/takeup.md.
+    """Permissible pressure angle of the follower and the tangent of its half; (13), (14) of docs/takeup.md.
 
     Parameters
     ----------
@@ -159,7 +155,7 @@ def lowest(designs: Array, i: int) -> tuple[float, float]:
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Return constants of one design; one of them, the least displacement, needs a search over the whole turn."""
+    """Constants of one design; one of them, the least displacement, needs a search over the whole turn."""
     size = 0.0
     for k in range(COLUMNS):
         if k != 5 and k != 6:  # the coefficients of friction are no lengths

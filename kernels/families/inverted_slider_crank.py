@@ -42,8 +42,7 @@ def poses(
     out: Outputs,
     joints: Numbers | None,
 ) -> None:
-    """Compute the rocker angle, place of the pin on the rocker
-    and their derivatives of every design at its crank angles; (1)-(5).
+    """Rocker angle, place of the pin on the rocker and derivatives of every design at its crank angles; (1)-(5).
 
     Parameters
     ----------

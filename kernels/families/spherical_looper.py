@@ -58,7 +58,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for links of no length and for what is not finite."""
+    """Constants of one design; ``valid`` is false for links of no length and for what is not finite."""
     d = designs[i]
     _, exponent = math.frexp(d[0].real)
     unit, per = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
@@ -97,7 +97,7 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
 
 @inline
 def _second_crank(r: Reduced, u: float, v: float) -> Path:
-    """Return the ball of crank 2 from the common point Os of both axes, (2)."""
+    """Ball of crank 2 from the common point Os of both axes, (2)."""
     u2, v2 = u * r.cos_offset - v * r.sin_offset, v * r.cos_offset + u * r.sin_offset
     radial = mix(r.a2 * u2, r.first, r.a2 * v2, r.second)
     tangential = mix(-r.a2 * v2, r.first, r.a2 * u2, r.second)
@@ -107,13 +107,13 @@ def _second_crank(r: Reduced, u: float, v: float) -> Path:
 
 @inline
 def _in_triad(r: Reduced, a: Vector, lift: float) -> Vector:
-    """Return components in the triad of the looper's axis, from a height along it."""
+    """Components in the triad of the looper's axis, from a height along it."""
     return dot(a, r.radial), dot(a, r.across), dot(a, r.axis) - lift
 
 
 @inline
 def _seen_from_carrier(r: Reduced, carrier: Swung, path: Path) -> Path:
-    """Return the driving ball in the looper's frame, which the carrier takes along, (3)."""
+    """Driving ball in the looper's frame, which the carrier takes along, (3)."""
     # turned back by the carrier's angle: minus the sine and minus all derivatives
     m, m1, m2, m3 = rotated(carrier.cos, -carrier.sin, -carrier.first, -carrier.second, -carrier.third, path)
     return _in_triad(r, m, r.along), _in_triad(r, m1, 0.0), _in_triad(r, m2, 0.0), _in_triad(r, m3, 0.0)

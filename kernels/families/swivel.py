@@ -50,7 +50,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for a crank of no length and for what is not finite."""
+    """Constants of one design; ``valid`` is false for a crank of no length and for what is not finite."""
     _, exponent = math.frexp(designs[i, 0].real)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, e, f, g = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
@@ -81,8 +81,7 @@ def poses(
     out: Outputs,
     joints: Numbers | None,
 ) -> None:
-    """Compute the rod between crank pin and block, and the working point, with derivatives,
-    of every design and crank angle.
+    """Rod between crank pin and block, and the working point, with derivatives, of every design and crank angle.
 
     Equations (1)-(4) of docs/swivel.md.
 

@@ -40,7 +40,7 @@ class Swung(NamedTuple):
 
 @inline
 def swing(path: Path, size: float, b: Any, c: Any, branch: float) -> Swung:
-    """Return the angle of the rocker for one place of the driving ball.
+    """Angle of the rocker for one place of the driving ball.
 
     Parameters
     ----------
@@ -132,9 +132,7 @@ class Crank(NamedTuple):
 
 @inline
 def reduce_crank(d: Any, per: float) -> Crank:
-    """Return constants from the first eight columns of a design, a b c e f g alpha branch;
-    ``per`` scales its lengths.
-    """
+    """Constants from the first eight columns of a design, a b c e f g alpha branch; ``per`` scales its lengths."""
     a, b, c, e, f, g = d[0] * per, d[1] * per, d[2] * per, d[3] * per, d[4] * per, d[5] * per
     sa, ca, branch = np.sin(d[6]), np.cos(d[6]), d[7].real
     size = a.real + abs(e.real) + abs(f.real) + abs(g.real)
@@ -145,9 +143,7 @@ def reduce_crank(d: Any, per: float) -> Crank:
 
 @inline
 def pin_path(r: Crank, u: Any, v: Any) -> Path:
-    """Return the crank pin from the foot of the rocker, (e, 0, g), with its derivatives, at (cos phi,
-    sin phi) = (u, v).
-    """
+    """Crank pin from the foot of the rocker, (e, 0, g), with its derivatives, at (cos phi, sin phi) = (u, v)."""
     hu, hv, tu, tv = r.a * (r.ca * u), r.a * (r.ca * v), r.a * (r.sa * u), r.a * (r.sa * v)
     pin = (r.a * u - r.e, r.y0 + hv, r.lift - r.g - tv)
     return pin, (-r.a * v, hu, -tu), (-r.a * u, -hv, tv), (r.a * v, -hu, tu)

@@ -49,8 +49,7 @@ def rssr_arc_ends(requirements: Array, ends: Array) -> None:
 
 @kernel
 def rssp_arc_ends(requirements: Array, ends: Array) -> None:
-    """Compute crank angles phi1 at which the slider ball would lie on the crank axis;
-    equation (10) of docs/synthesis.md.
+    """Crank angles phi1 at which the slider ball would lie on the crank axis; equation (10) of docs/synthesis.md.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ def _slide(r: Slider, u: float, v: float) -> Slide:
 
 @inline
 def _first_crank(r: Reduced, slide: Slide, u: float, v: float) -> Path:
-    """Return the ball of crank 1 from the foot of the shaft's rocker, which slides with the shaft or does not, (2)."""
+    """Ball of crank 1 from the foot of the shaft's rocker, which slides with the shaft or does not, (2)."""
     m, m1, m2, m3 = pin_path(r.swings, u, v)
     if r.slides == 1.0:
         m, m1 = (m[0], m[1], m[2] - slide.s), (m1[0], m1[1], m1[2] - slide.first)
@@ -85,8 +85,7 @@ def poses(
     out: Outputs,
     joints: Numbers | None,
 ) -> None:
-    """Compute the angle and place of the looper's shaft and the working point, with derivatives,
-    of every design and crank angle.
+    """Angle and place of the looper's shaft and the working point, with derivatives, of every design and crank angle.
 
     Equations (1)-(5) of docs/cylindrical_looper.md.
 
@@ -140,7 +139,7 @@ def poses(
 
 @inline
 def _code(valid: bool, slide_counts: bool, of_slide: int, shaft_counts: bool, of_shaft: int) -> int:
-    """Return the status of the first loop that counts and is not OK."""
+    """Status of the first loop that counts and is not OK."""
     if not valid:
         return st.INVALID_INPUT
     # the slider-crank first: the crank-rocker's driving ball may hang on it
@@ -151,7 +150,7 @@ def _code(valid: bool, slide_counts: bool, of_slide: int, shaft_counts: bool, of
 
 @inline
 def carried(r: Reduced, one: Swung, two: Slide) -> Path:
-    """Return the working point from the shaft's foot: fixed to the shaft, which turns and slides, (4)."""
+    """Working point from the shaft's foot: fixed to the shaft, which turns and slides, (4)."""
     # zeros of the design's own kind: complex where the design is, or the tuples would mix two types
     none = 0.0 * r.swings.e
     along = (

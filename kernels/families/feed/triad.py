@@ -36,7 +36,7 @@ _LENGTHS = (0, 1, 2, 3, 4, 5, 7, 9, 10, 11, 13, 14, 15, 17, 18, 19, 20, 21, 22, 
 
 @inline
 def _scaled(designs: Array, i: int, d: Array) -> tuple[float, bool]:
-    """Return columns of one design in units of a power of two near its greatest length; the unit, and whether valid.
+    """Columns of one design in units of a power of two near its greatest length; the unit, and whether valid.
 
     Newton's steps are measured against 1, so the greatest length sets the scale, not some link that may be tiny.
     """
@@ -61,7 +61,7 @@ def _scaled(designs: Array, i: int, d: Array) -> tuple[float, bool]:
 
 @inline
 def _leads(d: Array, u: Any, v: Any) -> tuple[Driven, Driven, Driven, int]:
-    """Return the three driven points with their derivatives, and the status of the rocker."""
+    """Three driven points with their derivatives, and the status of the rocker."""
     sa, ca = np.sin(d[6]), np.cos(d[6])
     rocker = Rocker(
         d[0], d[2], d[3], d[4] * sa, d[5] - d[4] * ca, ca, sa, (d[2] - d[1]) * (d[2] + d[1]),
@@ -78,7 +78,7 @@ def _leads(d: Array, u: Any, v: Any) -> tuple[Driven, Driven, Driven, int]:
 
 @inline
 def _solved(m: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the solution of a 3 x 3 system by Cramer's rule, and its determinant; m holds the rows."""
+    """Solution of a 3 x 3 system by Cramer's rule, and its determinant; m holds the rows."""
     m0, m1, m2, m3, m4, m5, m6, m7, m8 = m
     c0, c1, c2 = m4 * m8 - m5 * m7, m5 * m6 - m3 * m8, m3 * m7 - m4 * m6
     det = m0 * c0 + m1 * c1 + m2 * c2
@@ -90,7 +90,7 @@ def _solved(m: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any, Any]:
 
 @inline
 def _links(d: Array, leads: tuple[Driven, Driven, Driven], x: Any, y: Any, chi: Any) -> tuple[Any, Any, Any]:
-    """Return rows of the Jacobian, closures |link|^2 - q^2 (halved) and arms on the rack at (x, y, chi)."""
+    """Rows of the Jacobian, closures |link|^2 - q^2 (halved) and arms on the rack at (x, y, chi)."""
     one, two, three = leads
     cos, sin = np.cos(chi), np.sin(chi)
     g1x, g1y = cos * d[17] - sin * d[18], sin * d[17] + cos * d[18]
@@ -111,7 +111,7 @@ def _links(d: Array, leads: tuple[Driven, Driven, Driven], x: Any, y: Any, chi: 
 
 @inline
 def _newton(d: Array, u: float, v: float, x: float, y: float, chi: float) -> tuple[float, float, float, float, int]:
-    """Return the tooth, rack angle and determinant at one crank angle, from a start nearby."""
+    """Tooth, rack angle and determinant at one crank angle, from a start nearby."""
     one, two, three, code = _leads(d, u, v)
     det = math.nan
     if code != st.OK:
@@ -134,7 +134,7 @@ def _newton(d: Array, u: float, v: float, x: float, y: float, chi: float) -> tup
 
 @inline
 def _begun(d: Array, x: float, y: float, chi: float) -> tuple[float, float, float, int]:
-    """Return tooth and rack angle near the assembly at phi = 0 that a guess chooses.
+    """Tooth and rack angle near the assembly at phi = 0 that a guess chooses.
 
     Half the squares of the links' lengths go from those of the guess to their own in stages as long as Newton's steps
     keep halving; a good guess takes one.  NOT_CONVERGED where the leads lock on the way.
@@ -172,7 +172,7 @@ def _begun(d: Array, x: float, y: float, chi: float) -> tuple[float, float, floa
 
 @inline
 def _rates(d: Array, leads: tuple[Driven, Driven, Driven], x: Any, y: Any, chi: Any) -> Any:
-    """Return the first and second derivatives of tooth and rack angle by phi, and the determinant; (16), (17)."""
+    """First and second derivatives of tooth and rack angle by phi, and the determinant; (16), (17)."""
     rows, _, arms = _links(d, leads, x, y, chi)
     one, two, three = leads
     first = (
@@ -210,8 +210,7 @@ def _round(d: Array, nodes: Array) -> int:
 
 @kernel
 def triad_poses(designs: Array, phi: Array, status: Status, outputs: Array) -> None:
-    """Compute the path of the tooth and angle of a rack on three leads, with two derivatives;
-    (15)-(17) of docs/feed.md.
+    """Path of the tooth and angle of a rack on three leads, with two derivatives; (15)-(17) of docs/feed.md.
 
     Parameters
     ----------

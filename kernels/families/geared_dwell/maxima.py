@@ -17,8 +17,7 @@ from kernels.types import Array, Status
 def stretch(
     r: Reduced, k: float, a: float, number: int, s2: Array, q: Array, d: Array, lean: Array
 ) -> tuple[float, float]:
-    """Return the quadratics of a stretch of the half turn in its own variable tau >= 0,
-    its length and |dtau/dcos(phi)|.
+    """Quadratics of a stretch of the half turn in its own variable tau >= 0, its length and |dtau/dcos(phi)|.
 
     ``s2`` is sin^2(phi), ``q`` and ``d`` are Q and D.  The turn is cut at phi = pi/2 with tau = t (number 0) and
     tau = 1 + cos(phi) (number 1).  Where the pin passes nearest to the axis at cos(phi) = 1/k, near a = -k, it is cut
@@ -44,7 +43,7 @@ def stretch(
 
 @inline
 def angle_at(k: float, number: int, tau: float) -> float:
-    """Return the carrier angle in [0, pi] at a place of a stretch."""
+    """Carrier angle in [0, pi] at a place of a stretch."""
     if number == 1:
         return math.pi - 2.0 * math.asin(math.sqrt(0.5 * tau))
     t = tau if number == 0 else ((k - 1.0) + (tau if number == 2 else -tau)) / k
@@ -167,9 +166,7 @@ def turn_maxima(
 
 @inline
 def rising_angle(r: Reduced, psi: float, extreme: float) -> float:
-    """Find where psi, rising from its extreme to pi at phi = pi, takes a value;
-    nan if the iteration does not settle.
-    """
+    """Find where psi, rising from its extreme to pi at phi = pi, takes a value; nan if the search does not settle."""
     low, high = extreme, math.pi
     phi, before = min(2.0 * extreme, 0.5 * (low + high)), math.inf  # twice the extreme is the root for k -> 1
     for _ in range(100):

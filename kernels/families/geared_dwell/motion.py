@@ -46,7 +46,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_half(sign: float, k: float, a: float, ak4: float) -> Half:
-    """Return constants of one half turn."""
+    """Constants of one half turn."""
     below = 1.0 - k
     rough = a - k
     back = rough - a
@@ -65,7 +65,7 @@ def reduce_half(sign: float, k: float, a: float, ak4: float) -> Half:
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for k <= 0 and for what is not finite or above 1e30."""
+    """Constants of one design; ``valid`` is false for k <= 0 and for what is not finite or above 1e30."""
     k, a = designs[i, 0], designs[i, 1]
     ak4 = 4.0 * (a * k)
     front, back = reduce_half(1.0, k, a, ak4), reduce_half(-1.0, -k, -a, ak4)
@@ -90,7 +90,7 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
 
 @inline
 def pin(h: Half, t: float, s: float) -> tuple[float, float, float]:
-    """Return pin coordinates in the half's own frame, and the rounding error of the two together."""
+    """Pin coordinates in the half's own frame, and the rounding error of the two together."""
     m = h.below + h.k * t
     y = 2.0 * (s * m)
     c = 1.0 - t
@@ -106,9 +106,7 @@ def pin(h: Half, t: float, s: float) -> tuple[float, float, float]:
 
 @inline
 def velocity(h: Half, ak4: float, t: float, square: float) -> float:
-    """Return the velocity analogue from the squared distance D of the pin, (4):
-    the form that does not cancel at this place.
-    """
+    """Velocity analogue from the squared distance D of the pin, (4), in the form that does not cancel at this place."""
     ratio = h.total * (h.e - 2.0 * t) / square
     if abs(ratio.real - 1.0) > 0.5:
         return 1.0 - ratio

@@ -18,8 +18,7 @@ from kernels.types import Array, Status
 
 @kernel
 def pressure_ellipse(designs: Array, ellipse: Array) -> None:
-    """Compute the ellipse that the coupler direction draws in the plane across the slide;
-    see kernels.effects.pressure_extrema.
+    """Ellipse that the coupler direction draws in the plane across the slide; see kernels.effects.pressure.
 
     ``designs`` (n, 6); ``ellipse`` (n, 7) out: (x_C - x_B)/b and (z_C - z_B)/b as constant, cosine, sine each, and the
     size of the terms that round.
@@ -93,8 +92,7 @@ def poses(
     out: Outputs,
     joints: Array | None,
 ) -> None:
-    """Compute the slider displacement, transfer functions,
-    discriminant and pressure angle of every design at its crank angles.
+    """Slider displacement, transfer functions, discriminant and pressure angle of every design at its crank angles.
 
     Equations (1)-(3), (5) and (6) of docs/rssp.md: Q = (b - m)(b + m) - n^2, s = y_B + branch sqrt(Q), cos(pressure
     angle) = sqrt(Q)/b, and the derivatives of Q in the factored form that stays accurate for tiny cranks.

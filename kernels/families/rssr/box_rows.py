@@ -54,7 +54,7 @@ def _passed(start: Array, pose: Array, side: int, total: float, crank: float) ->
 
 @kernel
 def _worst(p: Problem, start: Array, group: int, total: float, crank: float) -> int:
-    """Return the pose at which the centre design is farthest out of one side of the tube on one stroke; -1 for none."""
+    """Pose at which the centre design is farthest out of one side of the tube on one stroke; -1 for none."""
     stroke, side = p.tube.shape[0] // 2, LOW + group % 2
     sign = p.branch if side == HIGH else -p.branch
     found, lowest = -1, math.inf
@@ -126,7 +126,7 @@ def _single(rows: Room, start: int, count: int) -> int:
 
 @inline
 def _doubtful(rows: Room, count: int, n: int) -> int:
-    """Return the row of limits that is nearest to being negative on the whole box, in units of its spread."""
+    """Row of limits that is nearest to being negative on the whole box, in units of its spread."""
     found, lowest = -1, math.inf
     for j in range(count):
         if not rows.objective[j]:
@@ -139,7 +139,7 @@ def _doubtful(rows: Room, count: int, n: int) -> int:
 
 @inline
 def _lengths(f: Formulas, rows: Room) -> bool:
-    """Return the lengths of the designs; false where a divisor may vanish, or the crank."""
+    """Lengths of the designs; false where a divisor may vanish, or the crank."""
     at, n = rows.at, rows.ones.shape[0]
     if f.slots[bt.SIGN] >= 0:
         sign = 1.0 if at[f.slots[bt.SIGNED], VALUE] > 0.0 else -1.0  # where it is not known, this part ends anyway
@@ -151,7 +151,7 @@ def _lengths(f: Formulas, rows: Room) -> bool:
 
 @inline
 def _by_target(rows: Room, count: int) -> bool:
-    """Return whether the multipliers use rows that only designs with the target keep."""
+    """Whether the multipliers use rows that only designs with the target keep."""
     found = False
     for j in range(count):
         found = found or (rows.kinds[j] >= AHEAD and rows.factors[j] != 0.0)
@@ -168,13 +168,13 @@ def _emptied(p: Problem, rows: Room, count: int) -> tuple[int, int, float]:
 
 @inline
 def crank_known(f: Formulas, rows: Room) -> bool:
-    """Return whether rho1 + rho2, by which the crank's length is divided, vanishes nowhere in the box."""
+    """Whether rho1 + rho2, by which the crank's length is divided, vanishes nowhere in the box."""
     return bool(least(rows.at[f.slots[bt.STARTS]], rows.ones.shape[0]) > 0.0)
 
 
 @kernel
 def _limits_alone(p: Problem, rows: Room, count: int) -> bool:
-    """Return whether the rows of limits contradict each other on the box; ``rows.factors`` tell how."""
+    """Whether the rows of limits contradict each other on the box; ``rows.factors`` tell how."""
     single = _single(rows, 0, count)
     if single >= 0:
         rows.factors[:] = 0.0

@@ -34,8 +34,7 @@ def dense_maxima(
     at: Indices | None = None,
     values: Array | None = None,
 ) -> None:
-    """Compute the largest |psi'|, |psi''|, |psi'''| over a grid of crank angles, and the smallest Delta;
-    the sweep's hot loop.
+    """Largest |psi'|, |psi''|, |psi'''| over a grid of crank angles, and the smallest Delta; the sweep's hot loop.
 
     Parameters
     ----------

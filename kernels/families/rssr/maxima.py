@@ -142,7 +142,7 @@ def _keep_what_turns(start: int, count: int, at: Array, who: Counts, status: Sta
 
 @inline
 def _highest(begin: int, end: int, m: Array) -> tuple[float, float, float, float]:
-    """Return the height, place and the errors of both of the highest refined maximum of a design."""
+    """Height, place and the errors of both of the highest refined maximum of a design."""
     # The first and the last without a loop: few designs have more, and the processor guesses that rightly.
     best, winner = max(m[begin + HEIGHT], 0.0), begin
     for peak in range(begin + 1, end - 1):
@@ -168,8 +168,7 @@ def true_maxima(
     max_abs_d2psi: Array | None,
     max_abs_d3psi: Array | None,
 ) -> None:
-    """Compute the largest magnitude of one transfer function over the whole turn, where it is,
-    and an estimate of its error.
+    """Largest magnitude of one transfer function over the whole turn, where it is, and an estimate of its error.
 
     Parameters
     ----------

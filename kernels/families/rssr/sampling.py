@@ -59,7 +59,7 @@ def append(
 
 @inline
 def _jet(m: Array, i: int, first: Array | None, second: Array | None) -> tuple[float, float, float]:
-    """Return the wanted transfer function and its next two derivatives at a maximum of the list."""
+    """Wanted transfer function and its next two derivatives at a maximum of the list."""
     e, y0, ca, k0, k1, k2 = m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2]
     u, v = m[i + _U], m[i + _V]
     p, q, j, k = follower(e, y0, ca, k0, k1, k2, u, v)
@@ -108,8 +108,9 @@ def finish(
     begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None,
     error: Array | None, phi_error: Array | None,
 ) -> None:  # fmt: skip
-    """Compute the peak of the parabola through the last point, what it adds as an error estimate,
-    and, where an estimate is wanted, the rounding error and that of the place.
+    """Compute the peak of the parabola through the last point, and what it adds as an error estimate.
+
+    Where an estimate is wanted, also the rounding error and that of the place.
     """
     for i in range(begin, end):
         y, dy, d2y = _jet(m, i, first, second)
@@ -148,8 +149,9 @@ def settle(
     begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None,
     error: Array | None, phi_error: Array | None,
 ) -> float:  # fmt: skip
-    """Take more steps for the maxima not trusted yet;
-    return the largest error estimate of all, infinite if one still is not.
+    """Take more steps for the maxima not trusted yet.
+
+    Returns the largest error estimate of all, infinite if one is still not trusted.
     """
     worst = 0.0
     for i in range(begin, end):
@@ -169,9 +171,7 @@ _NEVER_NEGATIVE = 2047
 
 
 def sampling_tables() -> tuple[Array, Array]:
-    """Return cosines and sines of N equally spaced angles for N = 16, 32, ...
-    1024; those of N start at position N - 16.
-    """
+    """Cosines and sines of N equally spaced angles for N = 16, 32, ..., 1024; those of N start at position N - 16."""
     phi = np.concatenate([np.arange(n) * (2.0 * np.pi / n) for n in (16 << k for k in range(7))])
     return np.cos(phi), np.sin(phi)
 
@@ -191,7 +191,7 @@ def sample(
 
 @inline
 def _row(size: Array, i: int) -> Array:
-    """Return row i of the samples of a block.
+    """Row i of the samples of a block.
 
     An index into a row is seen not to be negative; one that is a sum is not, and would be written to one by one.
     """
@@ -202,9 +202,7 @@ def _row(size: Array, i: int) -> Array:
 def sample_block(
     count: int, at: Array, cos: Array, sin: Array, size: Array, first: Array | None, second: Array | None
 ) -> None:
-    """Sample as :func:`sample` does with FEWEST angles, all designs of a block:
-    angle i of design k at (i + 1) BLOCK + k.
-    """
+    """Sample all designs of a block at the FEWEST angles: angle i of design k stands at (i + 1) BLOCK + k."""
     for i in range(FEWEST):
         u, v, here = cos[i], sin[i], _row(size, 1 + i)
         for k in range(count):
@@ -274,7 +272,7 @@ def list_marked(
 
 @inline
 def _marks(begin: int, width: int, floor: float, size: Array) -> int:
-    """Return the local maxima of at least ``floor`` among ``width`` samples from ``begin`` on, as bits."""
+    """Local maxima of at least ``floor`` among ``width`` samples from ``begin`` on, as bits."""
     begin, marks = begin & _NEVER_NEGATIVE, 0
     for i in range(width):
         y = size[begin + i + 1]

@@ -41,7 +41,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for a crank of no length, k < 0 and what is not finite."""
+    """Constants of one design; ``valid`` is false for a crank of no length, k < 0 and what is not finite."""
     _, exponent = math.frexp(designs[i, 0].real)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, e, f, g = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
