@@ -9,7 +9,7 @@ from sweep.effects import NAMES, effect
 from sweep.effects.base import Effect
 from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
-from sweep.study.units import internal_unit
+from sweep.quantities.units import internal_unit
 
 
 def complete_effects(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:

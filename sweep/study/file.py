@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from sweep.errors import StudyError, choices, closest, shown
-from sweep.study import units
+from sweep.quantities import units
 
 Key: TypeAlias = tuple[str | int, ...]
 

@@ -20,7 +20,7 @@ from sweep.families.base import Family
 from sweep.families.machines import Machine
 from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve, SeriesCurve, table_curve
-from sweep.study import units
+from sweep.quantities import units
 from sweep.study.file import Faults, Key, StudyFile
 from sweep.study.section import Number, Section, read_section
 

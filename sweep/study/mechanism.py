@@ -12,7 +12,7 @@ from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Family
 from sweep.families.specification import Specification, specification
-from sweep.study import units
+from sweep.quantities import units
 from sweep.study.file import Faults, Key, StudyFile
 from sweep.study.section import Number, Section, read_section
 

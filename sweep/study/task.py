@@ -9,7 +9,7 @@ from typing import Any
 
 from sweep.errors import InputError, StudyError, choices
 from sweep.families import family
-from sweep.study import units
+from sweep.quantities import units
 from sweep.study.file import Faults, Key, StudyFile
 from sweep.study.toml import key_lines, read_toml, toml_text
 from sweep.synthesis import tasks

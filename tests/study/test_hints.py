@@ -11,7 +11,7 @@ import pytest
 from sweep.cli.tables import write_table
 from sweep.errors import StoreError, closest, edits
 from sweep.families import NAMES
-from sweep.study.units import SYMBOLS
+from sweep.quantities.units import SYMBOLS
 
 OUTPUTS = [
     "psi", "eps_y", "dpsi", "d2psi", "swing", "margin", "max_abs_d2psi", "max_crank_acceleration", "max_pressure_angle",

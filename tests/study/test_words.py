@@ -16,9 +16,9 @@ from sweep.errors import StudyError
 from sweep.families.names import negative
 from sweep.optimise import Problem, minimise
 from sweep.optimise.manufacture.tolerance import sensitivities
+from sweep.quantities.units import UnitFault, factor
 from sweep.report.quantities import quantity
 from sweep.study import Limit, OptimiseSettings, load_study
-from sweep.study.units import UnitFault, factor
 
 STUDY = """
 [study]
