@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kernels.types import Array
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, choices
 from sweep.families.base import Parameter
 from sweep.families.frames import Axis, Frame, mounted
 
@@ -108,7 +108,7 @@ def read_shafts(
         for key in table:
             if key not in SHAFT_KEYS or (name == MAIN and key in ("ratio", "phase")):
                 known = SHAFT_KEYS[:3] if name == MAIN else SHAFT_KEYS
-                raise InputError(key, table[key], f"{', '.join(known)}{nearest(key, known)}", where)
+                raise InputError(key, table[key], choices(key, known), where)
         place = placed(f"shafts.{name}", {key: table[key] for key in SHAFT_KEYS[:3] if key in table})
         ratio = table.get("ratio", 1)
         if isinstance(ratio, bool) or not isinstance(ratio, int | float) or ratio != int(ratio) or ratio == 0:
@@ -129,7 +129,7 @@ def read_mount(table: Mapping[str, Any], shafts: Mapping[str, Shaft], where: str
     """
     name = table["shaft"]
     if name not in shafts:
-        raise InputError("shaft", name, f"one of {', '.join(shafts)}{nearest(str(name), shafts)}", where)
+        raise InputError("shaft", name, f"one of {choices(str(name), shafts)}", where)
     for key in ("place", "ratio", "offset", "driver"):
         if key in table:
             allowed = "nothing beside shaft, which decides it: give sense, shift, turn and key"
