@@ -202,8 +202,8 @@ def test_best_transmission_crank_rocker_comes_out(tmp_path, swing, phi0):
         (("values = [45, -60]", "from = -45, to = 45, count = 3"), "allowed: an angle below one turn, or its negative"),
         (('phi0 = "165 deg"\n', ""), "locus.phi0 is missing; needed: crank angle from the extended"),
         (("g = ", 'a = "10 mm"\ng = '), "design.a = '10 mm'; allowed: nothing here: it follows from [locus]"),
-        (("[limits]", '[limits]\nswing = { max = 50, unit = "deg" }'), "nothing here: [locus] prescribes it; with [tolerance]"),
-        (("[limits]", '[limits]\nswing = "40 +- 60 deg"'), "nothing here: [locus] prescribes it; with [tolerance]"),
+        (("[limits]", '[limits]\nswing = { max = 50, unit = "deg" }'), "[locus] prescribes it; with [tolerance]"),
+        (("[limits]", '[limits]\nswing = "40 +- 60 deg"'), "[locus] prescribes it; with [tolerance]"),
         (('"rssr"', '"geared_dwell"'), "allowed: a mechanism that is or begins with rssr or rssp"),
     ],
 )  # fmt: skip
