@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from kernels.types import TWO_PI, Array
 from sweep.effects import all_inputs
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, MissingInput, nearest
 from sweep.evaluation.angles import TURNING, grid_in_radians, is_plausible
 from sweep.evaluation.poses import asked_of_poses, check_march, values_of_the_variable
 from sweep.evaluation.routes import design_outputs
@@ -113,7 +113,7 @@ class BoundDesign:
             for p, value in zip(family.parameters, given, strict=True):
                 if value is None:
                     present = ", ".join(self.dimensions) or "nothing"
-                    raise InputError(p.name, "missing", f"the {p.text}; given {present}", _place(self.family))
+                    raise MissingInput(p.name, f"the {p.text}; given {present}", _place(self.family))
             row = self._rows[family.parameter_names] = np.array([given], np.float64)
         return row
 
@@ -145,7 +145,7 @@ def mechanism(family: Mechanism, **dimensions: Number) -> BoundDesign:
     >>> {name: round(value, 4) for name, value in m.poses(0.5, "psi, d2psi").items()}
     {'psi': -1.6003, 'd2psi': -0.1961, 'status': 0}
     >>> m.poses([0.0, 0.5], ["dpsi"])["dpsi"].round(4)
-    array([-0.2124, -0.2877])
+    array([-0.2124, -0.4886])
     >>> found = m.with_(a=10).outputs(["margin", "max_abs_d2psi"])
     >>> round(found["max_abs_d2psi"], 4), found["status"]
     (0.6276, 0)

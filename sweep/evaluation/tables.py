@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, MissingInput, choices, nearest
 from sweep.families.base import Array, Parameter
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     Table: TypeAlias = pd.DataFrame | Mapping[str, Any]
 
 
+FORMS = "a DataFrame of pandas, or a dict of columns; most other tables become one by .to_pandas()"
 FEW = 64  # rows of a table that is looked at as a whole: to take its columns out one by one takes longer than poses
 
 
@@ -74,6 +75,7 @@ def plain_columns(table: Table) -> Table:
     """
     import pandas as pd
 
+    _check_kind(table)
     if not isinstance(table, pd.DataFrame) or not table.columns.is_unique:
         return table
     columns: dict[Any, Any] = {}
@@ -129,7 +131,7 @@ def kept_columns(table: Table, keep: bool | str | Sequence[str], made: Collectio
     columns: dict[str, Any] = {}
     for name in chosen:
         if name not in keys:
-            raise InputError("keep", name, f"columns of the table: {', '.join(keys)}{nearest(name, keys)}", "table")
+            raise InputError("keep", name, f"columns of the table: {choices(name, keys)}", "table")
         if name in made:
             raise InputError("keep", name, "another name: the result has a column of this one itself", "table")
         values = table[keys[name]]
@@ -142,10 +144,14 @@ def kept_columns(table: Table, keep: bool | str | Sequence[str], made: Collectio
     return columns
 
 
+def _check_kind(table: object) -> None:
+    if not isinstance(table, Mapping) and not (hasattr(table, "columns") and hasattr(table, "iloc")):
+        raise InputError("table", type(table).__name__, FORMS, "table")
+
+
 def _column_names(table: Table) -> dict[str, Any]:
     """Return names of the columns, each once, and the keys under which the table has them."""
-    if not isinstance(table, Mapping) and not (hasattr(table, "columns") and hasattr(table, "iloc")):
-        raise InputError("table", type(table).__name__, "a DataFrame, or a dict of columns", "table")
+    _check_kind(table)
     names = [str(key) for key in table]
     for name in names if len(set(names)) < len(names) else ():
         if names.count(name) > 1:
@@ -162,9 +168,7 @@ def _checked_column(
             return p.default
         guess = nearest(p.name, [n for n in keys if n not in family.parameter_names])
         present = ", ".join(keys) or "none"
-        raise InputError(
-            p.name, "missing", f"a column with the {p.text}; found {present}{guess}", f"table of {family.name}"
-        )
+        raise MissingInput(p.name, f"a column with the {p.text}; found {present}{guess}", f"table of {family.name}")
     values = columns[p.name]
     # Least and largest tell in two passes whether anything is to be refused: nan makes both of them nan.
     if not values.ndim:
@@ -249,7 +253,9 @@ def _is_number(value: Any) -> bool:
 def _refuse(bad: Any, values: Array, name: str, allowed: str) -> None:
     if np.any(bad):
         row = int(np.argmax(bad))
-        raise InputError(name, float(values.flat[row]), allowed, f"column {name}, row {row}")
+        value = float(values.flat[row])
+        gap = "; an empty cell is read as nan" if math.isnan(value) else ""
+        raise InputError(name, value, allowed + gap, f"column {name}, row {row}")
 
 
 def parameter_units(parameters: Iterable[Parameter]) -> dict[str, str]:

@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any, TypeAlias
 
 import sweep.sources  # noqa: F401 (read before any source that makes a value is imported, and all of those begin here)
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, choices
 from sweep.families.base import Family
 from sweep.families.chain import chain as chain_of  # the name of the module stays that of the module
 from sweep.families.check import check_family
@@ -142,7 +142,7 @@ def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = No
 @lru_cache
 def _single(name: str) -> Family:
     if name not in NAMES:
-        raise InputError("family", name, f"one of {', '.join(NAMES)}{nearest(name, NAMES)}", "family")
+        raise InputError("family", name, f"one of {choices(name, NAMES)}", "family")
     file, attribute = _IN_FILE_OF.get(name, (name, "FAMILY"))
     entry: Family = getattr(import_module(f"sweep.families.{file}"), attribute)
     return check_family(entry)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, choices, nearest
 from sweep.families.base import Event, Family, Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.domain import Turn, reads_as_degrees
@@ -107,7 +107,7 @@ def _member(name: str, table: dict[str, Any], earlier: Mapping[str, Member], fin
     where = f"machine.{name}"
     for key in table:
         if key not in MEMBER_KEYS:
-            raise InputError(key, table[key], f"{', '.join(MEMBER_KEYS)}{nearest(key, MEMBER_KEYS)}", where)
+            raise InputError(key, table[key], choices(key, MEMBER_KEYS), where)
     if ("family" in table) == ("chain" in table):
         raise InputError("family", table.get("family"), "either family or chain", where)
     family = find(table["family"]) if "family" in table else find(list(table["chain"]))
@@ -183,7 +183,7 @@ def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> E
     where = f"machine.relations.{name}"
     for key in table:
         if key not in EVENT_KEYS:
-            raise InputError(key, table[key], f"{', '.join(EVENT_KEYS)}{nearest(key, EVENT_KEYS)}", where)
+            raise InputError(key, table[key], choices(key, EVENT_KEYS), where)
     of, level, rising = table["event"], table.get("level", 0.0), table.get("rising", True)
     if of not in outputs:
         raise InputError("event", of, f"a pose output of the machine{nearest(str(of), outputs)}", where)
@@ -218,7 +218,7 @@ def _relation(name: str, table: dict[str, Any], members: Mapping[str, Member]) -
     known |= {m.name: (m.name, _stages(m.family)[0]) for m in members.values()}
     for part in given:
         if part not in known:
-            raise InputError(kind, part, f"members: {', '.join(known)}{nearest(part, known)}", where)
+            raise InputError(kind, part, f"members: {choices(part, known)}", where)
     if kind == "torque":
         return ShaftTorque(
             name, tuple((f"{known[x][0]}.drive_torque{known[x][1]}", members[known[x][0]].ratio) for x in given)
@@ -244,5 +244,5 @@ def _two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: 
 def _each(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
     for part in given:
         if part not in known:
-            raise InputError(what, part, f"{what}: {', '.join(known)}{nearest(part, known)}", where)
+            raise InputError(what, part, f"{what}: {choices(part, known)}", where)
     return given

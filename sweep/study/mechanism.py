@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from sweep.errors import InputError, closest, nearest
+from sweep.errors import InputError, choices, closest
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Family
@@ -98,14 +98,14 @@ def _flatten(data: dict[str, Any], key: tuple[str, ...], members: Mapping[str, A
 
 
 def read_mechanism(
-    section: MechanismSection, file: StudyFile, threads: Mapping[str, dict[str, Any]]
+    section: MechanismSection, file: StudyFile, threads: Mapping[str, dict[str, Any]] | None
 ) -> tuple[tuple[str, ...] | Specification, Family] | None:
     """Read the mechanism as the study names it, and its family without effects; None with its faults.
 
     Parameters
     ----------
     section : [mechanism]
-    threads : of a machine, as relations
+    threads : of a machine, as relations; None with the faults of one, which take the names of its outputs along
     """
     data, faults = file.data, file.faults
     if "machine" not in file:
@@ -144,7 +144,7 @@ def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> 
     unknown = [k for k, name in enumerate(names) if name not in NAMES]
     for k in unknown:
         key: Key = ("mechanism", "family") if single else ("mechanism", "chain", k)
-        faults.value(key, names[k], f"one of {', '.join(NAMES)}{nearest(names[k], NAMES)}")
+        faults.value(key, names[k], f"one of {choices(names[k], NAMES)}")
     guessed = tuple(closest(name, NAMES) if name not in NAMES else name for name in names)
     if not guessed or None in guessed:
         return None
@@ -156,7 +156,7 @@ def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> 
 
 
 def _machine(
-    data: Mapping[str, Any], faults: Faults, threads: Mapping[str, dict[str, Any]]
+    data: Mapping[str, Any], faults: Faults, threads: Mapping[str, dict[str, Any]] | None
 ) -> tuple[Specification, Family] | None:
     """Read the machine of a file with its threads, or None with its faults."""
     before = len(faults.lines)
@@ -166,11 +166,11 @@ def _machine(
     for name, raw in _tables(data, "relations", faults).items():
         section = read_section(RelationSection, raw, ("relations", name), faults)
         relations[name] = section.model_dump(exclude_none=True)
-    for name, thread in threads.items():
+    for name, thread in (threads or {}).items():
         if name in relations:
             faults.value(("thread", name), thread, "a name that no relation has")
         relations[name] = thread
-    if len(faults.lines) > before:
+    if threads is None or len(faults.lines) > before:
         return None
     try:
         plain = {name: table for name, table in relations.items() if not {"event", "value"} & set(table)}
