@@ -253,7 +253,7 @@ def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, wind
     own = m.designs(designs)
     once = len(own) > 1 and bool((own[1:] == own[0]).all())
     found = design_outputs(m.family, own[:1] if once else own, inner.outputs, accuracy, window)
-    phase = designs[:, m.columns.stop]
+    phase = m.phase(designs)
     columns: Columns = {"status": found["status"]}
     for name in inner.outputs:
         dotted = f"{m.name}.{name}"

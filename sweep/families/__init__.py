@@ -98,7 +98,9 @@ def family(name: Mechanism) -> Family:
     return _chain(names)
 
 
-def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = None) -> Machine:
+def machine(
+    members: Mapping[str, Any], relations: Mapping[str, Any] | None = None, shafts: Mapping[str, Any] | None = None
+) -> Machine:
     """Several mechanisms on one main shaft, accepted wherever a family's name is.
 
     Parameters
@@ -113,6 +115,8 @@ def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = No
         ``{"speed": [point]}`` or of the second of two points relative to the first, ``{"torque": [member, ...]}``,
         ``{"shaking": [member, ...]}``, ``{"event": pose output, "level": number, "rising": true or false}``,
         ``{"thread": [point, take-up, ...], "stock": length, ...}`` (docs/thread.md, section 7)
+    shafts : by name, each ``at``, ``axis``, ``zero`` and, but for ``main``, ``ratio`` and ``phase``; a member then
+        names its ``shaft`` with ``sense``, ``shift``, ``turn`` and ``key`` instead of its place (docs/machines.md)
 
     Returns
     -------
@@ -136,7 +140,7 @@ def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = No
     """
     if not isinstance(members, Mapping):
         raise InputError("members", members, "a table of members by name", "machine")
-    return _machine(specified(members, relations))
+    return _machine(specified(members, relations, shafts))
 
 
 @lru_cache

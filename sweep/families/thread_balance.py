@@ -25,8 +25,8 @@ import numpy as np
 from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
 from sweep.families.capabilities import ThreadPath
+from sweep.families.frames import Frame
 from sweep.families.parts import AXES, Member, vector
-from sweep.families.relations import Frame
 from sweep.numerics.curves import TableCurve, table_curve
 
 KEYS = ("thread", "stock", "tension", "stiffness", "radius", "allowed")
