@@ -170,11 +170,10 @@ def _in_internal_units(family: Family, dimensions: Mapping[str, Number]) -> dict
 
 def _is_number(given: object) -> TypeGuard[float]:
     """Tell whether it is a finite number, of Python or numpy."""
-    return (
-        isinstance(given, int | float | np.integer | np.floating)
-        and not isinstance(given, bool)
-        and abs(given) <= LARGEST
-    )
+    if isinstance(given, bool) or not isinstance(given, int | float | np.integer | np.floating):
+        return False
+    number: Any = given
+    return bool(abs(number) <= LARGEST)
 
 
 @of_family
