@@ -12,9 +12,9 @@ from pydantic import Field
 from sweep.errors import InputError
 from sweep.families.base import Family, Output
 from sweep.families.names import is_flag
+from sweep.quantities import units
 from sweep.quantities.limits import Limit
 from sweep.quantities.resolve import output as design_output
-from sweep.study import units
 from sweep.study.file import Faults, Key, StudyFile
 from sweep.study.locus import prescribed_limits
 from sweep.study.parameter import Entry

@@ -92,11 +92,16 @@ def test_bars_of_the_model_run_from_joint_to_joint(tmp_path):
     np.testing.assert_allclose(end, part.joints["c"], atol=1e-4)
 
 
-def test_stages_in_frames_of_their_own_stand_side_by_side(tmp_path):
-    model = pygltflib.GLTF2().load(sweep.export(["rssr", "guide"], chain_design(), tmp_path / "chain.glb"))
+def test_stages_of_a_chain_stand_in_one_frame(tmp_path):
+    design = chain_design() | {"shift2": 7.5, "turn2": 0.3}
+    model = pygltflib.GLTF2().load(sweep.export(["rssr", "guide"], design, tmp_path / "chain.glb"))
     shifts = {node.name: node.translation for node in model.nodes if node.name.startswith("stage")}
-    assert shifts["stage 1"] == [0.0, 0.0, 0.0]
-    assert shifts["stage 2"][0] > 0.0
+    assert shifts["stage 1"] == shifts["stage 2"] == [0.0, 0.0, 0.0]
+    found = parts(["rssr", "guide"], design, 0.0)
+    nodes = {(k, node.name): node for k, node in enumerate(model.nodes)}
+    pivots = [node.translation for (_, name), node in nodes.items() if name == "A"]
+    np.testing.assert_allclose(pivots, [part.joints["a"][0] for part in found], atol=1e-5)
+    np.testing.assert_allclose(found[1].joints["a"][0], [design["e1"], 0.0, 7.5], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", DRAWN)
