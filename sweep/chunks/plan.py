@@ -20,9 +20,9 @@ from sweep.chunks.parameters import parameter_matrix, parameter_ns
 from sweep.evaluation.summaries import output
 from sweep.families.base import Array, Unit
 from sweep.families.names import is_error, without_error
+from sweep.quantities.units import internal_unit
 from sweep.reductions.steps import is_proven
 from sweep.sources import DIGESTS
-from sweep.study.units import internal_unit
 
 if TYPE_CHECKING:
     from sweep.study import Study

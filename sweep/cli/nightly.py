@@ -10,7 +10,7 @@ from sweep.cli.options import BACKEND, JOBS
 from sweep.errors import InputError
 from sweep.nights import Settings
 from sweep.nights import nightly as run_night
-from sweep.study.units import factor, split
+from sweep.quantities.units import factor, split
 
 
 @click.command()

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from sweep.families.domain import Turn
 from sweep.families.names import is_error, is_place, parts, without_error, without_minus
 from sweep.families.reduction import split
-from sweep.study.units import internal_unit
+from sweep.quantities.units import internal_unit
 
 POSITIONS = {
     "s": "displacement",

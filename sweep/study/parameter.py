@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field
 
 from sweep.families.base import Parameter
-from sweep.study import units
+from sweep.quantities import units
 from sweep.study.file import Faults, Key
 from sweep.study.section import Count, Number, Section, read_section
 from sweep.study.space import Axis

@@ -11,12 +11,12 @@ from typing import Any, TypeAlias
 from sweep.effects import input_names
 from sweep.families import NAMES, family
 from sweep.families.base import Family, Parameter
+from sweep.quantities.units import example, internal_unit
 from sweep.study.design import SampleTable
 from sweep.study.limits import LimitEntry
 from sweep.study.parameter import FixedEntry, ListEntry, RangeEntry
 from sweep.study.section import Section
 from sweep.study.tables import REQUIRED_TABLES, TABLES
-from sweep.study.units import example, internal_unit
 
 Schema: TypeAlias = dict[str, Any]
 

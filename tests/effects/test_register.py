@@ -18,7 +18,7 @@ from sweep.families import NAMES as FAMILIES
 from sweep.families import family
 from sweep.families.capabilities import JointRecords, ThreadPath
 from sweep.families.link_tree import LinkTree
-from sweep.study.units import factor, internal_unit
+from sweep.quantities.units import factor, internal_unit
 
 ROOT = Path(__file__).resolve().parents[2]
 

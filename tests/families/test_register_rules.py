@@ -15,7 +15,7 @@ from sweep.families.capabilities import Assembly, Dimensions, JointRecords, Link
 from sweep.families.check import FamilyError, check_family
 from sweep.families.domain import Interval, March
 from sweep.families.skeletons import ORIGIN
-from sweep.study.units import factor, internal_unit
+from sweep.quantities.units import factor, internal_unit
 
 
 def yoke(designs: Any, angles: Any, wanted: frozenset[str]) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from sweep.optimise.local.kkt import Result
 from sweep.optimise.starts.candidates import diverse
 from sweep.optimise.starts.posing import problem_of_dataset
 from sweep.optimise.study import certificates, outputs, write
-from sweep.study.units import internal_unit
+from sweep.quantities.units import internal_unit
 
 if TYPE_CHECKING:
     from sweep.optimise.problem.statement import Problem

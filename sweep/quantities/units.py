@@ -1,4 +1,4 @@
-"""Units of study files: a number and its unit to mm, t, s, rad and what follows from them, or bytes.
+"""Written units: a number and its unit to mm, t, s, rad and what follows from them, or bytes.
 
 Forces in N, couples in N mm, pressures in MPa are consistent with lengths in mm, times in s and masses in tonnes: no
 factor stands in any equation of motion.
