@@ -47,7 +47,7 @@ def write_hardpoints(mechanism: Mechanism, design: Table, path: Path, phi: float
 
 
 def _per_angle(family: Family, name: str) -> str:
-    """Unit that a derivative by the shaft's angle has behind that of its output: /rad^2 of the second one."""
+    """Say which unit a derivative by the shaft's angle has behind its output's: /rad^2 for the second."""
     if family.domain.unit != "rad":
         return ""  # a derivative by anything else has its unit
     found = family.split(name) if isinstance(family, Machine) else None
@@ -198,7 +198,7 @@ def _writer(
 
 
 def _numbers(design: Table) -> dict[str, float]:
-    """Return the columns of one design as numbers."""
+    """Columns of one design as numbers."""
     columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
     found = {}
     for key, value in columns.items():

@@ -75,7 +75,7 @@ def as_crank_rocker(designs: Array) -> Array:
 
 
 def as_guide(designs: Array) -> Array:
-    """Return the design matrix of the same linkage as a guide whose line is the frame's, (n, 9)."""
+    """Design matrix of the same linkage as a guide whose line is the frame's, (n, 9)."""
     matrix = np.zeros((len(designs), len(guide.PARAMETERS)), designs.dtype)
     matrix[:, :6], matrix[:, 8] = designs[:, :6], designs[:, 6]
     return matrix

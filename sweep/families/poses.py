@@ -176,7 +176,7 @@ class Together:
         return self._poses.__qualname__
 
     def __call__(self, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-        """Return the wanted outputs and the status of every design at its angles, each (n, m)."""
+        """Wanted outputs and the status of every design at its angles, each (n, m)."""
         key = wanted, np.iscomplexobj(angles.cos) or np.iscomplexobj(designs)
         count = len(designs) * angles.cos.shape[1]
         self._asked[key] = self._asked.get(key, 0) + count
@@ -186,7 +186,7 @@ class Together:
         return {name: found[name] for name in (*wanted, "status")}
 
     def _larger(self, wanted: frozenset[str], is_complex: bool) -> frozenset[str]:
-        """Return the set that a set on few poses is taken from."""
+        """Set that a set on few poses is taken from."""
         if is_complex and self._first is None:
             self._first = wanted
         return self._first if is_complex and self._first is not None and wanted <= self._first else self._all
@@ -248,7 +248,7 @@ DIFFERENCE = 1e-5
 
 
 def differentiable(family: Family) -> Family:
-    """Return the family with poses that take complex designs and angles; the family itself where they do already."""
+    """Family with poses that take complex designs and angles; the family itself where they do already."""
     if family.analytic:
         return family
     return replace(family, poses=partial(_poses, family.poses), analytic=True)

@@ -130,7 +130,7 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
 
 
 def ellipse(designs: Array) -> Array:
-    """Return the curve of the coupler direction across the rocker's motion, (n, 7)."""
+    """Curve of the coupler direction across the rocker's motion, (n, 7)."""
     out = np.empty((len(designs), 7))
     rssr.pressure_ellipse(designs, out)
     return out
@@ -143,7 +143,7 @@ def discriminant_scale(designs: Array) -> Array:
 
 
 def rocker_origin(designs: Array) -> Array:
-    """Return the foot of the common perpendicular on the rocker axis, (n, 3)."""
+    """Foot of the common perpendicular on the rocker axis, (n, 3)."""
     origin = np.zeros((len(designs), 3), designs.dtype)
     origin[:, 0] = designs[:, 3]
     return origin

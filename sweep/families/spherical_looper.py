@@ -87,7 +87,7 @@ def second_coupler_square(designs: Array) -> Array:
 
 
 def second_shaft(designs: Array) -> Array:
-    """Return the direction of the shaft of crank 2, (n, 3)."""
+    """Direction of the shaft of crank 2, (n, 3)."""
     theta, beta = parameter(PARAMETERS, "theta2", designs), parameter(PARAMETERS, "beta2", designs)
     return np.stack([np.sin(theta) * np.cos(beta), np.sin(theta) * np.sin(beta), np.cos(theta)], axis=1)
 

@@ -59,8 +59,9 @@ class Stop:
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """Let a signal within this context raise KeyboardInterrupt as well:
-        for work of one process that looks at no flag.
+        """Let a signal raise KeyboardInterrupt as well within this context.
+
+        This is for work of one process that looks at no flag.
 
         It ends the context without a word; the flag says why.  A compiler may swallow the interruption and fail over it
         later: once the flag is set, any error is a consequence.
@@ -96,7 +97,8 @@ def stop_on_signal() -> Iterator[Stop]:
 
 @contextmanager
 def unheard() -> Iterator[None]:
-    """Keep signals from processes begun within:
+    """Keep signals from processes begun within.
+
     Ctrl-C reaches the whole group, also those that are still starting up.
 
     This process hears what came in between as soon as the context ends.
@@ -182,8 +184,9 @@ def _leave(number: int, words: str) -> None:
 
 
 def depend_on_parent(parent: int) -> None:
-    """Leave signals, which a terminal sends to the whole group, to the parent of this worker process,
-    and die with it.
+    """Leave signals to the parent of this worker process, and die with it.
+
+    A terminal sends them to the whole group.
 
     Without its parent a worker holds no lock on the folder and would wait for work for minutes.
     """
@@ -208,6 +211,6 @@ class Deadline:
         self.stop, self.pulled = stop, False
 
     def __call__(self) -> bool:
-        """Return whether to stop."""
+        """Whether to stop."""
         self.pulled = self.pulled or time.monotonic() >= self.end or (self.stop is not None and self.stop())
         return self.pulled

@@ -74,7 +74,7 @@ class _Panels(NamedTuple):
 
 
 def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
-    """Return integrals of n curves over x, each to a relative error.
+    """Integrals of n curves over x, each to a relative error.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _halved(function: Integrand, panels: _Panels) -> _Panels:
 
 
 def _weighted(weights: Array, values: Array) -> Array:
-    """Return sums (k, q) over the nodes of values (k, j, q), in one order: that of a library depends on k."""
+    """Return the sums (k, q) over the nodes of values (k, j, q), in one order: that of a library depends on k."""
     total: Array = weights[0] * values[:, 0]
     for j in range(1, weights.size):
         total += weights[j] * values[:, j]

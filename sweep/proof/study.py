@@ -83,7 +83,7 @@ def known_proof(study: Study, folder: str | Path) -> Proof | None:
 
 
 def _asked(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, str]:
-    """Return settings, question, target in the unit of the proof's rows, and what the certificate depends on."""
+    """Return the settings, question, target in the unit of the proof's rows, and what the certificate depends on."""
     if study.optimise is None or study.optimise.prove is None:
         raise InputError("optimise.prove", None, '{ gap = "1 %", boxes = 1000000 }', str(study.path))
     asked, question = study.optimise.prove, question_of(study)
@@ -95,7 +95,7 @@ def _asked(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, 
 
 
 def _best(path: Path, question: Question) -> float:
-    """Return the objective of the study's optimum; nan where no feasible design was found."""
+    """Objective of the study's optimum; nan where no feasible design was found."""
     import pyarrow.parquet as pq
 
     table = pq.read_table(path, columns=["role", "status", question.objective]).to_pylist()
@@ -104,7 +104,7 @@ def _best(path: Path, question: Question) -> float:
 
 
 def proof_words(proof: Proof, name: str, show: Callable[[float], str], seconds: float | None = None) -> str:
-    """Return one sentence or two for a report or a terminal, without the full stop at their end.
+    """One sentence or two for a report or a terminal, without the full stop at their end.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _bounded(proof: Proof, name: str, show: Callable[[float], str], took: str) -
 
 
 def _unfinished(proof: Proof, took: str) -> str:
-    """Return how far the boxes have come and what would help."""
+    """How far the boxes have come and what would help."""
     if proof.settled:
         return f" ({proof.boxes} boxes{took})"
     head = f". After {proof.boxes} boxes{took}, {proof.open} are still open: "

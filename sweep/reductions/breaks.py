@@ -60,15 +60,16 @@ def jumps(values: Array, size: Array, rough: float) -> tuple[Mask, Mask]:
 
 
 def near_jumps(between: Mask, row: Index, column: Index) -> Mask:
-    """Return which samples (row, column) lie within `BESIDE` samples of a jump."""
+    """Which samples (row, column) lie within `BESIDE` samples of a jump."""
     near = np.logical_or.reduce([np.roll(between, k, axis=1) for k in range(-BESIDE + 1, BESIDE + 1)])
     found: Mask = near[row, column]
     return found
 
 
 def level(values: Array, mode: int, share: float) -> Array:
-    """Return what a peak of each row of samples must reach to be looked at: of a magnitude this share of the largest,
-    of values this share of their range.
+    """Return what a peak of each row of samples must reach to be looked at.
+
+    Of a magnitude it is this share of the largest, of values this share of their range.
     """
     height = np.abs(values) if mode == 0 else mode * values
     most: Array = height.max(axis=1)
@@ -76,7 +77,7 @@ def level(values: Array, mode: int, share: float) -> Array:
 
 
 def search(curve: Curve, measured: Curve, column: Index, samples: int, least: Array) -> Arcs:
-    """Return the highest measured values on the arcs that end and begin at jumps.
+    """Highest measured values on the arcs that end and begin at jumps.
 
     Parameters
     ----------

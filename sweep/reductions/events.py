@@ -21,7 +21,7 @@ PASSES = 80
 
 
 def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
-    """Return the first place and number of the events that the names are about.
+    """First place and number of the events that the names are about.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy
 
 
 def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) -> tuple[Array, Array, Array, Status]:
-    """Return the first angle of the event and its error, how often it happens, and status, each (n,)."""
+    """First angle of the event and its error, how often it happens, and status, each (n,)."""
     n = len(designs)
     phi, err, number, status = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n), np.zeros(n, np.uint8)
     samples = accuracy.samples or START
@@ -82,9 +82,7 @@ def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) ->
 
 
 def _crossings(family: Family, designs: Array, rows: Index, values: Array, event: Event) -> tuple[Array, Array, Array]:
-    """Return how often samples (r, m) pass the level in the event's sense,
-    and the first place with its error, each (r,).
-    """
+    """How often samples (r, m) pass the level in the event's sense, and the first place with its error, each (r,)."""
     off = (values - event.level) * (1.0 if event.rising else -1.0)
     passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
     if isinstance(family.domain, Interval):
@@ -103,8 +101,9 @@ def _crossings(family: Family, designs: Array, rows: Index, values: Array, event
 def _root(
     family: Family, designs: Array, event: Event, left: Array, right: Array, low: Array, high: Array
 ) -> tuple[Array, Array]:
-    """Find a passage between two samples by regula falsi in the Illinois form, all designs at once;
-    its error is from the last slope.
+    """Find a passage between two samples by regula falsi in the Illinois form, all designs at once.
+
+    Its error is from the last slope.
     """
     sense = 1.0 if event.rising else -1.0
     slope = (high - low) / (right - left)

@@ -117,7 +117,7 @@ class FusedCurve:
         found.err[rows] = peaks.err_height + self._behind(designs[rows], there) * np.abs(peaks.height)
 
     def _precisely(self, precise: Family, designs: Array, phi: Array) -> dict[str, Array]:
-        """Return the pose output and the discriminants of the later stages, each at one crank angle of each design."""
+        """Pose output and the discriminants of the later stages, each at one crank angle of each design."""
         names = [self.request.pose, *(loop.discriminant for loop in self._later())]
         poses, _ = pose_columns(precise, designs, phi[:, None], list(dict.fromkeys(names)))
         return {name: values[:, 0].copy() for name, values in poses.items()}
@@ -134,7 +134,7 @@ class FusedCurve:
 
 
 def curve_of(family: Family, request: Request, anywhere: bool) -> FusedCurve | None:
-    """Return the fused curve of what is requested; None where there is none.
+    """Fused curve of what is requested; None where there is none.
 
     ``anywhere`` as of `sweep.reductions.extrema.true_extrema`: then the least discriminant of a later stage.
     """

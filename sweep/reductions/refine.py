@@ -58,7 +58,7 @@ class Peaks(NamedTuple):
 
 
 def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
-    """Return peaks of the quartics through five samples.
+    """Peaks of the quartics through five samples.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
 
 
 def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> Peaks:
-    """Return the highest points near the given ones, by quartics through five points ever closer together.
+    """Highest points near the given ones, by quartics through five points ever closer together.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def confirmed(
     sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, rounding: Array | float = 0.0,
     there: Array | None = None,
 ) -> Peaks:  # fmt: skip
-    """Return peaks as poses of higher precision have them: their heights are values at their places.
+    """Peaks as poses of higher precision have them: their heights are values at their places.
 
     One pose at the place of a peak measures how far rounding, and what was left of interpolation, have moved its
     value.  Only where that is more than the ``tolerance``, or the place is not known to ``locate``, the peak is
@@ -175,12 +175,12 @@ def confirmed(
 
 
 def attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
-    """Return heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
+    """Heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
     return reaching(sample(which, peaks.phi[:, None])[:, 0], peaks)
 
 
 def reaching(height: Array, peaks: Peaks) -> Peaks:
-    """Return peaks of these heights, and by how much that changes them added to their errors."""
+    """Peaks of these heights, and by how much that changes them added to their errors."""
     return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
 
 

@@ -194,8 +194,9 @@ def _extended_is_largest(family: Family, designs: Array, position: str) -> Mask:
 
 
 def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mask) -> tuple[Array, Array]:
-    """Return what the two limit positions say; ``wraps`` is about the position, ``outward`` (n,):
-    the largest is extended.
+    """Return what the two limit positions say; ``wraps`` is about the position.
+
+    ``outward`` (n,) tells where the largest position is the extended one.
     """
     ext = Extremum(*(np.where(outward, a, b) for a, b in zip(most, least, strict=True)))
     fold = Extremum(*(np.where(outward, b, a) for a, b in zip(most, least, strict=True)))
@@ -215,5 +216,5 @@ def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mas
 
 
 def _principal(angle: Array) -> Array:
-    """Return the angle in (-pi, pi], as atan2 has it."""
+    """Angle in (-pi, pi], as atan2 has it."""
     return angle - TWO_PI * np.ceil((angle - np.pi) / TWO_PI)

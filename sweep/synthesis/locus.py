@@ -189,7 +189,7 @@ LOCI = (
 
 
 def locus(family: str, names: tuple[str, ...]) -> Locus:
-    """Return the way of stating a requirement that the column names tell.
+    """Way of stating a requirement that the column names tell.
 
     Raises
     ------
@@ -210,8 +210,7 @@ def locus(family: str, names: tuple[str, ...]) -> Locus:
 
 
 def locus_designs(family: str, columns: Table) -> tuple[Columns, Status]:
-    """Return parameters of mechanisms that meet requirements:
-    a derivation of design columns for studies and optimisers.
+    """Parameters of mechanisms that meet requirements: a derivation of design columns for studies and optimisers.
 
     Parameters
     ----------
@@ -240,7 +239,7 @@ def locus_designs(family: str, columns: Table) -> tuple[Columns, Status]:
 
 
 def admissible_arcs(family: str, requirement: Mapping[str, float]) -> list[tuple[float, float]]:
-    """Return arcs of phi1 on which test (i), the side condition, holds; equations (4) and (10) of docs/synthesis.md.
+    """Arcs of phi1 on which test (i), the side condition, holds; equations (4) and (10) of docs/synthesis.md.
 
     Parameters
     ----------

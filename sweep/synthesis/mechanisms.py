@@ -50,8 +50,7 @@ class CentralSlot:
 
 
 def central_slots(table: Table) -> pd.DataFrame:
-    """Return fork slots with s = 0 for a wanted crank angle between the limit positions,
-    one row per row of the table.
+    """Fork slots with s = 0 for a wanted crank angle between the limit positions, one row per row of the table.
 
     Parameters
     ----------
@@ -106,7 +105,7 @@ _OF_THEIR_OWN: dict[str, Callable[[Table], pd.DataFrame]] = {CentralSlot.name: c
 def synthesise(
     family: str, table: Table, *, max_pressure_angle: float | None = None, angles: AngleUnit | None = None
 ) -> pd.DataFrame:
-    """Return mechanisms that meet requirements, one row per solution, in the order of the table.
+    """Mechanisms that meet requirements, one row per solution, in the order of the table.
 
     Parameters
     ----------
@@ -174,7 +173,7 @@ def synthesise(
 
 
 def _units(way: Locus) -> dict[str, str]:
-    """Return units of the columns that have one, by the letter of the output: an angle psi, a displacement s."""
+    """Units of the columns that have one, by the letter of the output: an angle psi, a displacement s."""
     mechanism, amplitude = find_family(way.family), way.parameter_names[0]
     letter, unit = mechanism.position, mechanism.pose_output[mechanism.position].unit
     angles = dict.fromkeys(("phi_ext", "phi_fold", "phi0", "max_pressure_angle"), "rad")

@@ -68,7 +68,7 @@ class OnLocus:
         return words if bad.any() else None
 
     def links(self, columns: Mapping[str, Array]) -> tuple[dict[str, Array], Status]:
-        """Return the parameters in ``made``, (n,) each, and the status of each design.
+        """Parameters in ``made``, (n,) each, and the status of each design.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class OnLocus:
         return self.links_of(found), found.status
 
     def links_of(self, found: Found) -> dict[str, Array]:
-        """Return the parameters in ``made`` out of mechanisms of this stage alone."""
+        """Parameters in ``made`` out of mechanisms of this stage alone."""
         own = find_family(self.family).parameter_names
         return {name: found.designs[:, own.index(name.removesuffix(self.number))] for name in self.made}
 

@@ -38,7 +38,7 @@ class Position(NamedTuple):
 
 
 def equation_names(alpha: float, count: int) -> tuple[str, ...]:
-    """Return which positions remain as equations: f takes the first one, unless sin(alpha) = 0."""
+    """Which positions remain as equations: f takes the first one, unless sin(alpha) = 0."""
     first = 2 if abs(np.sin(alpha)) > PLANAR else 1
     return tuple(f"position {k}" for k in range(first, count + 1))
 
@@ -61,8 +61,7 @@ def through_positions(
     positions: tuple[Position, ...],
     f: float,
 ) -> Through:
-    """Return crank-rockers on the locus whose f makes them pass the first position exactly,
-    and how they miss the others.
+    """Crank-rockers on the locus whose f makes them pass the first position exactly, and how they miss the others.
 
     Equation (15) of docs/synthesis.md.  With sin(alpha) = 0 the closure does not contain f: the given f is taken and
     the first position is a residual like the others.  Residuals are in squared mean distances of the rocker ball from
@@ -93,7 +92,7 @@ def through_positions(
 
 
 def _branch_slack(designs: Array, psi: Array, phi: Array) -> Array:
-    """Return the cosine of the pressure angle at a position, positive if it lies on the design's own branch."""
+    """Cosine of the pressure angle at a position, positive if it lies on the design's own branch."""
     a, b, _, e, f, _, alpha, branch = designs.T
     x, y = e - a * np.cos(phi), f * np.sin(alpha) + a * np.cos(alpha) * np.sin(phi)
     slack: Array = -branch * (x * np.sin(psi) + y * np.cos(psi)) / b

@@ -48,7 +48,7 @@ class Drive(NamedTuple):
         return cls(matrix[0], *(float(found[name][0]) for name in names))
 
     def columns(self, count: int) -> dict[str, Array]:
-        """Return its parameters as columns of stage 1."""
+        """Its parameters as columns of stage 1."""
         return {f"{name}1": np.full(count, value) for name, value in zip(RSSR.parameter_names, self.row, strict=True)}
 
 
@@ -58,15 +58,13 @@ def chain_of(second: str) -> Family:
 
 
 def chain_motion(chain: Family, columns: Mapping[str, Array], *wanted: str) -> Columns:
-    """Return pose outputs of chains over one turn, nan where there is no mechanism or a stage does not reach."""
+    """Pose outputs of chains over one turn, nan where there is no mechanism or a stage does not reach."""
     rows = np.column_stack([columns[name] for name in chain.parameter_names])
     return chain.poses(rows, turn(), frozenset(wanted))
 
 
 def second_pressure_limit(motion: Columns, largest: float) -> Array:
-    """Return the slack of the limit on the pressure angle of stage 2 over the poses of a turn,
-    cos^2 - cos^2[largest].
-    """
+    """Slack of the limit on the pressure angle of stage 2 over the poses of a turn, cos^2 - cos^2[largest]."""
     angle = np.asarray(motion["pressure_angle2"], np.float64)
     slack: Array = (np.cos(angle) ** 2).min(axis=1) - np.cos(largest) ** 2
     return slack
