@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 LONGEST = 200  # letters of a value in a message
+MOST_FAULTS = 30  # of a study file in its message
+MOST_NAMES = 40  # in one list of a message
 
 
 class LinksweepError(Exception):
@@ -30,8 +34,26 @@ class InputError(LinksweepError, ValueError):
         self.name, self.value, self.allowed, self.place = name, value, allowed, place
         super().__init__(f"{place}: {name} = {shown(value)}; allowed: {allowed}")
 
-    def __reduce__(self) -> tuple[type[InputError], tuple[str, object, str, str]]:
+    def __reduce__(self) -> tuple[type[InputError], tuple[Any, ...]]:
         return type(self), (self.name, self.value, self.allowed, self.place)
+
+
+class MissingInput(InputError):
+    """A column, a point or another thing that is needed was not given.
+
+    Parameters
+    ----------
+    name : what is missing
+    needed : what it should be
+    place : where it was looked for
+    """
+
+    def __init__(self, name: str, needed: str, place: str) -> None:
+        super().__init__(name, None, needed, place)
+        self.args = (f"{place}: {name} is missing; needed: {needed}",)
+
+    def __reduce__(self) -> tuple[type[MissingInput], tuple[str, str, str]]:
+        return type(self), (self.name, self.allowed, self.place)
 
 
 def shown(value: object) -> str:
@@ -44,12 +66,20 @@ def shown(value: object) -> str:
 
 
 class StudyError(LinksweepError, ValueError):
-    """A study file has faults; all of them are reported at once, each with its place."""
+    """A study file has faults; all of them are reported at once, each with its place.
+
+    Parameters
+    ----------
+    path : of the file
+    faults : each with its place; the message holds the first of very many
+    """
 
     def __init__(self, path: str, faults: Sequence[str]) -> None:
         self.path, self.faults = path, list(faults)
-        noun = "fault" if len(self.faults) == 1 else "faults"
-        super().__init__("\n".join([f"{path}: {len(self.faults)} {noun}", *(f"  {f}" for f in self.faults)]))
+        count = len(self.faults)
+        lines = [f"{path}: {count} {'fault' if count == 1 else 'faults'}", *(f"  {f}" for f in faults[:MOST_FAULTS])]
+        more = [f"  and {count - MOST_FAULTS} more; mend these first"] if count > MOST_FAULTS else []
+        super().__init__("\n".join([*lines, *more]))
 
     def __reduce__(self) -> tuple[type[StudyError], tuple[str, list[str]]]:
         return type(self), (self.path, self.faults)
@@ -145,6 +175,8 @@ class MeasuredRangeWarning(LinksweepWarning):
     """Reported constants are used outside the range in which they were measured; the numbers extrapolate."""
 
 
+_SPACE = re.compile("[ -]")
+
 # Of a misspelt word at most this share of its letters is wrong.
 SLIPS = 0.45
 
@@ -154,6 +186,11 @@ SYNONYMS = {
     "coupler": ("b", "b1"),
     "rocker": ("c", "c1"),
     "frame": ("e", "e1"),
+    "crank_rocker": ("rssr",),
+    "spatial_crank_rocker": ("rssr",),
+    "spatial_slider_crank": ("rssp",),
+    "planar_crank_rocker": ("four_bar",),
+    "box": ("box_x", "box_x1"),
     "velocity": ("dpsi", "ds"),
     "acceleration": ("d2psi", "d2s"),
     "jerk": ("d3psi", "d3s"),
@@ -175,7 +212,7 @@ def closest(word: str, known: Iterable[str]) -> str | None:
     choices = list(known)
     # Case first: among e1, f1, g1 the letters of E1 say nothing.
     matches = [k for k in choices if k.casefold() == word.casefold()]
-    matches = matches or [name for name in SYNONYMS.get(word.casefold().replace(" ", "_"), ()) if name in choices]
+    matches = matches or [name for name in SYNONYMS.get(_SPACE.sub("_", word.casefold()), ()) if name in choices]
     if not matches:
         alike = difflib.get_close_matches(word, choices, n=8, cutoff=0.5)
         # Letters in common are not enough: a slip changes few of them.
@@ -209,3 +246,16 @@ def nearest(word: str, known: Iterable[str]) -> str:
     """Return ``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string."""
     guess = closest(word, known)
     return f", did you mean '{guess}'?" if guess else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """Write names with commas between them, and how many there are besides the first of very many."""
+    every = list(names)
+    more = f" and {len(every) - MOST_NAMES} more" if len(every) > MOST_NAMES else ""
+    return ", ".join(every[:MOST_NAMES]) + more
+
+
+def choices(word: str, known: Iterable[str]) -> str:
+    """Write the names that may stand where ``word`` does, and the nearest of them."""
+    names = list(known)
+    return f"{listed(names)}{nearest(word, names)}"

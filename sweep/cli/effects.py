@@ -7,7 +7,7 @@ import click
 from sweep.cli.families import aligned, echo_columns
 from sweep.effects import NAMES, effect
 from sweep.effects.base import Effect
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
 from sweep.quantities.units import internal_unit
 
@@ -32,7 +32,7 @@ def effects(name: str | None, markdown: bool) -> None:
         click.echo("design output such as unevenness; `sweep effects NAME` lists outputs and inputs")
         return
     if name not in NAMES:
-        raise InputError("effect", name, f"one of {', '.join(NAMES)}{nearest(name, NAMES)}", "sweep effects")
+        raise InputError("effect", name, f"one of {choices(name, NAMES)}", "sweep effects")
     for line in explain(effect(name)):
         click.echo(line)
 

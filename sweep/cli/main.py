@@ -19,7 +19,7 @@ from typing import Any, TextIO
 import click
 from click.shell_completion import CompletionItem
 
-from sweep.errors import LinksweepError, LinksweepWarning, ProgramFault, StoreError, WorkerDied
+from sweep.errors import LinksweepError, LinksweepWarning, ProgramFault, StoreError, WorkerDied, nearest
 from sweep.jobs.signals import leaving_within
 
 SIGNALLED = 128  # and the number of the signal: what a shell expects of an interrupted command
@@ -67,6 +67,18 @@ class Verbs(click.Group):
         module, name = VERBS[cmd_name][0].split(":")
         command: click.Command = getattr(import_module(f"sweep.cli.{module}"), name)
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the verb that is called; of a word that is none, say what it may be."""
+        word = args[0]
+        if word not in VERBS and not word.startswith("-"):
+            from sweep.study.tables import TABLES
+
+            hint = f"; [{word}] is a table of a study, which `sweep run STUDY` obeys" if word in TABLES else ""
+            ctx.fail(f"No such command '{word}'{nearest(word, VERBS) or hint}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of verbs without importing them."""

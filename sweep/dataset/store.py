@@ -203,8 +203,8 @@ def _twice(folder: Path, one: Part, other: Part) -> StoreError:
 def foreign(folder: Path, found: str, plan: Plan) -> InputError:
     """Return the error for data of another study or code; they are never mixed."""
     allowed = (
-        f"chunks of study {plan.study[:12]} and code {plan.code[:12]} only (identity {plan.identity}); "
-        "choose another folder with --out, or set the old data aside with --force"
+        f"data of this study, as its file is now, and of this version of the program (identity {plan.identity}); "
+        "take another folder with --out, or set what is there aside with --force"
     )
     return InputError("dataset", found, allowed, str(folder))
 

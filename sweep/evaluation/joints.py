@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,8 +19,9 @@ from sweep.families import family as find_family
 from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import Link, OutputLink, Points, Skeleton
 from sweep.families.chain import Chain, drive, driving_names, stages_of
+from sweep.families.frames import WHOLE, Frame
 from sweep.families.machines import Machine
-from sweep.families.parts import TIP, Member
+from sweep.families.parts import AXES, TIP, Member
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +38,7 @@ class Part:
     Parameters
     ----------
     member, stage : names; empty where there is one only
-    frame : in which coordinates are given: "machine", or the family's own, with the number of its stage
+    frame : in which coordinates are given: "machine", that of a chain's first stage, or the family's own
     family, design : the stage's own family and its parameters, (P,)
     phi : angle of the driving shaft, (m,)
     crank, position : the stage's own crank angle and its output, the angle or displacement of its follower, (m,)
@@ -81,8 +82,7 @@ class _Where:
     member: str = ""
     stage: str = ""
     frame: str = ""
-    rotation: Array = field(default_factory=lambda: np.eye(3))
-    at: Array = field(default_factory=lambda: np.zeros(3))
+    placed: Frame = WHOLE
     tip: Array | None = None
 
 
@@ -113,8 +113,8 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
         status     why, see :mod:`kernels.status`
         ========== ==================================================================================
 
-        A machine places the last stage of a member; an earlier stage keeps its own frame.  ``attrs["units"]`` names
-        the units.
+        All stages of a chain stand in the frame of its first one; where a family names no axis that the next one
+        could turn on, each keeps its own.  ``attrs["units"]`` names the units.
 
     Raises
     ------
@@ -161,30 +161,46 @@ def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
     angles = np.atleast_1d(numbers(phi, "phi", "phi, position"))
     if angles.ndim != 1 or not np.isfinite(angles).all():
         raise InputError("phi", phi, "finite angles [rad], one or a plain list", "phi")
-    check_march(family, angles)
+    check_march(family.domain, angles)
     given = Angles.of(np.ascontiguousarray(angles[None, :]))
     if isinstance(family, Machine):
         return [part for member in family.members for part in _of_member(family, member, matrix, given)]
     if not any(stage.family.find(Skeleton) or stage.family.find(Points) for stage in stages_of(family)):
         raise InputError("mechanism", family.name, "a mechanism that has joints", "joints")
-    return list(_of_stages(family, matrix, given, angles, _Where(frame=family.name)))
+    return list(_of_stages(family, matrix, given, angles, _wheres(family, matrix)))
+
+
+def _wheres(family: Family, matrix: Array) -> list[_Where]:
+    """Return where the stages of a mechanism stand: in the frame of the first, where a chain says how."""
+    stages = stages_of(family)
+    if not isinstance(family, Chain):
+        return [_Where(frame=family.name)]
+    names = [f"stage {stage.number} ({stage.family.name})" for stage in stages]
+    if not family.is_placed:
+        return [_Where("", str(stage.number), name) for stage, name in zip(stages, names, strict=True)]
+    placed = zip(stages, family.frames(matrix), strict=True)
+    return [_Where("", str(stage.number), names[0], frame) for stage, frame in placed]
 
 
 def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) -> Iterator[Part]:
-    start = member.columns.stop
-    offset, at = float(matrix[0, start]), matrix[0, start + 1 : start + 4]
     driving = angles.phi
     if member.driver is not None:
         name = ".".join(member.driver)
         driving = np.asarray(machine.poses(matrix, angles, frozenset({name}))[name], np.float64)
-    own = Angles.of(np.ascontiguousarray(member.ratio * driving + offset))
-    tip = matrix[0, start + 4 : start + 7] if member.tip is not None else None
-    where = _Where(member.name, "", "machine", member.place.rotation, at, tip)
-    return _of_stages(member.family, member.designs(matrix), own, angles.phi[0], where)
+    own = Angles.of(np.ascontiguousarray(member.ratio * driving + member.phase(matrix)))
+    wheres = []
+    for stage, frame in zip(stages_of(member.family), member.frames(matrix), strict=True):
+        number = str(stage.number) if isinstance(member.family, Chain) else ""
+        alone = f"{member.name} stage {number} ({stage.family.name})"
+        wheres.append(_Where(member.name, number, *(("machine", frame) if frame else (alone,))))
+    if member.tip is not None:
+        tip = np.array([member.column(matrix, f"{axis}_tip")[0] for axis in AXES])
+        wheres[-1] = replace(wheres[-1], tip=tip)
+    return _of_stages(member.family, member.designs(matrix), own, angles.phi[0], wheres)
 
 
-def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, last: _Where) -> Iterator[Part]:
-    """Yield every stage in its own frame, the last one where ``last`` says."""
+def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, wheres: Sequence[_Where]) -> Iterator[Part]:
+    """Yield every stage where it stands."""
     stages = stages_of(family)
     status = np.zeros(phi.size, np.uint8)
     for k, stage in enumerate(stages):
@@ -192,15 +208,7 @@ def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, last: 
         more = driving_names(own, stages[k + 1].family) | {own.position} if k + 1 < len(stages) else {own.position}
         found = own.poses(stage.designs(matrix), angles, frozenset(_needed(own) | more))
         np.copyto(status, np.asarray(found["status"], np.uint8)[0], where=status == OK)
-        where = last
-        if isinstance(family, Chain):
-            number = str(stage.number)
-            if k + 1 < len(stages) or not last.member:
-                frame = f"{last.member} stage {number} ({own.name})".strip()
-                where = _Where(last.member, number, frame)
-            else:
-                where = _Where(last.member, number, last.frame, last.rotation, last.at, last.tip)
-        yield _part(own, stage.designs(matrix), angles, phi, dict(found), where, status.copy())
+        yield _part(own, stage.designs(matrix), angles, phi, dict(found), wheres[k], status.copy())
         if k + 1 < len(stages):
             after = stages[k + 1]
             kappa, offset = (np.ascontiguousarray(matrix[:, column]) for column in (after.kappa, after.offset))
@@ -234,11 +242,12 @@ def _part(
         axes = {name: point.axis(matrix)[0] for name, point in skeleton.fixed.items() if point.axis is not None}
     if where.tip is not None:
         moving[TIP] = _tip(family, matrix, np.asarray(found[family.position][0], np.float64), where.tip)
-    turned = {name: path @ where.rotation.T + where.at for name, path in (fixed | moving).items()}
+    rotation, at = where.placed.rotation[0], where.placed.at[0]
+    turned = {name: path @ rotation.T + at for name, path in (fixed | moving).items()}
     crank, position = (np.asarray(values[0], np.float64) for values in (angles.phi, found[family.position]))
     return Part(
         where.member, where.stage, where.frame, family, matrix[0], phi, crank, position, turned,
-        {name: where.rotation @ axis for name, axis in axes.items()},
+        {name: rotation @ axis for name, axis in axes.items()},
         {name: point.kind for name, point in skeleton.fixed.items()} if skeleton else {},
         skeleton.links if skeleton else (), status,
     )  # fmt: skip

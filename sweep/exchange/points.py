@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, MissingInput, choices
 from sweep.evaluation.joints import parts
 from sweep.exchange.dxf import NAMED, ezdxf_or_refuse
 from sweep.families import NAMES
@@ -99,8 +99,9 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
     off = {name: float(np.linalg.norm(given[name] - at)) for name, at in joints.items()}
     for name, distance in off.items():  # the first one off is named: it puts those behind it off as well
         if not distance <= tolerance * extent:
-            allowed = f"within {tolerance * extent:.3g} of the joint, which would stand at {_words(joints[name])}"
-            raise InputError(name, _words(given[name]), allowed, f"points of a {found.title}, {distance:.3g} off")
+            allowed = f"a point at most {tolerance * extent:.3g} from {_words(joints[name])}"
+            why = f", where the other points put it; it is {distance:.3g} off (tolerance = {tolerance:g})"
+            raise InputError(name, _words(given[name]), allowed + why, f"points of {found.name}")
     x, y, z = reading.at.tolist()
     place = Placement((x, y, z), _triple(reading.z), _triple(reading.x))
     return PlacedDesign(found.name, reading.parameters, reading.phi, place, max(off.values()))
@@ -126,12 +127,13 @@ def _checked(reader: Hardpoints, points: Mapping[str, Sequence[float] | Array]) 
     known = (*reader.needs, *reader.may)
     for name in points:
         if name not in known:
-            raise InputError("point", name, f"{', '.join(known)}{nearest(name, known)}", "points")
+            raise InputError("point", name, choices(name, known), "points")
     given = {}
     for name in known:
         if name not in points:
             if name in reader.needs:
-                raise InputError(name, "missing", f"[x, y, z]; needed are {', '.join(reader.needs)}", "points")
+                kind = "a direction" if name.startswith("axis_") else "a point"
+                raise MissingInput(name, f"{kind} [x, y, z], as for {', '.join(reader.needs)}", "points")
             continue
         at = np.array(vector(points[name], name))
         if name.startswith("axis_"):

@@ -1,4 +1,4 @@
-"""What every export begins with: the joints over one whole turn, stages in frames of their own side by side."""
+"""What every export begins with: the joints over one whole turn, what stands in different frames side by side."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any, TypeAlias
 
 import sweep.sources  # noqa: F401 (read before any source that makes a value is imported, and all of those begin here)
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, choices
 from sweep.families.base import Family
 from sweep.families.chain import chain as chain_of  # the name of the module stays that of the module
 from sweep.families.check import check_family
@@ -98,7 +98,9 @@ def family(name: Mechanism) -> Family:
     return _chain(names)
 
 
-def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = None) -> Machine:
+def machine(
+    members: Mapping[str, Any], relations: Mapping[str, Any] | None = None, shafts: Mapping[str, Any] | None = None
+) -> Machine:
     """Several mechanisms on one main shaft, accepted wherever a family's name is.
 
     Parameters
@@ -113,6 +115,8 @@ def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = No
         ``{"speed": [point]}`` or of the second of two points relative to the first, ``{"torque": [member, ...]}``,
         ``{"shaking": [member, ...]}``, ``{"event": pose output, "level": number, "rising": true or false}``,
         ``{"thread": [point, take-up, ...], "stock": length, ...}`` (docs/thread.md, section 7)
+    shafts : by name, each ``at``, ``axis``, ``zero`` and, but for ``main``, ``ratio`` and ``phase``; a member then
+        names its ``shaft`` with ``sense``, ``shift``, ``turn`` and ``key`` instead of its place (docs/machines.md)
 
     Returns
     -------
@@ -136,13 +140,13 @@ def machine(members: Mapping[str, Any], relations: Mapping[str, Any] | None = No
     """
     if not isinstance(members, Mapping):
         raise InputError("members", members, "a table of members by name", "machine")
-    return _machine(specified(members, relations))
+    return _machine(specified(members, relations, shafts))
 
 
 @lru_cache
 def _single(name: str) -> Family:
     if name not in NAMES:
-        raise InputError("family", name, f"one of {', '.join(NAMES)}{nearest(name, NAMES)}", "family")
+        raise InputError("family", name, f"one of {choices(name, NAMES)}", "family")
     file, attribute = _IN_FILE_OF.get(name, (name, "FAMILY"))
     entry: Family = getattr(import_module(f"sweep.families.{file}"), attribute)
     return check_family(entry)

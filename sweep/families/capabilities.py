@@ -194,8 +194,8 @@ class Points:
 class OutputLink:
     """The link that turns about an axis parallel to z by the family's position angle.
 
-    ``origin(designs)``, (n, 3), is the point of the axis from which a point fixed to the link is measured: x along the
-    link at angle 0, y across it, z along the axis.
+    ``origin(designs)``, (n, 3), is the point of the axis with z = 0, from which a point fixed to the link is measured:
+    x along the link at angle 0, y across it, z along the axis.
     """
 
     origin: DesignMap
@@ -237,11 +237,15 @@ class Fixed:
     axis : unit vector (n, 3) about which its link turns right-handed, or along which its slider moves; None for a point
         about which a link may turn anyhow
     kind : "axis" of a link that turns, "slide" of one that moves along a line, "point" for neither
+    foot : of a crank axis, the point from which lengths along it count, (n, 3); None is ``at``
+    zero : of a crank axis, unit vector (n, 3) to the crank pin at phi = 0; None is x
     """
 
     at: DesignMap
     axis: DesignMap | None = None
     kind: Literal["axis", "slide", "point"] = "axis"
+    foot: DesignMap | None = None
+    zero: DesignMap | None = None
 
 
 @dataclass(frozen=True)

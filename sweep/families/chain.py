@@ -17,6 +17,7 @@ from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink, Points
 from sweep.families.curve_features import of_stages
 from sweep.families.domain import Turn
+from sweep.families.frames import Frame, can_be_placed, stage_frames
 from sweep.families.parts import Stage
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
@@ -27,6 +28,15 @@ class Chain(Family):
     """A family made of stages; the output angle of each drives the crank of the next."""
 
     stages: tuple[Stage, ...] = ()
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether all stages stand in one frame."""
+        return self.stages[-1].is_placed
+
+    def frames(self, designs: Array) -> list[Frame]:
+        """Return the frames of all stages in that of the first."""
+        return stage_frames(self.stages, designs)
 
     @cached_property
     def positions(self) -> Mapping[str, str]:
@@ -178,6 +188,16 @@ def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Pa
                 Parameter(f"offset{number}", "angle", angle, default=0.0),
             ]
         stages.append(stage)
+    if len(families) > 1 and can_be_placed(families):
+        for k, stage in enumerate(stages[1:], start=1):
+            stages[k] = replace(stage, shift=len(parameters), turn=len(parameters) + 1)
+            n, on = stage.number, f"on the output axis of stage {stage.number - 1}"
+            parameters += [
+                Parameter(
+                    f"shift{n}", "length", f"place of the origin of stage {n} {on}, from z = 0 of it", default=0.0
+                ),
+                Parameter(f"turn{n}", "angle", f"angle of x of stage {n} {on}, from x of that", default=0.0),
+            ]
     return tuple(stages), tuple(parameters)
 
 

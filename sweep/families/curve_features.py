@@ -182,7 +182,7 @@ def _of_shaft(member: Member, known: Bends) -> Bends:
 
 def _turned(member: Member, curves: Callable[[Array, Angles], Array], designs: Array, angles: Angles) -> Array:
     """Return functions of a member that the main shaft drives, at angles of the main shaft."""
-    phase = designs[:, member.columns.stop]
+    phase = member.phase(designs)
     return curves(member.designs(designs), Angles.of(member.ratio * angles.phi + phase[:, None]))
 
 
@@ -223,7 +223,7 @@ def _of_member(members: tuple[Member, ...], designs: Array) -> Array:
 
 def _on_shaft(member: Member, angles: DesignMap, designs: Array) -> Array:
     """Return angles of the main shaft at which a member's crank passes its switches."""
-    own = angles(member.designs(designs)) - designs[:, [member.columns.stop]]
+    own = angles(member.designs(designs)) - member.phase(designs)[:, None]
     turns = TWO_PI * np.arange(abs(member.ratio))
     every: Array = (own[:, :, None] + turns) / member.ratio
     return every.reshape(len(designs), -1)

@@ -9,7 +9,7 @@ import numpy as np
 from kernels.families import epicyclic_dwell, geared_dwell
 from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import Link, Made, Points, Skeleton
+from sweep.families.capabilities import Link, Made, OutputLink, Points, Skeleton, constant
 from sweep.families.curve_features import Singular, Waves
 from sweep.families.outputs import angle_outputs, ladders
 from sweep.families.poses import filled, optional_outputs, poses_of
@@ -156,6 +156,7 @@ FAMILY = Family(
     capabilities=(
         Singular(pin_distance_squared, ("x_b", "y_b")),
         Points({"b": ("x_b", "y_b", None)}),
+        OutputLink(constant(0.0, 0.0, 0.0)),
         Skeleton(
             {"a": standing(PARAMETERS, "a"), "d": ORIGIN},
             (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),
@@ -232,6 +233,7 @@ EPICYCLIC = Family(
         Singular(pin_distance_squared, ("x_b", "y_b")),
         Waves(planet_turns),
         Points({"b": ("x_b", "y_b", None)}),
+        OutputLink(constant(0.0, 0.0, 0.0)),
         Skeleton(
             {"a": standing(EPICYCLIC_PARAMETERS, "a"), "d": ORIGIN},
             (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),

@@ -24,7 +24,7 @@ from sweep.families.capabilities import (
 )
 from sweep.families.converted import move_records, of_matrix, step_of
 from sweep.families.outputs import angle_outputs, ladders
-from sweep.families.skeletons import CRANK_ROCKER, links, standing
+from sweep.families.skeletons import CRANK_ROCKER, Y, links, standing
 
 PARAMETERS = (
     Parameter("r", "length", "crank", positive=True),
@@ -191,7 +191,7 @@ FAMILY = Family(
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         Skeleton(
             {
-                "a": standing(PARAMETERS, axis=(0.0, 0.0, -1.0)),
+                "a": standing(PARAMETERS, axis=(0.0, 0.0, -1.0), zero=Y),
                 "d": standing(PARAMETERS, None, "a", "b", axis=(-1.0, 0.0, 0.0)),
             },
             CRANK_ROCKER,

@@ -16,7 +16,7 @@ from sweep.families.base import Angles, Columns, Event, Family, Output, Paramete
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.curve_features import of_members
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
-from sweep.families.relations import Frame, Reading, Relation, Timing
+from sweep.families.relations import Reading, Relation, Timing
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             columns = _member(m, designs, angles, own, found)
             np.copyto(status, columns.pop("status"), where=status == OK)
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
-    frames = {m.name: Frame(m.place.rotation, m.origin(designs)) for m in machine.members} if relations else {}
+    frames = {m.name: m.frame(designs) for m in machine.members} if relations else {}
     found["phi"] = angles.phi
     columns_of = machine.parameter_names
     found |= {p.name: designs[:, [columns_of.index(p.name)]] for r in relations for p in r.parameters}
@@ -187,11 +187,10 @@ def _driving(member: Member, needed: set[str]) -> set[str]:
 
 def _member(m: Member, designs: Array, angles: Angles, own: set[str], found: Mapping[str, Any]) -> dict[str, Any]:
     """Return pose outputs of a member by their own names, and ``status``; what no design varies is computed once."""
-    columns = slice(m.columns.start, m.columns.stop + 1)  # its own parameters and the phase
-    rows = designs[:, columns]
-    if m.driver is None and angles.cos.shape[0] == 1 and len(rows) > 1 and (rows[1:] == rows[0]).all():
-        rows = rows[:1]
-    own_designs, phase = np.ascontiguousarray(rows[:, :-1]), rows[:, -1]
+    own_designs, phase = m.designs(designs), m.phase(designs)
+    once = m.driver is None and angles.cos.shape[0] == 1 and len(designs) > 1
+    if once and (own_designs[1:] == own_designs[0]).all() and (phase[1:] == phase[0]).all():
+        own_designs, phase = own_designs[:1], phase[:1]
     motion = {name for name in own if name in m.family.pose_output}
     motion |= {x for point in m.points for x in _made_of(m, point, own)}
     motion |= {name for derivative in motion for name in m.family.orders(derivative)}

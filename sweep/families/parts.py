@@ -13,6 +13,8 @@ from kernels.types import Array
 from sweep.errors import InputError
 from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import Coordinates, OutputLink, Points
+from sweep.families.frames import WHOLE, Frame, crank_axis, stage_frames
+from sweep.families.shafts import Mount
 
 TIP = "tip"
 EYE = "eye"  # on the coupler, the link between the points b and c
@@ -28,11 +30,13 @@ class Placement:
     at : where the origin of the member's frame stands [length]
     axis : direction of the member's z, of any length
     zero : direction of the member's x; what it has along ``axis`` does not count
+    stage : of a chain, 1 where the first stage stands there, 0 for the last one
     """
 
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     zero: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    stage: int = 0
 
     @property
     def rotation(self) -> Array:
@@ -57,9 +61,12 @@ def placement(member: str, given: Placement | dict[str, Any] | None) -> Placemen
         return given
     where = f"machine.{member}.place"
     for key in given:
-        if key not in ("at", "axis", "zero"):
-            raise InputError(key, given[key], "at, axis, zero", where)
-    found = Placement(**{key: vector(value, f"{where}.{key}") for key, value in given.items()})
+        if key not in ("at", "axis", "zero", "stage"):
+            raise InputError(key, given[key], "at, axis, zero, stage", where)
+    if given.get("stage", 1) != 1:
+        raise InputError("stage", given["stage"], "1 for the first stage; the last one if left out", where)
+    vectors = {key: vector(value, f"{where}.{key}") for key, value in given.items() if key != "stage"}
+    found = Placement(**vectors, stage=given.get("stage", 0))
     if not np.linalg.norm(found.axis) > 0.0:
         raise InputError("axis", found.axis, "a direction", where)
     if not np.linalg.norm(np.cross(found.axis, found.zero)) > 1e-9 * np.linalg.norm(found.axis) * np.linalg.norm(
@@ -98,6 +105,13 @@ class Stage:
     columns: slice
     kappa: int | None = None  # columns of the coupling to the stage before; none for stage 1
     offset: int | None = None
+    shift: int | None = None  # columns of its place on the shaft between; none where the families name no such axis
+    turn: int | None = None
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether it is known where its frame stands in that of the stage before."""
+        return self.shift is not None
 
     def designs(self, designs: Array) -> Array:
         """Design matrix of this stage alone."""
@@ -121,6 +135,7 @@ class Member:
     eye : a point of the coupler: along it from its first joint; of a planar one also across it and along the axes; the
         defaults of ``x_eye`` ...
     columns : where its own parameters stand in the machine's design matrix
+    mount : how its first crank sits on a shaft of the machine, instead of place, ratio, offset and driver
     """
 
     name: str
@@ -133,15 +148,55 @@ class Member:
     tip: tuple[float, float, float] | None = None
     eye: tuple[float, ...] | None = None
     columns: slice = field(default_factory=lambda: slice(0, 0))
+    mount: Mount | None = None
 
     def designs(self, designs: Array) -> Array:
         """Design matrix of this member's family."""
         return np.ascontiguousarray(designs[:, self.columns])
 
-    def origin(self, designs: Array) -> Array:
-        """Origin of its frame in the machine's frame, (n, 3)."""
-        start = self.columns.stop + 1  # behind its own parameters and the phase
-        return designs[:, start : start + 3]
+    def column(self, designs: Array, name: str) -> Array:
+        """Column of one of the added parameters, (n,)."""
+        at = [p.name for p in self.added].index(name)
+        column: Array = designs[:, self.columns.stop + at]
+        return column
+
+    def phase(self, designs: Array) -> Array:
+        """Crank angle where the driving angle is 0, (n,)."""
+        if self.mount is None:
+            return self.column(designs, "offset")
+        return self.mount.phase(self.column(designs, "turn"), self.column(designs, "key"))
+
+    def frame(self, designs: Array) -> Frame:
+        """Frame of its family, of a chain that of the last stage, in the machine's."""
+        if self.mount is None and not self.place.stage:
+            return self._given(designs)
+        found = self.frames(designs)[-1]
+        assert found is not None
+        return found
+
+    def _given(self, designs: Array) -> Frame:
+        """Frame that ``place`` gives, of the stage that it is about."""
+        at = np.stack([self.column(designs, f"{axis}_at") for axis in AXES], axis=1)
+        return Frame(self.place.rotation[None], at)
+
+    def frames(self, designs: Array) -> list[Frame | None]:
+        """Frames of all stages in the machine's; None where a chain does not say how they stand to each other."""
+        own, stages = self.designs(designs), getattr(self.family, "stages", ())
+        if stages and not stages[-1].is_placed:
+            return [None] * (len(stages) - 1) + [self.frame(designs)]
+        inner = stage_frames(stages, own) if stages else [WHOLE]
+        if self.mount is not None:
+            family = stages[0].family if stages else self.family
+            crank = crank_axis(family, stages[0].designs(own) if stages else own)
+            assert crank is not None
+            first = self.mount.frame(crank, self.column(designs, "shift"), self.column(designs, "turn"))
+        elif self.place.stage:
+            first = self._given(designs)
+        else:
+            last = self._given(designs)
+            first = inner[-1].inverse.within(last)
+            return [*(frame.within(first) for frame in inner[:-1]), last]
+        return [frame.within(first) for frame in inner]
 
     def own(self, name: str) -> str:
         """Give a dotted name as the member's family knows it; "" for a name of another member."""
@@ -150,11 +205,13 @@ class Member:
 
     @property
     def added(self) -> tuple[Parameter, ...]:
-        """Its parameters beside those of its family: phase, place and tip."""
-        crank = Parameter("offset", "angle", "crank angle where the driving angle is 0", default=self.offset)
+        """Its parameters beside those of its family: phase and place, tip, eye."""
         place = [
-            Parameter(f"{axis}_at", "length", f"{axis} of the member's origin in the machine's frame", default=x)
-            for axis, x in zip(AXES, self.place.at, strict=True)
+            Parameter("offset", "angle", "crank angle where the driving angle is 0", default=self.offset),
+            *(
+                Parameter(f"{axis}_at", "length", f"{axis} of the member's origin in the machine's frame", default=x)
+                for axis, x in zip(AXES, self.place.at, strict=True)
+            ),
         ]
         tip = [
             Parameter(f"{axis}_tip", "length", f"tip {way} the output link", default=x)
@@ -164,7 +221,7 @@ class Member:
             Parameter(f"{axis}_eye", "length", f"point of the coupler {way}", default=x)
             for axis, way, x in zip(AXES, ("along it", "across it", "along the axes"), self.eye or (), strict=False)
         ]
-        return crank, *place, *tip, *eye
+        return *(place if self.mount is None else self.mount.parameters), *tip, *eye
 
     @cached_property
     def derivatives(self) -> frozenset[str]:
@@ -192,21 +249,20 @@ class Member:
 
 def coordinates(m: Member, point: str, designs: Array, own_designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
     """Coordinates of a point in the machine's frame, (n, m)."""
-    start, at = m.columns.stop + 1, m.origin(designs)
     if point == TIP:
         link = m.family.find(OutputLink)
         assert link is not None
-        x, y, z = (designs[:, [start + k]] for k in range(3, 6))
+        x, y, z = (m.column(designs, f"{axis}_tip")[:, None] for axis in AXES)
         angle = result[m.family.position]
         cos, sin, origin = np.cos(angle), np.sin(angle), link.origin(own_designs)
         local = [origin[:, [0]] + x * cos - y * sin, origin[:, [1]] + x * sin + y * cos, origin[:, [2]] + z + 0.0 * cos]
     elif point == EYE:
-        first = start + (3 if m.tip is None else 6)
-        local = _on_coupler(m, result, [designs[:, [first + k]] for k in range(len(m.eye or ()))])
+        eye = [m.column(designs, f"{axis}_eye")[:, None] for axis, _ in zip(AXES, m.eye or (), strict=False)]
+        local = _on_coupler(m, result, eye)
     else:
         local = _local(m, point, result)
-    turn = m.place.rotation
-    return {f"{point}_{axis}": at[:, [k]] + sum(turn[k, j] * local[j] for j in range(3)) for k, axis in enumerate(AXES)}
+    placed = m.frame(designs).placed(local)
+    return {f"{point}_{axis}": part for axis, part in zip(AXES, placed, strict=True)}
 
 
 def coupler_joints(m: Member) -> tuple[Coordinates, Coordinates] | None:
@@ -240,12 +296,11 @@ def _on_coupler(m: Member, result: Mapping[str, Any], eye: list[Any]) -> list[An
 def velocity(m: Member, point: str, designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
     """Velocity analogue of a point in the machine's frame, (n, m): the frame of a member does not move."""
     if point == TIP:
-        start = m.columns.stop + 1
-        x, y = designs[:, [start + 3]], designs[:, [start + 4]]
+        x, y = (m.column(designs, name)[:, None] for name in ("x_tip", "y_tip"))
         angle, rate = result[m.family.position], result[str(m.moving[TIP][0])]
         cos, sin = np.cos(angle), np.sin(angle)
         local = [rate * (-x * sin - y * cos), rate * (x * cos - y * sin), 0.0 * rate]
     else:
         local = [result[name] if name else 0.0 for name in m.moving[point]]
-    turn = m.place.rotation
-    return {f"d{point}_{axis}": sum(turn[k, j] * local[j] for j in range(3)) for k, axis in enumerate(AXES)}
+    turned = m.frame(designs).turned(local)
+    return {f"d{point}_{axis}": part for axis, part in zip(AXES, turned, strict=True)}

@@ -4,24 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from kernels.types import Array
 from sweep.families.base import Output, Parameter
+from sweep.families.frames import Frame
 from sweep.families.parts import AXES
-
-
-class Frame(NamedTuple):
-    """A member's frame in the machine's frame: v of the member is ``rotation`` v, from the origin ``at``, (n, 3)."""
-
-    rotation: Array
-    at: Array
-
-    def turned(self, vector: list[Any]) -> list[Any]:
-        """Return components in the machine's frame of a vector of the member's frame, each (n, m)."""
-        return [sum(self.rotation[k, j] * vector[j] for j in range(3)) for k in range(3)]
 
 
 class Relation(Protocol):

@@ -37,7 +37,8 @@ def parameter(parameters: tuple[Parameter, ...], name: str | None, designs: Arra
 
 def crank_axis(parameters: tuple[Parameter, ...], f: str, alpha: str) -> Fixed:
     """Return the crank's centre, ``f`` along the axis (0, sin alpha, cos alpha) from the origin."""
-    return Fixed(partial(_along, parameters, f, alpha), partial(_along, parameters, None, alpha))
+    at, axis = partial(_along, parameters, f, alpha), partial(_along, parameters, None, alpha)
+    return Fixed(at, axis, foot=partial(_same, (0.0, 0.0, 0.0)))
 
 
 def _along(parameters: tuple[Parameter, ...], f: str | None, alpha: str, designs: Array) -> Array:
@@ -54,9 +55,11 @@ def standing(
     *,
     axis: tuple[float, float, float] | None = Z,
     kind: Literal["axis", "slide", "point"] = "axis",
+    zero: tuple[float, float, float] = X,
 ) -> Fixed:
     """Fix a point whose coordinates are parameters, or 0 where none is named, and a constant direction."""
-    return Fixed(partial(_coordinates, parameters, (x, y, z)), None if axis is None else partial(_same, axis), kind)
+    along = None if axis is None else partial(_same, axis)
+    return Fixed(partial(_coordinates, parameters, (x, y, z)), along, kind, zero=partial(_same, zero))
 
 
 def _coordinates(parameters: tuple[Parameter, ...], names: tuple[str | None, ...], designs: Array) -> Array:

@@ -72,9 +72,11 @@ def unit(designs: Array) -> Array:
     return np.ones(len(designs))
 
 
-def pivot(designs: Array) -> Array:
-    """Return the point (e, 0, g) of the driven axis, (n, 3)."""
-    return np.stack([designs[:, 1], np.zeros(len(designs)), designs[:, 3]], axis=1)
+def driven_origin(designs: Array) -> Array:
+    """Return the point (e, 0, 0) of the driven axis, (n, 3)."""
+    origin = np.zeros((len(designs), 3), designs.dtype)
+    origin[:, 0] = designs[:, 1]
+    return origin
 
 
 _RATES = ("psi", "dpsi", "d2psi", "rho", "drho", "d2rho")
@@ -115,7 +117,7 @@ FAMILY = Family(
         Dimensions(links("a"), optional=("k",)),
         Assembly("discriminant", "pressure_angle", unit),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
-        OutputLink(pivot),
+        OutputLink(driven_origin),
         LINKS,
         Skeleton(
             {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")},
@@ -162,13 +164,6 @@ def slot_squared(designs: Array, angles: Angles, found: Columns) -> Array:
     return np.square(np.asarray(found["s"], np.float64))
 
 
-def rocker_origin(designs: Array) -> Array:
-    """Return the rocker pivot, (n, 3)."""
-    origin = np.zeros((len(designs), 3))
-    origin[:, 0] = designs[:, 1]
-    return origin
-
-
 def slot_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
     """Return the foot of the rocker pivot on the slot, (n, m, 3): ``h`` from the pivot, square to the slot."""
     psi = np.asarray(motion["psi"], np.float64)
@@ -191,7 +186,7 @@ PLANAR = Family(
         Dimensions(links("a")),
         Assembly("discriminant", "pressure_angle", unit),
         Points({"b": ("x_b", "y_b", None)}),
-        OutputLink(rocker_origin),
+        OutputLink(driven_origin),
         Skeleton(
             {"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, "e")},
             (CRANK, Link("rocker", ("d", "c", "b"))),

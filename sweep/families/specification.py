@@ -8,16 +8,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from sweep.errors import InputError, nearest
+import numpy as np
+
+from sweep.errors import InputError, choices, nearest
 from sweep.families.base import Event, Family, Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.domain import Turn, reads_as_degrees
+from sweep.families.frames import crank_axis
 from sweep.families.machines import Machine, assemble
 from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
 from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Shaking, Speed, Timing
+from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.thread_balance import thread_balance
 
-MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye")
+MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
 RELATION_KINDS = ("distance", "speed", "timing", "event", "value", "torque", "shaking", "thread")
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -32,9 +36,12 @@ class Specification:
 
     members: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
     relations: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
+    shafts: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = ()
 
 
-def specification(members: Mapping[str, Any], relations: Mapping[str, Any] | None) -> Specification:
+def specification(
+    members: Mapping[str, Any], relations: Mapping[str, Any] | None, shafts: Mapping[str, Any] | None = None
+) -> Specification:
     """Return what a user wrote, brought to one form.
 
     Raises
@@ -53,12 +60,14 @@ def specification(members: Mapping[str, Any], relations: Mapping[str, Any] | Non
         else:
             raise InputError(str(name), given, "a family, a list of families, or a table", "machine")
         found.append((name, _frozen(table)))
-    return Specification(tuple(found), tuple((name, _frozen(r)) for name, r in (relations or {}).items()))
+    between = tuple((name, _frozen(r)) for name, r in (relations or {}).items())
+    turning = tuple((name, _frozen(s, "shaft", SHAFT_KEYS)) for name, s in (shafts or {}).items())
+    return Specification(tuple(found), between, turning)
 
 
-def _frozen(table: Any) -> tuple[tuple[str, Any], ...]:
+def _frozen(table: Any, what: str = "relation", keys: Sequence[str] = RELATION_KINDS) -> tuple[tuple[str, Any], ...]:
     if not isinstance(table, Mapping):
-        raise InputError("relation", table, f"a table with one of {', '.join(RELATION_KINDS)}", "machine")
+        raise InputError(what, table, f"a table with one of {', '.join(keys)}", "machine")
     return tuple((str(key), _hashable(value)) for key, value in table.items())
 
 
@@ -82,10 +91,11 @@ def built(given: Specification, find: FindFamily) -> Machine:
     if not given.members:
         raise InputError("members", {}, "at least one member", "machine")
     members: dict[str, Member] = {}
+    shafts = read_shafts({name: dict(table) for name, table in given.shafts}, placement)
     for name, table in given.members:
         if not _WORD.fullmatch(name) or name in members:
             raise InputError("member", name, "a plain word, each once", "machine")
-        members[name] = _member(name, dict(table), members, find)
+        members[name] = _member(name, dict(table), members, shafts, find)
     plain = {name: dict(table) for name, table in given.relations if not {"event", "value"} & set(dict(table))}
     known = {name: _relation(name, table, members) for name, table in plain.items()}
     outputs = _outputs(members, tuple(known.values()))
@@ -103,17 +113,20 @@ def built(given: Specification, find: FindFamily) -> Machine:
     return assemble(f"machine ({title})", tuple(members.values()), relations)
 
 
-def _member(name: str, table: dict[str, Any], earlier: Mapping[str, Member], find: FindFamily) -> Member:
+def _member(
+    name: str, table: dict[str, Any], earlier: Mapping[str, Member], shafts: Mapping[str, Shaft], find: FindFamily
+) -> Member:
     where = f"machine.{name}"
     for key in table:
         if key not in MEMBER_KEYS:
-            raise InputError(key, table[key], f"{', '.join(MEMBER_KEYS)}{nearest(key, MEMBER_KEYS)}", where)
+            raise InputError(key, table[key], choices(key, MEMBER_KEYS), where)
     if ("family" in table) == ("chain" in table):
         raise InputError("family", table.get("family"), "either family or chain", where)
     family = find(table["family"]) if "family" in table else find(list(table["chain"]))
     if not isinstance(family.domain, Turn):
         raise InputError("family", family.name, "a family over a closed turn", where)
-    ratio = table.get("ratio", 1)
+    mount = _mount(table, family, shafts, where)
+    ratio = table.get("ratio", 1) if mount is None else mount.ratio
     if isinstance(ratio, bool) or not isinstance(ratio, int | float) or ratio != int(ratio) or ratio == 0:
         allowed = (
             "a whole number but 0: the machine's turn is one of the main shaft, so choose its slowest shaft as that"
@@ -132,8 +145,24 @@ def _member(name: str, table: dict[str, Any], earlier: Mapping[str, Member], fin
     driver = _driver(table.get("driver"), earlier, where)
     drives = {} if driver is None else dict(earlier[driver[0]].family.derivative_of)
     spot = placement(name, None if table.get("place") is None else dict(table["place"]))
-    member = Member(name, family, int(ratio), float(offset), driver, drives, spot, tip)
+    member = Member(name, family, int(ratio), float(offset), driver, drives, spot, tip, mount=mount)
     return member if table.get("eye") is None else replace(member, eye=_eye(member, table["eye"], f"{where}.eye"))
+
+
+def _mount(table: dict[str, Any], family: Family, shafts: Mapping[str, Shaft], where: str) -> Mount | None:
+    """Read how a member sits on a shaft; without one, and without another member that drives it, none may be known."""
+    if "shaft" not in table:
+        for key in MOUNT_KEYS[1:]:
+            if key in table:
+                raise InputError(key, table[key], "nothing here: it belongs to a member that names its shaft", where)
+        if shafts and table.get("driver", "shaft") == "shaft":
+            raise InputError("shaft", None, f"the shaft that drives it: {', '.join(shafts)}", where)
+        return None
+    stages = getattr(family, "stages", ())
+    first = stages[0].family if stages else family
+    if crank_axis(first, np.ones((1, len(first.parameters)))) is None or (stages and not stages[-1].is_placed):
+        raise InputError("family", family.name, "a family with a crank axis, its stages in one frame", where)
+    return read_mount(table, shafts, where)
 
 
 def _eye(member: Member, given: Any, where: str) -> tuple[float, ...]:
@@ -183,7 +212,7 @@ def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> E
     where = f"machine.relations.{name}"
     for key in table:
         if key not in EVENT_KEYS:
-            raise InputError(key, table[key], f"{', '.join(EVENT_KEYS)}{nearest(key, EVENT_KEYS)}", where)
+            raise InputError(key, table[key], choices(key, EVENT_KEYS), where)
     of, level, rising = table["event"], table.get("level", 0.0), table.get("rising", True)
     if of not in outputs:
         raise InputError("event", of, f"a pose output of the machine{nearest(str(of), outputs)}", where)
@@ -218,7 +247,7 @@ def _relation(name: str, table: dict[str, Any], members: Mapping[str, Member]) -
     known |= {m.name: (m.name, _stages(m.family)[0]) for m in members.values()}
     for part in given:
         if part not in known:
-            raise InputError(kind, part, f"members: {', '.join(known)}{nearest(part, known)}", where)
+            raise InputError(kind, part, f"members: {choices(part, known)}", where)
     if kind == "torque":
         return ShaftTorque(
             name, tuple((f"{known[x][0]}.drive_torque{known[x][1]}", members[known[x][0]].ratio) for x in given)
@@ -244,5 +273,5 @@ def _two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: 
 def _each(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
     for part in given:
         if part not in known:
-            raise InputError(what, part, f"{what}: {', '.join(known)}{nearest(part, known)}", where)
+            raise InputError(what, part, f"{what}: {choices(part, known)}", where)
     return given

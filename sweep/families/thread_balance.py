@@ -22,11 +22,11 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
 from sweep.families.capabilities import ThreadPath
+from sweep.families.frames import Frame
 from sweep.families.parts import AXES, Member, vector
-from sweep.families.relations import Frame
 from sweep.numerics.curves import TableCurve, table_curve
 
 KEYS = ("thread", "stock", "tension", "stiffness", "radius", "allowed")
@@ -219,7 +219,7 @@ def thread_balance(name: str, table: Mapping[str, Any], members: Mapping[str, Me
     where = f"machine.relations.{name}"
     for key in table:
         if key not in KEYS:
-            raise InputError(key, table[key], f"{', '.join(KEYS)}{nearest(key, KEYS)}", where)
+            raise InputError(key, table[key], choices(key, KEYS), where)
     path = tuple(_place(given, members, where) for given in table["thread"])
     bends = _bends(path)
     if bends is None:
@@ -252,7 +252,7 @@ def _place(given: Any, members: Mapping[str, Member], where: str) -> Waypoint:
     points = [f"{m.name}.{point}" for m in members.values() for point in m.points]
     if given not in points:
         known = [*points, *(m.name for m in members.values() if m.family.find(ThreadPath) is not None)]
-        raise InputError("thread", given, f"points, take-ups: {', '.join(known)}{nearest(given, known)}", where)
+        raise InputError("thread", given, f"points, take-ups: {choices(given, known)}", where)
     return given
 
 

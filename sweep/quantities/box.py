@@ -141,5 +141,5 @@ def _of_columns(piece: Piece, columns: slice, designs: Any) -> Any:
 
 def _placed(m: Member, fixed: Fixed, axis: int, columns: slice, designs: Any) -> Any:
     """Return a coordinate in the machine's frame of a point that stands still in the member's."""
-    start = m.columns.stop + 1
-    return designs[:, start + axis] + np.asarray(fixed.at(designs[:, columns])) @ m.place.rotation[axis]
+    at = np.asarray(fixed.at(designs[:, columns]))
+    return m.frame(designs).placed([at[:, [k]] for k in range(3)])[axis][:, 0]

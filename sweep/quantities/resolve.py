@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sweep.effects import elsewhere, offered
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, listed, nearest
 from sweep.families.base import Event, Family, Output, of_family
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
@@ -212,8 +212,10 @@ def _margin(family: Family, name: str) -> Margin | None:
 
 
 def _limit(family: Family, name: str) -> LimitPosition | None:
+    # The times of both strokes stand to each other as the angles do: two words for one ratio.
+    plain = name.replace("time_ratio", "stroke_ratio")
     for position, stage in family.positions.items():
-        kind = limit_names(family, position, stage).get(name)
+        kind = limit_names(family, position, stage).get(plain)
         if kind is None:
             continue
         unit = family.pose_output[position].unit
@@ -298,7 +300,7 @@ def _known(family: Family, name: str) -> str:
     """Return words for an unknown name: what there is, and the nearest."""
     names = output_names(family)
     grammar = prefixes(family.domain)
-    special = ", ".join(n for n in names if not n.startswith(grammar))
+    special = listed(n for n in names if not n.startswith(grammar))
     words = f"{', '.join(f'{prefix}x' for prefix in grammar)} of a pose output x, or one of {special}"
     of_effects = [o.name for o in offered(family)]
     near = nearest(name, [*names, *of_effects, *(f"{prefix}{x}" for x in of_effects for prefix in grammar)])

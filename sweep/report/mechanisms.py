@@ -118,12 +118,11 @@ def mechanism_caption(designs: Mapping[str, Sequence[Part]]) -> str:
     if any(part.kinds for part in every):
         text += " Triangles: fixed joints; dash-dotted: their axes, with the positive sense."
     if any(part.member for part in every):
-        text += " Members stand in the machine's frame, earlier stages of a chain in frames of their own."
+        text += " Members stand in the machine's frame."
     elif len({part.frame for part in every}) > 1:
         text += (
-            " Every stage is drawn in a frame of its own. The chain fixes the angle by which the shaft between two"
-            " stages drives the next one (phi2 = kappa2 psi1 + offset2), but not where along the shaft that stage"
-            " stands, nor how its frame is turned about it: both are left to the designer."
+            " Every stage is drawn in a frame of its own: one of these families names no axis that the next stage"
+            " could turn on."
         )
     return text
 

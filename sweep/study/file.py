@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
-from sweep.errors import StudyError, closest, nearest, shown
+from sweep.errors import StudyError, choices, closest, shown
 from sweep.quantities import units
 
 Key: TypeAlias = tuple[str | int, ...]
@@ -51,7 +51,7 @@ class Faults:
         guess = closest(str(key[-1]), names)
         if guess is not None:
             self._misspelt.add((*key[:-1], guess))
-        self.unknown_name(key, what, f"{', '.join(names)}{nearest(str(key[-1]), names)}")
+        self.unknown_name(key, what, choices(str(key[-1]), names))
 
     def unknown_name(self, key: Key, what: str, allowed: str) -> None:
         """Report a key that should be the name of something."""

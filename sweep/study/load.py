@@ -20,7 +20,7 @@ from sweep.study.file import Faults, StudyFile
 from sweep.study.fit import read_fit
 from sweep.study.limits import read_limits
 from sweep.study.loads import Inputs, read_inputs, tables_of_inputs
-from sweep.study.locus import read_locus
+from sweep.study.locus import RATIOS, read_locus
 from sweep.study.mechanism import flattened, read_mechanism
 from sweep.study.objective import check_goal, check_objective
 from sweep.study.optimise import check_search, check_steady, read_optimise
@@ -191,7 +191,8 @@ def _study(
     check_tolerance(alone.tolerance, family, limits, faults)
     reference = read_reference(sections.reference, bare, family, faults, other, space)
     check_report(sections.report, file, family, prescribed)
-    want = _computed(family, [*expanded(bare, sections.scene.want), *prescribed], limits, goal, front)
+    ratios = [name for name in file.free_table("locus") or () if name.startswith(RATIOS)]
+    want = _computed(family, [*expanded(bare, sections.scene.want), *prescribed, *ratios], limits, goal, front)
     check_proofs(alone.accuracy, family, want, window=alone.window is not None, faults=faults)
     file.raise_faults()
     assert space is not None  # without it there are faults

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from sweep.effects import curved_inputs, input_names
 from sweep.effects.base import STUDY_LOADS
-from sweep.errors import closest, nearest
+from sweep.errors import choices, closest
 from sweep.families.base import Family
 from sweep.families.machines import Machine
 from sweep.families.names import at_stage
@@ -211,9 +211,7 @@ def _file(
     known = [str(column) for column in table.columns]
     for k, column in enumerate(section.columns or ()):
         if column not in known:
-            faults.value(
-                (*key, "columns", k), column, f"columns of the file: {', '.join(known)}{nearest(column, known)}"
-            )
+            faults.value((*key, "columns", k), column, f"columns of the file: {choices(column, known)}")
             return None
     if len(known) < 2 or len(table) > MOST_POINTS:
         faults.value(place, name, f"two columns, angle and load, of at most {MOST_POINTS} rows")

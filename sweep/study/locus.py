@@ -17,6 +17,8 @@ from sweep.study.space import Axis
 from sweep.synthesis import LOCI
 from sweep.synthesis.prescription import OnLocus
 
+# Two words for phi0/(2 pi - phi0): that of the time there over the time back, and the output's.
+RATIOS = ("time_ratio", "stroke_ratio")
 WHOLE_TURN = 2.0 * np.pi * (1.0 - 1e-12)
 
 
@@ -42,7 +44,8 @@ def _stage(family: Family, faults: Faults) -> OnLocus | None:
 def _prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled: bool) -> dict[str, Entry]:
     """Read the prescribed outputs as fixed values or axes; faulty ones are reported and left out."""
     known = [p.name for p in locus.prescribed]
-    ratio, phi0 = f"time_ratio{locus.number}", f"phi0{locus.number}"
+    ratios, phi0 = [f"{name}{locus.number}" for name in RATIOS], f"phi0{locus.number}"
+    ratio = next((name for name in ratios if name in raw), ratios[0])
     known.insert(known.index(phi0) + 1, ratio)
     for name in raw:
         if name not in known:

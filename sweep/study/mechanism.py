@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from sweep.errors import InputError, closest, nearest
+from sweep.errors import InputError, choices, closest
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Family
@@ -37,6 +37,17 @@ class PlaceTable(Section):
     at: ThreeTexts | None = Field(None, description='three lengths, as ["0 mm", "30 mm", "12 mm"]')
     axis: Three | None = Field(None, description="a direction [x, y, z]: the member's z")
     zero: Three | None = Field(None, description="a direction [x, y, z]: the member's x")
+    stage: int | None = Field(None, description="of a chain, 1 where its first stage stands there; else its last")
+
+
+class ShaftSection(Section):
+    """Table ``shafts.<name>``."""
+
+    at: ThreeTexts | None = Field(None, description='a point of the axis, as ["0 mm", "30 mm", "12 mm"]')
+    axis: Three | None = Field(None, description="its direction [x, y, z]")
+    zero: Three | None = Field(None, description="the direction [x, y, z] of its mark at angle 0")
+    ratio: int | None = Field(None, description="whole turns for one of the main shaft, with the sense, not 0")
+    phase: str | None = Field(None, description='its angle where that of the main shaft is 0, as "30 deg"')
 
 
 class MemberSection(Section):
@@ -48,6 +59,11 @@ class MemberSection(Section):
     offset: str | None = Field(None, description='an angle with its unit, as "180 deg"')
     driver: str | None = Field(None, description='"shaft", or an angle of an earlier member, as "needle.psi1"')
     place: PlaceTable | None = Field(None, description="{ at = [...], axis = [...], zero = [...] }")
+    shaft: str | None = Field(None, description="the shaft that its crank sits on, one of [shafts]")
+    sense: int | None = Field(None, description="1 or -1: its crank axis along the shaft or against it")
+    shift: str | None = Field(None, description='place of its origin along the shaft, as "12 mm"')
+    turn: str | None = Field(None, description='angle of its frame about the shaft, as "90 deg"')
+    key: str | None = Field(None, description='angle of its crank on the shaft, as "15 deg"')
     tip: ThreeTexts | None = Field(
         None, description='three lengths along, across, along the axis, as ["30 mm", "0 mm", "2 mm"]'
     )
@@ -98,21 +114,22 @@ def _flatten(data: dict[str, Any], key: tuple[str, ...], members: Mapping[str, A
 
 
 def read_mechanism(
-    section: MechanismSection, file: StudyFile, threads: Mapping[str, dict[str, Any]]
+    section: MechanismSection, file: StudyFile, threads: Mapping[str, dict[str, Any]] | None
 ) -> tuple[tuple[str, ...] | Specification, Family] | None:
     """Read the mechanism as the study names it, and its family without effects; None with its faults.
 
     Parameters
     ----------
     section : [mechanism]
-    threads : of a machine, as relations
+    threads : of a machine, as relations; None with the faults of one, which take the names of its outputs along
     """
     data, faults = file.data, file.faults
     if "machine" not in file:
         if "mechanism" not in file:
             faults.missing(("mechanism",), "a table [mechanism]")
-        if "relations" in file:
-            faults.value(("relations",), data["relations"], "nothing here: relations are those of a [machine]")
+        for table in ("relations", "shafts"):
+            if table in file:
+                faults.value((table,), data[table], f"nothing here: {table} are those of a [machine]")
         names = _families(section, data, faults)
         family = _family(names, data, faults)
         return None if family is None else (names, family)
@@ -144,7 +161,7 @@ def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> 
     unknown = [k for k, name in enumerate(names) if name not in NAMES]
     for k in unknown:
         key: Key = ("mechanism", "family") if single else ("mechanism", "chain", k)
-        faults.value(key, names[k], f"one of {', '.join(NAMES)}{nearest(names[k], NAMES)}")
+        faults.value(key, names[k], f"one of {choices(names[k], NAMES)}")
     guessed = tuple(closest(name, NAMES) if name not in NAMES else name for name in names)
     if not guessed or None in guessed:
         return None
@@ -156,7 +173,7 @@ def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> 
 
 
 def _machine(
-    data: Mapping[str, Any], faults: Faults, threads: Mapping[str, dict[str, Any]]
+    data: Mapping[str, Any], faults: Faults, threads: Mapping[str, dict[str, Any]] | None
 ) -> tuple[Specification, Family] | None:
     """Read the machine of a file with its threads, or None with its faults."""
     before = len(faults.lines)
@@ -166,26 +183,30 @@ def _machine(
     for name, raw in _tables(data, "relations", faults).items():
         section = read_section(RelationSection, raw, ("relations", name), faults)
         relations[name] = section.model_dump(exclude_none=True)
-    for name, thread in threads.items():
+    shafts = {name: _shaft(name, raw, faults) for name, raw in _tables(data, "shafts", faults).items()}
+    for name, thread in (threads or {}).items():
         if name in relations:
             faults.value(("thread", name), thread, "a name that no relation has")
         relations[name] = thread
-    if len(faults.lines) > before:
+    if threads is None or len(faults.lines) > before:
         return None
     try:
         plain = {name: table for name, table in relations.items() if not {"event", "value"} & set(table)}
-        outputs = find_family(specification(members, plain)).pose_output if len(plain) < len(relations) else {}
+        outputs = find_family(specification(members, plain, shafts)).pose_output if len(plain) < len(relations) else {}
         for name, table in relations.items():
             if "level" in table and (of := outputs.get(table.get("event", ""))) is not None:
                 table["level"] = _level(table["level"], units.internal_unit(of.unit), name, faults)
         if len(faults.lines) > before:
             return None
-        given = specification(members, relations)
+        given = specification(members, relations, shafts)
         return given, find_family(given)
     except InputError as error:
         place: Key = tuple(error.place.removeprefix("machine.").split(".")) if error.place != "machine" else ()
         if place[:1] == ("relations",) and place[1:] and place[1] in threads:
             faults.value(("thread", place[1], _key_of_thread(error)), error.value, error.allowed)
+            return None
+        if place[:1] == ("shafts",):
+            faults.value(place if place[-1] == error.name else (*place, error.name), error.value, error.allowed)
             return None
         key: Key = place if place[:1] == ("relations",) else ("machine", *place)
         faults.value(key if place[:1] == ("relations",) else (*key, error.name), error.value, error.allowed)
@@ -218,17 +239,30 @@ def _tables(data: Mapping[str, Any], name: str, faults: Faults) -> dict[str, Any
 def _member(name: str, raw: object, faults: Faults) -> dict[str, Any]:
     key: Key = ("machine", name)
     section = read_section(MemberSection, raw, key, faults)
-    found: dict[str, Any] = section.model_dump(exclude_none=True, exclude={"offset", "place", "tip", "eye"})
-    if section.offset is not None:
-        found["offset"] = faults.number(section.offset, "rad", (*key, "offset")) or 0.0
+    units_of = {"offset": "rad", "turn": "rad", "key": "rad", "shift": "mm"}
+    found: dict[str, Any] = section.model_dump(exclude_none=True, exclude={*units_of, "place", "tip", "eye"})
+    for one, unit in units_of.items():
+        if (text := getattr(section, one)) is not None:
+            found[one] = faults.number(text, unit, (*key, one)) or 0.0
     for name, texts in (("tip", section.tip), ("eye", section.eye)):
         if texts is not None:
             found[name] = _lengths(texts, (*key, name), faults)
     if section.place is not None:
-        place: dict[str, Any] = section.place.model_dump(exclude_none=True, exclude={"at"})
-        if section.place.at is not None:
-            place["at"] = _lengths(section.place.at, (*key, "place", "at"), faults)
-        found["place"] = place
+        found["place"] = _placed(section.place, (*key, "place"), faults)
+    return found
+
+
+def _placed(section: PlaceTable | ShaftSection, key: Key, faults: Faults) -> dict[str, Any]:
+    place: dict[str, Any] = section.model_dump(exclude_none=True, exclude={"at", "phase"})
+    return place if section.at is None else place | {"at": _lengths(section.at, (*key, "at"), faults)}
+
+
+def _shaft(name: str, raw: object, faults: Faults) -> dict[str, Any]:
+    key: Key = ("shafts", name)
+    section = read_section(ShaftSection, raw, key, faults)
+    found = _placed(section, key, faults)
+    if section.phase is not None:
+        found["phase"] = faults.number(section.phase, "rad", (*key, "phase")) or 0.0
     return found
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from sweep.errors import nearest
+from sweep.errors import choices
 from sweep.families.base import Family
 from sweep.study.file import StudyFile
 from sweep.study.section import Number, Section, missing_keys
@@ -73,5 +73,5 @@ def check_report(report: ReportSection, file: StudyFile, family: Family, prescri
         missing_keys(CurveTable, curve.model_fields_set, ("report", "curves", k), faults)
         for key, axis in (("x", curve.x), ("y", curve.y)):
             if axis is not None and axis not in parameters:
-                allowed = f"one of {', '.join(parameters)}{nearest(axis, parameters)}"
+                allowed = f"one of {choices(axis, parameters)}"
                 faults.value(("report", "curves", k, key), axis, allowed)

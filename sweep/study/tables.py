@@ -11,7 +11,7 @@ from sweep.study.design import ReferenceSection
 from sweep.study.file import StudyFile
 from sweep.study.fit import FitSection
 from sweep.study.loads import CurveSection
-from sweep.study.mechanism import MechanismSection, MemberSection, RelationSection
+from sweep.study.mechanism import MechanismSection, MemberSection, RelationSection, ShaftSection
 from sweep.study.objective import ObjectiveSection
 from sweep.study.optimise import OptimiseSection
 from sweep.study.output import BudgetSection, OutputSection
@@ -44,6 +44,7 @@ TABLES: Mapping[str, Table] = {
     "study": Table("Name, title and question.", StudySection),
     "mechanism": Table("What the study is about.", MechanismSection),
     "machine": Table(MACHINE, each=MemberSection),
+    "shafts": Table("Axes that turn with the main shaft, which cranks of members sit on.", each=ShaftSection),
     "relations": Table(MACHINE, each=RelationSection),
     "thread": Table(
         "The threads of a machine, each from its tensioner over points and take-ups to the stitch.", each=ThreadSection

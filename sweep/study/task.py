@@ -7,7 +7,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
-from sweep.errors import InputError, StudyError, nearest
+from sweep.errors import InputError, StudyError, choices
 from sweep.families import family
 from sweep.quantities import units
 from sweep.study.file import Faults, Key, StudyFile
@@ -75,7 +75,7 @@ def read_task(raw: object, faults: Faults) -> Problem | None:
         return None
     kind = raw.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
-        faults.value(("task", "kind"), kind, f"{', '.join(KINDS)}{nearest(str(kind), KINDS)}")
+        faults.value(("task", "kind"), kind, choices(str(kind), KINDS))
         return None
     known = {f.name: f for f in fields(KINDS[kind]) if f.init}
     for name in raw:

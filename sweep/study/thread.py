@@ -58,9 +58,10 @@ class ThreadSection(Section):
     allowed: AllowedTable | None = Field(None, description='{ phi = [...], values = [...], unit = "mm" }')
 
 
-def read_threads(file: StudyFile) -> dict[str, dict[str, Any]]:
-    """Read the threads as relations of the machine, in internal units."""
+def read_threads(file: StudyFile) -> dict[str, dict[str, Any]] | None:
+    """Read the threads as relations of the machine, in internal units; None if one is faulty."""
     faults, raw = file.faults, file.data.get("thread", {})
+    before = len(faults.lines)
     found: dict[str, dict[str, Any]] = {}
     if raw and "machine" not in file:
         faults.value(("thread",), raw, "nothing here: it needs a [machine], over whose members the thread runs")
@@ -68,12 +69,9 @@ def read_threads(file: StudyFile) -> dict[str, dict[str, Any]]:
         faults.value(("thread",), raw, "tables [thread.NAME]")
     else:
         for name, table in raw.items():
-            before = len(faults.lines)
             section = read_section(ThreadSection, table, ("thread", name), faults)
-            relation = _relation(section, ("thread", name), faults)
-            if len(faults.lines) == before:
-                found[name] = relation
-    return found
+            found[name] = _relation(section, ("thread", name), faults)
+    return found if len(faults.lines) == before else None
 
 
 def _relation(section: ThreadSection, key: Key, faults: Faults) -> dict[str, Any]:

@@ -16,8 +16,13 @@ _KEY = re.compile(r"""\s*([\w."'-]+)\s*=""")
 _TABLE = re.compile(r"\s*\[+([^\[\]]+)\]+\s*(?:#.*)?")
 _BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-_STRINGS = re.compile(r'"""(?:\\.|[^\\])*?"{3,5}|\'\'\'.*?\'{3,5}|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'', re.DOTALL)
+_LONG, _SHORT = r'"""(?:\\.|[^\\])*?"{3,5}|\'\'\'.*?\'{3,5}', r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\''
+_STRINGS = re.compile(f"{_LONG}|{_SHORT}", re.DOTALL)
 _SCALAR = re.compile(r"[^,\]}\n#]*")
+_OPENED = re.compile(f"#[^\n]*|{_LONG}|(?P<three>[\"']{{3}})|{_SHORT}|(?P<one>[\"'])", re.DOTALL)
+# What tomllib says of a text that has no end.
+_QUOTED = 'a text between quotes, as name = "press", over several lines between three of them'
+_NO_END = ("Illegal character '\\n'", "Found invalid character '\\n'", "Unterminated string", "Expected \"'")
 # What tomllib says where a key or a table comes a second time.
 _TWICE = ("Cannot overwrite", "Cannot declare", "Duplicate inline")
 
@@ -75,6 +80,10 @@ def _said(text: str, message: str) -> str:
     line, column = text.count("\n") + 1, len(text) - text.rfind("\n")
     message = message.replace("at end of document", f"at line {line}, column {column}, the end of the file")
     place = _PLACE.search(message)
+    if place is not None and message.startswith(_NO_END):
+        opened = next((found.start() for found in _OPENED.finditer(text) if found.lastgroup), None)
+        line = int(place[1]) if opened is None else text.count("\n", 0, opened) + 1
+        return f"line {line}: a text without its closing quote; allowed: {_QUOTED}"
     if place is None or not message.startswith(_TWICE):
         return message
     lines = text.splitlines()[: int(place[1])]

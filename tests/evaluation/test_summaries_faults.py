@@ -100,7 +100,9 @@ def test_order_and_company_change_no_bit():
 
 @pytest.mark.parametrize("accuracy", [Accuracy(target=1e-6), Accuracy(samples=90)])
 def test_no_designs_give_no_rows(accuracy):
-    found = design_outputs(NEEDLE, np.empty((0, 19)), ["margin", "stroke", "max_abs_dev"], accuracy, (0.0, 0.5))
+    found = design_outputs(
+        NEEDLE, np.empty((0, len(NEEDLE.parameters))), ["margin", "stroke", "max_abs_dev"], accuracy, (0.0, 0.5)
+    )
     assert all(values.shape == (0,) for values in found.values())
 
 

@@ -92,11 +92,16 @@ def test_bars_of_the_model_run_from_joint_to_joint(tmp_path):
     np.testing.assert_allclose(end, part.joints["c"], atol=1e-4)
 
 
-def test_stages_in_frames_of_their_own_stand_side_by_side(tmp_path):
-    model = pygltflib.GLTF2().load(sweep.export(["rssr", "guide"], chain_design(), tmp_path / "chain.glb"))
+def test_stages_of_a_chain_stand_in_one_frame(tmp_path):
+    design = chain_design() | {"shift2": 7.5, "turn2": 0.3}
+    model = pygltflib.GLTF2().load(sweep.export(["rssr", "guide"], design, tmp_path / "chain.glb"))
     shifts = {node.name: node.translation for node in model.nodes if node.name.startswith("stage")}
-    assert shifts["stage 1"] == [0.0, 0.0, 0.0]
-    assert shifts["stage 2"][0] > 0.0
+    assert shifts["stage 1"] == shifts["stage 2"] == [0.0, 0.0, 0.0]
+    found = parts(["rssr", "guide"], design, 0.0)
+    nodes = {(k, node.name): node for k, node in enumerate(model.nodes)}
+    pivots = [node.translation for (_, name), node in nodes.items() if name == "A"]
+    np.testing.assert_allclose(pivots, [part.joints["a"][0] for part in found], atol=1e-5)
+    np.testing.assert_allclose(found[1].joints["a"][0], [design["e1"], 0.0, 7.5], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", DRAWN)
@@ -298,7 +303,8 @@ def test_files_of_other_programs_are_refused_as_points(tmp_path):
 def test_law_has_units_in_its_headings_and_its_metadata(tmp_path):
     design = scaled("slider_crank")
     table = pd.read_csv(sweep.export("slider_crank", design, tmp_path / "law.csv", "law", poses=72, speed=10.0))
-    assert list(table.columns[:4]) == ["phi [rad]", "t [s]", "s [mm]", "ds [mm]"]
+    assert list(table.columns[:4]) == ["phi [rad]", "t [s]", "s [mm]", "ds [mm/rad]"]
+    assert {"d2s [mm/rad^2]", "d3s [mm/rad^3]", "pressure_angle [rad]"} <= set(table.columns)
     poses = sweep.evaluate("slider_crank", design, ["s", "d2s"], phi=table["phi [rad]"].to_list())
     np.testing.assert_allclose(table["s [mm]"], poses["s"], rtol=1e-15)
     np.testing.assert_allclose(table["t [s]"], table["phi [rad]"] / 10.0, rtol=1e-15)

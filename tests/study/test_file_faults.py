@@ -26,6 +26,15 @@ def test_toml_faults_name_line_and_column(text: str, place: str, tmp_path: Path)
     assert place in message
 
 
+@pytest.mark.parametrize(
+    ("title", "line"), [('"Press', 3), ("'Press", 3), ('"""Press\nit', 3), ("'''Press\nit", 3), ('["a",\n"b]', 4)]
+)
+def test_a_quote_that_is_not_closed_is_told_with_its_line(title: str, line: int, tmp_path: Path) -> None:
+    text = f'[study]  # "quoted\nname = ""\ntitle = {title}\n[scene]\nwant = 1\n'
+    (message,) = faults_of(text, tmp_path)
+    assert message.startswith(f"study.toml: line {line}: a text without its closing quote; allowed: ")
+
+
 def test_a_file_that_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_bytes(b"[study]\nname = '\xff'\n")
     with pytest.raises(StudyError, match="line 2 is no UTF-8 text"):

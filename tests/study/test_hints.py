@@ -10,6 +10,7 @@ import pytest
 
 from sweep.cli.tables import write_table
 from sweep.errors import StoreError, closest, edits
+from sweep.families import NAMES
 from sweep.quantities.units import SYMBOLS
 
 OUTPUTS = [
@@ -35,6 +36,9 @@ PARAMETERS = ["a", "b", "c", "e", "f", "g", "alpha", "branch"]
         ("alhpa", PARAMETERS, "alpha"),
         ("crosshead", ["branch"], None),
         ("zzz", OUTPUTS, None),
+        ("box", ["size", "box_x", "box_y"], "box_x"),
+        ("crank_rocker", NAMES, "rssr"),
+        ("Spatial crank-rocker", NAMES, "rssr"),
         ("", OUTPUTS, None),
     ],
 )

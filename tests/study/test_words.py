@@ -155,6 +155,17 @@ def test_time_ratio_prescribes_the_angle_between_the_limits(tmp_path) -> None:
     assert axis.values[1] == pytest.approx(2.0 * math.pi * 1.1 / 2.1, rel=4e-16)  # even in the ratio as written
 
 
+def test_the_ratio_is_answered_by_the_name_that_was_written(tmp_path) -> None:
+    one, other = LOCUS, LOCUS.replace("time_ratio", "stroke_ratio")
+    for number, (text, name) in enumerate([(one, "time_ratio"), (other, "stroke_ratio")]):
+        study = study_of(tmp_path, text)
+        assert study.space.fixed["phi0"] == pytest.approx(2.0 * math.pi * 1.1 / 2.1, rel=4e-16)
+        found = sweep.load(run(study, out=tmp_path / str(number), jobs=1))
+        assert found.loc[found["status"] == st.OK, name].to_numpy() == pytest.approx(1.1, abs=1e-9)
+    bound = STUDY.replace('swing = ">= 20 deg"', 'time_ratio = ">= 0.9"')
+    assert Limit("time_ratio", 0.9, None) in study_of(tmp_path, bound).limits
+
+
 def test_designs_of_a_time_ratio_have_it(tmp_path) -> None:
     folder = run(study_of(tmp_path, LOCUS), out=tmp_path / "out", jobs=1)
     found = sweep.load(folder)

@@ -23,7 +23,7 @@ CURVES = {"ds": (0, 1), "d2s": (0, 2), "d3s": (0, 3), "dev": (1, 0), "ddev": (1,
 def double_drives(n, seed):
     first, r = needle_drives(n, seed), np.random.default_rng(seed + 5)
     coupling = np.column_stack([r.choice([-1.0, 1.0], n), r.uniform(-3.0, 3.0, n)])
-    return np.column_stack([needle_drives(n, seed + 50)[:, :8], first[:, :8], coupling, first[:, 8:]])
+    return np.column_stack([needle_drives(n, seed + 50)[:, :8], first[:, :8], coupling, first[:, 8:], np.zeros((n, 2))])
 
 
 # Family, designs, columns in which its crank-rockers and couplings begin, column of the guide.

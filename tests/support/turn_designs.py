@@ -31,13 +31,13 @@ def guided_four_bars(n, seed, crank=(0.1, 1.0)):
 
 def needle_drives(n, seed):
     r = np.random.default_rng(seed + 1000)
-    coupling = np.column_stack([r.choice([-1.0, 1.0], n), r.uniform(-3.0, 3.0, n)])
+    coupling = np.column_stack([r.choice([-1.0, 1.0], n), r.uniform(-3.0, 3.0, n), np.zeros((n, 2))])
     return np.column_stack([crank_rockers(n, seed), guided_four_bars(n, seed + 1, (0.5, 2.0)), coupling])
 
 
 def driven_sliders(n, seed):
     r = np.random.default_rng(seed + 2)
-    coupling = np.column_stack([r.choice([-1.0, 1.0], n), r.uniform(-3.0, 3.0, n)])
+    coupling = np.column_stack([r.choice([-1.0, 1.0], n), r.uniform(-3.0, 3.0, n), np.zeros((n, 2))])
     return np.column_stack([crank_rockers(n, seed), slider_cranks(n, seed + 1), coupling])
 
 

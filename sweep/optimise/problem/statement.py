@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, choices
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.domain import March
 from sweep.optimise.problem.coordinates import Coordinates
@@ -67,7 +67,7 @@ class Problem:
         names = tuple(name for name in self.family.parameter_names if name not in self.made) + self.given
         for name in (*self.variables, *self.fixed):
             if name not in names:
-                raise InputError("parameter", name, f"{', '.join(names)}{nearest(name, names)}", PLACE)
+                raise InputError("parameter", name, choices(name, names), PLACE)
         if len(set(self.variables)) < len(self.variables) or not self.variables:
             raise InputError("variables", self.variables, "at least one parameter, each once", PLACE)
         for parameter in self.family.parameters:

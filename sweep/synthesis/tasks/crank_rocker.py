@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from kernels import synthesis as kernels
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, choices
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Columns
@@ -103,7 +103,7 @@ def size_limits(columns: Mapping[str, Array], bounds: Bounds) -> list[Array]:
     slacks = []
     for name, (low, high) in bounds.items():
         if name not in columns:
-            raise InputError("bounds", name, f"{', '.join(columns)}{nearest(name, columns)}", "task")
+            raise InputError("bounds", name, choices(name, columns), "task")
         slacks += [(columns[name] - low) / (high - low), (high - columns[name]) / (high - low)]
     return slacks
 

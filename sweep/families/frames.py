@@ -1,0 +1,124 @@
+"""Frames of stages and members: a crank axis is laid on an axis that turns, the rest of the mechanism follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from kernels.types import Array
+from sweep.families.base import Family
+from sweep.families.capabilities import OutputLink, Skeleton
+
+if TYPE_CHECKING:
+    from sweep.families.parts import Stage
+
+CRANKS = ("a", "a1", "o2")  # what families call the joint on the axis of their first crank
+X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+class Frame(NamedTuple):
+    """A frame in another one: a vector v of it is ``rotation`` v there, from ``at``; one for each design, or for all.
+
+    ``rotation`` is (n, 3, 3) or (1, 3, 3), ``at`` (n, 3) or (1, 3); complex designs give complex frames.
+    """
+
+    rotation: Array
+    at: Array
+
+    def turned(self, vector: list[Any]) -> list[Any]:
+        """Return components in the other frame of a vector of this one, each (n, m)."""
+        return [sum(self.rotation[:, k, j, None] * vector[j] for j in range(3)) for k in range(3)]
+
+    def placed(self, point: list[Any]) -> list[Any]:
+        """Return coordinates in the other frame of a point of this one, each (n, m)."""
+        return [self.at[:, [k]] + part for k, part in enumerate(self.turned(point))]
+
+    def within(self, outer: Frame) -> Frame:
+        """Return this frame in the one that ``outer``, in which it stands, is given in."""
+        return Frame(outer.rotation @ self.rotation, outer.at + _times(outer.rotation, self.at))
+
+    @property
+    def inverse(self) -> Frame:
+        """The other frame in this one."""
+        back = np.swapaxes(self.rotation, 1, 2)
+        return Frame(back, -_times(back, self.at))
+
+
+class Axis(NamedTuple):
+    """An axis that turns: a point of it, its direction, and the direction from which angles about it count; (n, 3)."""
+
+    at: Array
+    along: Array
+    zero: Array
+
+
+WHOLE = Frame(np.eye(3)[None], np.zeros((1, 3)))
+
+
+def _times(matrix: Array, vector: Array) -> Array:
+    return np.asarray((matrix @ vector[:, :, None])[:, :, 0])
+
+
+def mounted(axis: Axis, crank: Axis, sense: Any, shift: Any, turn: Any) -> Frame:
+    """Return the frame whose crank axis lies on a turning axis, machine-and-stitch (1) and (4).
+
+    Parameters
+    ----------
+    axis : what turns
+    crank : the crank axis in the wanted frame, with the direction of the crank at phi = 0
+    sense : +1 or -1: whether the crank axis runs along the turning axis or against it
+    shift : from the point of the axis, along it, to the point of the crank axis, (n,)
+    turn : angle about the axis, from its zero, to the direction of the crank at phi = 0, (n,)
+    """
+    sense, shift, turn = (np.atleast_1d(x)[:, None] for x in (sense, shift, turn))
+    zero = np.cos(turn) * axis.zero + np.sin(turn) * np.cross(axis.along, axis.zero)
+    rotation = _columns(zero, sense * axis.along) @ np.swapaxes(_columns(crank.zero, crank.along), 1, 2)
+    return Frame(rotation, axis.at + shift * axis.along - _times(rotation, crank.at))
+
+
+def _columns(zero: Array, along: Array) -> Array:
+    zero, along = np.broadcast_arrays(zero, along)
+    return np.stack([zero, np.cross(along, zero), along], axis=-1)
+
+
+def crank_axis(family: Family, designs: Array) -> Axis | None:
+    """Return the axis of the first crank in the family's frame; None where the family has none."""
+    skeleton = family.find(Skeleton)
+    crank = next((skeleton.fixed[name] for name in CRANKS if name in skeleton.fixed), None) if skeleton else None
+    if crank is None or crank.axis is None or crank.kind != "axis":
+        return None
+    at = crank.at if crank.foot is None else crank.foot
+    zero = np.tile(X, (len(designs), 1)) if crank.zero is None else crank.zero(designs)
+    return Axis(at(designs), crank.axis(designs), zero)
+
+
+def output_axis(family: Family, designs: Array) -> Axis | None:
+    """Return the axis of the output link in the family's frame, from its point with z = 0; None without such a link."""
+    link = family.find(OutputLink)
+    if link is None:
+        return None
+    at = link.origin(designs)
+    return Axis(at, np.tile(Z, (len(at), 1)), np.tile(X, (len(at), 1)))
+
+
+def stage_frames(stages: Sequence[Stage], designs: Array) -> list[Frame]:
+    """Return the frames of all stages of a chain in that of the first, from designs of the chain."""
+    found = [WHOLE]
+    for before, stage in pairwise(stages):
+        axis = output_axis(before.family, before.designs(designs))
+        crank = crank_axis(stage.family, stage.designs(designs))
+        assert axis is not None and crank is not None and stage.shift is not None
+        kappa, shift, turn = (designs[:, k] for k in (stage.kappa, stage.shift, stage.turn))
+        found.append(mounted(axis, crank, kappa, shift, turn).within(found[-1]))
+    return found
+
+
+def can_be_placed(families: Sequence[Family]) -> bool:
+    """Tell whether each of these families drives the crank of the next about an axis that both name."""
+    return all(
+        before.find(OutputLink) is not None and crank_axis(family, np.ones((1, len(family.parameters)))) is not None
+        for before, family in pairwise(families)
+    )

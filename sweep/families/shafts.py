@@ -1,0 +1,147 @@
+"""Shafts of a machine, and how the crank of a member sits on one: machine-and-stitch, 1.3."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kernels.types import Array
+from sweep.errors import InputError, choices
+from sweep.families.base import Parameter
+from sweep.families.frames import Axis, Frame, mounted
+
+SHAFT_KEYS = ("at", "axis", "zero", "ratio", "phase")
+MOUNT_KEYS = ("shaft", "sense", "shift", "turn", "key")
+MAIN = "main"
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """An axis of the machine that turns by ``ratio`` phi + ``phase``, right-handed about its direction.
+
+    Parameters
+    ----------
+    name : for messages
+    at : the point from which lengths along it count
+    along : its direction, a unit vector
+    zero : unit vector square to it, to its mark at angle 0
+    ratio : whole turns for one of the main shaft, with the sense
+    phase : its angle where that of the main shaft is 0 [rad]
+    """
+
+    name: str
+    at: tuple[float, float, float]
+    along: tuple[float, float, float]
+    zero: tuple[float, float, float]
+    ratio: int = 1
+    phase: float = 0.0
+
+    @property
+    def axis(self) -> Axis:
+        """The axis with one row, for all designs."""
+        return Axis(*(np.array([x]) for x in (self.at, self.along, self.zero)))
+
+
+@dataclass(frozen=True)
+class Mount:
+    """How the first crank of a member sits on a shaft.
+
+    Parameters
+    ----------
+    shaft : the shaft
+    sense : +1 or -1, whether its crank axis runs along the shaft or against it
+    shift : place of its origin along the shaft; the default of the parameter ``shift``
+    turn : angle about the shaft, from its zero direction, to the direction that its crank has at phi = 0
+    key : angle of its crank on the shaft, from the shaft's mark
+    """
+
+    shaft: Shaft
+    sense: int = 1
+    shift: float = 0.0
+    turn: float = 0.0
+    key: float = 0.0
+
+    @property
+    def ratio(self) -> int:
+        """Turns of its crank, in its own sense, for one of the main shaft."""
+        return self.sense * self.shaft.ratio
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """What a study may vary."""
+        on = f"shaft {self.shaft.name}"
+        return (
+            Parameter("key", "angle", f"angle of its crank on the {on}, from the mark", default=self.key),
+            Parameter("shift", "length", f"place of its origin along the {on}", default=self.shift),
+            Parameter(
+                "turn", "angle", f"angle of its frame about the {on}, from the zero direction", default=self.turn
+            ),
+        )
+
+    def phase(self, turn: Array, key: Array) -> Array:
+        """Return the member's crank angle where that of the main shaft is 0, (4)."""
+        return self.sense * (self.shaft.phase + key - turn)
+
+    def frame(self, crank: Axis, shift: Array, turn: Array) -> Frame:
+        """Return the frame of the member's first stage in the machine's."""
+        return mounted(self.shaft.axis, crank, float(self.sense), shift, turn)
+
+
+def read_shafts(
+    given: Mapping[str, Mapping[str, Any]], placed: Callable[[str, dict[str, Any]], Any]
+) -> dict[str, Shaft]:
+    """Return the shafts of a machine from what a user gives, checked; ``placed`` reads at, axis and zero.
+
+    Raises
+    ------
+    InputError
+        for an unknown key, a ratio that is no whole number, a main shaft with a ratio or phase, or none of that name.
+    """
+    if given and MAIN not in given:
+        raise InputError("shafts", list(given), "one of them named main", "machine.shafts")
+    found = {}
+    for name, table in given.items():
+        where = f"machine.shafts.{name}"
+        for key in table:
+            if key not in SHAFT_KEYS or (name == MAIN and key in ("ratio", "phase")):
+                known = SHAFT_KEYS[:3] if name == MAIN else SHAFT_KEYS
+                raise InputError(key, table[key], choices(key, known), where)
+        place = placed(f"shafts.{name}", {key: table[key] for key in SHAFT_KEYS[:3] if key in table})
+        ratio = table.get("ratio", 1)
+        if isinstance(ratio, bool) or not isinstance(ratio, int | float) or ratio != int(ratio) or ratio == 0:
+            raise InputError("ratio", ratio, "a whole number but 0, of turns for one of the main shaft", where)
+        rotation = place.rotation
+        along, zero = (tuple(rotation[:, k].tolist()) for k in (2, 0))
+        found[name] = Shaft(name, place.at, along, zero, int(ratio), _number("phase", table, where))
+    return found
+
+
+def read_mount(table: Mapping[str, Any], shafts: Mapping[str, Shaft], where: str) -> Mount:
+    """Return how a member sits on the shaft that its table names, checked.
+
+    Raises
+    ------
+    InputError
+        for an unknown shaft, a key that the shaft already decides, a sense that is none.
+    """
+    name = table["shaft"]
+    if name not in shafts:
+        raise InputError("shaft", name, f"one of {choices(str(name), shafts)}", where)
+    for key in ("place", "ratio", "offset", "driver"):
+        if key in table:
+            allowed = "nothing beside shaft, which decides it: give sense, shift, turn and key"
+            raise InputError(key, table[key], allowed, where)
+    sense = table.get("sense", 1)
+    if sense not in (1, -1) or isinstance(sense, bool):
+        raise InputError("sense", sense, "1 or -1: the crank axis along the shaft or against it", where)
+    return Mount(shafts[name], int(sense), *(_number(key, table, where) for key in MOUNT_KEYS[2:]))
+
+
+def _number(key: str, table: Mapping[str, Any], where: str) -> float:
+    value = table.get(key, 0.0)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise InputError(key, value, "a finite number, angles in rad", where)
+    return float(value)
