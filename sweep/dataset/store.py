@@ -55,6 +55,7 @@ from sweep.dataset.parts import (
     STATUS_NAMES,
     Part,
     about,
+    check_columns,
     content_hash,
     is_whole,
     listing,
@@ -91,6 +92,7 @@ __all__ = [
     "about",
     "append_run",
     "beside",
+    "check_columns",
     "content_hash",
     "encode",
     "finished_chunks",
@@ -312,6 +314,7 @@ def load(folder: str | Path) -> pd.DataFrame:
         if one.index == other.index:
             raise _twice(place, one, other)
     frames = [part.rows() for part in chunks]
+    check_columns(chunks)
     missing = missing_chunks(place, chunks)
     if missing:
         text = f"{place}: incomplete, {len(missing)} of {len(missing) + len(chunks)} chunks are missing"
