@@ -177,6 +177,7 @@ def check_columns(chunks: Sequence[Part]) -> None:
         found = pq.read_schema(part.path).names
         names = names or found
         if found != names:
+            part.read()  # a damaged name is no other column
             apart = ", ".join(sorted({*names} ^ {*found})) or "their order"
             raise StoreError(
                 f"{part.path}: other columns than {chunks[0].path.name} ({apart}); move it away, then run again"

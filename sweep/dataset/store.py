@@ -299,7 +299,7 @@ def load(folder: str | Path) -> pd.DataFrame:
     >>> len(rows), rows.attrs["units"]["max_pressure_angle"]
     (25, 'rad')
     >>> rows.nsmallest(1, "max_abs_d2s")[["a", "b", "max_abs_d2s"]].round(4).values.tolist()
-    [[0.95, 3.15, 1.2455]]
+    [[9.5, 31.5, 12.4546]]
     """
     import pandas as pd
 
