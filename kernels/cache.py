@@ -1,7 +1,7 @@
 """numba's disk cache of machine code, kept in the folder of :mod:`kernels.cache_folder` and checked as it is read.
 
-This is the one file that derives from classes of ``numba.core``.  Where a version of numba has others, kernels fall
-back to numba's own cache inside that folder, and one line on the standard error says so.
+This is the one file that derives from classes of ``numba.core``.  Where a version of numba has others, `kernels.jit`
+leaves it aside and kernels use numba's own cache inside that folder.
 """
 
 # mypy: disable-error-code="no-untyped-call"
@@ -17,34 +17,44 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numba
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 
-from kernels.cache_folder import CACHE_DIR, SOURCES, locked, may_keep, resolved, say, writable
+from kernels.cache_folder import CACHE_DIR, SOURCES, locked, resolved, writable
 
 # What reading a file that is not whole raises (numba does not wait for its files to reach the disk), and one that names
 # what this process does not know: an argument's type of a module that only the writer had.
 DAMAGED = (EOFError, ImportError, AttributeError)
 HASH_BYTES = hashlib.sha256().digest_size
-config: Any = numba.config
 
 
-class _Locator(UserProvidedCacheLocator):
-    """The folder of a kernel's machine code."""
+class _Locator:
+    """The folder of a kernel's machine code, with the methods that numba asks of such an object."""
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
-        super().__init__(function, file)
-        self._cache_path = str(CACHE_DIR / resolved(file).relative_to(SOURCES).with_suffix(""))
+        self._folder = CACHE_DIR / resolved(file).relative_to(SOURCES).with_suffix("")
+        self._line = function.__code__.co_firstlineno
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> _Locator | None:
         """Make the folder if need be; None where it cannot be written."""
         place = cls(function, file)
-        return place if writable(Path(place.get_cache_path())) else None
+        return place if writable(place._folder) else None
+
+    def get_cache_path(self) -> str:
+        """Name the folder."""
+        return str(self._folder)
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder, which may have been emptied meanwhile."""
+        self._folder.mkdir(parents=True, exist_ok=True)
 
     def get_source_stamp(self) -> str:
         """Give numba nothing to compare: the folder's name is a hash of the sources already."""
         return CACHE_DIR.name
+
+    def get_disambiguator(self) -> str:
+        """Tell functions of one name and file apart."""
+        return str(self._line)
 
 
 class _Implementation(CompileResultCacheImpl):
@@ -133,20 +143,6 @@ class KernelCache(FunctionCache):
             super().save_overload(sig, data)
 
 
-def keep(dispatcher: Any) -> Any:
-    """Let a compiled function load its machine code from disk and keep it there, where that is safe and there is room.
-
-    A function from outside of the package, as a bench or a study may have, is in no hash: every process compiles it.
-    """
-    if config.DISABLE_JIT:
-        return dispatcher  # it is the Python function itself
-    file = dispatcher.py_func.__code__.co_filename
-    if not may_keep(file) or not writable(CACHE_DIR):
-        return dispatcher
-    try:
-        dispatcher._cache = KernelCache(dispatcher.py_func)
-    except (AttributeError, TypeError, NotImplementedError, RuntimeError) as error:
-        config.CACHE_DIR = str(CACHE_DIR)
-        dispatcher.enable_caching()
-        say(f"numba {numba.__version__} keeps its machine code in another way ({error}); its own cache is used")
-    return dispatcher
+def keep(dispatcher: Any) -> None:
+    """Let a compiled function load its machine code from our folder and keep it there."""
+    dispatcher._cache = KernelCache(dispatcher.py_func)

@@ -27,17 +27,38 @@ import numba
 from numba.core.event import Listener, register
 from numba.extending import typeof_impl
 
-from kernels.cache import config, keep
+from kernels.cache_folder import CACHE_DIR, may_keep, say, writable
 
 F = TypeVar("F", bound=Callable[..., Any])
+config: Any = numba.config
 
 # Flags must be said: a helper without them takes those of the kernel that happens to be compiled first, and keeps
 # them in every other kernel, so the last bits of a result would depend on what was computed before it.
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
 
 
+def _kept(dispatcher: Any) -> Any:
+    """Let a compiled function load its machine code from disk and keep it there, where that is safe and there is room.
+
+    A function from outside of the package, as a bench or a study may have, is in no hash: every process compiles it.
+    """
+    if config.DISABLE_JIT:
+        return dispatcher  # it is the Python function itself
+    if not may_keep(dispatcher.py_func.__code__.co_filename) or not writable(CACHE_DIR):
+        return dispatcher
+    try:
+        from kernels.cache import keep  # here, as its import may be what fails
+
+        keep(dispatcher)
+    except (ImportError, AttributeError, TypeError, NotImplementedError, RuntimeError) as error:
+        config.CACHE_DIR = str(CACHE_DIR)
+        dispatcher.enable_caching()
+        say(f"numba {numba.__version__} keeps its machine code in another way ({error}); its own cache is used")
+    return dispatcher
+
+
 def _compiled(function: F, **options: Any) -> F:
-    return cast(F, keep(numba.njit(**(OPTIONS | options))(function)))
+    return cast(F, _kept(numba.njit(**(OPTIONS | options))(function)))
 
 
 class Helper:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from sweep.engine.run import run
     from sweep.evaluation import thread
     from sweep.evaluation.joints import joints
+    from sweep.evaluation.mechanism import mechanism
     from sweep.evaluation.poses import evaluate
     from sweep.evaluation.summaries import summarise
     from sweep.exchange.export import export
@@ -37,6 +38,7 @@ __all__ = [
     "joints",
     "load",
     "machine",
+    "mechanism",
     "plot",
     "run",
     "scan",
@@ -58,6 +60,7 @@ _HOMES = {
     "joints": "sweep.evaluation.joints",
     "load": "sweep.dataset.store",
     "machine": "sweep.families",
+    "mechanism": "sweep.evaluation.mechanism",
     "run": "sweep.engine.run",
     "scan": "sweep.dataset.reading",
     "summarise": "sweep.evaluation.summaries",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from sweep.cli.families import main_outputs
 from sweep.families.base import Family, Parameter
@@ -17,10 +17,12 @@ SI = {
     "pressure": "N/m^2", "stiffness": "N/m", "damping": "N*s/m", "acceleration": "m/s^2",
 }  # fmt: skip
 LENGTHS = {"length": "mm", "1/length": "1/mm"}
+POWER = {"length": 1, "1/length": -1}
 OTHERS = {"speed": "rad/s", "angular_acceleration": "rad/s^2", "time": "s", "angle": "deg"}
 PURE = ("ratio", "sign", "count", "none", "choice")
 SPREAD, COUNT = 0.05, 5  # of the swept parameters: part of the example's value to either side, values
 SWEPT = 2
+LEAST_SIZE = 20.0  # mm, of the longest dimension of what stands in a machine
 FIRST = ("swing", "stroke", "margin", "max_pressure_angle", "dwell_angle", "dwell_deviation")
 FEWEST_WANTED, MOST_WANTED = 3, 5
 WIDTH = 56  # column of the explanations
@@ -134,12 +136,14 @@ def design_lines(family: Family, swept: list[str]) -> Iterator[str]:
     """Yield every parameter with its meaning: ``swept`` ones as ranges, those with a default as comments."""
     example = _example(family)
     given = {p.unit for p in family.parameters}
-    units = OTHERS | (SI if given & {"mass", "force", "stiffness", "torque"} else LENGTHS)
+    si = bool(given & {"mass", "force", "stiffness", "torque"})
+    units = OTHERS | (SI if si else LENGTHS)
+    scale = 1.0 if si else _scale(family, example)
     for p in family.parameters:
         value = example.get(p.name, p.default)
         assert value is not None  # an example has every parameter that must be given
         unit = units.get(p.unit, "")
-        shown = math.degrees(value) if unit == "deg" else value
+        shown = math.degrees(value) if unit == "deg" else value * scale ** POWER.get(p.unit, 0)
         if p.name in swept:
             ends = sorted((shown * (1.0 - SPREAD), shown * (1.0 + SPREAD)))
             more = f', unit = "{unit}"' if unit else ""
@@ -148,6 +152,12 @@ def design_lines(family: Family, swept: list[str]) -> Iterator[str]:
             entry = f"{p.name} = " + (f'"{shown:.6g} {unit}"' if unit else f"{shown:g}")
         left_out = p.name not in example
         yield f"{'# ' if left_out else ''}{entry}".ljust(WIDTH) + f" # {_words(p)}"
+
+
+def _scale(family: Family, example: Mapping[str, float]) -> float:
+    """Return the power of ten by which the example, which is in any unit, becomes as large as a machine's."""
+    longest = max((abs(example.get(p.name, 0.0)) for p in family.parameters if p.unit == "length"), default=0.0)
+    return 10.0 ** max(0, math.ceil(math.log10(LEAST_SIZE / longest))) if longest else 1.0
 
 
 def _words(p: Parameter) -> str:

@@ -73,7 +73,7 @@ _FIRST_ONLY = ("speed", "speed_change")
 
 NO_CURVES: Mapping[str, Curve] = MappingProxyType({})
 
-_INPUT_NAMES: dict[tuple[tuple[str, str], ...], frozenset[str]] = {}
+_INPUTS: dict[tuple[tuple[str, str], ...], Mapping[str, Parameter]] = {}
 
 
 @lru_cache
@@ -149,15 +149,20 @@ def _handing(family: Family, placed: Placed) -> list[Placed]:
     return found if len(found) == len(stages_of(family)) - 1 - placed.stage else []
 
 
-def input_names(family: Family) -> frozenset[str]:
-    """Collect the inputs of all effects that can be asked of a family, or of the stages of a chain."""
+def all_inputs(family: Family) -> Mapping[str, Parameter]:
+    """Collect the inputs of all effects of a family, by name with the number of a stage or the name of a member."""
     if isinstance(family, Machine):
-        return frozenset(f"{m.name}.{name}" for m in family.members for name in input_names(m.family))
+        return {f"{m.name}.{name}": p for m in family.members for name, p in all_inputs(m.family).items()}
     # Asked at every call of the reductions; it depends on nothing but the names of the stages.
     stages = tuple((stage.name, number) for stage, number in stages_of(family))
-    if stages not in _INPUT_NAMES:
-        _INPUT_NAMES[stages] = frozenset(p.name for p in inputs(family, applicable(family)))
-    return _INPUT_NAMES[stages]
+    if stages not in _INPUTS:
+        _INPUTS[stages] = {p.name: p for p in inputs(family, applicable(family))}
+    return _INPUTS[stages]
+
+
+def input_names(family: Family) -> frozenset[str]:
+    """Collect the names of the inputs of all effects that can be asked of a family, or of the stages of a chain."""
+    return frozenset(all_inputs(family))
 
 
 def curved_inputs(family: Family) -> tuple[str, ...]:

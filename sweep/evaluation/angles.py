@@ -129,11 +129,9 @@ def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
         found = np.abs(numbers(values, name, "column"))
     except InputError:
         return  # whoever reads it says so, with the right row
-    if found.size == 0 or np.max(found) <= MOST:
+    if found.size == 0 or np.maximum.reduce(found, axis=None) <= MOST:
         return  # the usual case, in one pass
-    if not (largest := float(np.max(found, initial=0.0, where=np.isfinite(found)))) > MOST:
-        return
-    if turns_on and not reads_as_degrees(largest):
+    if is_plausible(float(np.max(found, initial=0.0, where=np.isfinite(found))), turns_on):
         return
     row = int(np.argmax(np.where(np.isfinite(found), found, 0.0)))
     raise InputError(
@@ -142,6 +140,11 @@ def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
         f"{'rad, which this does not look like' if turns_on else 'at most 2 pi, in rad'}; " + REMEDY.format(name=name),
         f"{'' if turns_on else 'column '}{name}, row {row}",
     )
+
+
+def is_plausible(largest: float, turns_on: bool) -> bool:
+    """Tell whether the largest magnitude of an angle can be one in rad; ``turns_on`` for one that counts full turns."""
+    return not largest > MOST or (turns_on and not reads_as_degrees(largest))
 
 
 def _first(values: Any, row: int) -> float:

@@ -161,7 +161,7 @@ def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
     angles = np.atleast_1d(numbers(phi, "phi", "phi, position"))
     if angles.ndim != 1 or not np.isfinite(angles).all():
         raise InputError("phi", phi, "finite angles [rad], one or a plain list", "phi")
-    check_march(family, angles)
+    check_march(family.domain, angles)
     given = Angles.of(np.ascontiguousarray(angles[None, :]))
     if isinstance(family, Machine):
         return [part for member in family.members for part in _of_member(family, member, matrix, given)]

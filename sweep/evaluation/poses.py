@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Container, Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +18,8 @@ from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Angles, Columns, Family
-from sweep.families.domain import March
+from sweep.families.base import Angles, Columns, Family, of_family
+from sweep.families.domain import Domain, March
 from sweep.quantities.resolve import output_names
 
 if TYPE_CHECKING:
@@ -84,9 +84,7 @@ def evaluate(
     import pandas as pd
 
     bare = find_family(family).precise()
-    names = expanded(bare, wanted_names(want, f"pose outputs of {bare.name}"), poses=True)
-    mechanism = extended(bare, names, curves_of(bare, loads))
-    wanted = pose_wants(mechanism, names)
+    mechanism, wanted, units = asked_of_poses(bare, want, loads)
     given = table
     table = in_radians(mechanism, plain_columns(table), angles, input_names(bare), mechanism.domain)
     phi = None if phi is None else grid_in_radians(mechanism.domain.name, mechanism.domain.unit, phi, angles)
@@ -107,13 +105,40 @@ def evaluate(
     made = head | {name: columns[name].ravel() for name in [*wanted, "status"]}
     if status_text:
         made["status_text"] = np.array(meanings(made["status"]), dtype=object)
-    result = _beside(
-        kept_columns(given, keep, made, len(matrix)), pd.DataFrame(made, index=index), len(matrix), repeats
-    )
-    result.attrs["units"] = {mechanism.domain.name: mechanism.domain.unit} | {
-        name: mechanism.pose_output[name].unit for name in wanted
-    }
+    own = pd.DataFrame(made, index=index, copy=False)  # nobody else has these arrays
+    result = _beside(kept_columns(given, keep, made, len(matrix)), own, len(matrix), repeats)
+    result.attrs["units"] = dict(units)
     return result
+
+
+class Question(NamedTuple):
+    """What is asked of a mechanism: its family with the effects that this takes, the names in order, their units."""
+
+    family: Family
+    wanted: tuple[str, ...]
+    units: Mapping[str, str]
+
+
+@of_family
+def questions(family: Family) -> dict[Hashable, Question]:
+    """Remember what was asked of a family, as long as no loads come with it: each question is looked at once."""
+    return {}
+
+
+def asked_of_poses(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
+    """Make the question for pose outputs of a family with precise poses."""
+    given = wanted_names(want, f"pose outputs of {family.name}")
+    known, key = questions(family), ("poses", *given)
+    if key in known and not loads:
+        return known[key]
+    names = expanded(family, given, poses=True)
+    mechanism = extended(family, names, curves_of(family, loads))
+    wanted = tuple(pose_wants(mechanism, names))
+    units = {name: mechanism.pose_output[name].unit for name in wanted}
+    found = Question(mechanism, wanted, {mechanism.domain.name: mechanism.domain.unit} | units)
+    if not loads:
+        known[key] = found
+    return found
 
 
 def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> pd.DataFrame:
@@ -126,7 +151,7 @@ def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> 
     return pd.concat([inputs, result], axis=1)
 
 
-def _values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
+def values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
     """Return the argument phi= as a plain array."""
     grid = numbers(phi, "phi", "phi, position")
     if grid.ndim > 1:
@@ -155,14 +180,14 @@ def _grid(mechanism: Family, table: Table, phi: ArrayLike) -> NDArray[np.float64
     if variable in map(str, table):
         allowed = f"either phi= for every design, or a column {variable}, not both"
         raise InputError(variable, "a column", allowed, f"table of {mechanism.name}")
-    grid = _values_of_the_variable(phi)
-    check_march(mechanism, grid)
+    grid = values_of_the_variable(phi)
+    check_march(mechanism.domain, grid)
     return grid
 
 
-def check_march(mechanism: Family, grid: NDArray[np.float64]) -> None:
+def check_march(domain: Domain, grid: NDArray[np.float64]) -> None:
     """Refuse crank angles that are no march over one turn."""
-    if not isinstance(mechanism.domain, March):
+    if not isinstance(domain, March):
         return
     steps = np.arange(grid.size) * (TWO_PI / grid.size)
     off = np.abs(grid - steps) > 1e-12 * TWO_PI

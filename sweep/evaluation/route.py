@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from numbers import Real
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -65,7 +65,10 @@ def own_route(family: Family, step: Step, stage: Stage | None, outputs: tuple[st
     name = f"stage {stage.number}: {step.name}" if stage else step.name
     owner = stage.family if stage else family
     place = [own.name for own in steps_of(owner)].index(step.name)
-    run, cost = partial(_run_step, family, step, stage, outputs), step_ns(owner, step, accuracy)
+    run, cost = (
+        partial(_run_step, owner, step, stage, _own_outputs(owner, step, stage, outputs)),
+        step_ns(owner, step, accuracy),
+    )
     return Route(name, outputs, cost, run, order=(step.work, place), columns=stage.columns.stop if stage else None)
 
 
@@ -91,34 +94,49 @@ def _run_general(
             return limits_and_reductions(family, designs, outputs, accuracy, window)
 
 
+class _Own(NamedTuple):
+    """An output of a step: its name outside, in the stage, and the pose output whose precise maximum may replace it."""
+
+    name: str
+    plain: str
+    pose: str
+
+
+def _own_outputs(family: Family, step: Step, stage: Stage | None, outputs: Sequence[str]) -> tuple[_Own, ...]:
+    plain = [at_stage(name, str(stage.number)) if stage else name for name in outputs]
+    return tuple(_Own(name, own, _sharpened(family, step, own)) for name, own in zip(outputs, plain, strict=True))
+
+
+def _sharpened(family: Family, step: Step, name: str) -> str:
+    """Name the pose output of a located maximum, which the family's precise poses can make more accurate; "" if none.
+
+    The poses of an effect come from the same solution of the whole turn: they are wrong alike.
+    """
+    if family.precise_poses is None or step.work is Work.EFFECT:
+        return ""
+    place = f"{family.domain.name}_{name}"
+    if not any(o.name == place for o in step.provides):
+        return ""
+    asked = find(family, name)
+    return asked.of if isinstance(asked, Reduced) and asked.reduction.modes == (0,) else ""
+
+
 def _run_step(
-    family: Family, step: Step, stage: Stage | None, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy,
+    family: Family, step: Step, stage: Stage | None, outputs: tuple[_Own, ...], designs: Array, accuracy: Accuracy,
     window: Part,
 ) -> Columns:  # fmt: skip
-    own = {name: at_stage(name, str(stage.number)) if stage else name for name in outputs}
-    part, mechanism = (stage.designs(designs), stage.family) if stage else (designs, family)
-    found = step.run(part, frozenset(own.values()), accuracy)
+    part = stage.designs(designs) if stage else designs
+    found = step.run(part, frozenset(own.plain for own in outputs), accuracy)
     if accuracy.target is not None:
-        for plain in own.values():
-            # A step that serves a target promises it; one that estimates its error says so itself.
-            found.setdefault(error_of(plain), accuracy.target * np.abs(np.asarray(found[plain], np.float64)))
-            # The poses of an effect come from the same solution of the whole turn: they are wrong alike.
-            if not accuracy.certify and step.work is not Work.EFFECT:
-                _sharpen(mechanism, step, part, plain, found, accuracy.target)
-    return {"status": found["status"]} | {
-        key: found[own_key]
-        for name, plain in own.items()
-        for key, own_key in ((name, plain), (error_of(name), error_of(plain)))
-        if own_key in found
-    }
-
-
-def _sharpen(family: Family, step: Step, designs: Array, name: str, columns: Columns, target: float) -> None:
-    """Take a step's maxima that rounding left less accurate than was asked from the family's precise poses."""
-    if family.precise_poses is None:
-        return
-    place = f"{family.domain.name}_{name}"
-    located = any(o.name == place for o in step.provides)
-    asked = find(family, name)
-    if located and isinstance(asked, Reduced) and asked.reduction.modes == (0,):
-        sharpen_maxima(family, step, designs, asked.of, name, columns, target)
+        for _, plain, pose in outputs:
+            if error_of(plain) not in found:  # a step that serves a target promises it, or says its error itself
+                found[error_of(plain)] = accuracy.target * np.abs(np.asarray(found[plain], np.float64))
+            # Rounding may have left a maximum less accurate than was asked.
+            if pose and not accuracy.certify:
+                sharpen_maxima(family, step, part, pose, plain, found, accuracy.target)
+    columns: Columns = {"status": found["status"]}
+    for name, plain, _ in outputs:
+        columns[name] = found[plain]
+        if error_of(plain) in found:
+            columns[error_of(name)] = found[error_of(plain)]
+    return columns

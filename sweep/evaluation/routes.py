@@ -82,25 +82,24 @@ def design_outputs(
     if accuracy.samples is not None and kinds and "margin" not in kinds and margin_suffixes(family):
         # Refinement meets a dead point between samples, a plain grid does not.
         status = margin_group(family, designs, (), accuracy)["status"].astype(np.uint8)
-    for route in ways:
-        assert route.run is not None
-        # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
-        alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None is all of them
-        of_these = designs if alive is None or alive.size == n else designs[alive]
-        with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+    with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+        for route in ways:
+            assert route.run is not None
+            # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
+            alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None is all of them
+            of_these = designs if alive is None or alive.size == n else designs[alive]
             found = route.run(of_these, accuracy, window)
-        for name in route.outputs:
-            for key in (name, error_of(name)) if accuracy.target is not None else (name,):
-                columns[key] = _spread(found[key], alive, n)
-        now = found["status"].astype(np.uint8)
-        if alive is None:
-            status = now
-        else:
-            status[alive] = np.where(status[alive] == st.OK, now, status[alive])
-    if isinstance(family.domain, Interval):
-        status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
-    chosen = {name: columns[name] for name in dict.fromkeys(with_errors(wanted, accuracy))}
-    return explained(chosen | {"status": status}, dict.fromkeys(wanted))
+            for name in with_errors(route.outputs, accuracy):
+                columns[name] = _spread(found[name], alive, n)
+            now = found["status"].astype(np.uint8)
+            if alive is None:
+                status = now
+            else:
+                status[alive] = np.where(status[alive] == st.OK, now, status[alive])
+        if isinstance(family.domain, Interval):
+            status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
+        chosen = {name: columns[name] for name in with_errors(wanted, accuracy)}
+        return explained(chosen | {"status": status}, dict.fromkeys(wanted))
 
 
 def _spread(values: NDArray[np.generic], rows: Index | None, n: int) -> NDArray[np.generic]:
@@ -114,7 +113,7 @@ def _spread(values: NDArray[np.generic], rows: Index | None, n: int) -> NDArray[
 
 def with_errors(wanted: Sequence[str], accuracy: Accuracy) -> list[str]:
     """List the wanted names, and behind them those of their errors where a target is set."""
-    return [*wanted, *(error_of(name) for name in wanted if accuracy.target is not None)]
+    return [*wanted, *map(error_of, wanted)] if accuracy.target is not None else list(wanted)
 
 
 def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:

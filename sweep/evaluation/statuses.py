@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
+from functools import reduce
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.status import INVALID_INPUT, MEANING, OK
 from sweep.families.base import Columns
@@ -30,9 +33,10 @@ def explained(columns: Columns, names: Iterable[str]) -> Columns:
     """
     status = np.array(columns["status"], np.uint8)
     changed: Columns = {}
+    names = [name for name in names if columns[name].dtype.kind == "f"]
+    if _all_finite([columns[name] for name in names]):
+        return columns | {"status": status}
     for name in names:
-        if columns[name].dtype.kind != "f":
-            continue
         missing = ~np.isfinite(columns[name])
         if not missing.any():
             continue
@@ -41,3 +45,13 @@ def explained(columns: Columns, names: Iterable[str]) -> Columns:
             if key in columns and not (np.isnan(columns[key]) | ~missing).all():
                 changed[key] = np.where(missing, np.nan, columns[key])
     return columns | changed | {"status": status}
+
+
+def _all_finite(values: Sequence[NDArray[np.generic]]) -> bool:
+    """Tell whether equally shaped columns surely hold finite values alone.
+
+    A value that is missing stays so in a sum; a sum that overflows is no more than a reason to look closer.
+    """
+    if not values:
+        return True
+    return math.isfinite(np.add.reduce(reduce(np.add, values), axis=None))

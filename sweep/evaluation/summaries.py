@@ -13,13 +13,14 @@ from sweep.effects.wanted import expanded
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians
 from sweep.evaluation.loads import Loads, curves_of
+from sweep.evaluation.poses import Question, questions
 from sweep.evaluation.route import Route
 from sweep.evaluation.routes import design_outputs, routes, with_errors
 from sweep.evaluation.statuses import meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Accuracy
+from sweep.families.base import Accuracy, Family
 from sweep.families.domain import Domain, March
 from sweep.families.names import error_of
 from sweep.quantities.resolve import output, output_names
@@ -107,10 +108,8 @@ def summarise(
     import pandas as pd
 
     bare = find_family(family)
-    wanted = expanded(bare, wanted_names(want, f"design outputs of {bare.name}"))
-    mechanism = extended(bare, wanted, curves_of(bare, loads))
-    wanted = [name for name in wanted if name != "status"]
-    chosen = _accuracy(mechanism.domain, samples, accuracy, certify)
+    mechanism, wanted, units = asked_of_designs(bare, want, loads)
+    chosen = chosen_accuracy(mechanism.domain, samples, accuracy, certify)
     if certify:
         check_certifiable(mechanism, wanted, chosen, window is not None)
     given = table
@@ -121,13 +120,28 @@ def summarise(
     if status_text:
         made["status_text"] = np.array(meanings(columns["status"]), dtype=object)
     index = given.index if isinstance(given, pd.DataFrame) else None
-    found = pd.DataFrame(kept_columns(given, keep, made, len(matrix)) | made, index=index)
-    units = {name: output(mechanism, name).unit for name in wanted}
-    found.attrs["units"] = units | {error_of(name): unit for name, unit in units.items() if error_of(name) in made}
+    kept = kept_columns(given, keep, made, len(matrix))
+    found = pd.DataFrame(kept | made, index=index, copy=bool(kept))  # nobody else has the arrays made here
+    found.attrs["units"] = {**units, **{error_of(name): unit for name, unit in units.items() if error_of(name) in made}}
     return found
 
 
-def _accuracy(
+def asked_of_designs(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
+    """Make the question for design outputs of a family."""
+    given = wanted_names(want, f"design outputs of {family.name}")
+    known, key = questions(family), ("designs", *given)
+    if key in known and not loads:
+        return known[key]
+    names = expanded(family, given)
+    mechanism = extended(family, names, curves_of(family, loads))
+    wanted = tuple(name for name in names if name != "status")
+    found = Question(mechanism, wanted, {name: output(mechanism, name).unit for name in wanted})
+    if not loads:
+        known[key] = found
+    return found
+
+
+def chosen_accuracy(
     domain: Domain, samples: int | None, accuracy: float | None, certify: bool | Sequence[str] = False
 ) -> Accuracy:
     if isinstance(domain, March) and samples is None and accuracy is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 
 FORMS = "a DataFrame of pandas, or a dict of columns; most other tables become one by .to_pandas()"
+FEW = 64  # rows of a table that is looked at as a whole: to take its columns out one by one takes longer than poses
 
 
 class Parametrised(Protocol):
@@ -49,16 +51,17 @@ def design_matrix(
     """
     known = [*family.parameter_names, *extra]
     keys = _column_names(table)
-    names = list(keys)
-    for name in names:
-        missing = [k for k in known if k not in names]
-        if name not in known and name not in unused and nearest(name, missing):
-            raise InputError("column", name, f"the columns {', '.join(known)}{nearest(name, missing)}", "table")
-    rows = _row_count(table, {n: keys[n] for n in names if n in known})
+    for name in keys:
+        if name not in known and name not in unused:
+            guess = nearest(name, [k for k in known if k not in keys])
+            if guess:
+                raise InputError("column", name, f"the columns {', '.join(known)}{guess}", "table")
+    columns = {name: numbers(table[key], name, f"column {name}, row") for name, key in keys.items() if name in known}
+    rows = _row_count(columns)
     matrix = np.empty((rows, len(family.parameters)))
     for k, parameter in enumerate(family.parameters):
-        matrix[:, k] = _parameter_column(family, parameter, table, keys, rows)
-    extras = {name: np.broadcast_to(_column(table, keys, name), rows) for name in extra if name in names}
+        matrix[:, k] = _checked_column(family, parameter, columns, keys)
+    extras = {name: np.broadcast_to(columns[name], rows) for name in extra if name in columns}
     for name, values in extras.items():
         _refuse(~np.isfinite(values), values, name, "a finite number")
     return matrix, extras
@@ -76,6 +79,8 @@ def plain_columns(table: Table) -> Table:
     if not isinstance(table, pd.DataFrame) or not table.columns.is_unique:
         return table
     columns: dict[Any, Any] = {}
+    if len(table) <= FEW and (whole := table.to_numpy()).dtype.kind in "fiu":
+        return dict(zip(table.columns, whole.T, strict=True))
     for name, values in table.items():
         plain = isinstance(values.dtype, np.dtype) and values.dtype.kind in "fiu"
         columns[name] = values.to_numpy() if plain else values
@@ -148,23 +153,31 @@ def _column_names(table: Table) -> dict[str, Any]:
     """Return names of the columns, each once, and the keys under which the table has them."""
     _check_kind(table)
     names = [str(key) for key in table]
-    for name in names:
+    for name in names if len(set(names)) < len(names) else ():
         if names.count(name) > 1:
             raise InputError("column", name, f"each name once; it stands {names.count(name)} times", "table")
     return dict(zip(names, table, strict=True))
 
 
-def _parameter_column(family: Parametrised, p: Parameter, table: Table, keys: dict[str, Any], rows: int) -> Array:
-    if p.name not in keys:
+def _checked_column(
+    family: Parametrised, p: Parameter, columns: Mapping[str, Array], keys: Iterable[str]
+) -> Array | float:
+    """Return the column of a parameter, one number where it is that for all rows, or its default."""
+    if p.name not in columns:
         if p.default is not None:
-            return np.full(rows, p.default)
+            return p.default
         guess = nearest(p.name, [n for n in keys if n not in family.parameter_names])
         present = ", ".join(keys) or "none"
         raise MissingInput(p.name, f"a column with the {p.text}; found {present}{guess}", f"table of {family.name}")
-    values = np.broadcast_to(_column(table, keys, p.name), rows)
+    values = columns[p.name]
     # Least and largest tell in two passes whether anything is to be refused: nan makes both of them nan.
-    least, largest = (values.min(), values.max()) if rows else (1.0, 1.0)
-    if not np.isfinite(least) or not np.isfinite(largest):
+    if not values.ndim:
+        least = largest = float(values)
+    elif values.size:
+        least, largest = np.minimum.reduce(values), np.maximum.reduce(values)
+    else:
+        return values
+    if not math.isfinite(least) or not math.isfinite(largest):
         _refuse(~np.isfinite(values), values, p.name, "a finite number")
     if p.sign and (p.not_zero or p.wrong_sign(least)):
         _refuse(p.wrong_sign(values), values, p.name, f"a {p.sign} {p.unit}")
@@ -173,14 +186,13 @@ def _parameter_column(family: Parametrised, p: Parameter, table: Table, keys: di
     return values
 
 
-def _row_count(table: Table, keys: dict[str, Any]) -> int:
+def _row_count(columns: Mapping[str, Array]) -> int:
     lengths: dict[str, int] = {}
-    for name, key in keys.items():
-        shape = numbers(table[key], name, f"column {name}, row").shape
-        if len(shape) > 1:
-            raise InputError(name, f"shape {shape}", "a plain column or one number", f"column {name}")
-        if shape:
-            lengths[name] = shape[0]
+    for name, values in columns.items():
+        if values.ndim > 1:
+            raise InputError(name, f"shape {values.shape}", "a plain column or one number", f"column {name}")
+        if values.ndim:
+            lengths[name] = len(values)
     if not lengths:
         return 1
     first, rows = next(iter(lengths.items()))
@@ -188,10 +200,6 @@ def _row_count(table: Table, keys: dict[str, Any]) -> int:
         if length != rows:
             raise InputError(name, f"{length} rows", f"as many rows as column {first}, {rows}", f"column {name}")
     return rows
-
-
-def _column(table: Table, keys: dict[str, Any], name: str) -> Array:
-    return numbers(table[keys[name]], name, f"column {name}, row")
 
 
 def numbers(values: object, name: str, place: str) -> Array:
@@ -242,11 +250,12 @@ def _is_number(value: Any) -> bool:
     return True
 
 
-def _refuse(bad: np.ndarray[Any, np.dtype[np.bool_]], values: Array, name: str, allowed: str) -> None:
-    if bad.any():
+def _refuse(bad: Any, values: Array, name: str, allowed: str) -> None:
+    if np.any(bad):
         row = int(np.argmax(bad))
-        gap = "; an empty cell is read as nan" if np.isnan(values[row]) else ""
-        raise InputError(name, float(values[row]), allowed + gap, f"column {name}, row {row}")
+        value = float(values.flat[row])
+        gap = "; an empty cell is read as nan" if math.isnan(value) else ""
+        raise InputError(name, value, allowed + gap, f"column {name}, row {row}")
 
 
 def parameter_units(parameters: Iterable[Parameter]) -> dict[str, str]:

@@ -15,7 +15,9 @@ from sweep.evaluation.tables import design_matrix
 from sweep.exchange.scene import pose, shown_name
 from sweep.families import Mechanism
 from sweep.families import family as find_family
+from sweep.families.base import Family
 from sweep.families.domain import Interval, Turn, equal_steps
+from sweep.families.machines import Machine
 
 if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
@@ -32,6 +34,15 @@ def write_hardpoints(mechanism: Mechanism, design: Table, path: Path, phi: float
                 rows.writerow([*head, shown_name(joint), *map(repr, at[0].tolist()), unit])
             for joint, axis in part.axes.items():
                 rows.writerow([*head, f"axis_{shown_name(joint)}", *map(repr, axis.tolist()), "1"])
+
+
+def _per_angle(family: Family, name: str) -> str:
+    """Return what a derivative by the shaft's angle has behind the unit of its output: /rad^2 of the second one."""
+    if family.domain.unit != "rad":
+        return ""  # a derivative by anything else has its unit
+    found = family.split(name) if isinstance(family, Machine) else None
+    order = len(family.orders(name) if found is None else found[0].family.orders(found[1]))
+    return "" if order == 0 else "/rad" if order == 1 else f"/rad^{order}"
 
 
 def write_law(
@@ -55,7 +66,7 @@ def write_law(
         angles, text = equal_steps(domain, matrix, poses), domain.text
     found = evaluate(mechanism, design, names, phi=angles, angles="rad")
     units = {o.name: o.unit for o in family.pose_outputs} | {domain.name: domain.unit}
-    units = {name: of.replace("length", unit) for name, of in units.items()}
+    units = {name: of.replace("length", unit) + _per_angle(family, name) for name, of in units.items()}
     texts = {o.name: o.text for o in family.pose_outputs} | {domain.name: text}
     columns = {domain.name: angles}
     if speed is not None and not isinstance(domain, Interval):

@@ -139,6 +139,8 @@ def sharpen_maxima(
     place = f"{family.domain.name}_{name}"
     value, err = (np.asarray(columns[key], np.float64) for key in (name, f"err_{name}"))
     wanting = np.flatnonzero(err > target * np.abs(value))
+    if not wanting.size:
+        return
     # The larger its error the nearer the singularity, as a rule, and the more poses a block of such designs takes.
     wanting = wanting[np.argsort(err[wanting] / np.abs(value[wanting]), kind="stable")]
     for rows in blocks(wanting, POSES):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.curves import samples as scan
-from sweep.families.base import Angles, Array, Columns, Family, PoseFunction
+from sweep.families.base import Angles, Array, Columns, Family, PoseFunction, of_family
 from sweep.families.capabilities import Assembly
 from sweep.families.domain import Interval
 
@@ -80,6 +80,7 @@ def _evaluate(family: Family, designs: Array, angles: Angles, names: Sequence[st
     return {name: cast(Array, columns[name]) for name in names}, cast(Status, columns["status"])
 
 
+@of_family
 def on_closed_turn(family: Family) -> Family:
     """Return the family with poses over a closed turn; the family itself unless its domain is an interval."""
     domain = family.domain

@@ -118,7 +118,8 @@ def histogram(data: Dataset, output: str) -> Histogram | None:
     design = np.array([float(row[name]) for name in study.family.parameter_names])
     designs = deviating(study.family, design, study.tolerance, study.optimise.seed, SAMPLES)
     values = design_outputs(study.family, designs, [output], study.accuracy, study.window)[output]
-    limit = next((x for x in study.output_limits if x.output == output), Limit(output, None, None))
+    limits = [x for x in study.output_limits if x.output == output]
+    limit = limits[-1] if limits else Limit(output, None, None)  # of two the band around what [locus] prescribes
     return _histogram(data, limit, compared(output, np.asarray(values, np.float64)))
 
 

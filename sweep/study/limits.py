@@ -48,13 +48,13 @@ def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]
     """Read the limits in internal units: those of prescribed outputs, then those of the table in its order."""
     raw, faults = file.free_table("limits") or {}, file.faults
     found = list(prescribed_limits(prescribed))
+    held = {limit.output: limit for limit in found}
     for name, entry in raw.items():
-        if name in prescribed:
-            faults.value(("limits", name), entry, "nothing here: [locus] prescribes it")
         key: Key = ("limits", name)
         output = _parameter(family, name) or read_output_name(family, name, key, faults)
         if output is None:
             continue
+        before = len(found)
         if is_flag(name):
             if entry is not True:
                 faults.value(key, entry, "true")
@@ -67,7 +67,18 @@ def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]
             found += _read_bounds(output, entry, key, faults)
         else:
             faults.value(key, entry, _form(output))
+        counts = "tolerance" in file and all(_around(held.get(name), band) for band in found[before:])
+        if name in prescribed and not counts:
+            allowed = "nothing here: [locus] prescribes it; with [tolerance] a band around that, as"
+            faults.value(key, entry, f"{allowed} {_band(units.internal_unit(output.unit))}")
     return tuple(found)
+
+
+def _around(held: Limit | None, band: Limit) -> bool:
+    """Tell whether a limit leaves room on both sides of what the locus holds."""
+    ends = (band.minimum, *((held.minimum, held.maximum) if held else ()), band.maximum)
+    known = [x for x in ends if x is not None]
+    return len(known) == 4 and known == sorted(known) and known[0] < known[1] and known[2] < known[3]
 
 
 def _parameter(family: Family, name: str) -> Output | None:

@@ -184,6 +184,12 @@ class Study:
         return tuple(limit for limit in self.output_limits if limit.output not in self.prescribed)
 
     @property
+    def bands(self) -> tuple[Limit, ...]:
+        """The limits around what [locus] prescribes: a design holds its value exactly, what is made of it scatters."""
+        own = [limit for limit in self.output_limits if limit.output in self.prescribed]
+        return tuple(x for k, x in enumerate(own) if x.output in [other.output for other in own[:k]])
+
+    @property
     def made(self) -> tuple[str, ...]:
         """Parameters that [locus] or [fit] sets."""
         links = () if self.locus is None else self.locus.made

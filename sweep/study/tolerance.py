@@ -41,7 +41,8 @@ def check_tolerance(tolerance: Tolerance | None, family: Family, limits: tuple[L
     for key, unit, size in (("lengths", "length", tolerance.lengths), ("angles", "angle", tolerance.angles)):
         if size > 0.0 and not any(p.unit == unit and p.choices is None for p in family.parameters):
             faults.value(("tolerance", key), size, f"nothing: {family.name} has no {key} that could deviate")
-    equal = [x.output for x in limits if x.minimum is not None and x.minimum == x.maximum]
+    roomy = [x.output for x in limits if x.minimum != x.maximum]
+    equal = [x.output for x in limits if x.minimum is not None and x.minimum == x.maximum and x.output not in roomy]
     if tolerance.robust is not None and equal:
         words = 'limits with room, as swing = "40 +- 0.2 deg": no mechanism that is made keeps an equation'
         faults.value(("tolerance", "robust"), ", ".join(equal), words)

@@ -57,6 +57,19 @@ def test_first_study_of_every_family_is_sound_and_runs(family, tmp_path):
     assert len(rows) >= 1 and rows[study.objective.output].notna().all()
 
 
+@pytest.mark.parametrize("family", [*NAMES, *CHAINS])
+def test_first_study_has_sizes_of_a_machine(family, tmp_path):
+    """The tolerance that the file proposes, 0.02 mm, is a small part of every length that is swept."""
+    study = load_study(written(tmp_path, family))
+    lengths = {p.name for p in study.bare.parameters if p.unit == "length"}
+    sizes = [abs(x) for name, x in study.space.fixed.items() if name in lengths]
+    swept = [axis for axis in study.space.axes if axis.name in lengths]
+    in_si = any(p.unit in ("force", "mass") for p in study.bare.parameters)
+    if lengths and not in_si:  # those with forces are of a size that their forces ask for
+        assert max([*sizes, *(axis.high for axis in swept)]) >= 20.0
+        assert all(min(abs(axis.low), abs(axis.high)) > 50 * 0.02 for axis in swept)
+
+
 @pytest.mark.parametrize("members", [
     ("needle=rssr+guide", "looper=rssr"),
     ("cam=cam", "bar=slider_crank"),

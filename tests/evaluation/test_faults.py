@@ -59,7 +59,7 @@ def test_columns_of_unequal_length() -> None:
 
 @pytest.mark.parametrize("table", [None, [1, 2], np.zeros((2, 7)), FRAME["a"], "designs.csv", [ROCKER, ROCKER]])
 def test_tables(table: Any) -> None:
-    refused("allowed: a DataFrame, or a dict of columns", sweep.summarise, "rssr", table, "swing")
+    refused("allowed: a DataFrame of pandas, or a dict of columns", sweep.summarise, "rssr", table, "swing")
 
 
 def test_a_column_that_stands_twice() -> None:

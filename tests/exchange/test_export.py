@@ -303,7 +303,8 @@ def test_files_of_other_programs_are_refused_as_points(tmp_path):
 def test_law_has_units_in_its_headings_and_its_metadata(tmp_path):
     design = scaled("slider_crank")
     table = pd.read_csv(sweep.export("slider_crank", design, tmp_path / "law.csv", "law", poses=72, speed=10.0))
-    assert list(table.columns[:4]) == ["phi [rad]", "t [s]", "s [mm]", "ds [mm]"]
+    assert list(table.columns[:4]) == ["phi [rad]", "t [s]", "s [mm]", "ds [mm/rad]"]
+    assert {"d2s [mm/rad^2]", "d3s [mm/rad^3]", "pressure_angle [rad]"} <= set(table.columns)
     poses = sweep.evaluate("slider_crank", design, ["s", "d2s"], phi=table["phi [rad]"].to_list())
     np.testing.assert_allclose(table["s [mm]"], poses["s"], rtol=1e-15)
     np.testing.assert_allclose(table["t [s]"], table["phi [rad]"] / 10.0, rtol=1e-15)

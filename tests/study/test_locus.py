@@ -26,6 +26,8 @@ from sweep.optimise.starts.posing import problem_of
 from sweep.study import Study, load_study
 from sweep.study.study import Limit
 
+PHI0 = 'phi0 = { from = 160, to = 170, count = 3, unit = "deg" }'
+
 ROCKER = """
 [study]
 name = "rocker"
@@ -200,7 +202,8 @@ def test_best_transmission_crank_rocker_comes_out(tmp_path, swing, phi0):
         (("values = [45, -60]", "from = -45, to = 45, count = 3"), "allowed: an angle below one turn, or its negative"),
         (('phi0 = "165 deg"\n', ""), "locus.phi0 is missing; needed: crank angle from the extended"),
         (("g = ", 'a = "10 mm"\ng = '), "design.a = '10 mm'; allowed: nothing here: it follows from [locus]"),
-        (("[limits]", '[limits]\nswing = { max = 50, unit = "deg" }'), "allowed: nothing here: [locus] prescribes it"),
+        (("[limits]", '[limits]\nswing = { max = 50, unit = "deg" }'), "[locus] prescribes it; with [tolerance]"),
+        (("[limits]", '[limits]\nswing = "40 +- 60 deg"'), "[locus] prescribes it; with [tolerance]"),
         (('"rssr"', '"geared_dwell"'), "allowed: a mechanism that is or begins with rssr or rssp"),
     ],
 )  # fmt: skip
@@ -208,3 +211,35 @@ def test_faults_of_locus_are_told(tmp_path, change, message):
     with pytest.raises(StudyError) as caught:
         study_of(tmp_path, ROCKER.replace(*change))
     assert message in str(caught.value)
+
+
+def test_a_band_around_what_is_prescribed_counts_in_what_is_made(tmp_path):
+    """The swing of a design on the locus is exact; of what is made of it some has another one."""
+    made = BEST_TRANSMISSION.replace("count = 181", "count = 19") + '[tolerance]\nlengths = "0.3 mm"\n'
+    exact = study_of(tmp_path, made)
+    assert exact.bands == ()
+    shares = {}
+    for band in (None, "0.1", "1", "60"):
+        text = made if band is None else made.replace("[optimise]", f'[limits]\nswing = "45 +- {band} deg"\n[optimise]')
+        study = study_of(tmp_path, text)
+        shares[band] = pd.read_parquet(
+            beside(run(study, out=tmp_path / f"band{band}" / "designs", jobs=1)) / "_optimum.parquet"
+        )
+    yields = {band: frame["yield"].iloc[0] for band, frame in shares.items()}
+    assert yields[None] == 1.0  # nothing is limited that could be missed
+    assert 0.02 < yields["0.1"] < yields["1"] <= yields["60"] == 1.0
+    values = [frame["max_pressure_angle"].iloc[0] for frame in shares.values()]
+    np.testing.assert_allclose(values, values[0], rtol=1e-9)  # the optimum itself is the same
+    assert study.bands == study.limits[-1:] and study.tested_limits == ()
+
+
+@pytest.mark.parametrize(
+    ("band", "refused"), [("46 +- 0.5 deg", True), ("45.5 +- 0.6 deg", False), ("<= 46 deg", True)]
+)
+def test_a_band_has_room_on_both_sides(band, refused, tmp_path):
+    text = BEST_TRANSMISSION + f'[tolerance]\nlengths = "0.3 mm"\nrobust = "90 %"\n[limits]\nswing = "{band}"\n'
+    if not refused:
+        assert [x.output for x in study_of(tmp_path, text.replace('phi0 = "165 deg"', PHI0)).bands] == ["swing"]
+        return
+    with pytest.raises(StudyError, match=r"limits\.swing = .*; allowed: nothing here: \[locus\] prescribes it; with"):
+        study_of(tmp_path, text)

@@ -63,7 +63,7 @@ def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Pr
     names = tuple(name for name in varied if name not in held)
     own = [name for name in (*study.family.parameter_names, *given) if name not in follows]
     fixed = {name: abs(x) if name in given else x for name, x in study.space.fixed.items() if name in own}
-    limits = [limit for limit in study.output_limits if limit.output not in given]
+    limits = [limit for limit in study.output_limits if limit.output not in given or limit in study.bands]
     limits += [limit for limit in study.parameter_limits if limit.output in (*follows, *chosen)]
     if not names:
         allowed = "a parameter that changes steadily beside the listed ones; the sweep has tried them all"

@@ -1,0 +1,229 @@
+"""``mechanism``: one design, checked and bound once, so that a number of it costs little more than its kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property, lru_cache
+from typing import Any, TypeAlias, TypeGuard
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kernels.types import TWO_PI, Array
+from sweep.effects import all_inputs
+from sweep.errors import InputError, MissingInput, nearest
+from sweep.evaluation.angles import TURNING, grid_in_radians, is_plausible
+from sweep.evaluation.poses import asked_of_poses, check_march, values_of_the_variable
+from sweep.evaluation.routes import design_outputs
+from sweep.evaluation.statuses import explained
+from sweep.evaluation.summaries import asked_of_designs, chosen_accuracy
+from sweep.families import Mechanism
+from sweep.families import family as find_family
+from sweep.families.base import Angles, Family, Parameter, of_family
+from sweep.families.domain import Domain, Turn
+from sweep.families.names import stem
+from sweep.quantities.units import LARGEST, UnitFault, factor, internal_unit, split
+
+Number: TypeAlias = "float | str"
+"""A dimension [mm, rad, t, s and what follows from them], or a text with its unit, as "12 mm"."""
+
+KEPT = 2**14  # crank angles of a grid whose cosines and sines are kept for the next call
+
+
+class BoundDesign:
+    """One design of a mechanism, as `mechanism` binds it; nothing of it changes.
+
+    Parameters
+    ----------
+    family : of the design
+    dimensions : its parameters, and inputs of effects, by name, in internal units
+    """
+
+    def __init__(self, family: Family, dimensions: Mapping[str, float]) -> None:
+        self.family = family
+        self.dimensions = dict(dimensions)
+        self._rows: dict[tuple[str, ...], Array] = {}
+        self._row(family)
+
+    def __repr__(self) -> str:
+        given = "".join(f", {name}={value!r}" for name, value in self.dimensions.items())
+        return f"mechanism({self.family.name}{given})"
+
+    def __call__(self, phi: ArrayLike) -> dict[str, Any]:
+        """Give every pose output at crank angles; see `poses`."""
+        return self.poses(phi, self.family.pose_names)
+
+    def poses(self, phi: ArrayLike, want: str | Sequence[str]) -> dict[str, Any]:
+        """Give pose outputs at crank angles, bit for bit those of `sweep.evaluate`.
+
+        Parameters
+        ----------
+        phi : crank angle [rad], or a plain list of them; a family over an interval takes its own variable
+        want : names of pose outputs or effects, in a list or in one text between commas
+
+        Returns
+        -------
+        dict
+            an array like ``phi`` for each wanted name and ``status``; of one angle a number each.  ``pd.DataFrame``
+            takes it as it is
+        """
+        asked = asked_of_poses(self._precise, want)
+        angles, is_one = _angles(self.family.domain, phi)
+        with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+            found = explained(
+                asked.family.poses(self._row(asked.family), angles, frozenset(asked.wanted)), asked.wanted
+            )
+        if is_one:
+            return {name: found[name].item() for name in (*asked.wanted, "status")}
+        return {name: found[name][0] for name in (*asked.wanted, "status")}
+
+    def outputs(
+        self,
+        want: str | Sequence[str],
+        *,
+        samples: int | None = None,
+        accuracy: float | None = None,
+        window: tuple[float, float] | None = None,
+    ) -> dict[str, Any]:
+        """Give design outputs, bit for bit those of `sweep.summarise`, whose arguments these are.
+
+        Returns
+        -------
+        dict
+            a number for each wanted name, with ``accuracy`` its ``err_<name>``, and ``status``
+        """
+        asked = asked_of_designs(self.family, want)
+        chosen = chosen_accuracy(self.family.domain, samples, accuracy)
+        found = design_outputs(asked.family, self._row(asked.family), asked.wanted, chosen, window)
+        return {name: values.item() for name, values in found.items()}
+
+    def with_(self, **dimensions: Number) -> BoundDesign:
+        """Bind the same mechanism with some dimensions changed."""
+        return BoundDesign(self.family, self.dimensions | _in_internal_units(self.family, dimensions))
+
+    @cached_property
+    def _precise(self) -> Family:
+        return self.family.precise()
+
+    def _row(self, family: Family) -> Array:
+        """Give the design matrix of one row of the family, which effects may have extended by inputs."""
+        row = self._rows.get(family.parameter_names)
+        if row is None:
+            given = [self.dimensions.get(p.name, p.default) for p in family.parameters]
+            for p, value in zip(family.parameters, given, strict=True):
+                if value is None:
+                    present = ", ".join(self.dimensions) or "nothing"
+                    raise MissingInput(p.name, f"the {p.text}; given {present}", _place(self.family))
+            row = self._rows[family.parameter_names] = np.array([given], np.float64)
+        return row
+
+
+def mechanism(family: Mechanism, **dimensions: Number) -> BoundDesign:
+    """Bind one design of a mechanism, to ask it for numbers at once.
+
+    Parameters
+    ----------
+    family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
+    dimensions : parameters, and inputs of effects that will be asked for: numbers in mm and rad (t, s, N), or texts
+        with a unit.  Those of a machine have dots: ``**{"needle.a1": 10.0}``
+
+    Returns
+    -------
+    BoundDesign
+        ``m(phi)`` gives all pose outputs, ``m.poses(phi, names)`` some, ``m.outputs(names)`` design outputs,
+        ``m.with_(a=12)`` another design
+
+    Raises
+    ------
+    InputError
+        for a name that the mechanism does not have, a dimension that is missing, or a bad value.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> m = sweep.mechanism("rssr", a="12 mm", b=40, c=25, e=35, f=5, g=-3, alpha="60 deg")
+    >>> {name: round(value, 4) for name, value in m.poses(0.5, "psi, d2psi").items()}
+    {'psi': -1.6003, 'd2psi': -0.1961, 'status': 0}
+    >>> m.poses([0.0, 0.5], ["dpsi"])["dpsi"].round(4)
+    array([-0.2124, -0.4886])
+    >>> found = m.with_(a=10).outputs(["margin", "max_abs_d2psi"])
+    >>> round(found["max_abs_d2psi"], 4), found["status"]
+    (0.6276, 0)
+    """
+    bare = find_family(family)
+    return BoundDesign(bare, _in_internal_units(bare, dimensions))
+
+
+def _place(family: Family) -> str:
+    return f"mechanism {family.name}"
+
+
+def _in_internal_units(family: Family, dimensions: Mapping[str, Number]) -> dict[str, float]:
+    """Read dimensions as `mechanism` takes them."""
+    known = _known(family)
+    for name in dimensions:
+        if name not in known:
+            allowed = f"{', '.join(family.parameter_names)}{nearest(name, known)}"
+            raise InputError("dimension", name, allowed, _place(family))
+    return {name: _value(name, known[name], given, _place(family)) for name, given in dimensions.items()}
+
+
+def _is_number(given: object) -> TypeGuard[float]:
+    """Tell whether it is a finite number, of Python or numpy."""
+    if isinstance(given, bool) or not isinstance(given, int | float | np.integer | np.floating):
+        return False
+    number: Any = given
+    return bool(abs(number) <= LARGEST)
+
+
+@of_family
+def _known(family: Family) -> Mapping[str, Parameter]:
+    """Collect all that may be given: parameters, and inputs of effects."""
+    return dict(all_inputs(family)) | {p.name: p for p in family.parameters}
+
+
+def _value(name: str, p: Parameter, given: object, place: str) -> float:
+    """Read one dimension, and check it as a table's column is checked."""
+    internal = internal_unit(p.unit)
+    if isinstance(given, str):
+        try:
+            number, unit = split(given, internal)
+            value = number * factor(unit, internal)
+        except UnitFault as fault:
+            raise InputError(name, given, str(fault), place) from None
+    elif _is_number(given):
+        value = float(given)
+        if p.unit == "angle" and not is_plausible(abs(value), stem(name) in TURNING):
+            allowed = f'an angle in rad, which this does not look like; for degrees a text, as "{value:g} deg"'
+            raise InputError(name, given, allowed, place)
+    else:
+        allowed = (
+            "a finite number" if internal == "1" else f'a finite number in {internal}, or a text such as "1 {internal}"'
+        )
+        raise InputError(name, given, allowed, place)
+    if p.sign and p.wrong_sign(value):
+        raise InputError(name, given, f"a {p.sign} {p.unit}", place)
+    if p.choices is not None and value not in p.choices:
+        raise InputError(name, given, p.choice, place)
+    return value
+
+
+def _angles(domain: Domain, phi: ArrayLike) -> tuple[Angles, bool]:
+    """Check crank angles and tabulate them, a grid of the usual size only once; tell whether it is one angle."""
+    if isinstance(phi, float) and isinstance(domain, Turn) and abs(phi) <= TWO_PI:
+        return Angles.of(np.array([[phi]])), True
+    grid = np.asarray(phi)
+    if grid.dtype == np.float64 and grid.ndim == 1 and grid.size <= KEPT:
+        return _tabulated(domain, grid.tobytes()), False
+    return _checked(domain, phi), grid.ndim == 0
+
+
+def _checked(domain: Domain, phi: ArrayLike) -> Angles:
+    grid = values_of_the_variable(grid_in_radians(domain.name, domain.unit, phi, None))
+    check_march(domain, grid)
+    return Angles.of(grid[None, :])
+
+
+@lru_cache(maxsize=32)
+def _tabulated(domain: Domain, grid: bytes) -> Angles:
+    return _checked(domain, np.frombuffer(grid, np.float64).copy())
