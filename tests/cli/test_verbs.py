@@ -235,9 +235,9 @@ def test_run_passes_its_options_on(study: Path, monkeypatch: pytest.MonkeyPatch)
         given.update(options, positional=arguments)
         return Path("somewhere")
 
-    monkeypatch.setattr("sweep.cli.run.run_study", run)
+    monkeypatch.setattr("sweep.engine.run.run", run)
     ended = Ending(("the answer",), 0)
-    monkeypatch.setattr("sweep.cli.run.ending", lambda folder: ended)
+    monkeypatch.setattr("sweep.report.terminal.ending", lambda folder: ended)
     options = ("--jobs", 3, "--backend", "loky", "--accuracy", 1e-5, "--smoke", "--force", "--out", "x")
     assert call("run", study, *options).output == "the answer\ndataset: somewhere\n"
     assert given["positional"] == (study, Path("x"), 3, "loky")
@@ -248,7 +248,7 @@ def test_interrupt_ends_with_130(study: Path, monkeypatch: pytest.MonkeyPatch) -
     def run(*_: object, **__: object) -> Path:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sweep.cli.run.run_study", run)
+    monkeypatch.setattr("sweep.engine.run.run", run)
     assert call("run", study).exit_code == 130
 
 

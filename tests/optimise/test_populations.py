@@ -15,7 +15,7 @@ from sweep.optimise.multistart.multistart import explore
 from sweep.optimise.starts import global_starts, populations
 from sweep.optimise.starts.batched_sqp import BatchedSqp
 from sweep.optimise.starts.dataset import drawn, kinds
-from sweep.optimise.starts.global_starts import from_populations
+from sweep.optimise.starts.global_starts import from_populations, searched
 from sweep.optimise.starts.linear import Elimination, elimination
 from sweep.optimise.starts.populations import Bred, Size, bred
 from sweep.optimise.starts.pose_rows import UNKNOWNS, PoseRows
@@ -25,6 +25,7 @@ from tests.support.needle208_record import record
 EXPECTED = json.loads((Path(__file__).parents[2] / "studies" / "needle208" / "expected.json").read_text())["record"]
 RECORD = EXPECTED["outputs"]["max_abs_d2s"]
 SIGNS = [{"branch1": 1.0, "branch2": x, "kappa2": 1.0} for x in (1.0, -1.0)]
+FIRST = np.zeros(400, np.intp)  # all of the first kind
 SEEN = 2e-4  # parabolas through 64 poses see the peaks of acceleration to this part of them
 
 
@@ -37,7 +38,7 @@ def eliminated(least: float | None = None) -> Elimination:
 
 @pytest.fixture(scope="module")
 def rows() -> PoseRows:
-    return PoseRows(eliminated(), SIGNS[0])
+    return PoseRows(eliminated(), SIGNS)
 
 
 def place_of_record(rows: PoseRows) -> np.ndarray:
@@ -51,15 +52,15 @@ def place_of_record(rows: PoseRows) -> np.ndarray:
 
 
 def test_record_is_worth_its_acceleration_and_its_rows_hold(rows: PoseRows) -> None:
-    place = place_of_record(rows)
+    ratios = rows.own.placed(place_of_record(rows), FIRST[:1])
     # The first linear program knows the peaks at the poses only, the others those between them.
-    x = rows.unknowns(place)
+    x = rows.linear.unknowns(ratios)
     for _ in range(4):
-        x = rows.solved(place, x)
+        x = rows.solved(ratios, x)
     # The record keeps its limits to the last digit, and what 64 poses see beyond them is priced.
-    assert rows.worth(place, x)[0] == pytest.approx(RECORD, rel=3.0 * SEEN)
+    assert rows.worth(ratios, x)[0] == pytest.approx(RECORD, rel=3.0 * SEEN)
     names = rows.family.parameter_names
-    design = rows.designs(place, x)[0]
+    design = rows.linear.finished(ratios, x)[0]
     for name in ("a2", "xi2", "eta2", "h2"):  # a line the other way round is the same line
         assert abs(design[names.index(name)]) == pytest.approx(abs(EXPECTED["design"][name]), rel=5e-3)
 
@@ -67,15 +68,16 @@ def test_record_is_worth_its_acceleration_and_its_rows_hold(rows: PoseRows) -> N
 def test_gradients_by_places_and_unknowns_are_those_of_differences(rows: PoseRows) -> None:
     rng = np.random.default_rng(1)
     place = np.clip(place_of_record(rows) + 0.003 * rng.standard_normal((3, len(rows.own.columns))), 0.01, 0.99)
-    x = rows.unknowns(place)
-    found, n = rows.rows(place, x), place.shape[1]
+    ratios = rows.own.placed(place, FIRST[:3])
+    x = rows.linear.unknowns(ratios)
+    found, n = rows.rows(ratios, x), place.shape[1]
     assert found.slopes.shape == (3, found.values.shape[1], n + UNKNOWNS)
-    np.testing.assert_allclose(found.values, rows.values(place, x), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found.values, rows.values(ratios, x), rtol=1e-12, atol=1e-12)
     varied = np.concatenate([place, x], axis=1)
     for k in range(n + UNKNOWNS):
         step = np.zeros(n + UNKNOWNS)
         step[k] = 1e-6 if k < n else 1e-5
-        up, down = (rows.values(v[:, :n], v[:, n:]) for v in (varied + step, varied - step))
+        up, down = (rows.values(rows.own.placed(v[:, :n], FIRST[:3]), v[:, n:]) for v in (varied + step, varied - step))
         slopes = (up - down) / (2.0 * step[k])
         # Differences are good to the square of the step and to rounding over it.
         np.testing.assert_allclose(found.slopes[:, :, k], slopes, rtol=1e-5, atol=2e-6 * np.abs(slopes).max() + 1e-9)
@@ -84,7 +86,7 @@ def test_gradients_by_places_and_unknowns_are_those_of_differences(rows: PoseRow
 def test_descents_from_around_the_record_end_at_it(rows: PoseRows) -> None:
     rng = np.random.default_rng(4)
     begin = place_of_record(rows)[0] + 0.004 * rng.standard_normal((8, len(rows.own.columns)))
-    many = BatchedSqp(rows, np.clip(begin, 0.0, 1.0))
+    many = BatchedSqp(rows, np.clip(begin, 0.0, 1.0), FIRST[:8])
     before = many.worth.copy()
     many.advance(40)
     reached = many.worth[np.isfinite(before)]
@@ -97,7 +99,7 @@ def test_descents_from_around_the_record_end_at_it(rows: PoseRows) -> None:
 def test_descents_beside_change_nothing_and_descents_can_be_given_up(rows: PoseRows) -> None:
     rng = np.random.default_rng(4)
     begin = np.clip(place_of_record(rows)[0] + 0.004 * rng.standard_normal((4, len(rows.own.columns))), 0.0, 1.0)
-    together, alone = BatchedSqp(rows, begin), BatchedSqp(rows, begin[2:3])
+    together, alone = BatchedSqp(rows, begin, FIRST[:4]), BatchedSqp(rows, begin[2:3], FIRST[:1])
     together.advance(3)
     together.keep(np.array([2, 0]))
     together.advance(4)
@@ -109,10 +111,11 @@ def test_descents_beside_change_nothing_and_descents_can_be_given_up(rows: PoseR
 def test_linear_unknowns_and_worth_are_looked_for_where_something_turns_only(rows: PoseRows) -> None:
     places = np.random.default_rng(3).random((400, len(rows.own.columns)))
     places[:20] = np.clip(place_of_record(rows) + 0.002 * np.random.default_rng(4).standard_normal((20, 11)), 0.0, 1.0)
-    x, worth = rows.begun(places)
-    known = np.isfinite(rows.unknowns(places)).all(axis=1)
+    x, worth = rows.begun(places, FIRST)
+    ratios = rows.own.placed(places, FIRST)
+    known = np.isfinite(rows.linear.unknowns(ratios)).all(axis=1)
     assert 5 < known.sum() < 200 and np.isinf(worth[~known]).all()
-    np.testing.assert_array_equal(worth[known], rows.worth(places[known], x[known]))
+    np.testing.assert_array_equal(worth[known], rows.worth(ratios[known], x[known]))
 
 
 def end(worth: float, swing: float, place: np.ndarray, kind: int = 0) -> populations._End:
@@ -137,19 +140,18 @@ def test_every_class_of_swings_has_parents_however_good_the_others_are() -> None
 
 def test_children_are_the_best_of_many_tries(rows: PoseRows, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(6)
-    record_place = rows.with_middle(place_of_record(rows))[0]
+    record_place = rows.with_middle(place_of_record(rows), FIRST[:1])[0]
     parents = [end(10.3, 0.83, record_place), end(10.9, 0.8, np.clip(record_place + 0.02 * rng.random(11), 0.0, 1.0))]
     worth = {}
     monkeypatch.setattr(populations, "DRIVERS", 1)
     for tries in (1, 64):
         monkeypatch.setattr(populations, "TRIES", tries)
         monkeypatch.setattr(populations, "STRANGERS", 4 * tries)
-        places = populations._children(rows, parents, parents, np.random.default_rng(7), 24)
-        assert places.shape == (24, 11) and (places >= 0.0).all() and (places <= 1.0).all()
-        worth[tries] = rows.begun(rows.without_middle(places))[1]
+        places, kinds = populations._children(rows, parents, np.random.default_rng(7), 24)
+        assert places.shape == (24, 11) and not kinds.any() and (places >= 0.0).all() and (places <= 1.0).all()
+        worth[tries] = populations._tried(rows, places, kinds)
     # Of one try most do not turn; of 64 nearly all children do, and their middle is far better.
     assert np.isfinite(worth[64]).mean() > 0.9 and np.median(worth[64]) < 0.5 * np.median(worth[1])
-    assert not len(populations._children(rows, [], parents, rng, 24))
 
 
 SMALL = Size(sampled=1 << 13, first=12, later=6, generations=1, heat=4, steps=8)
@@ -212,10 +214,15 @@ def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest
     study = record(8.0, starts=4, populations=2, seed=3, looks=100)
     assert study.optimise is not None
     known = drawn(study, 1, 3)
-    begun = from_populations(study, study.optimise, problem_of(study, known), known[:0], np.empty(0), lambda: False, 1)
-    found = bred(eliminated(8.0), kinds(study, begun.problem, known[:0]), 2, 3, size=SMALL)
+    problem = problem_of(study, known)
+    begun = from_populations(study, study.optimise, problem, known[:0], np.empty(0), lambda: False, 1)
+    linear = elimination(problem)
+    assert linear is not None
+    found = bred(linear, kinds(study, begun.problem, known[:0]), 2, 3, size=SMALL)
     assert begun.origins is not None and begun.origins[:2] == (0, 1) and len(begun.starts) == 4
-    np.testing.assert_array_equal(begun.starts[:2], [one.designs[0] for one in found])
+    ends = [one.designs[0] for one in found]
+    settled = [searched(study, problem, end[None, :], study.optimise, lambda: False, 1)[0].design for end in ends]
+    np.testing.assert_array_equal(begun.starts[:2], settled)
     worth = {one.designs[k].tobytes(): one.worth[k] for one in found for k in range(len(one.worth))}
     values = sorted(worth[start.tobytes()] for start in begun.starts[2:])
     assert all(high > low * 1.001 for low, high in itertools.pairwise(values))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from sweep.families.base import Array
 from sweep.optimise.local.least_squares import BEND, FLAT
 from sweep.optimise.starts.linear import POSES
 from sweep.optimise.starts.pose_rows import LOCKED, UNKNOWNS, PoseRows
+from sweep.optimise.starts.proportions import Index
 
 RADIUS, LARGEST, LEAST = 0.1, 0.3, 1e-6  # of the first box about a place, of any, of one that has come to rest
 SPENT = 1e-6  # gain promised, as a share of the objective, at which a descent has come to rest
@@ -64,18 +66,33 @@ class _Trial(NamedTuple):
     values: Array
 
 
+@dataclass
+class _Step:
+    """A step of a descent on its way: what it promises, the best design so far, and how often it may be corrected."""
+
+    program: _Program
+    step: Array
+    weights: Array
+    promised: float
+    best: _Trial | None = None
+    corrections: int = CORRECTIONS
+
+
 class BatchedSqp:
     """Descents from many places; ``worth`` (k,) is what each has reached, ``looks`` counts designs with gradients.
+
+    They advance together, whatever each of them does at the moment, so that their designs are looked at in one call.
 
     Parameters
     ----------
     rows : the problem
     places : (k, n) where they begin, between 0 and 1
+    kinds : (k,) the signs of each
     """
 
-    def __init__(self, rows: PoseRows, places: Array) -> None:
-        self.rows, self.places = rows, places.copy()
-        self.x, self.worth = rows.begun(self.places)
+    def __init__(self, rows: PoseRows, places: Array, kinds: Index) -> None:
+        self.rows, self.places, self.kinds = rows, places.copy(), kinds
+        self.x, self.worth = rows.begun(self.places, kinds)
         k, n = places.shape
         self.radius: Array = np.where(self.worth < LOCKED, RADIUS, 0.0)
         self.rested: Array = np.full(k, np.inf)
@@ -88,7 +105,7 @@ class BatchedSqp:
 
     def keep(self, numbers: NDArray[np.intp]) -> None:
         """Go on with some of the descents only."""
-        for name in ("places", "x", "worth", "radius", "rested", "curvature"):
+        for name in ("places", "kinds", "x", "worth", "radius", "rested", "curvature"):
             setattr(self, name, getattr(self, name)[numbers])
         self.memory = [self.memory[k] for k in numbers]
         self.known = [self.known[k] for k in numbers]
@@ -96,19 +113,23 @@ class BatchedSqp:
 
     def advance(self, steps: int, stop: Callable[[], bool] = lambda: False) -> None:
         """So many steps of all descents that have not come to rest."""
-        for _ in range(steps):
-            moving = np.flatnonzero(self.radius > LEAST)
-            if not len(moving) or stop():
-                return
-            self._look([int(k) for k in moving])
-            self._step([int(k) for k in moving if self.radius[k] > LEAST])
+        left = np.where(self.radius > LEAST, steps, 0)
+        under: dict[int, _Step] = {}
+        while left.any() and not stop():
+            moving = np.flatnonzero(left).tolist()
+            self._look([k for k in moving if self.known[k] is None])
+            under |= {k: self._begun(k) for k in moving if k not in under and self.radius[k] > LEAST}
+            for k, trial in self._tried({k: step.step for k, step in under.items()}).items():
+                if not self._corrected(k, under[k], trial):
+                    self._taken(k, under.pop(k))
+                    left[k] -= 1
+            left[self.radius <= LEAST] = 0
 
-    def _look(self, own: list[int]) -> None:
+    def _look(self, new: list[int]) -> None:
         """Rows and gradients where a descent has moved, and what its curvature learns from them."""
-        new = [k for k in own if self.known[k] is None]
         if not new:
             return
-        found = self.rows.rows(self.places[new], self.x[new])
+        found = self.rows.rows(self._ratios(new, self.places[new]), self.x[new])
         self.looks += len(new)
         for j, k in enumerate(new):
             if not np.isfinite(found.slopes[j]).all():
@@ -126,58 +147,56 @@ class BatchedSqp:
                 self.memory[k] = None
             self.programs[k] = None
 
+    def _ratios(self, own: list[int], places: Array) -> Array:
+        return self.rows.own.placed(places, self.kinds[own])
+
     def _varied(self, k: int) -> Array:
         return np.concatenate([self.places[k], self.x[k]])
 
-    def _step(self, own: list[int]) -> None:
-        """One step of some descents, corrected where its rows bend away; kept where it gains."""
-        programs, steps, weights, promised = {}, {}, {}, {}
-        for k in own:
-            programs[k] = self._prepared(k)
-            steps[k], weights[k], promised[k] = self._solved(k, programs[k], self._here(k).values)
-        best: dict[int, _Trial] = {}
-        left = own
-        for _ in range(1 + CORRECTIONS):
-            left = [k for k, trial in zip(left, self._tried(left, steps), strict=True) if self._better(k, trial, best)]
-            left = [k for k in left if self.worth[k] - best[k].worth < GOOD * promised[k] and best[k].worth < LOCKED]
-            if not left:
-                break
-            for k in left:
-                here, trial = self._here(k), best[k]
-                moved = np.concatenate([trial.place, trial.x]) - here.varied
-                steps[k] = self._solved(k, programs[k], trial.values - here.slopes @ moved)[0]
-        for k in own:
-            self._taken(k, best.get(k), promised[k], weights[k])
+    def _begun(self, k: int) -> _Step:
+        """Begin a step of a descent where it stands."""
+        program = self._prepared(k)
+        return _Step(program, *self._solved(k, program, self._here(k).values))
+
+    def _corrected(self, k: int, under: _Step, trial: _Trial) -> bool:
+        """Look at the design that a step leads to; whether its rows bend away and the step is to be tried anew."""
+        if under.best is not None and not trial.worth < under.best.worth:
+            return False
+        under.best = trial
+        enough = not self.worth[k] - trial.worth < GOOD * under.promised
+        if enough or not trial.worth < LOCKED or not under.corrections:
+            return False
+        here = self._here(k)
+        moved = np.concatenate([trial.place, trial.x]) - here.varied
+        under.step = self._solved(k, under.program, trial.values - here.slopes @ moved)[0]
+        under.corrections -= 1
+        return True
 
     def _here(self, k: int) -> _Known:
         here = self.known[k]
         assert here is not None
         return here
 
-    def _tried(self, own: list[int], steps: dict[int, Array]) -> list[_Trial]:
+    def _tried(self, steps: dict[int, Array]) -> dict[int, _Trial]:
         """Designs that steps lead to, with their own linear unknowns or the best ones of their proportions."""
-        if not own:
-            return []
-        n = self.places.shape[1]
-        places = np.array([np.clip(self.places[k] + steps[k][:n], 0.0, 1.0) for k in own])
-        x = np.array([self.x[k] + steps[k][n:] for k in own])
-        solved = self.rows.solved(places, x)
-        both = [self.rows.values(places, u) for u in (solved, x)]
+        if not steps:
+            return {}
+        own, n = list(steps), self.places.shape[1]
+        step = np.array(list(steps.values()))
+        places = np.clip(self.places[own] + step[:, :n], 0.0, 1.0)
+        ratios, x = self._ratios(own, places), self.x[own] + step[:, n:]
+        solved = self.rows.solved(ratios, x)
+        both = [self.rows.values(ratios, u) for u in (solved, x)]
         worth = [self.rows.judged(values) for values in both]
-        return [
-            _Trial(float(worth[w][j]), places[j], (solved, x)[w][j], both[w][j])
-            for j in range(len(own))
-            for w in [0 if worth[0][j] <= worth[1][j] else 1]
-        ]
+        found = {}
+        for j, k in enumerate(own):
+            w = 0 if worth[0][j] <= worth[1][j] else 1
+            found[k] = _Trial(float(worth[w][j]), places[j], (solved, x)[w][j], both[w][j])
+        return found
 
-    def _better(self, k: int, trial: _Trial, best: dict[int, _Trial]) -> bool:
-        if k in best and not trial.worth < best[k].worth:
-            return False
-        best[k] = trial
-        return True
-
-    def _taken(self, k: int, trial: _Trial | None, promised: float, weights: Array) -> None:
+    def _taken(self, k: int, under: _Step) -> None:
         """Go to a design that gains; the box grows or shrinks with what has become of the promise."""
+        trial, promised, weights = under.best, under.promised, under.weights
         if trial is None:
             self.radius[k] = 0.0
             return
@@ -237,7 +256,7 @@ class BatchedSqp:
         rows[:OBJECTIVE] += here.t / unit
         step, there, weights = np.empty(len(program.centre)), np.empty(len(rows)), np.empty(len(rows))
         nearest_of_many(
-            rows, program.linear, program.back, program.centre, program.low, program.high, self.rows.turns.rows,
+            rows, program.linear, program.back, program.centre, program.low, program.high, self.rows.turns,
             NEAR, MISSED, JOINED, EXACT, step, there, weights,
         )  # fmt: skip
         missed = -float((there[OBJECTIVE:] - step[-1]).min())

@@ -142,18 +142,22 @@ class _Group:
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[Array, Array]:
         """Return designs (k, P) and their merits, the best first."""
-        own = Proportions(self.linear, self.signs[number % len(self.signs)])
+        own = Proportions(self.linear, [self.signs[number % len(self.signs)]])
+
+        def worth_of(places: Array) -> Array:
+            return merit(self.linear, own.designs(places, np.zeros(len(places), np.intp)))[1]
+
         place = sobol(len(own.columns), self.seed + number).random(SAMPLED)
-        worth = np.concatenate([own.merit(block) for block in np.split(place, max(1, SAMPLED // BLOCK))])
+        worth = np.concatenate([worth_of(block) for block in np.split(place, max(1, SAMPLED // BLOCK))])
         order = np.argsort(worth, kind="stable")
         order = order[worth[order] < STUCK]
         if not len(order):
-            return np.empty((0, len(own.base))), np.empty(0)
+            return np.empty((0, own.bases.shape[1])), np.empty(0)
         begin = place[order][spread(place[order], np.zeros(len(order), np.intp), STRATEGIES)]
         rng = np.random.default_rng(self.seed + number)
-        place, worth = evolved(own.merit, begin, RADIUS, GENERATIONS, rng, should_stop, HEATS)
+        place, worth = evolved(worth_of, begin, RADIUS, GENERATIONS, rng, should_stop, HEATS)
         order = np.argsort(worth, kind="stable")
-        designs, worth = merit(self.linear, own.designs(place[order]))
+        designs, worth = merit(self.linear, own.designs(place[order], np.zeros(len(order), np.intp)))
         known = np.isfinite(designs).all(axis=1) & (worth < STUCK)
         return turned_into(self.linear.problem, designs[known]), worth[known]
 

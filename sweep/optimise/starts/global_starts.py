@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import zip_longest
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -73,20 +74,23 @@ def from_populations(
     count = settings.starts
     own = diverse(problem, known, merit, count // SWEPT, ALIKE) if len(merit) else known[:0]
     signs = kinds(study, problem, own)
-    ends: list[float] = []
+    results: list[Result | None] = []  # from the best end of each population; none where it has no end
 
     def enough(found: list[Bred]) -> int | None:
         """How many populations tell enough, by where their best ends lead: poses take one valley for several."""
-        new = [(one.designs[0] if len(one.designs) else None) for one in found[len(ends) :]]
-        designs = [design for design in new if design is not None]
-        results = iter(searched(study, problem, np.array(designs), settings, stop, jobs) if designs else [])
-        for design in new:
-            result = None if design is None else next(results, None)
-            ends.append(result.objective if result is not None and result.feasible else math.inf)
-        return among(ends, wanted(settings, True))
+        new = found[len(results) :]
+        designs = [one.designs[0] for one in new if len(one.designs)]
+        made = iter(searched(study, problem, np.array(designs), settings, stop, jobs) if designs else [])
+        results.extend(next(made, None) if len(one.designs) else None for one in new)
+        return among([_value(result) for result in results], wanted(settings, True))
 
     populations = bred(linear, signs, settings.populations, settings.seed, stop, jobs, say, enough)
-    first = [(k, found.designs[0]) for k, found in enumerate(populations) if len(found.designs)]
+    # Where the local search has ended it is at home: it goes on from there, not from the population's end again.
+    first = [
+        (k, found.designs[0] if result is None else result.design)
+        for k, (found, result) in enumerate(zip_longest(populations, results[: len(populations)]))
+        if len(found.designs)
+    ]
     met = [float(found.worth[0]) for found in populations if len(found.worth)]
     others = sorted(
         (float(worth), k, row)
@@ -106,6 +110,10 @@ def from_populations(
         raise InputError("design space", study.space.count, allowed, str(study.path))
     origins = tuple([k for k, _ in first] + [-1] * len(own))
     return Begun(holding(study, problem, found), starts, origins)
+
+
+def _value(result: Result | None) -> float:
+    return result.objective if result is not None and result.feasible else math.inf
 
 
 def searched(

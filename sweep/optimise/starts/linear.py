@@ -159,8 +159,8 @@ class Elimination:
         out = designs.copy()
         for name in self.guide.links:
             out[:, self.column(name)] *= scale
-        # numpy's arctan2 and complex products depend on the processor, the C library's arctan2 does not
-        lam = np.array([math.atan2(-y, x) for x, y in x[:, :2]])
+        # numpy's arctan2 depends on the processor, that of the C library does not
+        lam = np.array([math.atan2(-y, x) for x, y in x[:, :2].tolist()])
         out[:, along] = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * grown
         out[:, aside] = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * grown
         out[:, offset], out[:, line] = x[:, 4], self.turned(lam)

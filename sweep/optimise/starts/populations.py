@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,8 +24,8 @@ from sweep.optimise.samples import sobol
 from sweep.optimise.starts.batched_sqp import BatchedSqp
 from sweep.optimise.starts.candidates import spread
 from sweep.optimise.starts.linear import Elimination
-from sweep.optimise.starts.pose_rows import PoseRows
-from sweep.optimise.starts.proportions import STUCK, turned_into
+from sweep.optimise.starts.pose_rows import LOCKED, PoseRows
+from sweep.optimise.starts.proportions import Index, turned_into
 
 BLOCK = 1 << 13  # proportions that are looked at together
 PARENTS = 40  # best ends, no two of them alike, from which a generation is made: as many of all signs
@@ -84,71 +84,80 @@ class Population:
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Bred:
         """Return the ends of the population of that number."""
-        rows = [PoseRows(self.linear, choice) for choice in self.signs]
+        rows = PoseRows(self.linear, self.signs)
         rng = np.random.default_rng((self.seed, number))
         ends: list[_End] = []
         looks = 0
         for generation in range(1 + self.size.generations):
             if should_stop():
                 break
-            parents = _parents(ends, -(-PARENTS // len(rows)), ~rows[0].driving)
+            parents = _parents(ends, -(-PARENTS // len(self.signs)), ~rows.driving)
             if generation and not parents:
                 break
-            classes = _Classes.between(np.array([p.swing for p in parents]))
-            for kind, own in enumerate(rows):
-                if generation == 0:
-                    places, classes = _sampled(own, rng, self.size, len(rows))
-                else:
-                    places = _children(
-                        own, [p for p in parents if p.kind == kind], parents, rng, -(-self.size.later // len(rows))
-                    )
-                found, spent = _descended(own, kind, places, classes, self.size, should_stop)
-                ends, looks = ends + found, looks + spent
-        best = _parents(ends, PARENTS, ~rows[0].driving)[:PARENTS]
+            if generation == 0:
+                places, kinds, classes = _sampled(rows, rng, self.size)
+            else:
+                places, kinds = _children(rows, parents, rng, -(-self.size.later // len(self.signs)))
+                classes = _Classes.between(np.array([p.swing for p in parents]))
+            found, spent = _descended(rows, places, kinds, classes, self.size, should_stop)
+            ends, looks = ends + found, looks + spent
+        best = _parents(ends, PARENTS, ~rows.driving)[:PARENTS]
         names = self.linear.problem.family.parameter_names
         designs = np.array([end.design for end in best]).reshape(-1, len(names))
         return Bred(turned_into(self.linear.problem, designs), np.array([end.worth for end in best]), looks)
 
 
-def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, kinds: int) -> tuple[Array, _Classes]:
-    """Places of a Sobol sample that turn, the best of every class of swings that are not alike; and these classes."""
-    place = sobol(len(rows.own.columns), rng).random(size.sampled)
-    worth = np.concatenate([rows.own.merit(block) for block in np.split(place, max(1, size.sampled // BLOCK))])
+def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size) -> tuple[Array, Index, _Classes]:
+    """Places of a Sobol sample of each kind that turn, the best of every class of swings that are not alike."""
+    number = len(rows.own.bases)
+    place = np.concatenate([sobol(len(rows.own.columns), rng).random(size.sampled) for _ in range(number)])
+    kinds = np.repeat(np.arange(number), size.sampled)
+    worth = np.concatenate([_tried(rows, *some) for some in _blocks(place, kinds)])
     order = np.argsort(worth, kind="stable")
-    order = order[worth[order] < STUCK]
-    place, found = place[order], list[int]()
-    swings = rows.own.swings(rows.own.placed(place))
+    order = order[worth[order] < LOCKED]
+    place, kinds = place[order], kinds[order]
+    swings = rows.own.swings(rows.own.placed(place, kinds))
     classes = _Classes.between(swings[: len(swings) // 4])
-    number = classes.of(swings)
-    for k in range(CLASSES):
-        own = np.flatnonzero(number == k)
-        found += own[spread(place[own], number[own], -(-size.first // (kinds * CLASSES)))].tolist()
-    return np.asarray(place[sorted(found)], np.float64), classes
+    numbers, found = kinds * CLASSES + classes.of(swings), list[int]()
+    for k in range(number * CLASSES):
+        own = np.flatnonzero(numbers == k)
+        found += own[spread(place[own], kinds[own], -(-size.first // (number * CLASSES)))].tolist()
+    chosen = sorted(found)
+    return place[chosen], kinds[chosen], classes
 
 
-def _children(
-    rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int
-) -> Array:
-    """Places of children: the best of many tries for each, by what they are worth before any descent.
+def _blocks(place: Array, kinds: Index) -> Iterator[tuple[Array, Index]]:
+    for first in range(0, len(place), BLOCK):
+        yield place[first : first + BLOCK], kinds[first : first + BLOCK]
+
+
+def _tried(rows: PoseRows, places: Array, kinds: Index) -> Array:
+    """Return what places with the middle of the guide's input angles are worth (k,) before any descent."""
+    return rows.begun(rows.without_middle(places, kinds), kinds)[1]
+
+
+def _children(rows: PoseRows, parents: Sequence[_End], rng: np.random.Generator, count: int) -> tuple[Array, Index]:
+    """Places and kinds of children, so many of each kind: the best of many tries for each.
 
     Most of them are stage 1 of one parent and the guide of another, slightly varied, a sixth is stage 1 of a parent
     with a guide at random, a sixth the guide of a parent with a stage 1 at random.
     """
-    if not own:
-        return np.empty((0, len(rows.own.columns)))
-    few = count // 6
-    drivers = np.array([p.place for p in parents])[rng.integers(0, len(parents), few)]
-    guides = np.array([p.place for p in own])[rng.integers(0, len(own), few)]
-    found = [_mixed(rows, own, parents, rng, count - 2 * few)]
-    for kept, part in ((drivers, ~rows.driving), (guides, rows.driving)):
-        places = np.repeat(kept[:, None], STRANGERS, axis=1)
-        places[:, :, part] = rng.random((few, STRANGERS, int(part.sum())))
-        found.append(_best(rows, places))
-    return np.concatenate(found)
+    few, places, kinds = count // 6, list[Array](), list[int]()
+    for kind in sorted({p.kind for p in parents}):
+        own = [p for p in parents if p.kind == kind]
+        drivers = np.array([p.place for p in parents])[rng.integers(0, len(parents), few)]
+        guides = np.array([p.place for p in own])[rng.integers(0, len(own), few)]
+        places.append(_best(rows, _mixed(rows, own, parents, rng, count - 2 * few), kind))
+        for kept, part in ((drivers, ~rows.driving), (guides, rows.driving)):
+            tries = np.repeat(kept[:, None], STRANGERS, axis=1)
+            tries[:, :, part] = rng.random((few, STRANGERS, int(part.sum())))
+            places.append(_best(rows, tries, kind))
+        kinds += [kind] * count
+    return np.concatenate(places), np.array(kinds, np.intp)
 
 
 def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int) -> Array:
-    """Places with stage 1 of one parent and the guide of another, slightly varied.
+    """Put stage 1 of one parent and the guide of another together, slightly varied, many tries of each child.
 
     Offsets whose bounds lie on both sides of zero alike change their side in every second try: a crank-rocker and
     its mirror image move alike.
@@ -164,36 +173,36 @@ def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np
     numbers = np.array([next(k for k, p in enumerate(parents) if p is end) for end in own])
     same = driver == numbers[guide][:, None]
     spread_by = np.where(same, MUTATIONS[-1], np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)][:, None])
-    return _best(rows, places + spread_by[:, :, None] * rng.standard_normal(places.shape))
+    return places + spread_by[:, :, None] * rng.standard_normal(places.shape)
 
 
-def _best(rows: PoseRows, tries: Array) -> Array:
+def _best(rows: PoseRows, tries: Array, kind: int) -> Array:
     """Return the best try of each child: places (count, n) of (count, tries, n)."""
     places = rows.wrapped(tries.reshape(-1, tries.shape[2]))
-    worth = rows.begun(rows.without_middle(places))[1].reshape(tries.shape[:2])
+    worth = _tried(rows, places, np.full(len(places), kind)).reshape(tries.shape[:2])
     return np.asarray(places.reshape(tries.shape)[np.arange(len(tries)), np.argmin(worth, axis=1)], np.float64)
 
 
 def _descended(
-    rows: PoseRows, kind: int, places: Array, classes: _Classes, size: Size, stop: Callable[[], bool]
+    rows: PoseRows, places: Array, kinds: Index, classes: _Classes, size: Size, stop: Callable[[], bool]
 ) -> tuple[list[_End], int]:
     """Where descents from some places end, the worse half given up after a heat; and how many looks that took.
 
-    Each class of swings has its own worse half.
+    Each class of swings of each kind has its own worse half.
     """
-    if not len(places):
-        return [], 0
-    many = BatchedSqp(rows, rows.without_middle(places))
+    many = BatchedSqp(rows, rows.without_middle(places, kinds), kinds)
     many.advance(size.heat, stop)
-    own = classes.of(rows.own.swings(rows.own.placed(many.places)))
+    own = kinds * CLASSES + classes.of(rows.own.swings(rows.own.placed(many.places, kinds)))
     order = np.argsort(many.worth, kind="stable")
-    better = [some[: -(-len(some) // 2)] for some in (order[own[order] == number] for number in range(CLASSES))]
+    better = [some[: -(-len(some) // 2)] for some in (order[own[order] == number] for number in np.unique(own))]
     many.keep(np.sort(np.concatenate(better)))
     many.advance(size.steps - size.heat, stop)
-    designs, there = rows.designs(many.places, many.x), rows.with_middle(many.places)
-    swings = rows.own.swings(designs)
-    known = np.flatnonzero(many.worth < STUCK)
-    return [_End(float(many.worth[k]), kind, there[k], designs[k], float(swings[k])) for k in known], many.looks
+    there = rows.with_middle(many.places, many.kinds)
+    ratios = rows.own.placed(many.places, many.kinds)
+    designs, swings = rows.linear.finished(ratios, many.x), rows.own.swings(ratios)
+    known = np.flatnonzero(many.worth < LOCKED).tolist()
+    ends = [_End(float(many.worth[k]), int(many.kinds[k]), there[k], designs[k], float(swings[k])) for k in known]
+    return ends, many.looks
 
 
 class _Classes(NamedTuple):
@@ -212,9 +221,7 @@ class _Classes(NamedTuple):
         """Return the class (k,) of each swing."""
         if not self.low < self.high:
             return np.zeros(len(swings), np.intp)
-        # numpy's logarithm depends on the processor, that of the C library does not
-        place = np.array([math.log(max(x, SMALLEST) / self.low) for x in swings.tolist()])
-        place *= CLASSES / math.log(self.high / self.low)
+        place = np.log(np.maximum(swings, SMALLEST) / self.low) * (CLASSES / math.log(self.high / self.low))
         return np.asarray(np.clip(place, 0.0, CLASSES - 1.0), np.intp)
 
 

@@ -7,20 +7,19 @@ no pose output tells are left to that search, so that dozens of designs are look
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kernels import status as st
+from kernels.curves.sampled_rows import EVERY, HIGHEST, LOWEST, RANGE, sampled_rows
 from kernels.linear.minimax import minimax
 from sweep.families.base import Angles, Array
 from sweep.families.capabilities import Assembly
 from sweep.optimise.extrema.points import STEP
 from sweep.optimise.starts.linear import POSES, TURN, Elimination
-from sweep.optimise.starts.parabolas import End, Turns
-from sweep.optimise.starts.proportions import Proportions
+from sweep.optimise.starts.proportions import Index, Proportions
 from sweep.quantities.measures import ROTATABLE_MARGIN, Measure, measure
 
 UNKNOWNS = 5  # the linear part: point, line and scale
@@ -28,6 +27,7 @@ UNIT = 4.0 / math.pi**2  # of the objective, in strokes: no motion there and bac
 PRICE = 6.0  # of a limit missed by its own size, in such units
 DEVIATION = 1.0 / 30.0  # the same for the deviation, as a share: a straightness twice as coarse gains little
 LOCKED = 1e6  # what a design is worth that does not turn
+TOGETHER = 16  # designs whose gradients are computed in one go: their poses stay in the cache
 COMPLEX_TURN = Angles.of(TURN[None, :].astype(np.complex128))
 REAL_TURN = Angles.of(TURN[None, :])
 
@@ -43,100 +43,117 @@ class Rows(NamedTuple):
     t: Array
 
 
-@dataclass(frozen=True)
-class _Curve:
-    """``sign * output <= bound`` in units of ``size``: at every pose, where the output ends, or for its whole range.
-
-    ``at`` is "every", "highest", "lowest" or "range".
-    """
+class _Curve(NamedTuple):
+    """``sign * output <= bound`` in units of ``size``: at every pose, where the output ends, or for its whole range."""
 
     output: str
     sign: float
     bound: float
     size: float
-    at: str = "every"
+    at: int = EVERY
 
 
-@dataclass(frozen=True)
+class _Length(NamedTuple):
+    """Bounds of a length, by its column."""
+
+    column: int
+    least: float
+    most: float
+
+
 class _Part:
-    """Rows of some curves: the pose outputs they need, and which of them go around a turn."""
+    """Rows of some limits: the pose outputs they need, and which of the rows are curves around a turn."""
 
-    curves: tuple[_Curve, ...]
-    outputs: frozenset[str]
-    turns: Turns
+    def __init__(self, curves: Sequence[_Curve], lengths: Sequence[_Length], others: Sequence[str] = ()) -> None:
+        self.lengths = lengths
+        self.outputs = tuple(dict.fromkeys([*others, *(curve.output for curve in curves)]))
+        self.which = np.array([self.outputs.index(curve.output) for curve in curves])
+        self.at = np.array([curve.at for curve in curves])
+        self.signs = np.array([curve.sign for curve in curves])
+        self.bounds = np.array([curve.bound for curve in curves])
+        self.sizes = np.array([curve.size for curve in curves])
+        ends = np.cumsum(np.where(self.at == EVERY, POSES, 1))
+        self.of_curves = int(ends[-1])
+        self.count = self.of_curves + 2 * len(lengths)
+        self.turns = np.array([np.arange(end - POSES, end) for end in ends[self.at == EVERY]])
 
-    @classmethod
-    def of(cls, curves: tuple[_Curve, ...], others: frozenset[str]) -> _Part:
-        """Return the part of these curves; ``others`` are outputs that are needed beside theirs."""
-        turns, r = [np.arange(POSES), np.arange(POSES, 2 * POSES)], 2 * POSES
-        for curve in curves:
-            count = POSES if curve.at == "every" else 1
-            turns += [np.arange(r, r + count)] if count == POSES else []
-            r += count
-        return cls(curves, others | {curve.output for curve in curves}, Turns.of(np.array(turns)))
+    def values(self, found: Mapping[str, Array], designs: Array, moved: Array | None, slopes: Array | None) -> Array:
+        """Rows (k, r) of designs (k, P) with these pose outputs; their gradients (k, r, m) where asked for."""
+        out = np.empty((len(designs), self.count))
+        curves = np.stack([found[name] for name in self.outputs])
+        sampled_rows(curves, moved, self.which, self.at, self.signs, self.bounds, self.sizes, out, slopes)
+        for k, length in enumerate(self.lengths):
+            x, r = designs[:, length.column], self.of_curves + 2 * k
+            out[:, r], out[:, r + 1] = x / length.least - 1.0, 1.0 - x / length.most
+        return out
 
 
 class PoseRows:
-    """The rows of a problem at fixed poses, as functions of places between 0 and 1 and of the five linear unknowns.
+    """The rows of a problem at fixed poses, as functions of proportions and of the five linear unknowns.
+
+    Proportions (k, P) are designs as :meth:`sweep.optimise.starts.proportions.Proportions.placed` makes them.
 
     Parameters
     ----------
     linear : the linear part of the problem
-    signs : values of the parameters that are not varied
+    signs : combinations of the parameters that are not varied
     """
 
-    def __init__(self, linear: Elimination, signs: dict[str, float]) -> None:
+    def __init__(self, linear: Elimination, signs: Sequence[dict[str, float]]) -> None:
         self.linear, self.own = linear, Proportions(linear, signs, grown=True)
         self.family, problem = linear.problem.family, linear.problem
         self.unit = UNIT * linear.stroke
         self.price = PRICE * self.unit
-        self.loops = {loop.discriminant: loop for loop in self.family.every(Assembly)}
-        self.objective = linear.guide.across[linear.wanted] if linear.straight else linear.wanted
+        self.scales: dict[str, Callable[[Array], Array]] = {
+            loop.discriminant: loop.scale for loop in self.family.every(Assembly)
+        }
+        objective = linear.guide.across[linear.wanted] if linear.straight else linear.wanted
         off = linear.guide.across[linear.position]
-        curves: list[_Curve] = [_Curve(name, -1.0, -ROTATABLE_MARGIN, 1.0) for name in self.loops]
+        first = [_Curve(objective, sign, 0.0, 1.0) for sign in (1.0, -1.0)]
+        curves: list[_Curve] = [_Curve(name, -1.0, -ROTATABLE_MARGIN, 1.0) for name in self.scales]
         for limit in problem.limits:
             if not limit.output.startswith("rotatable"):
                 found = measure(self.family, limit.output, problem.window)
                 for bound, upper in ((limit.minimum, False), (limit.maximum, True)):
                     if bound is not None:
                         curves += _rows_of(found, found.to_inner(float(bound)), upper, off)
-        basic = frozenset({self.objective, linear.position})
-        self.whole = _Part.of(tuple(curves), basic)
-        self.turns = self.whole.turns
         names = problem.family.parameter_names
-        self.links = [names.index(name) for name in linear.links]
-        self.fitted = [linear.column(n) for n in (*linear.guide.arms, linear.guide.direction, linear.guide.offset)]
-        self.lengths = [
-            (names.index(name), float(problem.lower[k]), float(problem.upper[k]))
+        lengths = [
+            _Length(names.index(name), float(problem.lower[k]), float(problem.upper[k]))
             for name in linear.links
             for k in [problem.variables.index(name)]
         ]
+        self.whole = _Part([*first, *curves], lengths)
+        self.turns = self.whole.turns
+        self.links = [names.index(name) for name in linear.links]
+        self.fitted = [linear.column(n) for n in (*linear.guide.arms, linear.guide.direction, linear.guide.offset)]
         # Places of stage 1, those of them that may change their side, and that of the angle between the stages.
-        self.driving = np.array([c < len(self.own.driver.parameters) for c in self.own.columns])
         own = self.own
+        self.driving = np.array([c < len(own.driver.parameters) for c in own.columns])
         self.mirrored = self.driving & (own.low == -own.high)
         self.turning = own.columns.index(own.offset) if own.offset >= 0 else -1
         # Rows whose size is a length grow with the linear unknowns: they belong into the linear program.
         units = {o.name: o.unit for o in self.family.pose_outputs}
-        grow = [c for c in curves if units[c.output] == "length" and c.output not in self.loops]
-        self.mended = _Part.of(tuple(c for c in grow if c.at in ("every", "range")), basic)
-        self._sort_rows()
+        grow = [c for c in curves if units[c.output] == "length" and c.output not in self.scales]
+        grow = [c for c in grow if c.at in (EVERY, RANGE)]
+        self.mended = _Part([*first, *grow], lengths)
+        self._sort_rows(grow)
 
-    def _sort_rows(self) -> None:
+    def _sort_rows(self, grow: Sequence[_Curve]) -> None:
         """Which rows of the linear part are bounds that may be missed, and which are needs."""
         soft: list[int] = []
         above: list[float] = []
         need: list[tuple[int, float]] = []
         r = 2 * POSES
-        for curve in self.mended.curves:
-            count = POSES if curve.at == "every" else 1
-            if curve.at == "range" and curve.sign < 0.0:
+        for curve in grow:
+            count = POSES if curve.at == EVERY else 1
+            if curve.at == RANGE and curve.sign < 0.0:
                 need.append((r, -curve.bound / curve.size))
             else:
                 soft += range(r, r + count)
                 above += [curve.bound / curve.size] * count
             r += count
-        for _ in self.lengths:
+        for _ in self.mended.lengths:
             soft += [r, r + 1]
             above += [-1.0, 1.0]
             r += 2
@@ -144,12 +161,12 @@ class PoseRows:
         self.needed = np.array([k for k, _ in need], np.intp)
         self.need = np.array([x for _, x in need])
 
-    def without_middle(self, places: Array, sign: float = -1.0) -> Array:
+    def without_middle(self, places: Array, kinds: Index, sign: float = -1.0) -> Array:
         """Places with the offset between the stages itself for those with the middle of the guide's input angles."""
         out = places.copy()
         if self.turning >= 0:
             wide = self.own.high[self.turning] - self.own.low[self.turning]
-            out[:, self.turning] += sign * self.own.middles(self.own.placed(places)) / wide
+            out[:, self.turning] += sign * self.own.middles(self.own.placed(places, kinds)) / wide
             out[:, self.turning] = self.wrapped(out)[:, self.turning]
         return out
 
@@ -160,21 +177,16 @@ class PoseRows:
             out[:, self.turning] = places[:, self.turning] % 1.0
         return out
 
-    def with_middle(self, places: Array) -> Array:
+    def with_middle(self, places: Array, kinds: Index) -> Array:
         """Return the other way round."""
-        return self.without_middle(places, 1.0)
+        return self.without_middle(places, kinds, 1.0)
 
-    def designs(self, places: Array, x: Array) -> Array:
-        """Designs (k, P) at places (k, n) with linear unknowns (k, 5)."""
-        return self.linear.finished(self.own.placed(places), x)
-
-    def tangents(self, places: Array, x: Array) -> Array:
+    def tangents(self, ratios: Array, x: Array) -> Array:
         """Return derivatives (k, n + 5, P) of the designs by their places and linear unknowns."""
-        own, ratios, n = self.own, self.own.placed(places), places.shape[1]
-        out = np.zeros((len(places), n + UNKNOWNS, ratios.shape[1]))
+        own, n = self.own, len(self.own.columns)
+        out = np.zeros((len(ratios), n + UNKNOWNS, ratios.shape[1]))
         scale = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
-        wide = np.array([math.log(v / u) if w else 0.0 for u, v, w in zip(own.low, own.high, own.log, strict=True)])
-        per = np.where(own.log, ratios[:, own.columns] * wide, own.high - own.low)
+        per = np.where(own.log, ratios[:, own.columns] * own.wide, own.high - own.low)
         # X + iY = conj(z1) z2 times the coupler's length over the scale is the point.
         along, aside, line, offset = self.fitted
         dot, cross = x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1], x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]
@@ -194,45 +206,45 @@ class PoseRows:
         out[:, n + 4, offset] = 1.0
         return out
 
-    def unknowns(self, places: Array) -> Array:
-        """Return the linear unknowns (k, 5) that are best for some proportions, nan where nothing is."""
-        return self.linear.unknowns(self.own.placed(places))
+    def rows(self, ratios: Array, x: Array) -> Rows:
+        """Rows of proportions (k, P) with unknowns (k, 5), and their gradients by places and unknowns."""
+        return self._rows(ratios, x, self.tangents(ratios, x), self.whole)
 
-    def rows(self, places: Array, x: Array) -> Rows:
-        """Rows of designs at places (k, n) with unknowns (k, 5), and their gradients by both."""
-        return self._rows(places, x, self.tangents(places, x), self.whole)
-
-    def _rows(self, places: Array, x: Array, tangents: Array, part: _Part) -> Rows:
+    def _rows(self, ratios: Array, x: Array, tangents: Array, part: _Part) -> Rows:
         """Rows of a part, and their gradients along ``tangents`` (k, m, P)."""
         k, m = tangents.shape[:2]
-        real = self.designs(places, x)
-        designs = np.repeat(real, m, axis=0).astype(np.complex128)
-        designs.imag = STEP * tangents.reshape(k * m, -1)
-        with np.errstate(all="ignore"):  # what does not turn has nan, and is worth nothing
-            found = self.family.poses(np.ascontiguousarray(designs), COMPLEX_TURN, part.outputs)
-            columns = {name: found[name].real[::m] for name in part.outputs}
-            moved = {name: found[name].imag.reshape(k, m, -1) / STEP for name in part.outputs}
-            for name in part.outputs.intersection(self.loops):
-                # Products of numpy's complex numbers depend on the processor, those of Python's do not.
-                scale = self.loops[name].scale(designs.astype(object)).astype(np.complex128).reshape(k, m, 1)
-                columns[name] = columns[name] / scale.real[:, 0]
-                moved[name] = (moved[name] - columns[name][:, None] * (scale.imag / STEP)) / scale.real
-            ends = self._ends(columns, part)
-            values = np.concatenate(self._pieces(columns, real, ends, 1.0, part), axis=1)
-            turned = {name: moved[name].reshape(k * m, -1) for name in part.outputs}
-            every = {name: (high.repeated(m), low.repeated(m)) for name, (high, low) in ends.items()}
-            pieces = self._pieces(turned, tangents.reshape(k * m, -1), every, 0.0, part)
-        slopes = np.ascontiguousarray(np.concatenate(pieces, axis=1).reshape(k, m, -1).transpose(0, 2, 1))
-        sharp = part.turns.sharpened(values, slopes)
-        return Rows(sharp, slopes, -sharp[:, : 2 * POSES].min(axis=1))
+        real = self.linear.finished(ratios, x)
+        values, slopes = np.empty((k, part.count)), np.empty((k, part.count, m))
+        for begin in range(0, k, TOGETHER):
+            some = slice(begin, begin + TOGETHER)
+            values[some] = self._of_some(real[some], tangents[some], part, slopes[some])
+        for j, length in enumerate(part.lengths):
+            r, along = part.of_curves + 2 * j, tangents[:, :, length.column]
+            slopes[:, r], slopes[:, r + 1] = along / length.least, -along / length.most
+        return Rows(values, slopes, -values[:, : 2 * POSES].min(axis=1))
 
-    def solved(self, places: Array, x: Array) -> Array:
+    def _of_some(self, real: Array, tangents: Array, part: _Part, slopes: Array) -> Array:
+        """Rows (k, r) of designs (k, P), their gradients written into ``slopes`` (k, r, m), those of lengths aside."""
+        k, m = tangents.shape[:2]
+        designs: Any = np.repeat(real, m, axis=0).astype(np.complex128)
+        designs.imag = STEP * tangents.reshape(k * m, -1)
+        columns, moved = {}, np.empty((len(part.outputs), k, m, POSES))
+        with np.errstate(all="ignore"):  # what does not turn has nan, and is worth nothing
+            found: dict[str, Any] = self.family.poses(designs, COMPLEX_TURN, frozenset(part.outputs))
+            for j, name in enumerate(part.outputs):
+                if name in self.scales:
+                    found[name] = found[name] / self.scales[name](designs)[:, None]
+                columns[name] = found[name].real[::m]
+                np.divide(found[name].imag.reshape(k, m, POSES), STEP, out=moved[j])
+            return part.values(columns, real, moved, slopes)
+
+    def solved(self, ratios: Array, x: Array) -> Array:
         """Return the best linear unknowns (k, 5) of some proportions,
         limits that bend taken for straight about ``x``.
         """
-        own = self.tangents(places, x)[:, places.shape[1] :]
-        slopes = self._rows(places, x, own, self.mended).slopes
-        k = len(places)
+        own = self.tangents(ratios, x)[:, len(self.own.columns) :]
+        slopes = self._rows(ratios, x, own, self.mended).slopes
+        k = len(ratios)
         bound = np.repeat(np.stack([np.full(len(self.above), np.inf), self.above])[None], k, axis=0)
         found, t, v = np.empty((k, UNKNOWNS)), np.empty(k), np.empty(k)
         status = np.empty(k, np.uint8)
@@ -243,67 +255,35 @@ class PoseRows:
         minimax(wanted, others, needed, bound, need, self.price, found, t, v, status)
         return np.where((status == st.OK)[:, None], found, x)
 
-    def worth(self, places: Array, x: Array) -> Array:
-        """Objective plus what missed limits cost (k,), the smaller the better."""
-        return self.judged(self.values(places, x))
-
-    def begun(self, places: Array) -> tuple[Array, Array]:
-        """Return the best linear unknowns (k, 5) of some proportions, and what the designs are worth (k,)."""
-        x = self.unknowns(places)
+    def begun(self, places: Array, kinds: Index) -> tuple[Array, Array]:
+        """Return the best linear unknowns (k, 5) of some places, and what the designs are worth (k,)."""
+        ratios = self.own.placed(places, kinds)
+        x = self.linear.unknowns(ratios)
         known, worth = np.asarray(np.isfinite(x).all(axis=1), np.bool_), np.full(len(places), np.inf)
         x = np.where(known[:, None], x, 1.0)
-        worth[known] = self.worth(places[known], x[known])
+        worth[known] = self.worth(ratios[known], x[known])
         return x, worth
 
-    def values(self, places: Array, x: Array) -> Array:
+    def worth(self, ratios: Array, x: Array) -> Array:
+        """Objective plus what missed limits cost (k,), the smaller the better."""
+        return self.judged(self.values(ratios, x))
+
+    def values(self, ratios: Array, x: Array) -> Array:
         """Values of the rows (k, r), those of the objective for t = 0."""
-        designs = self.designs(places, x)
+        designs = self.linear.finished(ratios, x)
         with np.errstate(all="ignore"):
-            found = self.family.poses(np.ascontiguousarray(designs), REAL_TURN, self.whole.outputs)
-            columns = {name: np.asarray(found[name], np.float64) for name in self.whole.outputs}
-            for name, loop in self.loops.items():
-                columns[name] = columns[name] / loop.scale(designs)[:, None]
-            return self.turns.sharpened(
-                np.concatenate(self._pieces(columns, designs, self._ends(columns, self.whole), 1.0, self.whole), axis=1)
-            )
+            found: dict[str, Any] = self.family.poses(designs, REAL_TURN, frozenset(self.whole.outputs))
+            for name, scale in self.scales.items():
+                found[name] = found[name] / scale(designs)[:, None]
+            return self.whole.values(found, designs, None, None)
 
     def judged(self, values: Array) -> Array:
         """Return what designs with such values are worth (k,): see :meth:`worth`."""
         own, others = values[:, : 2 * POSES], values[:, 2 * POSES :]
         worth = self.price * np.maximum(-others.min(axis=1), 0.0) - own.min(axis=1)
-        margins = others[:, : len(self.loops) * POSES].min(axis=1, initial=1.0)
+        margins = others[:, : len(self.scales) * POSES].min(axis=1, initial=1.0)
         turns = np.isfinite(worth) & (margins > 0.0)
         return np.asarray(np.where(turns, worth, LOCKED * (2.0 - np.maximum(np.nan_to_num(margins, nan=-1e3), -1e3))))
-
-    def _ends(self, columns: Mapping[str, Array], part: _Part) -> dict[str, tuple[End, End]]:
-        """Where outputs are highest and lowest, of those whose ends are limited."""
-        limited = {curve.output for curve in part.curves if curve.at != "every"}
-        return {name: (End.of(-columns[name]), End.of(columns[name])) for name in limited}
-
-    def _pieces(
-        self,
-        columns: Mapping[str, Array],
-        designs: Array,
-        ends: Mapping[str, tuple[End, End]],
-        one: float,
-        part: _Part,
-    ) -> list[Array]:
-        """Return the rows (k, .) one limit after the other, those of the objective first, of outputs and designs.
-
-        They are linear: with ``one`` zero, derivatives of outputs and designs give those of the rows.
-        """
-        own = columns[self.objective]
-        out = [-own, own]
-        for curve in part.curves:
-            y = columns[curve.output]
-            if curve.at != "every":
-                high, low = (end.value(y) for end in ends[curve.output])
-                y = {"highest": high, "lowest": low, "range": high - low}[curve.at][:, None]
-            out.append((one * curve.bound - curve.sign * y) / curve.size)
-        for column, least, most in self.lengths:
-            out.append((designs[:, column] / least - one)[:, None])
-            out.append((one - designs[:, column] / most)[:, None])
-        return out
 
 
 def _rows_of(found: Measure, bound: float, upper: bool, deviation: str) -> list[_Curve]:
@@ -316,11 +296,11 @@ def _rows_of(found: Measure, bound: float, upper: bool, deviation: str) -> list[
     for series in found.series:
         own = size / DEVIATION if series.output == deviation else size
         if found.kind == "range":
-            curves.append(_Curve(series.output, side, side * bound, own, "range"))
+            curves.append(_Curve(series.output, side, side * bound, own, RANGE))
         elif found.kind == "max_abs":
             curves += [_Curve(series.output, sign, bound, own) for sign in (1.0, -1.0)] if upper else []
         else:
             every = (side * found.sign > 0.0) == (found.kind == "max")
-            at = "every" if every else "highest" if found.kind == "max" else "lowest"
+            at = EVERY if every else HIGHEST if found.kind == "max" else LOWEST
             curves.append(_Curve(series.output, side * found.sign, side * bound, own, at))
     return curves

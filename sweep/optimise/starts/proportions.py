@@ -1,4 +1,4 @@
-"""Proportions as places between 0 and 1, and what they are worth once their linear part is eliminated."""
+"""Proportions as places between 0 and 1."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
@@ -20,23 +21,30 @@ from sweep.quantities.limits import compared
 if TYPE_CHECKING:
     from sweep.study import Limit
 
-SHORT = 0.15  # shortest length of a guide that the strategies begin with, against the longest its crank may have
+Index = NDArray[np.intp]
+
+SHORT = 0.15  # shortest length of a guide that the search begins with, against the longest its crank may have
 MIDDLE = Accuracy(target=1e-3)
 
 
 class Proportions:
     """Places between 0 and 1 for what is not linear, and the designs that belong to them.
 
-    Lengths of the guide stand on a logarithmic scale against its crank, which is the unit.  Instead of the offset
-    between the stages the middle of the guide's input angles is varied, so that it stays while stage 1 changes.  With
-    ``grown`` the lengths of stage 1 that cannot vanish stand on such a scale too.
+    Lengths of the guide stand on a logarithmic scale against its crank, which is the unit.  With ``grown`` the lengths
+    of stage 1 that cannot vanish stand on such a scale too.
+
+    Parameters
+    ----------
+    linear : the linear part of the problem
+    signs : combinations of the parameters that are not varied; each design has the number of one of them, its kind
     """
 
-    def __init__(self, linear: Elimination, signs: dict[str, float], grown: bool = False) -> None:
+    def __init__(self, linear: Elimination, signs: Sequence[dict[str, float]], grown: bool = False) -> None:
         problem = linear.problem
         self.linear, names = linear, problem.family.parameter_names
         number = linear.last
-        self.base = problem.rows(problem.lower + 0.5 * problem.span, **signs)[0]
+        centre = problem.lower + 0.5 * problem.span
+        self.bases = np.array([problem.rows(centre, **choice)[0] for choice in signs])
         at = [problem.variables.index(name) for name in linear.free]
         self.low, self.high = problem.lower[at].astype(np.float64), problem.upper[at].astype(np.float64)
         units = {p.name: p for p in problem.family.parameters}
@@ -53,26 +61,31 @@ class Proportions:
                 self.log[k] = True
             elif grown and units[name].unit == "length" and self.low[k] > 0.0:
                 self.log[k] = True
+        self.wide = np.zeros(len(linear.free))
+        self.wide[self.log] = [math.log(x) for x in self.high[self.log] / self.low[self.log]]
         self.columns = [names.index(name) for name in linear.free]
-        self.base[names.index(linear.links[0])] = 1.0
+        self.bases[:, names.index(linear.links[0])] = 1.0
         self.offset = names.index(f"offset{number}") if f"offset{number}" in linear.free else -1
         self.driver = stages_of(problem.family)[0].family
 
-    def designs(self, places: Array) -> Array:
-        """Designs (k, P) at places (k, n), with the point, line and scale still to be found."""
-        designs = self.placed(places)
+    def designs(self, places: Array, kinds: Index) -> Array:
+        """Designs (k, P) at places (k, n), of kinds (k,), with the point, line and scale still to be found.
+
+        Instead of the offset between the stages the middle of the guide's input angles is at its place, so that it
+        stays while stage 1 changes.
+        """
+        designs = self.placed(places, kinds)
         if self.offset >= 0:
             designs[:, self.offset] -= self.middles(designs)
         return designs
 
-    def placed(self, places: Array) -> Array:
+    def placed(self, places: Array, kinds: Index) -> Array:
         """Return the same with the offset between the stages itself at its place."""
         values: Array = self.low + places * (self.high - self.low)
-        low, wide = self.low[self.log], np.array([math.log(x) for x in self.high[self.log] / self.low[self.log]])
         # numpy's exponential depends on the processor, that of the C library does not
-        grown = [math.exp(x) for x in (places[:, self.log] * wide).ravel()]
-        values[:, self.log] = low * np.reshape(grown, (len(places), len(wide)))
-        designs = np.repeat(self.base[None, :], len(places), axis=0)
+        grown = [math.exp(x) for x in (places[:, self.log] * self.wide[self.log]).ravel().tolist()]
+        values[:, self.log] = self.low[self.log] * np.reshape(grown, (len(places), int(self.log.sum())))
+        designs = self.bases[kinds]
         designs[:, self.columns] = values
         return designs
 
@@ -90,10 +103,6 @@ class Proportions:
         swing = np.asarray(found["swing"], np.float64)
         middle = np.asarray(found["psi_ext"], np.float64) + 0.5 * swing
         return np.nan_to_num(middle), np.nan_to_num(np.abs(swing))
-
-    def merit(self, places: Array) -> Array:
-        """Judge proportions by their least objective plus what missed limits cost (k,)."""
-        return merit(self.linear, self.designs(places))[1]
 
 
 def turned_into(problem: Problem, designs: Array) -> Array:

@@ -1,0 +1,110 @@
+"""Limits on sampled curves as rows of a program, with the least value of a parabola where a curve is lowest.
+
+The greatest of 64 samples is up to 2 in 1000 below the peak, and has a kink wherever the peak passes between two
+poses.  A descent on such values comes to rest at kinks that the motion does not have.  The parabola through three
+samples is off by 1 or 2 in 10 000 where links are short, by 1 in 100 000 elsewhere, and its kinks are as small.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.jit import inline, kernel
+from kernels.types import Array
+
+Index = NDArray[np.int64]
+
+EVERY, HIGHEST, LOWEST, RANGE = 0, 1, 2, 3  # where a limit holds: at all poses, at an end of the curve, for its range
+
+
+@inline
+def _parabola(before: float, here: float, after: float) -> tuple[float, float, float]:
+    """Weights of three neighbours, the middle one the lowest, in the least value of the parabola through them."""
+    bend = before - 2.0 * here + after
+    place = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    half = 0.5 * place * place
+    return half - 0.5 * place, 1.0 - 2.0 * half, half + 0.5 * place
+
+
+@inline
+def _end(y: Array, sign: float) -> tuple[int, int, int, float, float, float]:
+    """Three poses and their weights in the highest value of ``sign * y``, between the poses too."""
+    last, at, best = len(y) - 1, 0, -math.inf
+    for p in range(last + 1):
+        if sign * y[p] > best:
+            at, best = p, sign * y[p]
+    before, after = at - 1 if at > 0 else last, at + 1 if at < last else 0
+    first, middle, third = _parabola(-sign * y[before], -sign * y[at], -sign * y[after])
+    return before, at, after, first, middle, third
+
+
+@kernel
+def sampled_rows(
+    curves: Array,
+    moved: Array | None,
+    which: Index,
+    at: Index,
+    signs: Array,
+    bounds: Array,
+    sizes: Array,
+    values: Array,
+    slopes: Array | None,
+) -> None:
+    """Write the rows ``(bound - sign * curve) / size`` of some limits on sampled curves, and their gradients.
+
+    A value that is lowest among its neighbours is replaced by the least of the parabola there.  The place between the
+    poses is where the parabola is lowest, so to first order its own motion changes nothing.
+
+    Parameters
+    ----------
+    curves : (c, k, m) of k designs at m poses of a turn
+    moved : (c, k, n, m) their derivatives, None where no gradients are asked for
+    which, at : (l,) curve of each limit, and where it holds: at every pose it has m rows, else one
+    signs, bounds, sizes : (l,)
+    values : (k, r) out, the first rows are written
+    slopes : (k, r, n) out, or None
+    """
+    m = curves.shape[2]
+    for i in range(curves.shape[1]):
+        r = 0
+        for j in range(len(which)):
+            y, factor = curves[which[j], i], -signs[j] / sizes[j]
+            level = bounds[j] / sizes[j]
+            if at[j] == EVERY:
+                for p in range(m):
+                    values[i, r + p] = level + factor * y[p]
+                for p in range(m):
+                    before, after = p - 1 if p > 0 else m - 1, p + 1 if p < m - 1 else 0
+                    low, here, high = factor * y[before], factor * y[p], factor * y[after]
+                    lowest = here <= low and here <= high and low - 2.0 * here + high > 0.0
+                    first, middle, third = _parabola(low, here, high)
+                    if lowest:
+                        values[i, r + p] = level + first * low + middle * here + third * high
+                    if slopes is not None and moved is not None:
+                        of = moved[which[j], i]
+                        for q in range(of.shape[0]):
+                            if lowest:
+                                along = first * of[q, before] + middle * of[q, p] + third * of[q, after]
+                                slopes[i, r + p, q] = factor * along
+                            else:
+                                slopes[i, r + p, q] = factor * of[q, p]
+                r += m
+                continue
+            values[i, r] = level
+            if slopes is not None:
+                slopes[i, r, :] = 0.0
+            for sign in (1.0, -1.0):
+                if at[j] == (LOWEST if sign > 0.0 else HIGHEST):
+                    continue
+                before, here_at, after, first, middle, third = _end(y, sign)
+                share = -factor if at[j] == RANGE and sign < 0.0 else factor
+                values[i, r] += share * (first * y[before] + middle * y[here_at] + third * y[after])
+                if slopes is not None and moved is not None:
+                    of = moved[which[j], i]
+                    for q in range(of.shape[0]):
+                        along = first * of[q, before] + middle * of[q, here_at] + third * of[q, after]
+                        slopes[i, r, q] += share * along
+            r += 1
