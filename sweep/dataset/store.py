@@ -267,12 +267,13 @@ def front_cut_short(path: Path) -> str | None:
     return None if about.get(b"complete") != b"false" else about.get(b"steps", b"").decode() or None
 
 
-def load(folder: str | Path) -> pd.DataFrame:
+def load(folder: str | Path, units: bool = False) -> pd.DataFrame:
     """Return the finished part of a dataset, in design order.
 
     Parameters
     ----------
     folder : what ``sweep run`` wrote
+    units : whether the columns carry their units, ``alpha1 [rad]``
 
     Returns
     -------
@@ -300,6 +301,8 @@ def load(folder: str | Path) -> pd.DataFrame:
     (25, 'rad')
     >>> rows.nsmallest(1, "max_abs_d2s")[["a", "b", "max_abs_d2s"]].round(4).values.tolist()
     [[9.5, 31.5, 12.4546]]
+    >>> [name for name in sweep.load("results/press/designs", units=True) if name.startswith(("a", "max_p"))]
+    ['a [mm]', 'max_pressure_angle [rad]']
     """
     import pandas as pd
 
@@ -321,11 +324,16 @@ def load(folder: str | Path) -> pd.DataFrame:
         text += f" (the first is {missing[0]}); run the study again to have them computed"
         warnings.warn(text, IncompleteWarning, stacklevel=2)
     found = pd.concat(frames, ignore_index=True)
-    found.attrs["units"] = units(chunks[0])
+    named = units_of(chunks[0])
+    if units:
+        found = found.rename(
+            columns={name: f"{name} [{unit}]" for name, unit in named.items() if unit not in ("", "1")}
+        )
+    found.attrs["units"] = named
     return found
 
 
-def units(part: Part) -> dict[str, str]:
+def units_of(part: Part) -> dict[str, str]:
     """Return the unit of every column of a chunk that has one, as its field metadata say."""
     import pyarrow.parquet as pq
 
