@@ -266,7 +266,8 @@ def output_names(family: Family) -> tuple[str, ...]:
         reductions = [f"{prefix}{name}" for name in own for prefix in prefixes(family.domain)]
         events = [name for event in family.events for name in event_names(family, event)]
         whole = [name for name in (*sizes(family), *boxes(family)) if "." not in name]
-        return (*dotted, *MARGIN_TEXTS, *whole, *(t.name for t in family.timings), *events, *reductions)
+        made = [o.name for step in family.steps for o in step.provides]
+        return (*dotted, *MARGIN_TEXTS, *whole, *made, *(t.name for t in family.timings), *events, *reductions)
     names = [o.name for step in family.steps for o in step.provides]
     assemblies = family.every(Assembly)
     if assemblies:

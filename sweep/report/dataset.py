@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.dataset import store
+from sweep.dataset.files import check_tables
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
 from sweep.families.base import Family
@@ -161,7 +162,10 @@ def read_dataset(folder: Path) -> Dataset:
         plan |= {"counts": counts, "missed": missed}
     study = study_of(plan, folder)
     optima, curves, front = (store.beside(folder) / name for name in (store.OPTIMUM, store.CURVES, store.PARETO))
-    parts = tuple(part.path for part in store.parts(folder))
+    check_tables(folder, (store.OPTIMUM, store.CURVES, store.PARETO, store.SENSITIVITY, store.TOLERANCE))
+    chunks = store.parts(folder)
+    store.check_columns(chunks)
+    parts = tuple(part.path for part in chunks)
     units, definitions = field_metadata([path for path in (*parts[:1], optima, curves, front) if path.exists()])
     return Dataset(
         folder=folder,
