@@ -17,8 +17,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family
-from sweep.synthesis.tasks.crank_rocker import RSSR, size_limits, size_names, turn
-from sweep.synthesis.tasks.given import check_given
+from sweep.synthesis.tasks.crank_rocker import RSSR, check_given, size_limits, size_names, turn
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 
