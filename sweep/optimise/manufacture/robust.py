@@ -28,6 +28,7 @@ from sweep.quantities.limits import compared, meets
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Tolerance
 
+SAME = 1e-8  # relative, of values of two optima that are equally good
 SAMPLES = 8192  # a power of two: the share of 95 % is good to 0.25 %
 BOTH = 4.0  # ways in which a design misses a limit that know little of each other, to begin with
 TRIED = 4  # basins of the search that are begun with
@@ -120,7 +121,9 @@ def robust(
     # The objective of designs that miss their limits still says little.
     order = sorted(found, key=lambda r: (r.violation > NEARLY, r.objective if r.violation <= NEARLY else r.violation))
     # Another share-out saves far less than what separates basins: what is further behind stays behind.
-    ends = [r for r in _different(problem, order)[:ENDED] if r is order[0] or r.objective <= BEHIND * order[0].objective]
+    ends = [
+        r for r in _different(problem, order)[:ENDED] if r is order[0] or r.objective <= BEHIND * order[0].objective
+    ]
     if not ends:  # stopped before any of them was begun
         return None
     numbers = {r.start: k for k, r in enumerate(ends)}
@@ -132,7 +135,9 @@ def robust(
     good = [x for x in made if x.share >= (tolerance.robust or 0.0)]
     best = min(good, key=lambda x: x.result.objective) if good else max(made, key=lambda x: x.share)
     head = next(r for r in ends if r.start == best.result.start)
-    met = [r for r in found if r.violation <= NEARLY and abs(r.objective - head.objective) <= AGREE * abs(head.objective)]
+    met = [
+        r for r in found if r.violation <= NEARLY and abs(r.objective - head.objective) <= AGREE * abs(head.objective)
+    ]
     best = replace(best, result=replace(best.result, agree=max(1, len(met))))
     return replace(best, cut=best.cut or any(x.cut for x in made) or len(made) < len(ends) or len(found) < len(begin))
 
@@ -297,3 +302,15 @@ def _share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> 
 def yields(problem: Problem, designs: Array, tolerance: Tolerance, seed: int) -> list[float]:
     """Return the share of toleranced mechanisms about each design (k, P) that keep all limits on outputs."""
     return [_share(problem, design, tolerance, seed) for design in designs]
+
+
+def better_made(problem: Problem, results: list[Result], tolerance: Tolerance, seed: int) -> list[Result]:
+    """Return results with the one first that is made best, of those that have the value of the best."""
+    best = results[0]
+    equal = [r for r in results if r.feasible and abs(r.objective - best.objective) <= SAME * abs(best.objective)]
+    twins = _different(problem, equal)[:TRIED]
+    if len(twins) < 2:
+        return results
+    shares = yields(problem, np.array([r.design for r in twins]), tolerance, seed)
+    first = twins[int(np.argmax(shares))]
+    return [first, *(r for r in results if r is not first)]
