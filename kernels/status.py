@@ -22,6 +22,12 @@ NO_DWELL = 12
 NOT_ADMISSIBLE = 13
 NO_ROOT = 14
 NO_EVENT = 15
+NEVER = 16
+TWICE = 17
+TANGENT = 18
+WRONG_SIDE = 19
+WRONG_WAY = 20
+NO_FRAME = 21
 
 MEANING: dict[int, str] = {
     OK: "ok",
@@ -42,4 +48,10 @@ MEANING: dict[int, str] = {
     NO_ROOT: "the equation that fixes the position has no root in its interval, or fewer than asked for",
     NO_EVENT: "the event does not happen within the turn, or within the interval",
     NOT_ADMISSIBLE: "the point of the locus gives no mechanism that meets the requirement",
+    NEVER: "the looper's tip never passes beside the needle",
+    TWICE: "the looper's tip passes the needle more than once in the stated sense, beside it",
+    TANGENT: "the looper's tip touches the needle's line within rounding: whether it passes cannot be decided",
+    WRONG_SIDE: "the looper's tip passes the needle on the side away from the scarf",
+    WRONG_WAY: "the looper's tip passes the needle against the stated sense only",
+    NO_FRAME: "the needle has no frame: its scarf points along it",
 }

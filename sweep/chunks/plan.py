@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args
@@ -62,10 +62,14 @@ class Column:
 
 
 class Pilot(NamedTuple):
-    """Estimates from a few designs: time of one design on one core [s], and the share of designs within every limit."""
+    """Estimates from a few designs: time of one design on one core [s], and the share of designs within every limit.
+
+    ``reached`` are the outputs of every level of the cascade, and the share of designs that reach it.
+    """
 
     seconds_per_design: float
     feasible: float
+    reached: tuple[tuple[tuple[str, ...], float], ...]
 
 
 @dataclass(frozen=True)
@@ -183,11 +187,28 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
         feasible += int(cascade.counts[OK])
         total += len(designs)
     shares = [float(share) for share in reached / total]
+    outputs = tuple(level.outputs for level in levels(study))
+    return Pilot(_seconds(study, shares), feasible / total, tuple(zip(outputs, shares, strict=True)))
+
+
+def pilot_at(study: Study, known: Pilot) -> Pilot:
+    """Price a study by a pilot of the same study at another accuracy.
+
+    How far designs get depends on that only for those on the edge of a limit.  A level that a proof puts elsewhere is
+    reached by as many as before, and by no fewer than the levels behind it.
+    """
+    share_of = {name: share for names, share in known.reached for name in names or ("",)}
+    shares = [max(share_of[name] for name in level.outputs or ("",)) for level in levels(study)]
+    return known._replace(seconds_per_design=_seconds(study, [max(shares[k:]) for k in range(len(shares))]))
+
+
+def _seconds(study: Study, shares: Sequence[float]) -> float:
+    """Price one design [s], given the share of designs that reach each level."""
     seconds, calls = 1e-9 * parameter_ns(study), 1.0 / BLOCK
     for share, level in zip(shares, levels(study), strict=True):
         seconds += 1e-9 * share * level.ns_per_design
         calls += share / level.batch
-    return Pilot(seconds + CALL_SECONDS * calls, feasible / total)
+    return seconds + CALL_SECONDS * calls
 
 
 def spread_designs(study: Study, number: int) -> Array:

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from sweep.chunks.cascade import ordered_routes
-from sweep.chunks.plan import PARAMETER_UNITS, feasible_designs, spread_designs
+from sweep.chunks.plan import PARAMETER_UNITS, feasible_designs, pilot, spread_designs
 from sweep.cli.families import aligned, main_outputs
 from sweep.cli.options import SMOKE, STUDY
 from sweep.effects.advice import findings, left_out, tree
@@ -47,8 +47,9 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
     model = load_study(study, smoke=smoke)
     refuse_unprovable(model)
     with Phases(show=True) as phases:
-        cost = estimate(model, jobs, lambda done, of: phases.say("planning", done, of))
-        others = other_accuracies(model, jobs, lambda done, of: phases.say("other accuracies", done, of))
+        sent = pilot(model, lambda done, of: phases.say("planning", done, of))
+        cost = estimate(model, jobs, known=sent)
+        others = other_accuracies(model, jobs, lambda done, of: phases.say("other accuracies", done, of), sent)
         phases.say("what matters")
         lines = plan_lines(model, cost, others)
     for line in lines:

@@ -7,10 +7,7 @@ from pathlib import Path
 import click
 
 from sweep.cli.options import BACKEND, JOBS, OUT, SMOKE, STUDY
-from sweep.engine.opening import is_part
-from sweep.engine.run import run as run_study
 from sweep.errors import SearchCutShort
-from sweep.report.terminal import ending
 
 
 @click.command()
@@ -42,6 +39,10 @@ def run(
     same, bit for bit, with any number of workers.  The answer comes last; where no design keeps all limits, it says
     which of them have to give way, and the exit code is 4.
     """
+    from sweep.engine.opening import is_part  # the engine takes a second, which --help need not wait for
+    from sweep.engine.run import run as run_study
+    from sweep.report.terminal import ending
+
     proof = True if certify else None
     late: SearchCutShort | None = None
     try:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sweep.chunks.cascade import CALL_SECONDS, levels
-from sweep.chunks.plan import choose_chunk_size, describe_columns, pilot, row_bytes
+from sweep.chunks.plan import Pilot, choose_chunk_size, describe_columns, pilot, pilot_at, row_bytes
 from sweep.errors import BudgetError
 from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
 from sweep.families.names import is_error, is_flag
@@ -51,7 +51,12 @@ class Estimate:
     optimise_seconds: float | None
 
 
-def estimate(study: Study, jobs: int, tell: Callable[[int, int], None] = lambda _, __: None) -> Estimate:
+def estimate(
+    study: Study,
+    jobs: int,
+    tell: Callable[[int, int], None] = lambda _, __: None,
+    known: Pilot | None = None,
+) -> Estimate:
     """Estimate a run from the routes' cost figures and a pilot of about a thousand designs spread over the space.
 
     Parameters
@@ -59,6 +64,7 @@ def estimate(study: Study, jobs: int, tell: Callable[[int, int], None] = lambda 
     study : the question
     jobs : workers it will run on
     tell : called with how many parts of the pilot are done, and how many there are
+    known : the pilot, where it was already sent
 
     Returns
     -------
@@ -68,7 +74,7 @@ def estimate(study: Study, jobs: int, tell: Callable[[int, int], None] = lambda 
         assumed.  ``disk_bytes`` takes every result of a row as computed and free of repetition, which is too much where
         rows of infeasible designs are kept or symmetries make values repeat.
     """
-    found = pilot(study, tell)
+    found = pilot(study, tell) if known is None else known
     chunk_size = choose_chunk_size(study, found)
     designs = study.space.count
     kept = 1.0 if study.output.keep == "all" else max(found.feasible, LEAST_KEPT)
@@ -96,16 +102,17 @@ def estimate(study: Study, jobs: int, tell: Callable[[int, int], None] = lambda 
 
 
 def other_accuracies(
-    study: Study, jobs: int, tell: Callable[[int, int], None] = lambda _, __: None
+    study: Study, jobs: int, tell: Callable[[int, int], None] = lambda _, __: None, known: Pilot | None = None
 ) -> tuple[tuple[str, float], ...]:
     """Return what the same sweep would take at other accuracies: in words, and the estimated seconds.
 
-    ``tell`` is called with how many of them are done, and how many there are.
+    ``tell`` is called with how many of them are done, and how many there are.  ``known`` is the pilot of the study.
     """
+    sent = pilot(study) if known is None else known
     found, others = [], neighbours(study)
     for k, (words, other) in enumerate(others):
         tell(k, len(others))
-        found.append((words, estimate(other, jobs).seconds))
+        found.append((words, estimate(other, jobs, known=pilot_at(other, sent)).seconds))
     return tuple(found)
 
 

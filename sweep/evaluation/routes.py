@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
+from kernels.types import TWO_PI
 from sweep import costs
 from sweep.errors import InputError
 from sweep.evaluation import composed
@@ -29,14 +30,14 @@ from sweep.quantities.kinds import Extent, Group, Margin, Negative, Quantity, Ti
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
-from sweep.reductions.sampling import TWO_PI, Index, on_closed_turn
+from sweep.reductions.sampling import Index, on_closed_turn
 from sweep.reductions.steps import applying_step, group_ns
 from sweep.reductions.turn import margin_group
 
 # With these some outputs are missing or rough, the others are worth having.
 PARTIAL = (
     st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
-    st.NO_EVENT,
+    st.NO_EVENT, st.NEVER, st.TWICE, st.TANGENT, st.WRONG_SIDE, st.WRONG_WAY, st.NO_FRAME,
 )  # fmt: skip
 GOES_ON = np.isin(np.arange(256), PARTIAL)
 

@@ -99,7 +99,10 @@ def family(name: Mechanism) -> Family:
 
 
 def machine(
-    members: Mapping[str, Any], relations: Mapping[str, Any] | None = None, shafts: Mapping[str, Any] | None = None
+    members: Mapping[str, Any],
+    relations: Mapping[str, Any] | None = None,
+    shafts: Mapping[str, Any] | None = None,
+    tools: Mapping[str, Any] | None = None,
 ) -> Machine:
     """Several mechanisms on one main shaft, accepted wherever a family's name is.
 
@@ -117,6 +120,8 @@ def machine(
         ``{"thread": [point, take-up, ...], "stock": length, ...}`` (docs/thread.md, section 7)
     shafts : by name, each ``at``, ``axis``, ``zero`` and, but for ``main``, ``ratio`` and ``phase``; a member then
         names its ``shaft`` with ``sense``, ``shift``, ``turn`` and ``key`` instead of its place (docs/machines.md)
+    tools : by name, each a needle or a blade (docs/stitch.md), for ``{"gap": [body, body]}`` and
+        ``{"take": [needle, blade]}`` among the relations
 
     Returns
     -------
@@ -140,7 +145,7 @@ def machine(
     """
     if not isinstance(members, Mapping):
         raise InputError("members", members, "a table of members by name", "machine")
-    return _machine(specified(members, relations, shafts))
+    return _machine(specified(members, relations, shafts, tools))
 
 
 @lru_cache

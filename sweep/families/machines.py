@@ -15,8 +15,12 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Event, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.curve_features import of_members
+from sweep.families.moments import Taking
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
+from sweep.families.passages import step_of
 from sweep.families.relations import Reading, Relation, Timing
+from sweep.families.sites import coordinates as coordinates_of_site
+from sweep.families.sites import made_of
 
 
 @dataclass(frozen=True)
@@ -109,6 +113,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         f"{m.name}.{name}": f"{m.name}.{of}" for m in placed for name, of in m.family.derivative_of.items()
     }
     outputs += [o for relation in machine.relations for o in relation.outputs]
+    derivative_of |= {k: v for r in machine.relations if isinstance(r, Taking) for k, v in r.rates.items()}
     loops = tuple(_loop(m, loop) for m in placed for loop in m.family.every(Assembly))
     found = replace(
         machine,
@@ -125,7 +130,8 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     )
     poses = partial(_poses, found)
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
-    return replace(found, poses=poses, precise_poses=precise)
+    found = replace(found, poses=poses, precise_poses=precise)
+    return replace(found, steps=tuple(step_of(r, found) for r in machine.relations if isinstance(r, Taking)))
 
 
 def _loop(member: Member, loop: Assembly) -> Assembly:
@@ -192,13 +198,17 @@ def _member(m: Member, designs: Array, angles: Angles, own: set[str], found: Map
     if once and (own_designs[1:] == own_designs[0]).all() and (phase[1:] == phase[0]).all():
         own_designs, phase = own_designs[:1], phase[:1]
     motion = {name for name in own if name in m.family.pose_output}
-    motion |= {x for point in m.points for x in _made_of(m, point, own)}
+    motion |= {x for point in (*m.points, *dict(m.carried)) for x in _made_of(m, point, own)}
+    sites = {m.site_of[name] for name in own if name in m.site_of}
+    motion |= {x for site in sites for x in made_of(m, m.sites[site])}
     motion |= {name for derivative in motion for name in m.family.orders(derivative)}
     turned = _turned(m, phase, angles, found)
     result: dict[str, Any] = dict(m.family.poses(own_designs, turned, frozenset(motion)))
     _with_respect_to_shaft(m, result, found)
-    for point in m.points:
-        if any(f"{point}_{axis}" in own for axis in AXES):
+    for site in sites:
+        result |= coordinates_of_site(m, site, designs, result)
+    for point in (*m.points, *dict(m.carried)):
+        if point in m.points and any(f"{point}_{axis}" in own for axis in AXES):
             result |= coordinates(m, point, designs, own_designs, result)
         if any(f"d{point}_{axis}" in own for axis in AXES):
             result |= velocity(m, point, designs, result)
@@ -238,7 +248,7 @@ def _made_of(m: Member, point: str, own: set[str]) -> set[str]:
     """Return pose outputs that a point's coordinates and velocity are made of, as far as they are wanted."""
     at, moves = (any(f"{of}{point}_{axis}" in own for axis in AXES) for of in ("", "d"))
     found = {name for name in m.moving.get(point, ()) if name} if moves else set()
-    if point == TIP:
+    if point == TIP or point in dict(m.carried):
         return found | ({m.family.position} if at or moves else set())
     if point == EYE:
         return {name for joint in coupler_joints(m) or () for name in joint if name and at}

@@ -15,6 +15,7 @@ from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import Coordinates, OutputLink, Points
 from sweep.families.frames import WHOLE, Frame, crank_axis, stage_frames
 from sweep.families.shafts import Mount
+from sweep.families.sites import Site, sites_of
 
 TIP = "tip"
 EYE = "eye"  # on the coupler, the link between the points b and c
@@ -136,6 +137,7 @@ class Member:
         defaults of ``x_eye`` ...
     columns : where its own parameters stand in the machine's design matrix
     mount : how its first crank sits on a shaft of the machine, instead of place, ratio, offset and driver
+    carried : named points that turn with its output link, as a tip: those of the blade that it carries
     """
 
     name: str
@@ -149,6 +151,7 @@ class Member:
     eye: tuple[float, ...] | None = None
     columns: slice = field(default_factory=lambda: slice(0, 0))
     mount: Mount | None = None
+    carried: tuple[tuple[str, tuple[float, float, float]], ...] = ()
 
     def designs(self, designs: Array) -> Array:
         """Design matrix of this member's family."""
@@ -229,6 +232,16 @@ class Member:
         return frozenset(self.family.derivative_of.values())
 
     @cached_property
+    def sites(self) -> Mapping[str, Site]:
+        """Joints of all stages, carried points and fixed axes, by name."""
+        return sites_of(self)
+
+    @cached_property
+    def site_of(self) -> Mapping[str, str]:
+        """Of the name of each coordinate of a site, that of the site; points have their own."""
+        return {f"{name}_{axis}": name for name in self.sites if name not in self.points for axis in AXES}
+
+    @cached_property
     def points(self) -> tuple[str, ...]:
         """Names of the points whose coordinates are given in the machine's frame."""
         named = [name for points in self.family.every(Points) for name in points.at]
@@ -242,8 +255,9 @@ class Member:
         for name, at in ((n, at) for points in self.family.every(Points) for n, at in points.at.items()):
             if all(x is None or x in rates for x in at):
                 found[name] = tuple(x and rates[x] for x in at)
-        if self.tip is not None and self.family.position in rates:
-            found[TIP] = (rates[self.family.position],)
+        on_link = [*((TIP,) if self.tip is not None else ()), *(name for name, _ in self.carried)]
+        if self.family.position in rates:
+            found |= dict.fromkeys(on_link, (rates[self.family.position],))
         return found
 
 
@@ -295,9 +309,14 @@ def _on_coupler(m: Member, result: Mapping[str, Any], eye: list[Any]) -> list[An
 
 def velocity(m: Member, point: str, designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
     """Velocity analogue of a point in the machine's frame, (n, m): the frame of a member does not move."""
-    if point == TIP:
-        x, y = (m.column(designs, name)[:, None] for name in ("x_tip", "y_tip"))
-        angle, rate = result[m.family.position], result[str(m.moving[TIP][0])]
+    carried = dict(m.carried)
+    if point == TIP or point in carried:
+        x, y = (
+            carried[point][:2]
+            if point in carried
+            else (m.column(designs, name)[:, None] for name in ("x_tip", "y_tip"))
+        )
+        angle, rate = result[m.family.position], result[str(m.moving[point][0])]
         cos, sin = np.cos(angle), np.sin(angle)
         local = [rate * (-x * sin - y * cos), rate * (x * cos - y * sin), 0.0 * rate]
     else:

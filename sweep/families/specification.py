@@ -15,14 +15,17 @@ from sweep.families.base import Event, Family, Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.domain import Turn, reads_as_degrees
 from sweep.families.frames import crank_axis
+from sweep.families.gaps import Body, Gap
 from sweep.families.machines import Machine, assemble
+from sweep.families.moments import Taking
 from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
 from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Shaking, Speed, Timing
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.thread_balance import thread_balance
+from sweep.families.tools import BLADE_KEYS, NEEDLE_KEYS, Blade, Needle, Tool, bodies, length, read_tools
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
-RELATION_KINDS = ("distance", "speed", "timing", "event", "value", "torque", "shaking", "thread")
+RELATION_KINDS = ("distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take")
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
@@ -37,10 +40,14 @@ class Specification:
     members: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
     relations: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
     shafts: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = ()
+    tools: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = ()
 
 
 def specification(
-    members: Mapping[str, Any], relations: Mapping[str, Any] | None, shafts: Mapping[str, Any] | None = None
+    members: Mapping[str, Any],
+    relations: Mapping[str, Any] | None,
+    shafts: Mapping[str, Any] | None = None,
+    tools: Mapping[str, Any] | None = None,
 ) -> Specification:
     """Return what a user wrote, brought to one form.
 
@@ -62,7 +69,8 @@ def specification(
         found.append((name, _frozen(table)))
     between = tuple((name, _frozen(r)) for name, r in (relations or {}).items())
     turning = tuple((name, _frozen(s, "shaft", SHAFT_KEYS)) for name, s in (shafts or {}).items())
-    return Specification(tuple(found), between, turning)
+    working = tuple((name, _frozen(t, "tool", (*NEEDLE_KEYS, *BLADE_KEYS))) for name, t in (tools or {}).items())
+    return Specification(tuple(found), between, turning, working)
 
 
 def _frozen(table: Any, what: str = "relation", keys: Sequence[str] = RELATION_KINDS) -> tuple[tuple[str, Any], ...]:
@@ -80,7 +88,7 @@ def _hashable(value: Any) -> Any:
 
 
 def built(given: Specification, find: FindFamily) -> Machine:
-    """Return the machine of a specification.
+    """Machine of a specification.
 
     Raises
     ------
@@ -96,8 +104,9 @@ def built(given: Specification, find: FindFamily) -> Machine:
         if not _WORD.fullmatch(name) or name in members:
             raise InputError("member", name, "a plain word, each once", "machine")
         members[name] = _member(name, dict(table), members, shafts, find)
+    tools = read_tools({name: dict(table) for name, table in given.tools}, members)
     plain = {name: dict(table) for name, table in given.relations if not {"event", "value"} & set(dict(table))}
-    known = {name: _relation(name, table, members) for name, table in plain.items()}
+    known = {name: _relation(name, table, members, tools) for name, table in plain.items()}
     outputs = _outputs(members, tuple(known.values()))
     events = {
         name: _event(name, dict(table), outputs) if "event" in dict(table) else _reading(name, dict(table), outputs)
@@ -189,13 +198,13 @@ def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[s
 
 
 def _outputs(members: Mapping[str, Member], others: tuple[Any, ...]) -> Mapping[str, Output]:
-    """Return pose outputs of the machine: of its members, their points, and relations of several."""
+    """Pose outputs of the machine: of its members, their points, and relations of several."""
     relations = tuple(r for r in others if not isinstance(r, Timing))
     return assemble("", tuple(members.values()), relations).pose_output
 
 
 def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Reading:
-    """Return the value of a pose output at a crank angle."""
+    """Value of a pose output at a crank angle."""
     where, given = f"machine.relations.{name}", table["value"]
     if len(table) != 1:
         raise InputError(name, dict(table), "value alone", where)
@@ -208,7 +217,7 @@ def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) ->
 
 
 def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Event:
-    """Return the event where a pose output of the machine, a relation's or a member's, passes a level."""
+    """Event where a pose output of the machine, a relation's or a member's, passes a level."""
     where = f"machine.relations.{name}"
     for key in table:
         if key not in EVENT_KEYS:
@@ -224,8 +233,14 @@ def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> E
     return Event(name, of, text, float(level), rising)
 
 
-def _relation(name: str, table: dict[str, Any], members: Mapping[str, Member]) -> Relation | Timing:
+def _relation(
+    name: str, table: dict[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool]
+) -> Relation | Timing:
     where = f"machine.relations.{name}"
+    if "gap" in table:
+        return _gap(name, table, bodies(members, tools), where)
+    if "take" in table:
+        return _taking(name, table, tools, where)
     if "thread" in table:
         return thread_balance(name, table, members)
     if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
@@ -256,6 +271,29 @@ def _relation(name: str, table: dict[str, Any], members: Mapping[str, Member]) -
     if len({member for member, _ in placed}) < len(placed):
         raise InputError(kind, given, "each member once: the stages of a chain have different frames", where)
     return Shaking(name, tuple(placed))
+
+
+def _gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str) -> Gap:
+    for key in table:
+        if key not in ("gap", "radii"):
+            raise InputError(key, table[key], "gap, radii", where)
+    first, second = (known[one] for one in _two(table["gap"], list(known), "bodies", where))
+    if "radii" in table:
+        a, b = (length("radii", radius, where) for radius in table["radii"])
+        first, second = replace(first, radius=a), replace(second, radius=b)
+    return Gap(name, (first, second))
+
+
+def _taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Taking:
+    for key in table:
+        if key not in ("take", "sense"):
+            raise InputError(key, table[key], "take, sense", where)
+    needle, blade = (tools[one] for one in _two(table["take"], list(tools), "tools", where))
+    if not isinstance(needle, Needle) or not isinstance(blade, Blade):
+        raise InputError("take", table["take"], "a needle, then a blade", where)
+    if table.get("sense", 1) not in (1, -1):
+        raise InputError("sense", table["sense"], "1 or -1: the tip passes along n x w or against it", where)
+    return Taking(name, needle, blade, int(table.get("sense", 1)))
 
 
 def _stages(family: Family) -> list[str]:

@@ -15,6 +15,7 @@ from sweep.families.specification import Specification, specification
 from sweep.quantities import units
 from sweep.study.file import Faults, Key, StudyFile
 from sweep.study.section import Number, Section, read_section
+from sweep.study.tools import read_tool
 
 Names = Annotated[list[str], Field(min_length=1)]
 Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
@@ -82,6 +83,12 @@ class RelationSection(Section):
     level: str | Number | None = Field(None, description='what it passes, in its unit, as "1 mm"; 0 if left out')
     rising: bool | None = Field(None, description="true or false: whether it passes upwards; true if left out")
     value: Names | None = Field(None, description='a pose output and a crank angle, as ["pace", "phi_arrive"]')
+    gap: Names | None = Field(None, description='two bodies, links or tools, as ["needle.rocker1", "blade"]')
+    radii: Annotated[list[str], Field(min_length=2, max_length=2)] | None = Field(
+        None, description='of a gap, the radius of each body, as ["4 mm", "3 mm"]'
+    )
+    take: Names | None = Field(None, description='a needle and a blade of [tools], as ["thin", "blade"]')
+    sense: int | None = Field(None, description="of a take, 1 or -1: along n x w of the needle or against it")
     torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
     shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
 
@@ -127,7 +134,7 @@ def read_mechanism(
     if "machine" not in file:
         if "mechanism" not in file:
             faults.missing(("mechanism",), "a table [mechanism]")
-        for table in ("relations", "shafts"):
+        for table in ("relations", "shafts", "tools"):
             if table in file:
                 faults.value((table,), data[table], f"nothing here: {table} are those of a [machine]")
         names = _families(section, data, faults)
@@ -183,7 +190,10 @@ def _machine(
     for name, raw in _tables(data, "relations", faults).items():
         section = read_section(RelationSection, raw, ("relations", name), faults)
         relations[name] = section.model_dump(exclude_none=True)
+        if section.radii is not None:
+            relations[name]["radii"] = _lengths(section.radii, ("relations", name, "radii"), faults)
     shafts = {name: _shaft(name, raw, faults) for name, raw in _tables(data, "shafts", faults).items()}
+    tools = {name: read_tool(name, raw, faults) for name, raw in _tables(data, "tools", faults).items()}
     for name, thread in (threads or {}).items():
         if name in relations:
             faults.value(("thread", name), thread, "a name that no relation has")
@@ -192,20 +202,22 @@ def _machine(
         return None
     try:
         plain = {name: table for name, table in relations.items() if not {"event", "value"} & set(table)}
-        outputs = find_family(specification(members, plain, shafts)).pose_output if len(plain) < len(relations) else {}
+        outputs = (
+            find_family(specification(members, plain, shafts, tools)).pose_output if len(plain) < len(relations) else {}
+        )
         for name, table in relations.items():
             if "level" in table and (of := outputs.get(table.get("event", ""))) is not None:
                 table["level"] = _level(table["level"], units.internal_unit(of.unit), name, faults)
         if len(faults.lines) > before:
             return None
-        given = specification(members, relations, shafts)
+        given = specification(members, relations, shafts, tools)
         return given, find_family(given)
     except InputError as error:
         place: Key = tuple(error.place.removeprefix("machine.").split(".")) if error.place != "machine" else ()
         if place[:1] == ("relations",) and place[1:] and place[1] in threads:
             faults.value(("thread", place[1], _key_of_thread(error)), error.value, error.allowed)
             return None
-        if place[:1] == ("shafts",):
+        if place[:1] in (("shafts",), ("tools",)):
             faults.value(place if place[-1] == error.name else (*place, error.name), error.value, error.allowed)
             return None
         key: Key = place if place[:1] == ("relations",) else ("machine", *place)

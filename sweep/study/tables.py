@@ -21,6 +21,7 @@ from sweep.study.scene import SceneSection
 from sweep.study.section import Section, read_table
 from sweep.study.thread import ThreadSection
 from sweep.study.tolerance import ToleranceSection
+from sweep.study.tools import ToolSection
 
 REQUIRED_TABLES = ("study", "design")
 
@@ -45,6 +46,7 @@ TABLES: Mapping[str, Table] = {
     "mechanism": Table("What the study is about.", MechanismSection),
     "machine": Table(MACHINE, each=MemberSection),
     "shafts": Table("Axes that turn with the main shaft, which cranks of members sit on.", each=ShaftSection),
+    "tools": Table("Needles and blades, which gaps and moments are about.", each=ToolSection),
     "relations": Table(MACHINE, each=RelationSection),
     "thread": Table(
         "The threads of a machine, each from its tensioner over points and take-ups to the stitch.", each=ThreadSection

@@ -47,7 +47,7 @@ def chains(name, n, seed):
     for k, own in enumerate(names):
         make = crank_rockers if own == "rssr" else (lambda n, seed: guided_four_bars(n, seed, (0.5, 2.0)))
         parts += [make(40 * n, seed + 7 * k)] + ([coupled(40 * n, seed + 7 * k + 1)] if k else [])
-    designs = np.column_stack(parts)
+    designs = np.column_stack([*parts, np.zeros((40 * n, 2 * (len(names) - 1)))])
     margin = design_outputs(of, designs, ["margin"], Accuracy(target=1e-6))
     return of, np.ascontiguousarray(designs[margin["status"] == st.OK][:n])
 

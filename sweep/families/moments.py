@@ -1,0 +1,110 @@
+"""The moment A, where a looper's tip passes the needle and takes its loop: machine-and-stitch, 5.1 and 5.2.
+
+In the needle's frame, n along the needle to its point, w out of the scarf and square to n, u = n x w, the tip stands
+at X = (T - G).u across, Y = (T - G).w aside, Z = (T - G).n along the needle from the guided point G.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sweep.families.base import Output, Parameter
+from sweep.families.frames import Frame
+from sweep.families.segments import cross, dot, minus
+from sweep.families.sites import AXES
+from sweep.families.tools import Blade, Needle
+
+PARALLEL = 1e-6  # of the scarf's size: what is square to the needle says no direction below
+
+
+@dataclass(frozen=True)
+class Taking:
+    """A blade's tip in the frame of a needle, pose by pose; :mod:`sweep.families.passages` finds where it passes.
+
+    ``sense`` is +1 or -1: the tip passes towards u or against it.
+    """
+
+    name: str
+    needle: Needle
+    blade: Blade
+    sense: int
+
+    @property
+    def rates(self) -> Mapping[str, str]:
+        """Of each pose output its derivative by the angle of the main shaft."""
+        return {f"{self.name}_{what}": f"{self.name}_d{what}" for what in ("across", "side", "height", "depth")}
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Coordinates of the tip in the needle's frame, depth of the needle, and their derivatives."""
+        texts = {
+            "across": "the tip across the needle, along n x w",
+            "side": "the tip beside the needle's axis, out of the scarf",
+            "height": "the tip along the needle, from the guided point",
+            "depth": "the guided point along the needle's direction",
+        }
+        found = [Output(f"{self.name}_{what}", "length", text, "(12)") for what, text in texts.items()]
+        found += [
+            Output(
+                f"{self.name}_d{what}", "length", f"derivative of {self.name}_{what} by phi of the main shaft", "(12)"
+            )
+            for what in texts
+        ]
+        speed = "speed of the tip relative to the needle, per radian of the main shaft"
+        return (*found, Output(f"{self.name}_speed", "length", speed, "(12)"))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
+
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
+        """Return coordinates of both points and the line, and velocities where they are wanted."""
+        names = [self.needle.on, self.blade.tip, self.needle.line]
+        if any(name not in self.rates for name in wanted if name.startswith(f"{self.name}_")):
+            names += [_rate(self.needle.on), _rate(self.blade.tip)]
+        return frozenset(f"{name}_{axis}" for name in names for axis in AXES)
+
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+        """Return the wanted outputs, (n, m); nan where the scarf lies along the needle."""
+        point, tip, line = (_vector(found, name) for name in (self.needle.on, self.blade.tip, self.needle.line))
+        n = [self.needle.sense * x for x in line]
+        scarf = self.needle.scarf
+        along = dot(scarf, n)
+        w = [x - along * part for x, part in zip(scarf, n, strict=True)]
+        size = np.sqrt(dot(w, w))
+        size = np.where(np.real(size) > PARALLEL * np.linalg.norm(scarf), size, np.nan)
+        w = [x / size for x in w]
+        u = cross(n, w)
+        own = {name for name in wanted if name.startswith(f"{self.name}_")}
+        columns: dict[str, Any] = {}
+        for moving, d in ((False, ""), (True, "d")):
+            names = {what: f"{self.name}_{d}{what}" for what in ("across", "side", "height", "depth", "speed")}
+            if own.isdisjoint(names.values()) and not (moving and f"{self.name}_speed" in own):
+                continue
+            if moving:
+                point, tip = _vector(found, _rate(self.needle.on)), _vector(found, _rate(self.blade.tip))
+            r = minus(tip, point)
+            for what, value in (
+                ("across", dot(r, u)),
+                ("side", dot(r, w)),
+                ("height", dot(r, n)),
+                ("depth", dot(point, n)),
+            ):
+                columns[names[what]] = value
+            if moving:
+                columns[f"{self.name}_speed"] = np.sqrt(dot(r, r))
+        return columns
+
+
+def _rate(name: str) -> str:
+    member, _, own = name.partition(".")
+    return f"{member}.d{own}"
+
+
+def _vector(found: Mapping[str, Any], name: str) -> list[Any]:
+    return [found[f"{name}_{axis}"] for axis in AXES]

@@ -1,0 +1,87 @@
+"""Distances and sides of two segments, pose by pose: machine-and-stitch, 4.
+
+A point is a list of its coordinates, arrays of one shape; all of it takes complex numbers, for gradients by the complex
+step: what is nearest is decided by real parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+Point: TypeAlias = Sequence[Any]
+
+
+class Closest(NamedTuple):
+    """Distance of two segments, and where along each its end of the shortest connection lies, 0 to 1."""
+
+    distance: Any
+    first: Any
+    second: Any
+
+
+def dot(a: Point, b: Point) -> Any:
+    """Return the product of two vectors without conjugation."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Point, b: Point) -> list[Any]:
+    """Return the product vector."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def minus(a: Point, b: Point) -> list[Any]:
+    """Return the vector from b to a."""
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
+def closest(p1: Point, q1: Point, p2: Point, q2: Point) -> Closest:
+    """Return the least distance of the segments p1 q1 and p2 q2, (9).
+
+    The least of a convex function over a square: at one of four ends against the other segment, or inside both.  Each
+    candidate is the length of an actual difference, so none is too small; parallel segments need no threshold.
+    """
+    d1, d2, w = minus(q1, p1), minus(q2, p2), minus(p2, p1)
+    n = cross(d1, d2)
+    square = dot(n, n)
+    crossed = np.real(square) > 0.0
+    size = np.where(crossed, square, 1.0)
+    s, t = dot(cross(w, d2), n) / size, dot(cross(w, d1), n) / size
+    inside = crossed & _within(s) & _within(t)
+    zero = 0.0 * s
+    candidates = [
+        (zero, _foot(minus(p1, p2), d2)),
+        (zero + 1.0, _foot(minus(q1, p2), d2)),
+        (_foot(w, d1), zero),
+        (_foot(minus(q2, p1), d1), zero + 1.0),
+        (np.where(inside, s, 0.0), np.where(inside, t, 0.0)),
+    ]
+    best: Any = None
+    for along, across in candidates:
+        apart = [x + across * b - along * a for x, a, b in zip(w, d1, d2, strict=True)]
+        found = dot(apart, apart), along, across
+        nearer = None if best is None else np.real(found[0]) < np.real(best[0])
+        best = found if nearer is None else tuple(np.where(nearer, a, b) for a, b in zip(found, best, strict=True))
+    return Closest(np.sqrt(best[0]), best[1], best[2])
+
+
+def triple_product(p1: Point, q1: Point, p2: Point, q2: Point) -> Any:
+    """Return d1 . ((p2 - p1) x (q2 - p1)), (11): the signed distance of the lines, times the size of d1 x d2.
+
+    It changes its sign where the lines meet or are parallel.
+    """
+    return -dot(minus(p2, p1), cross(minus(q1, p1), minus(q2, p2)))
+
+
+def _within(x: Any) -> Any:
+    return (np.real(x) >= 0.0) & (np.real(x) <= 1.0)
+
+
+def _foot(v: Point, d: Point) -> Any:
+    """Return the place along d, 0 to 1, that is nearest to v; 0 on a segment of no length."""
+    square = dot(d, d)
+    some = np.real(square) > 0.0
+    t = dot(v, d) / np.where(some, square, 1.0)
+    return np.where(np.real(t) > 0.0, np.where(np.real(t) < 1.0, t, 1.0), 0.0) * some

@@ -1,0 +1,163 @@
+"""Tools of a machine: needles that a guided point carries along its line, blades fixed to an output link."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from sweep.errors import InputError, choices
+from sweep.families.capabilities import OutputLink
+from sweep.families.gaps import Body
+from sweep.families.parts import Member, vector
+from sweep.families.sites import links_of
+
+NEEDLE_KEYS = ("on", "line", "sense", "scarf", "diameter", "floor", "top", "scarf_end", "eye", "point")
+BLADE_KEYS = ("on", "tip", "back", "radius")
+NEEDED = {"needle": ("on", "line", "scarf", "diameter", "eye", "point"), "blade": ("on", "tip", "back")}
+
+
+@dataclass(frozen=True)
+class Needle:
+    """A needle, machine-and-stitch 5.1; lengths count along it from the guided point.
+
+    Parameters
+    ----------
+    name : of the tool
+    on : dotted name of the guided point
+    line : dotted name of the direction of its line
+    sense : +1 or -1: whether the needle points along the line or against it
+    scarf : a vector out of the scarf, in the machine's frame
+    diameter : of the blade above the scarf
+    floor : from the axis to the floor of the scarf
+    top, scarf_end, eye, point : where the needle begins, the scarf ends, the eye stands, the needle ends
+    """
+
+    name: str
+    on: str
+    line: str
+    sense: int
+    scarf: tuple[float, float, float]
+    diameter: float
+    floor: float
+    top: float
+    scarf_end: float
+    eye: float
+    point: float
+
+    @property
+    def body(self) -> Body:
+        """The needle from its top to its point."""
+        reach = (self.sense * self.top, self.sense * self.point)
+        return Body(self.name, (self.on, self.line), reach, 0.5 * self.diameter)
+
+
+@dataclass(frozen=True)
+class Blade:
+    """A blade that an output link carries: its tip, the back end, and its radius."""
+
+    name: str
+    tip: str
+    back: str
+    radius: float
+
+    @property
+    def body(self) -> Body:
+        """The blade from its tip to its back."""
+        return Body(self.name, (self.tip, self.back), None, self.radius)
+
+
+Tool: TypeAlias = Needle | Blade
+
+
+def read_tools(given: Mapping[str, Mapping[str, Any]], members: dict[str, Member]) -> dict[str, Tool]:
+    """Return the tools of a machine from what a user gives; members get the points of the blades that they carry.
+
+    Raises
+    ------
+    InputError
+        for unknown or missing keys, a point without line, a member without output link, a number that is none.
+    """
+    found: dict[str, Tool] = {}
+    for name, table in given.items():
+        where = f"machine.tools.{name}"
+        kind, keys = ("blade", BLADE_KEYS) if "back" in table else ("needle", NEEDLE_KEYS)
+        for key in table:
+            if key not in keys:
+                raise InputError(key, table[key], f"for a {kind}, {choices(key, keys)}", where)
+        for key in NEEDED[kind]:
+            if key not in table:
+                raise InputError(key, None, f"what a {kind} needs: {', '.join(NEEDED[kind])}", where)
+        found[name] = _blade(name, table, members, where) if kind == "blade" else _needle(name, table, members, where)
+    return found
+
+
+def _needle(name: str, table: Mapping[str, Any], members: Mapping[str, Member], where: str) -> Needle:
+    points = [f"{m.name}.{point}" for m in members.values() for point in m.moving]
+    if table["on"] not in points:
+        raise InputError("on", table["on"], f"a moving point: {choices(str(table['on']), points)}", where)
+    owner = members[str(table["on"]).partition(".")[0]]
+    lines = [site.removesuffix("_axis") for site, one in owner.sites.items() if one.free and not site[-1].isdigit()]
+    if table["line"] not in lines:
+        raise InputError("line", table["line"], f"an axis or line of it: {choices(str(table['line']), lines)}", where)
+    sense = table.get("sense", 1)
+    if sense not in (1, -1) or isinstance(sense, bool):
+        raise InputError("sense", sense, "1 or -1: the needle points along the line or against it", where)
+    diameter = length("diameter", table["diameter"], where)
+    top, end, eye, point = (number(key, table.get(key, 0.0), where) for key in ("top", "scarf_end", "eye", "point"))
+    if not top <= end < eye < point:
+        raise InputError("eye", eye, "top <= scarf_end < eye < point", where)
+    floor = length("floor", table["floor"], where) if "floor" in table else 0.5 * diameter
+    scarf = vector(table["scarf"], f"{where}.scarf")
+    return Needle(
+        name,
+        str(table["on"]),
+        f"{owner.name}.{table['line']}_axis",
+        sense,
+        scarf,
+        diameter,
+        floor,
+        top,
+        end,
+        eye,
+        point,
+    )
+
+
+def _blade(name: str, table: Mapping[str, Any], members: dict[str, Member], where: str) -> Blade:
+    carriers = [m.name for m in members.values() if m.family.find(OutputLink) is not None]
+    owner = table["on"]
+    if owner not in carriers:
+        allowed = f"a member whose output link turns: {choices(str(owner), carriers)}"
+        raise InputError("on", owner, allowed, where)
+    ends = tuple((f"{name}_{end}", vector(table[end], f"{where}.{end}")) for end in ("tip", "back"))
+    member = members[owner]
+    members[owner] = replace(member, carried=(*member.carried, *ends))
+    radius = length("radius", table["radius"], where) if "radius" in table else 0.0
+    return Blade(name, f"{owner}.{name}_tip", f"{owner}.{name}_back", radius)
+
+
+def length(key: str, value: object, where: str) -> float:
+    """Return a length that a user gives; refuse what is none."""
+    found = number(key, value, where)
+    if found < 0.0:
+        raise InputError(key, value, "a length that is not negative", where)
+    return found
+
+
+def number(key: str, value: object, where: str) -> float:
+    """Return a number that a user gives; refuse what is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise InputError(key, value, "a finite number", where)
+    return float(value)
+
+
+def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str, Body]:
+    """Return what gaps can be between: tools by their name, links by member and name."""
+    found = {name: tool.body for name, tool in tools.items()}
+    for m in members.values():
+        for link, (first, second) in links_of(m).items():
+            found[f"{m.name}.{link}"] = Body(f"{m.name}.{link}", (f"{m.name}.{first}", f"{m.name}.{second}"))
+    return found

@@ -1,0 +1,184 @@
+"""Gaps of capsules and the moment A against the 25-digit table, each within 16 roundings of its condition."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import sweep
+from kernels import status as st
+from sweep.families.segments import closest, triple_product
+
+TABLE = json.loads((Path(__file__).parents[1] / "oracle" / "machine_open.json").read_text())["rows"]
+FACTOR = 16.0
+TURN = np.arange(8192) * (2.0 * np.pi / 8192)
+
+
+def rows_of(kind, case=None):
+    return [row for row in TABLE if row["kind"] == kind and case in (None, row["case"])]
+
+
+def machine_of(given, **relations):
+    """Return the machine of a needle and a looper, and its design."""
+    needle, looper, design = given["needle"], given["looper"], {}
+    place = {key: needle[key] for key in ("at", "axis", "zero")} | {"stage": 1}
+    members = {
+        "needle": {"chain": [stage["family"] for stage in needle["stages"]], "place": place},
+        "looper": {
+            "family": "rssr",
+            "ratio": looper["ratio"],
+            "offset": looper["offset"],
+            "place": {key: looper[key] for key in ("at", "axis", "zero")},
+        },
+    }
+    for n, stage in enumerate(needle["stages"], start=1):
+        design |= {f"needle.{key}{n}": value for key, value in stage["p"].items()}
+        design |= {f"needle.{key}{n}": stage[key] for key in ("kappa", "offset", "shift", "turn") if key in stage}
+    design |= {f"looper.{key}": value for key, value in looper["p"].items()}
+    sizes = {key: needle[key] for key in ("sense", "scarf", "diameter", "scarf_end", "eye", "point")}
+    tools = {
+        "thin": {"on": "needle.point", "line": "line"} | sizes,
+        "blade": {"on": "looper", "tip": looper["tip"], "back": looper["back"]},
+    }
+    return sweep.machine(members, relations, tools=tools), design
+
+
+def factor(row, name, value):
+    exact = mpf(row["expected"][name])
+    with mp.workdps(40):
+        error = mpf(float(value)) - exact
+        if name.startswith("phi"):
+            error -= 2 * mp.pi * mp.nint(error / (2 * mp.pi))
+        return float(abs(error) / (mpf(2) ** -53 * max(mpf(row["cond"][name]), abs(exact))))
+
+
+def test_distances_of_segments_are_those_of_the_table():
+    worst = {}
+    for row in rows_of("capsule"):
+        p1, q1, p2, q2 = ([np.float64(x) for x in row["inputs"][name]] for name in ("p1", "q1", "p2", "q2"))
+        found = closest(p1, q1, p2, q2)
+        values = {"distance": found.distance, "gap": found.distance - row["inputs"]["r1"] - row["inputs"]["r2"]}
+        values |= {"triple_product": triple_product(p1, q1, p2, q2)}
+        for name, value in values.items():
+            if name in row["expected"]:
+                scale = float(row["scale"][name] if isinstance(row["scale"], dict) else row["scale"])
+                error = float(abs(mpf(float(value)) - mpf(row["expected"][name]))) / (2.0**-53 * scale)
+                worst[name, row["case"]] = max(worst.get((name, row["case"]), 0.0), error)
+    assert worst and max(worst.values()) < FACTOR, worst
+
+
+@pytest.mark.parametrize("case", sorted({row["case"] for row in rows_of("moment_A")}))
+def test_the_moment_a_is_that_of_the_table(case):
+    worst = {}
+    for row in rows_of("moment_A", case):
+        given, expected = row["inputs"], row["expected"]
+        machine, design = machine_of(given, a={"take": ["thin", "blade"], "sense": given["looper"]["sense"]})
+        names = {
+            "phi_A": "phi_a", "lag_A": "a_lag", "clearance_A": "a_clearance", "rise_A": "a_rise",
+            "above_eye_A": "a_above_eye", "below_scarf_end_A": "a_below_scarf_end", "overtravel_A": "a_overtravel",
+            "gauge": "a_gauge", "reach_before": "a_reach",
+        }  # fmt: skip
+        found = sweep.summarise(machine, design, [*names.values(), "count_a"], accuracy=1e-9).iloc[0]
+        assert found["count_a"] == expected["passages"]
+        for name, own in names.items():
+            if name not in expected:
+                continue
+            worst[name] = max(worst.get(name, 0.0), factor(row, name, found[own]))
+        if expected["passages"] == 1:
+            assert found["status"] in (st.OK, st.WRONG_SIDE)
+            rates = sweep.evaluate(
+                machine, design, ["a_dacross", "a_dside", "a_dheight", "a_ddepth"], phi=[found["phi_a"]]
+            )
+            for name, own in zip(("across", "side", "height", "needle"), rates.columns[-5:], strict=False):
+                worst[f"rate_{name}_A"] = max(
+                    worst.get(f"rate_{name}_A", 0.0), factor(row, f"rate_{name}_A", rates[own][0])
+                )
+        else:
+            assert found["status"] in (st.TWICE, st.NEVER, st.WRONG_WAY)
+    assert max(worst.values()) < FACTOR, worst
+
+
+def test_least_gap_over_the_turn_is_that_of_the_table():
+    for row in rows_of("capsule_turn"):
+        machine, design = machine_of(row["inputs"], free={"gap": ["thin", "blade"]})
+        found = sweep.summarise(machine, design, ["min_free", "phi_min_free"], accuracy=1e-9).iloc[0]
+        distance = found["min_free"] + 0.5 * row["inputs"]["needle"]["diameter"]
+        error = abs(float(mpf(float(distance)) - mpf(row["expected"]["distance"])))
+        assert error <= max(found["err_min_free"], FACTOR * 2.0**-53 * float(row["cond"]["distance"])), row["expected"]
+        apart = abs(found["phi_min_free"] - float(row["expected"]["phi"]))
+        assert min(apart, 2.0 * math.pi - apart) < 1e-6
+
+
+def dense(machine, design, needle):
+    """Read all crossings off a dense turn, in numpy alone: roots of straight pieces, side and rise between samples."""
+    names = [f"a_{x}" for x in ("across", "side", "height", "depth")]
+    found = sweep.evaluate(machine, design, names, phi=TURN)
+    x, y, z, g = (found[name].to_numpy() for name in names)
+    k = np.flatnonzero(x * np.roll(x, -1) < 0.0)
+    share = x[k] / (x[k] - np.roll(x, -1)[k])
+    y, z, h = (v[k] + share * (np.roll(v, -1)[k] - v[k]) for v in (y, z, g))
+    beside = (z > 0.0) & (z < needle["point"])
+    return TURN[k] + share * TURN[1], np.sign(np.roll(x, -1)[k] - x[k]), beside, y, z, g.max() - h
+
+
+def test_passages_of_random_machines_are_those_of_a_dense_turn():
+    rng, taken, seen = np.random.default_rng(31), 0, set()
+    rows = rows_of("moment_A", "passage")
+    for trial in range(60):
+        given = json.loads(json.dumps(rows[trial % len(rows)]["inputs"]))
+        given["looper"]["at"] = [x + rng.normal(0.0, 6.0) for x in given["looper"]["at"]]
+        given["looper"]["offset"] += rng.normal(0.0, 0.3)
+        sense = int(rng.choice([-1, 1]))
+        machine, design = machine_of(given, a={"take": ["thin", "blade"], "sense": sense})
+        names = ["phi_a", "count_a", "a_clearance", "a_rise", "a_above_eye", "a_back_side"]
+        found = sweep.summarise(machine, design, names, accuracy=1e-9).iloc[0]
+        phi, sign, beside, side, height, rise = dense(machine, design, given["needle"])
+        right = np.flatnonzero(beside & (sign == sense))
+        assert found["count_a"] == right.size
+        seen.add(int(found["status"]))
+        if right.size == 1:
+            taken, k = taken + 1, right[0]
+            assert found["phi_a"] == pytest.approx(phi[k], abs=2e-5)
+            assert found["a_clearance"] == pytest.approx(side[k] - 0.5 * given["needle"]["diameter"], abs=2e-3)
+            assert found["a_rise"] == pytest.approx(rise[k], abs=2e-3)
+            assert found["a_above_eye"] == pytest.approx(given["needle"]["eye"] - height[k], abs=2e-3)
+            assert found["a_back_side"] == pytest.approx(side[(k + 1) % phi.size], abs=2e-2)
+            assert (found["status"] == st.WRONG_SIDE) == (side[k] < 0.0)
+        elif right.size == 0:
+            assert found["status"] == (st.WRONG_WAY if (beside & (sign == -sense)).any() else st.NEVER)
+        else:
+            assert found["status"] == st.TWICE
+    assert taken > 12 and {st.OK, st.WRONG_SIDE, st.NEVER, st.WRONG_WAY} <= seen
+
+
+def test_scarf_along_the_needle_has_no_frame():
+    given = json.loads(json.dumps(rows_of("moment_A", "passage")[0]["inputs"]))
+    machine, design = machine_of(given, a={"take": ["thin", "blade"]})
+    frame = machine.members[0].frame(np.array([[design.get(p.name, p.default) for p in machine.parameters]], float))
+    lam = design["needle.lam2"]
+    given["needle"]["scarf"] = (frame.rotation[0] @ [math.cos(lam), math.sin(lam), 0.0]).tolist()
+    machine, design = machine_of(given, a={"take": ["thin", "blade"]})
+    assert sweep.summarise(machine, design, ["a_clearance"], accuracy=1e-9)["status"][0] == st.NO_FRAME
+
+
+def test_gap_of_links_is_the_least_of_dense_samples():
+    row = rows_of("capsule_turn")[0]
+    machine, design = machine_of(row["inputs"], free={"gap": ["needle.rocker1", "looper.coupler"], "radii": [1.0, 2.0]})
+    found = sweep.summarise(machine, design, ["min_free", "max_free"], accuracy=1e-8).iloc[0]
+    where = sweep.joints(machine, design, TURN[::4])
+
+    def path(member, stage, joint):
+        rows = where[(where["member"] == member) & (where["stage"] == stage) & (where["joint"] == joint)]
+        return rows[["x", "y", "z"]].to_numpy()
+
+    p, q = path("needle", "1", "d")[:, None, None], path("needle", "1", "c")[:, None, None]
+    a, b = path("looper", "", "b")[:, None, None], path("looper", "", "c")[:, None, None]
+    s, t = np.linspace(0.0, 1.0, 41)[None, :, None, None], np.linspace(0.0, 1.0, 41)[None, None, :, None]
+    grid = np.linalg.norm(p + s * (q - p) - a - t * (b - a), axis=3).min(axis=(1, 2)) - 3.0
+    assert found["min_free"] <= grid.min() + 1e-9 and found["min_free"] == pytest.approx(grid.min(), abs=0.3)
+    assert found["max_free"] == pytest.approx(grid.max(), abs=0.3)
