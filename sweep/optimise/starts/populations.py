@@ -281,13 +281,15 @@ def bred(
     size : of each
     """
     task, ended, found = Population(linear, tuple(signs), seed, size), itertools.count(1), list[Bred]()
-    unit = f"populations {AT_MOST}"
-    say("global search", 0, most, unit)
+
+    def tell(done: int) -> None:
+        say("global search", done, most, f"populations {AT_MOST}{_best_so_far(found)}")
+
+    tell(0)
     while len(found) < most:
         numbers = list(range(len(found), min(len(found) + max(1, jobs), most)))
-        told = f"{unit}{_best_so_far(found)}"
-        found += spread_over(task, numbers, stop, jobs, lambda told=told: say("global search", next(ended), most, told))
-        say("global search", len(found), most, f"{unit}{_best_so_far(found)}")
+        found += spread_over(task, numbers, stop, jobs, lambda: tell(next(ended)))
+        tell(len(found))
         if stop():
             break
         count = enough(found)
