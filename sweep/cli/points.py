@@ -16,6 +16,7 @@ from sweep.exchange.export import FORMATS
 from sweep.exchange.export import export as write
 from sweep.exchange.points import TOLERANCE, from_points, read_points, reader_of
 from sweep.report.dataset import chosen
+from sweep.report.workbook import write_workbook
 
 FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 
@@ -51,7 +52,7 @@ def points(family: str, file: Path, part: str, tolerance: float | None, out: Pat
 @click.command()
 @FOLDER
 @DESIGN
-@click.option("--format", "kind", required=True, type=click.Choice(["csv", "glb", "dxf", "mjcf", "law"]))
+@click.option("--format", "kind", required=True, type=click.Choice([*FORMATS, "xlsx"]))
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), help="Default: export/DESIGN.ending beside FOLDER."
 )
@@ -62,13 +63,25 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
 
     csv: hardpoints and axes.  glb: an animated model that a browser opens.  dxf: a drawing.  mjcf: a model for MuJoCo.
     law: the motion over one turn with units, .csv or .parquet.  dxf needs `pip install 'linksweep[cad]'`.
+
+    xlsx: the whole dataset as a workbook, best designs first, with optimum, curves and definitions; it needs
+    `pip install 'linksweep[excel]'`.
     """
+    if kind == "xlsx":
+        click.echo(f"xlsx: {write_workbook(folder, out or _place(folder, 'results.xlsx'))}")
+        return
     grid_in_radians("phi", "rad", phi, None)  # --phi is in rad, whatever the design is
     found = chosen(folder, design)
     if out is None:
         name = f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
-        out = beside(located(folder)) / "export" / name
-        out.parent.mkdir(exist_ok=True)
+        out = _place(folder, name)
     click.echo(
         f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed, angles='rad')}"
     )
+
+
+def _place(folder: Path, name: str) -> Path:
+    """Name a file in the folder ``export`` beside the designs, and make that folder."""
+    place = beside(located(folder)) / "export"
+    place.mkdir(exist_ok=True)
+    return place / name

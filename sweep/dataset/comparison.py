@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.dataset import store
+from sweep.dataset.files import check_tables
 from sweep.errors import InputError, StoreError
 from sweep.families.names import is_error
 
@@ -193,6 +194,7 @@ class _Rows:
             raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "compare")
         self.folder = folder
         self.stops = [store.about(part)["stop"] for part in chunks]
+        store.check_columns(chunks)
         names = pq.read_schema(io.BytesIO(chunks[0].read())).names
         self.columns = [name for name in names if not is_error(name)]
         self._chunks: Iterator[tuple[int, store.Part]] = iter(zip(self.stops, chunks, strict=True))
@@ -239,6 +241,8 @@ def _compare_optima(result: Comparison, old: Path, new: Path, rtol: float) -> No
     paths = [store.beside(folder) / store.OPTIMUM for folder in (old, new)]
     if not all(path.is_file() for path in paths):
         return
+    for folder in (old, new):
+        check_tables(folder, [store.OPTIMUM])
     tables = [store.read_table(path).drop_duplicates("role").set_index("role") for path in paths]
     shared = tuple(result.moved)
     for role in ROLES:

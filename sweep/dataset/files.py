@@ -81,6 +81,8 @@ def store_errors(place: Path) -> Iterator[None]:
     except OSError as error:
         where = error.filename or place
         remedy = "mend that and run again to continue" if error.errno in CLOSED else "run again to continue"
+        if error.errno == errno.EEXIST and Path(where).is_symlink():  # and what it leads to is no folder
+            raise StoreError(f"{where}: a link that leads to no folder; remove it, or take another folder") from error
         text = f"{where}: {error.strerror or error}; finished chunks are kept, {remedy}"
         raise StoreError(text) from error
 
@@ -262,6 +264,20 @@ def altered(place: Path, note: Mapping[str, Any], names: Iterable[str]) -> list[
     """
     known, found = note.get(TABLES) or {}, digests(place, names)
     return [name for name in names if name not in found or known.get(name, found[name]) != found[name]]
+
+
+def check_tables(folder: Path, names: Iterable[str]) -> None:
+    """Refuse tables beside the chunks of a dataset that are there, and not as their search has written them.
+
+    Raises
+    ------
+    StoreError
+        for the first such table.
+    """
+    place = beside(folder)
+    for name in altered(place, read_plan(folder) or {}, [name for name in names if (place / name).is_file()]):
+        text = "not as its search has written it; run the study again to have it searched anew"
+        raise StoreError(f"{place / name}: {text}")
 
 
 def metadata(path: Path) -> dict[bytes, bytes]:

@@ -6,6 +6,7 @@ import hashlib
 import io
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -159,6 +160,28 @@ def is_whole(part: Part) -> bool:
             raise
         return False
     return True
+
+
+def check_columns(chunks: Sequence[Part]) -> None:
+    """Refuse chunks that can be read and have not the columns of the first one.
+
+    Raises
+    ------
+    StoreError
+        for the first such chunk, with the columns that differ.
+    """
+    import pyarrow.parquet as pq
+
+    names: list[str] = []
+    for part in chunks:
+        found = pq.read_schema(part.path).names
+        names = names or found
+        if found != names:
+            part.read()  # a damaged name is no other column
+            apart = ", ".join(sorted({*names} ^ {*found})) or "their order"
+            raise StoreError(
+                f"{part.path}: other columns than {chunks[0].path.name} ({apart}); move it away, then run again"
+            )
 
 
 def missing_chunks(folder: Path, chunks: list[Part]) -> list[int]:

@@ -66,6 +66,7 @@ def scan(folder: str | Path) -> ds.Dataset:
             raise StoreError(f"{place}: {one.path.name} and {other.path.name} are not chunks of one table")
     for part in chunks:
         store.about(part)
+    store.check_columns(chunks)
     return ds.dataset([str(part.path) for part in chunks], format="parquet")
 
 

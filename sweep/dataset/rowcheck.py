@@ -121,6 +121,8 @@ def unequal(row: pd.DataFrame, again: Columns) -> str:
     if not len(row):
         return ""
     for name, values in again.items():
+        if name not in row.columns:
+            return f"no column {name}"
         stored = row[name].to_numpy()
         if not bool(_same(stored, values)[0]):
             return f"{name} = {stored[0]!r}, computed again {values[0]!r}"

@@ -55,6 +55,7 @@ from sweep.dataset.parts import (
     STATUS_NAMES,
     Part,
     about,
+    check_columns,
     content_hash,
     is_whole,
     listing,
@@ -91,6 +92,7 @@ __all__ = [
     "about",
     "append_run",
     "beside",
+    "check_columns",
     "content_hash",
     "encode",
     "finished_chunks",
@@ -265,12 +267,13 @@ def front_cut_short(path: Path) -> str | None:
     return None if about.get(b"complete") != b"false" else about.get(b"steps", b"").decode() or None
 
 
-def load(folder: str | Path) -> pd.DataFrame:
+def load(folder: str | Path, units: bool = False) -> pd.DataFrame:
     """Return the finished part of a dataset, in design order.
 
     Parameters
     ----------
     folder : what ``sweep run`` wrote
+    units : whether the columns carry their units, ``alpha1 [rad]``
 
     Returns
     -------
@@ -297,7 +300,9 @@ def load(folder: str | Path) -> pd.DataFrame:
     >>> len(rows), rows.attrs["units"]["max_pressure_angle"]
     (25, 'rad')
     >>> rows.nsmallest(1, "max_abs_d2s")[["a", "b", "max_abs_d2s"]].round(4).values.tolist()
-    [[0.95, 3.15, 1.2455]]
+    [[9.5, 31.5, 12.4546]]
+    >>> [name for name in sweep.load("results/press/designs", units=True) if name.startswith(("a", "max_p"))]
+    ['a [mm]', 'max_pressure_angle [rad]']
     """
     import pandas as pd
 
@@ -312,17 +317,23 @@ def load(folder: str | Path) -> pd.DataFrame:
         if one.index == other.index:
             raise _twice(place, one, other)
     frames = [part.rows() for part in chunks]
+    check_columns(chunks)
     missing = missing_chunks(place, chunks)
     if missing:
         text = f"{place}: incomplete, {len(missing)} of {len(missing) + len(chunks)} chunks are missing"
         text += f" (the first is {missing[0]}); run the study again to have them computed"
         warnings.warn(text, IncompleteWarning, stacklevel=2)
     found = pd.concat(frames, ignore_index=True)
-    found.attrs["units"] = units(chunks[0])
+    named = units_of(chunks[0])
+    if units:
+        found = found.rename(
+            columns={name: f"{name} [{unit}]" for name, unit in named.items() if unit not in ("", "1")}
+        )
+    found.attrs["units"] = named
     return found
 
 
-def units(part: Part) -> dict[str, str]:
+def units_of(part: Part) -> dict[str, str]:
     """Return the unit of every column of a chunk that has one, as its field metadata say."""
     import pyarrow.parquet as pq
 

@@ -12,9 +12,12 @@ from sweep.chunks import plan as plans
 from sweep.chunks.cascade import Dropped
 from sweep.chunks.chunk import compute_chunk
 from sweep.dataset.store import parts, write_chunk
-from sweep.errors import InputError, LinksweepError, ProgramFault, StoreError
+from sweep.errors import InputError, LinksweepError, ProgramFault, StoreError, WorkerDied
 from sweep.families.base import Columns
 from sweep.study import Study
+
+# What the loader says of a library for which there is no memory.
+UNMAPPED = "failed to map segment"
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,10 @@ class ChunkTask:
         except LinksweepError as error:
             return Done(number, error=error)
         except Exception as error:  # a bug: the parent raises it, with the trace of this worker
+            if isinstance(error, MemoryError) or UNMAPPED in str(error):
+                why = f"the memory it may use is full, in chunk {number}; fewer jobs need less"
+                message = f"{self.folder}: {why}; finished chunks are kept, run again to continue"
+                return Done(number, error=WorkerDied(message))
             fault = f"{type(error).__name__}: {error}".removesuffix(": ")
             message = (
                 f"{self.folder}: {fault}, in chunk {number}, designs {start}:{end}; this is an error in the program, "

@@ -89,7 +89,7 @@ def _hashable(value: Any) -> Any:
 
 
 def built(given: Specification, find: FindFamily) -> Machine:
-    """Return the machine of a specification.
+    """Machine of a specification.
 
     Raises
     ------
@@ -199,13 +199,13 @@ def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[s
 
 
 def _outputs(members: Mapping[str, Member], others: tuple[Any, ...]) -> Mapping[str, Output]:
-    """Return pose outputs of the machine: of its members, their points, and relations of several."""
+    """Pose outputs of the machine: of its members, their points, and relations of several."""
     relations = tuple(r for r in others if not isinstance(r, Timing))
     return assemble("", tuple(members.values()), relations).pose_output
 
 
 def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Reading:
-    """Return the value of a pose output at a crank angle."""
+    """Value of a pose output at a crank angle."""
     where, given = f"machine.relations.{name}", table["value"]
     if len(table) != 1:
         raise InputError(name, dict(table), "value alone", where)
@@ -218,7 +218,7 @@ def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) ->
 
 
 def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Event:
-    """Return the event where a pose output of the machine, a relation's or a member's, passes a level."""
+    """Event where a pose output of the machine, a relation's or a member's, passes a level."""
     where = f"machine.relations.{name}"
     for key in table:
         if key not in EVENT_KEYS:

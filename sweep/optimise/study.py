@@ -21,8 +21,8 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Angles, Array, Columns
 from sweep.families.domain import Interval
 from sweep.families.names import is_error, without_error
-from sweep.jobs.deadline import Deadline
 from sweep.jobs.progress import Say, unsaid
+from sweep.jobs.signals import Deadline
 from sweep.optimise.local.kkt import CAVEAT, Result
 from sweep.optimise.local.model import Model
 from sweep.optimise.manufacture.robust import robust, yields

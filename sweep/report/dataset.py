@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.dataset import store
+from sweep.dataset.files import check_tables
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
 from sweep.families.base import Family
@@ -161,7 +162,10 @@ def read_dataset(folder: Path) -> Dataset:
         plan |= {"counts": counts, "missed": missed}
     study = study_of(plan, folder)
     optima, curves, front = (store.beside(folder) / name for name in (store.OPTIMUM, store.CURVES, store.PARETO))
-    parts = tuple(part.path for part in store.parts(folder))
+    check_tables(folder, (store.OPTIMUM, store.CURVES, store.PARETO, store.SENSITIVITY, store.TOLERANCE))
+    chunks = store.parts(folder)
+    store.check_columns(chunks)
+    parts = tuple(part.path for part in chunks)
     units, definitions = field_metadata([path for path in (*parts[:1], optima, curves, front) if path.exists()])
     return Dataset(
         folder=folder,
@@ -180,13 +184,13 @@ def read_dataset(folder: Path) -> Dataset:
 
 
 def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
-    """Return the study a dataset answers, from its plan; its title and question stand there under ``about``."""
+    """Study a dataset answers, from its plan; its title and question stand there under ``about``."""
     about = plan.get("about", {"name": plan["name"]})
     return study_from_data({**plan["data"], "study": about}, store.beside(folder) / store.PLAN)
 
 
 def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str]]:
-    """Return units and definitions that stand in the schemas of Parquet files."""
+    """Units and definitions that stand in the schemas of Parquet files."""
     import pyarrow.parquet as pq
 
     units: dict[str, str] = {}
@@ -257,12 +261,12 @@ def _chosen(data: Dataset, design: dict[str, float]) -> Chosen:
 
 
 def objective_of(study: Study) -> str | None:
-    """Return the output that is to be small, if the study names one."""
+    """Output that is to be small, if the study names one."""
     return None if study.objective is None else study.objective.output
 
 
 def shown_objective(data: Dataset) -> Quantity | None:
-    """Return the objective as it is shown."""
+    """Objective as it is shown."""
     name = objective_of(data.study)
     return None if name is None else quantity(name, data.units.get(name, ""))
 
@@ -288,7 +292,7 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
 
 
 def divided_axes(study: Study, feasible: int) -> list[Cells]:
-    """Return the swept axes, divided into cells: finely if a single map shows them all, else coarsely.
+    """Swept axes, divided into cells: finely if a single map shows them all, else coarsely.
 
     Axes of a sample are divided so that a cell holds some of the ``feasible`` designs on average.  Left out are signs,
     which make no map, and what [locus] or [fit] makes.

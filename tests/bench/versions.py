@@ -64,7 +64,7 @@ def measured() -> dict[str, Any]:
     bits, random = hashlib.sha256(), np.random.default_rng(1)
     table = {name: value * random.uniform(0.9, 1.1, DESIGNS) for name, value in RSSR.items()}
     turn = np.linspace(0.0, 6.28, 360)
-    wants = ["margin", "swing", "max_abs_d2psi", "err_max_abs_d2psi"]
+    wants = ["margin", "swing", "max_abs_d2psi"]
     for family, design, outputs in (("rssr", RSSR, ["psi", "d3psi"]), ("guide", GUIDE, ["s", "d2s", "dev"])):
         bits.update(sweep.evaluate(family, design, outputs, phi=turn).to_numpy().tobytes())
     bits.update(sweep.summarise("rssr", table, wants, accuracy=1e-8).to_numpy().tobytes())

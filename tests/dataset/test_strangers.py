@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import json
 import os
 import shutil
@@ -13,15 +14,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
 import sweep
 import sweep.chunks.plan
+import sweep.engine.worker
 from sweep.cli import main
 from sweep.dataset import store
 from sweep.dataset.lock import locked
-from sweep.errors import InputError, LinksweepWarning, LockedError, StoreError
+from sweep.dataset.parts import content_hash
+from sweep.errors import InputError, LinksweepError, LinksweepWarning, LockedError, StoreError, WorkerDied
+from sweep.report import write_report
 from tests.support.engine_study import ROOT, SMALL_CHUNKS, chunk_bytes, write_study
 
 
@@ -162,6 +167,58 @@ def test_a_nested_line_in_the_log_and_wrong_times_are_left_out(whole: tuple[Path
     with (store.beside(dataset) / store.RUNS).open("a") as file:
         file.write("[" * 100_000 + "\n" + json.dumps({"event": "end", "outcome": "complete", "seconds": "x"}) + "\n")
     assert sweep.compare(whole[1], dataset).exit_code == 0
+
+
+def test_a_chunk_that_lacks_a_column_under_a_right_hash_is_found(whole: tuple[Path, Path], dataset: Path) -> None:
+    part = store.parts(dataset)[1]
+    table = pq.read_table(part.path)
+    buffer = io.BytesIO()
+    pq.write_table(table.drop_columns(["swing"]), buffer)
+    part.path.unlink()
+    name = part.path.name.rpartition("-")[0] + f"-{content_hash(buffer.getvalue())}.parquet"
+    (dataset / name).write_bytes(buffer.getvalue())
+    found = sweep.verify(dataset, designs=10)
+    assert found.exit_code == 74 and any(finding.path.name == name for finding in found.findings)
+    for read in (sweep.load, write_report, lambda folder: sweep.compare(whole[1], folder)):
+        with pytest.raises(
+            LinksweepError, match=r"part-000001-.*: other columns than part-000000-.* \(swing\); move it away"
+        ):
+            read(dataset)
+
+
+def test_a_table_beside_the_chunks_that_was_changed_is_refused(tmp_path: Path) -> None:
+    """Its columns are not looked for: the plan knows the bytes that its search has written."""
+    path = write_study(tmp_path / "study", count=4)
+    with path.open("a") as file:
+        file.write('[objective]\nminimise = "max_abs_d2psi"\n[optimise]\nstarts = 2\nseed = 1\n')
+    folder = sweep.run(path, tmp_path / "data" / "designs", jobs=1)
+    before = shutil.copytree(folder.parent, tmp_path / "before") / "designs"
+    table = store.beside(folder) / store.OPTIMUM
+    pq.write_table(pq.read_table(table).drop_columns(["role"]), table)
+    for read in (write_report, lambda folder: sweep.compare(before, folder)):
+        with pytest.raises(
+            StoreError, match=r"_optimum\.parquet: not as its search has written it; run the study again"
+        ):
+            read(folder)
+
+
+def test_a_link_in_place_of_the_folder_that_leads_nowhere_is_said(whole: tuple[Path, Path], dataset: Path) -> None:
+    shutil.rmtree(dataset)
+    dataset.symlink_to("designs")
+    with pytest.raises(StoreError, match=r"designs: a link that leads to no folder; remove it, or take another folder"):
+        sweep.run(whole[0], dataset)
+
+
+@pytest.mark.parametrize("error", [MemoryError(), ImportError("libarrow.so: failed to map segment from shared object")])
+def test_full_memory_is_no_error_in_the_program(
+    whole: tuple[Path, Path], tmp_path: Path, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*given: object) -> None:
+        raise error
+
+    monkeypatch.setattr(sweep.engine.worker, "compute_chunk", full)
+    with pytest.raises(WorkerDied, match="the memory it may use is full, in chunk 0; fewer jobs need less"):
+        sweep.run(whole[0], tmp_path / "designs", jobs=1)
 
 
 def test_the_parent_folder_may_be_exported(dataset: Path) -> None:

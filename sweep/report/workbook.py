@@ -1,0 +1,98 @@
+"""A dataset as an Excel workbook: its best designs, its optimum, one turn of it, and what each column means."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sweep.dataset.reading import best
+from sweep.dataset.store import load
+from sweep.errors import InputError, StoreError
+from sweep.report.dataset import Dataset, objective_of, read_dataset
+from sweep.report.quantities import quantity
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MOST_ROWS = 100_000  # of designs: a sheet holds 1 048 576, but nobody scrolls through them
+
+
+def write_workbook(folder: str | Path, path: str | Path) -> Path:
+    """Write a finished dataset as a workbook for Excel.
+
+    Parameters
+    ----------
+    folder : what ``sweep run`` wrote
+    path : a file ending in .xlsx
+
+    Returns
+    -------
+    Path
+        the file, with the sheets ``designs`` (within all limits, the best first where the study has an objective, at
+        most 100 000), ``optimum`` and ``curves`` (one turn, where the study optimises) and ``definitions``.  Headings
+        carry units; angles are in degrees, lengths in mm.
+
+    Raises
+    ------
+    InputError
+        for another ending, a folder that is no complete dataset, or where openpyxl is not installed
+        (``pip install 'linksweep[excel]'``).
+    StoreError
+        if the file cannot be written.
+    """
+    import pandas as pd
+
+    target = Path(path)
+    if target.suffix.lower() != ".xlsx":
+        raise InputError("path", target.name, "a file ending in .xlsx", "export")
+    data = read_dataset(Path(folder))
+    sheets = {"designs": _designs(data), "optimum": data.optima, "curves": data.curves}
+    kept = {name: frame for name, frame in sheets.items() if frame is not None}
+    partial = target.with_name(f"_tmp-{os.getpid()}-{target.name}")
+    try:
+        with pd.ExcelWriter(partial, engine="openpyxl") as book:
+            for name, frame in kept.items():
+                _headed(data, frame).to_excel(book, sheet_name=name, index=False, freeze_panes=(1, 1))
+            _definitions(data, kept).to_excel(book, sheet_name="definitions", index=False, freeze_panes=(1, 1))
+        partial.replace(target)
+    except ModuleNotFoundError as error:
+        raise InputError(
+            "format", "xlsx", "pip install 'linksweep[excel]' first: openpyxl is missing", "export"
+        ) from error
+    except OSError as error:
+        raise StoreError(f"{target}: cannot be written: {error}") from error
+    finally:
+        partial.unlink(missing_ok=True)
+    return target
+
+
+def _designs(data: Dataset) -> pd.DataFrame:
+    """Read the designs within all limits, the best first."""
+    objective = objective_of(data.study)
+    if objective is not None:
+        return best(data.folder, objective, MOST_ROWS)
+    rows = load(data.folder)
+    return rows[rows["status"] == 0].head(MOST_ROWS)
+
+
+def _headed(data: Dataset, frame: pd.DataFrame) -> pd.DataFrame:
+    """Convert a table to the units that are shown, and put these into its headings."""
+    shown = {
+        name: quantity(name, data.units[name])
+        for name in map(str, frame.select_dtypes("number"))
+        if data.units.get(name)
+    }
+    scaled = {name: frame[name] * of.factor for name, of in shown.items() if of.factor != 1.0}
+    return frame.assign(**scaled).rename(columns={n: f"{n} [{of.unit}]" for n, of in shown.items() if of.unit})
+
+
+def _definitions(data: Dataset, sheets: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """Tell what each column of the sheets is, and in which unit."""
+    import pandas as pd
+
+    names = list(dict.fromkeys(str(name) for frame in sheets.values() for name in frame))
+    numbers = {str(name) for frame in sheets.values() for name in frame.select_dtypes("number")}
+    units = {name: quantity(name, data.units[name]).unit for name in numbers if data.units.get(name)}
+    rows = [(name, units.get(name, ""), data.definitions.get(name, "")) for name in names]
+    return pd.DataFrame(rows, columns=["column", "unit", "definition"])
