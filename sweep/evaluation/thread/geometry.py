@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kernels.effects.wrap import guide_line, thread_over_point
+from kernels.effects.thread import guide_line, thread_over_point
 from kernels.families import eyelet as eyelet_kernels
 from kernels.families import free_cam as free_cam_kernels
 from kernels.families import guided_cam as guided_cam_kernels

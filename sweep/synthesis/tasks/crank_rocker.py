@@ -21,7 +21,7 @@ _EXACT = Accuracy(target=1e-10)
 
 @lru_cache(maxsize=8)
 def turn(poses: int = POSES) -> Angles:
-    """Return the equidistant crank angles of one turn, (1, poses)."""
+    """Equidistant crank angles of one turn, (1, poses)."""
     phi: Array = np.arange(poses, dtype=np.float64)[None, :] * (2.0 * np.pi / poses)
     return Angles.of(phi)
 
@@ -29,9 +29,7 @@ def turn(poses: int = POSES) -> Angles:
 def designs_on_locus(
     swing: Array, phi0: Array, phi1: Array, e: Array, f: Array, g: Array, alpha: Array
 ) -> tuple[Array, Array]:
-    """Return the design matrix (n, 8) and rocker angle psi1 (n,) of the extended position;
-    nan where a test (i)-(iii) fails.
-    """
+    """Design matrix (n, 8) and rocker angle psi1 (n,) of the extended position; nan where a test (i)-(iii) fails."""
     columns = np.broadcast_arrays(swing, phi0, phi1, e, f, g, alpha)
     requirements = np.column_stack(columns).astype(np.float64)
     n = len(requirements)
@@ -65,12 +63,12 @@ class LocusPoint:
 
 
 def motion(designs: Array, angles: Angles, *wanted: str) -> Columns:
-    """Return pose outputs of crank-rockers, nan where there is no mechanism."""
+    """Pose outputs of crank-rockers, nan where there is no mechanism."""
     return RSSR.poses(designs, angles, frozenset(wanted))
 
 
 def least_cos2(designs: Array) -> Array:
-    """Return the smallest cos^2 of the pressure angle over the turn, exact; nan where there is no mechanism."""
+    """Smallest cos^2 of the pressure angle over the turn, exact; nan where there is no mechanism."""
     whole = np.full(len(designs), np.nan)
     alive = np.isfinite(designs).all(axis=1)
     found = design_outputs(RSSR, designs[alive], ["margin"], _EXACT)
@@ -79,13 +77,13 @@ def least_cos2(designs: Array) -> Array:
 
 
 def pressure_limit(designs: Array, largest: float) -> Array:
-    """Return the slack of the limit on the pressure angle, cos^2 - cos^2[largest]; pi/2 asks for a full turn only."""
+    """Slack of the limit on the pressure angle, cos^2 - cos^2[largest]; pi/2 asks for a full turn only."""
     slack: Array = least_cos2(designs) - np.cos(largest) ** 2
     return slack
 
 
 def named(designs: Array, suffix: str = "") -> dict[str, Array]:
-    """Return the design matrix as columns."""
+    """Design matrix as columns."""
     return {f"{name}{suffix}": column for name, column in zip(RSSR.parameter_names, designs.T, strict=True)}
 
 
@@ -93,7 +91,7 @@ Bounds = Mapping[str, tuple[float, float]]
 
 
 def size_limits(columns: Mapping[str, Array], bounds: Bounds) -> list[Array]:
-    """Return slacks of the bounds on lengths, lower then upper each, in units of the range.
+    """Slacks of the bounds on lengths, lower then upper each, in units of the range.
 
     Raises
     ------

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from kernels.types import TWO_PI
 from sweep.errors import InputError
-from sweep.synthesis.locus import TWO_PI
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -156,8 +156,7 @@ def _missed(designs: Array, setting: Setting) -> list[Array]:
 
 
 def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
-    """Return which dimension of a crank-rocker adjusts what:
-    derivatives of swing and phi0, by implicit differentiation.
+    """Tell which dimension of a crank-rocker adjusts what: derivatives of swing and phi0, by implicit differentiation.
 
     Parameters
     ----------

@@ -131,7 +131,7 @@ class Task8:
         return Candidates(np.empty((n, 0)), limits, np.asarray(motion["d2s"], np.float64), results)
 
     def _deviation(self, designs: Array, phi1: Array, psi1: Array, theta: Array, lengths: Array) -> Array:
-        """Return the largest distance from the dwell position during the dwell."""
+        """Largest distance from the dwell position during the dwell."""
         window = np.linspace(-0.5 * self.dwell, 0.5 * self.dwell, WINDOW)
         law = RSSR.poses(designs, Angles.of(phi1[:, None] + window), frozenset(("psi",)))
         turned = np.asarray(law["psi"], np.float64) - psi1[:, None]
